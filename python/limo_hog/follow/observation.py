@@ -1,0 +1,74 @@
+"""What a follower knows at one instant: everything a controller may look at, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.detector import Detections
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """One turn of a planar lidar.
+
+    Attributes
+    ----------
+    ranges
+        float32 (N,) [m], counter-clockwise from `angle_min`; inf where nothing was hit.
+    angle_min, angle_max
+        Direction of the first and the last beam [rad], 0 straight ahead, counter-clockwise positive.
+    range_min, range_max
+        Limits between which a range is valid [m].
+    """
+
+    ranges: NDArray[np.float32]
+    angle_min: float
+    angle_max: float
+    range_min: float
+    range_max: float
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Where the wheels say the robot is: pose in the start frame [m, rad] and speeds [m/s, rad/s]."""
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+    linear: float = 0.0
+    angular: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One camera frame's detections with the other sensors' newest readings.
+
+    Attributes
+    ----------
+    stamp
+        When the camera frame was taken [s].
+    width, height
+        Size of the camera image [px].
+    focal_px
+        Focal length of the camera [px]; the principal point is the image centre.
+    detections
+        People found in the frame, best first.
+    depth
+        float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; None without a depth camera.
+    scan
+        The newest lidar scan; None without a lidar.
+    odometry
+        The newest odometry; None without wheel encoders.
+    """
+
+    stamp: float
+    width: int
+    height: int
+    focal_px: float
+    detections: Detections
+    depth: NDArray[np.float32] | None = None
+    scan: Scan | None = None
+    odometry: Odometry | None = None

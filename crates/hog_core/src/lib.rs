@@ -1,1 +1,3 @@
-//! x
+//! OpenCV's HOG people detector.
+#[cfg(feature = "python")]
+mod python;

@@ -1,0 +1,1 @@
+"""The command line `limo-hog`: one module a command."""

@@ -1,0 +1,1 @@
+"""A 10 x 10 m arena with a walking person and a Limo robot."""

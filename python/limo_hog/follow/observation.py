@@ -16,6 +16,8 @@ class Scan:
 
     Attributes
     ----------
+    stamp
+        When the turn was finished [s], on the clock of `Observation.stamp`.
     ranges
         float32 (N,) [m], counter-clockwise from `angle_min`; inf where nothing was hit.
     angle_min, angle_max
@@ -24,6 +26,7 @@ class Scan:
         Limits between which a range is valid [m].
     """
 
+    stamp: float
     ranges: NDArray[np.float32]
     angle_min: float
     angle_max: float
@@ -33,8 +36,12 @@ class Scan:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Where the wheels say the robot is: pose in the start frame [m, rad] and speeds [m/s, rad/s]."""
+    """Where the wheels say the robot is: pose in the start frame [m, rad] and speeds [m/s, rad/s].
 
+    `stamp` is when that was so [s], on the clock of `Observation.stamp`: a camera frame may be older.
+    """
+
+    stamp: float = 0.0
     x: float = 0.0
     y: float = 0.0
     yaw: float = 0.0
@@ -57,11 +64,13 @@ class Observation:
     detections
         People found in the frame, best first.
     depth
-        float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; None without a depth camera.
+        float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; None without the camera.
     scan
         The newest lidar scan; None without a lidar.
     odometry
         The newest odometry; None without wheel encoders.
+    fault
+        Why the senses cannot be trusted this time, "" where they can; the robot then stands still.
     """
 
     stamp: float
@@ -72,3 +81,14 @@ class Observation:
     depth: NDArray[np.float32] | None = None
     scan: Scan | None = None
     odometry: Odometry | None = None
+    fault: str = ""
+
+    @property
+    def now(self) -> float:
+        """The newest stamp of all [s]: the camera frame may have taken its time to arrive."""
+        stamps = [self.stamp]
+        if self.scan is not None:
+            stamps.append(self.scan.stamp)
+        if self.odometry is not None:
+            stamps.append(self.odometry.stamp)
+        return max(stamps)

@@ -1,1 +1,1 @@
-"""Reading and writing images and videos, and drawing on them."""
+"""Reading and writing images and videos, and drawing on them (extras `cv` and `video`)."""

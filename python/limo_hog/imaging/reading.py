@@ -1,0 +1,180 @@
+"""From what the user names (files, folders, globs, a camera, standard input) to pictures."""
+
+from __future__ import annotations
+
+import glob
+import shutil
+import sys
+import tempfile
+from collections.abc import Container, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.exceptions import LimoHogError
+from limo_hog.extras import needed
+
+with needed(by="reading pictures", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
+
+IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".jp2", ".pbm", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp")
+VIDEO_SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".ts", ".webm", ".wmv")
+
+#: The input that stands for standard input.
+STDIN = "-"
+
+
+class ReadError(LimoHogError):
+    """Something that was named as an input is not a picture, a video or a camera that can be read."""
+
+
+class Kind(Enum):
+    """What an input holds."""
+
+    IMAGE = "image"
+    VIDEO = "video"
+    CAMERA = "camera"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One thing to look at: its name as the user knows it, and where to read it."""
+
+    name: str
+    path: Path
+    kind: Kind
+
+
+def find_sources(name: str) -> list[Source]:
+    """Expand one input; a folder stands for all pictures and videos below it, a glob for what it matches.
+
+    Raises
+    ------
+    ReadError
+        If it stands for nothing.
+    """
+    path = Path(name)
+    if name == STDIN:
+        return [Source(name, path, Kind.IMAGE)]
+    if path.is_dir():
+        found = sorted(p for p in path.rglob("*") if _kind_by_suffix(p) is not None and p.is_file())
+        if not found:
+            raise ReadError(f"{name}: no image or video in this folder")
+    elif path.exists():
+        found = [path]
+    elif name.isdecimal():
+        return [Source(name, path, Kind.CAMERA)]
+    else:
+        # Path.glob takes no absolute patterns.
+        found = sorted(Path(p) for p in glob.glob(name, recursive=True))  # noqa: PTH207
+        if not found:
+            raise ReadError(f"{name}: no such file, folder or glob")
+    return [Source(str(p), p, _kind_by_suffix(p) or Kind.IMAGE) for p in found]
+
+
+def _kind_by_suffix(path: Path) -> Kind | None:
+    suffix = path.suffix.lower()
+    if suffix in IMAGE_SUFFIXES:
+        return Kind.IMAGE
+    return Kind.VIDEO if suffix in VIDEO_SUFFIXES else None
+
+
+@contextmanager
+def standard_input() -> Iterator[Source]:
+    """Keep standard input in a file for as long as it is looked at: one image, or one video."""
+    with tempfile.TemporaryDirectory(prefix="limo-hog-") as folder:
+        path = Path(folder) / "stdin"
+        with path.open("wb") as file:
+            shutil.copyfileobj(sys.stdin.buffer, file)
+        kind = Kind.IMAGE if cv2.haveImageReader(str(path)) else Kind.VIDEO
+        yield Source(STDIN, path, kind)
+
+
+def read_image(source: Source) -> NDArray[np.uint8]:
+    """Read an image as uint8 (height, width, 3) BGR, as `cv2.imread` does.
+
+    Raises
+    ------
+    ReadError
+        If the file is empty or no image; OSError if it cannot be opened.
+    """
+    data = np.frombuffer(source.path.read_bytes(), np.uint8)
+    if data.size == 0:
+        raise ReadError(f"{source.name}: the file is empty")
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    except cv2.error as error:
+        raise ReadError(f"{source.name}: OpenCV cannot decode this image: {error.err}") from error
+    if image is None:
+        raise ReadError(f"{source.name}: not an image that OpenCV can read ({data.size} bytes)")
+    return image.astype(np.uint8, copy=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Video:
+    """An open video file or camera.
+
+    Attributes
+    ----------
+    fps
+        Frames a second as the file says, 25 where it does not say.
+    frame_count
+        Frames as the file says; 0 for a camera and where it does not say.
+    """
+
+    source: Source
+    fps: float
+    frame_count: int
+    _capture: cv2.VideoCapture
+
+    def frames(
+        self, every: int = 1, skip: Container[int] = frozenset()
+    ) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+        """Yield (number, uint8 (height, width, 3) BGR) of every `every`-th frame not in `skip`.
+
+        Raises
+        ------
+        ReadError
+            At the end, if that comes well before the announced one.
+        """
+        number = 0
+        while self._capture.grab():
+            if number % every == 0 and number not in skip:
+                ok, image = self._capture.retrieve()
+                if not ok:
+                    break
+                yield number, image.astype(np.uint8, copy=False)
+            number += 1
+        # Containers estimate their frame count from duration and rate: a few frames less are no loss.
+        if number < 0.98 * self.frame_count - 2:
+            raise ReadError(
+                f"{self.source.name}: cut off: {number} of {self.frame_count} frames could be read"
+            )
+
+
+@contextmanager
+def open_video(source: Source) -> Iterator[Video]:
+    """Open a video file or a camera.
+
+    Raises
+    ------
+    ReadError
+        If it is none that OpenCV can read.
+    """
+    if source.kind is Kind.CAMERA:
+        capture, wanted = cv2.VideoCapture(int(source.name)), "no camera with this index"
+    elif source.path.stat().st_size == 0:
+        raise ReadError(f"{source.name}: the file is empty")
+    else:
+        capture, wanted = cv2.VideoCapture(str(source.path)), "not a video that OpenCV can read"
+    try:
+        if not capture.isOpened():
+            raise ReadError(f"{source.name}: {wanted}")
+        frames = 0 if source.kind is Kind.CAMERA else max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+        yield Video(source, capture.get(cv2.CAP_PROP_FPS) or 25.0, frames, capture)
+    finally:
+        capture.release()

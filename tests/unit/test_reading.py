@@ -1,0 +1,139 @@
+"""What the user names becomes pictures, and what is none is said in one line."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from limo_hog.imaging.reading import (
+    STDIN,
+    Kind,
+    ReadError,
+    Source,
+    find_sources,
+    open_video,
+    read_image,
+    standard_input,
+)
+from limo_hog.imaging.writing import video_writer, write_image
+
+
+def test_a_folder_stands_for_all_pictures_below_it_in_order(tmp_path: Path) -> None:
+    picture = np.zeros((8, 8, 3), np.uint8)
+    for name in ("b.png", "a.JPG", "deep/c.bmp"):
+        write_image(tmp_path / name, picture)
+    (tmp_path / "notes.txt").write_text("no picture")
+    (tmp_path / "film.mp4").write_bytes(b"")
+    found = find_sources(str(tmp_path))
+    assert [s.path.name for s in found] == ["a.JPG", "b.png", "c.bmp", "film.mp4"]
+    assert [s.kind for s in found] == [Kind.IMAGE] * 3 + [Kind.VIDEO]
+
+
+def test_a_glob_stands_for_what_it_matches(tmp_path: Path) -> None:
+    for name in ("b.png", "a.png", "c.bmp"):
+        write_image(tmp_path / name, np.zeros((8, 8, 3), np.uint8))
+    assert [s.path.name for s in find_sources(str(tmp_path / "*.png"))] == ["a.png", "b.png"]
+
+
+def test_a_file_whose_name_looks_like_a_glob_or_a_number_is_that_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_image(Path("[1].png"), np.zeros((8, 8, 3), np.uint8))
+    Path("0").write_bytes(b"")
+    assert [s.path for s in find_sources("[1].png")] == [Path("[1].png")]
+    assert find_sources("0")[0].kind is Kind.IMAGE
+    assert find_sources("7")[0].kind is Kind.CAMERA
+
+
+@pytest.mark.parametrize("name", ["nothing.jpg", "*.jpg", "empty"])
+def test_an_input_that_stands_for_nothing_is_named(name: str, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ReadError, match=r"no such file, folder or glob|no image or video"):
+        find_sources(str(tmp_path / name))
+
+
+def test_an_image_is_read_as_opencv_reads_it(tmp_path: Path) -> None:
+    picture = np.random.default_rng(0).integers(0, 256, (31, 47, 3), dtype=np.uint8)
+    path = tmp_path / "noise.jpg"
+    write_image(path, picture)
+    assert (read_image(find_sources(str(path))[0]) == cv2.imread(str(path))).all()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(b"", "the file is empty"), (b"hello", "not an image that OpenCV can read")]
+)
+def test_a_file_that_is_no_image_is_named(content: bytes, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.jpg"
+    path.write_bytes(content)
+    with pytest.raises(ReadError, match=f"bad.jpg: {said}"):
+        read_image(find_sources(str(path))[0])
+
+
+def _film(path: Path, frames: int = 20) -> Source:
+    with video_writer(path, fps=10) as write:
+        for i in range(frames):
+            write(np.full((48, 64, 3), 10 * i, np.uint8))
+    return find_sources(str(path))[0]
+
+
+def test_a_video_gives_every_nth_frame_that_is_not_done_yet(tmp_path: Path) -> None:
+    with open_video(_film(tmp_path / "film.mp4")) as video:
+        frames = dict(video.frames(every=5, skip={5}))
+    assert (video.fps, video.frame_count) == (10.0, 20)
+    assert list(frames) == [0, 10, 15]
+    assert abs(float(frames[10].mean()) - 100) < 5
+
+
+def test_a_video_that_was_cut_off_gives_its_frames_and_then_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10, (64, 48))
+    for i in range(40):
+        writer.write(np.full((48, 64, 3), 5 * i, np.uint8))
+    writer.release()
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    seen: list[int] = []
+    with (
+        pytest.raises(ReadError, match=r"cut off: \d+ of 40 frames"),
+        open_video(find_sources(str(path))[0]) as video,
+    ):
+        seen.extend(number for number, _ in video.frames())
+    assert 5 < len(seen) < 40
+
+
+@pytest.mark.parametrize(("content", "said"), [(b"", "empty"), (b"x" * 999, "not a video")])
+def test_a_file_that_is_no_video_is_named(content: bytes, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.mp4"
+    path.write_bytes(content)
+    with pytest.raises(ReadError, match=said), open_video(find_sources(str(path))[0]):
+        pass
+
+
+def test_a_camera_that_is_not_there_is_named() -> None:
+    with pytest.raises(ReadError, match="97: no camera"), open_video(find_sources("97")[0]):
+        pass
+
+
+@pytest.mark.parametrize("suffix", [".png", ".mp4"])
+def test_standard_input_holds_an_image_or_a_video(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / f"thing{suffix}"
+    if suffix == ".png":
+        write_image(path, np.zeros((8, 8, 3), np.uint8))
+    else:
+        _film(path)
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(path.read_bytes())))
+    with standard_input() as source:
+        assert source.name == STDIN
+        if suffix == ".png":
+            assert read_image(source).shape == (8, 8, 3)
+        else:
+            with open_video(source) as video:
+                assert len(list(video.frames())) == 20
+    assert not source.path.exists()

@@ -1,0 +1,72 @@
+"""Files appear under their name whole or not at all."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from limo_hog.atomic import whole_file
+from limo_hog.extras import MissingExtraError
+from limo_hog.imaging.writing import WriteError, video_writer, write_image
+
+
+def test_an_image_comes_back_as_it_was_written(tmp_path: Path) -> None:
+    picture = np.random.default_rng(0).integers(0, 256, (31, 47, 3), dtype=np.uint8)
+    path = tmp_path / "new" / "folder" / "noise.png"
+    write_image(path, picture)
+    assert (cv2.imread(str(path)) == picture).all()
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_an_unknown_picture_format_is_refused(tmp_path: Path) -> None:
+    with pytest.raises((WriteError, cv2.error)):
+        write_image(tmp_path / "a.docx", np.zeros((4, 4, 3), np.uint8))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_fails_half_way_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt), whole_file(path) as part:
+        part.write_text("half")
+        raise KeyboardInterrupt
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(("width", "height"), [(64, 48), (63, 47)])
+def test_a_video_is_h264_of_the_right_size_rate_and_length(width: int, height: int, tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    with video_writer(path, fps=12.5) as write:
+        for i in range(30):
+            write(np.full((height, width, 3), 8 * i, np.uint8))
+        assert not path.exists()
+    with av.open(path) as container:
+        stream = container.streams.video[0]
+        frames = [frame.to_ndarray(format="gray") for frame in container.decode(stream)]
+    assert stream.codec_context.name == "h264"
+    assert (stream.width, stream.height) == (64, 48)
+    assert stream.average_rate is not None
+    assert float(stream.average_rate) == 12.5
+    assert len(frames) == 30
+    assert abs(float(frames[20].mean()) - 160) < 3
+
+
+def test_a_video_without_a_frame_is_not_written(tmp_path: Path) -> None:
+    with pytest.raises(WriteError, match="no frame"), video_writer(tmp_path / "film.mp4", fps=10):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_pyav_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    with (
+        pytest.raises(MissingExtraError, match=r"needs PyAV: pip install 'limo-hog\[video\]'"),
+        video_writer(tmp_path / "film.mp4", fps=10),
+    ):
+        pass

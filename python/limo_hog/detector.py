@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: The person inside a detection window: x + .1 w, y + .07 h, .8 w, .8 h. The rest is the margin HOG was trained with.
+#: The person inside a window: x + .1 w, y + .07 h, .8 w, .8 h. The rest is the margin it was trained with.
 _PERSON_IN_WINDOW = (0.1, 0.07, 0.8, 0.8)
 
 
@@ -40,4 +40,4 @@ class Detections:
         dx, dy, sw, sh = _PERSON_IN_WINDOW
         x, y, w, h = self.boxes.T.astype(np.float64)
         person = np.stack([x + dx * w, y + dy * h, sw * w, sh * h], axis=1)
-        return np.rint(person).astype(np.int32)
+        return np.asarray(np.rint(person), np.int32)

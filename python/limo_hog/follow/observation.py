@@ -64,7 +64,7 @@ class Observation:
     detections
         People found in the frame, best first.
     depth
-        float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; None without the camera.
+        float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; or None.
     scan
         The newest lidar scan; None without a lidar.
     odometry

@@ -1,0 +1,271 @@
+//! Composes the stages: descriptors and hits of one image, and of a whole pyramid on several threads.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use crate::error::{HogError, Result};
+use crate::gradient::{Gradient, Padding, Region, gradient};
+use crate::grid::{Grid, Steps};
+use crate::group::{Candidate, Rect, clip, group_candidates, mean_shift};
+use crate::image::ImageView;
+use crate::params::{HogParams, HogSpec, Size};
+use crate::pyramid::{Level, levels, resize, to_image};
+use crate::reference;
+use crate::svm::Svm;
+
+/// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
+#[derive(Debug, Clone)]
+pub struct Hog {
+    spec: HogSpec,
+    svm: Option<Svm>,
+}
+
+/// Where and how densely to look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// A window whose score is at least this is a hit.
+    pub hit_threshold: f64,
+    /// Distance of neighbouring windows (x, y) [px of the level]; (0, 0): the default of the method.
+    pub win_stride: (i64, i64),
+    /// Border around the image (x, y) [px of the level], mirrored.
+    pub padding: (i64, i64),
+}
+
+/// How hits become the rectangles that are returned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Grouping {
+    /// Groups of more than this many similar rectangles; below 1 every hit is returned.
+    Similar(i32),
+    /// Modes of the hits' density with more than this weight.
+    MeanShift(f64),
+}
+
+/// A window that scored at least the threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Left edge of the window; negative inside the padding [px].
+    pub x: i64,
+    /// Upper edge [px].
+    pub y: i64,
+    /// SVM score with its bias.
+    pub weight: f64,
+}
+
+impl Hog {
+    /// A detector of this geometry; `coefficients` of the SVM, if any, must fit it.
+    pub fn new(params: &HogParams, coefficients: Option<&[f32]>) -> Result<Self> {
+        let spec = HogSpec::new(params)?;
+        let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
+        Ok(Self { spec, svm })
+    }
+
+    /// The checked geometry.
+    pub fn spec(&self) -> &HogSpec {
+        &self.spec
+    }
+
+    /// The gradient of the image with `left`, `top`, `right`, `bottom` columns and rows more (or fewer) around it.
+    pub fn gradient(
+        &self,
+        image: ImageView,
+        [left, top, right, bottom]: [i64; 4],
+    ) -> Result<(Gradient, Size)> {
+        let side = |name: &str, length: usize, before: i64, after: i64| {
+            let padded = (length as i64).saturating_add(before).saturating_add(after);
+            if (1..=i64::from(i32::MAX)).contains(&padded) {
+                return Ok(padded as usize);
+            }
+            Err(HogError::Parameter(format!(
+                "the padded {name} would be {padded} pixels; at least 1 is wanted"
+            )))
+        };
+        let size = Size::new(
+            side("width", image.width(), left, right)?,
+            side("height", image.height(), top, bottom)?,
+        );
+        if size.width.saturating_mul(size.height) > i32::MAX as usize {
+            return Err(HogError::Parameter(format!(
+                "the padded image would have {} x {} pixels; at most 2^31 - 1 are allowed",
+                size.width, size.height
+            )));
+        }
+        let region = Region { x: 0, y: 0, width: size.width, height: size.height };
+        Ok((gradient(image, Padding { left, top, size }, region, &self.spec), size))
+    }
+
+    /// The descriptors of the windows at `locations` (all windows if none are given), one after the other.
+    ///
+    /// A location whose window leaves the padded image has a descriptor of zeros. The stride (0, 0) is the cell size.
+    pub fn compute(
+        &self,
+        image: ImageView,
+        search: &Search,
+        locations: Option<&[(i64, i64)]>,
+    ) -> Result<Vec<f32>> {
+        let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
+        let count = locations.map_or(grid.len(), <[_]>::len);
+        let elements = count.saturating_mul(self.spec.descriptor_len());
+        if elements > i32::MAX as usize {
+            return Err(HogError::Parameter(format!(
+                "{count} windows of {} elements are too many for one array; use a larger winStride",
+                self.spec.descriptor_len()
+            )));
+        }
+        let Some(locations) = locations else {
+            return Ok(reference::descriptors(image, &grid, &self.spec));
+        };
+        let mut out = Vec::with_capacity(elements);
+        for &location in locations {
+            match grid.to_padded(location, &self.spec) {
+                Some(at) => out.extend(reference::window_descriptor(image, &grid, at, &self.spec)),
+                None => out.resize(out.len() + self.spec.descriptor_len(), 0.0),
+            }
+        }
+        Ok(out)
+    }
+
+    /// The windows that are hits, of those at `locations` (of all, if none are given), in their order.
+    ///
+    /// A location whose window leaves the padded image is passed over. The stride (0, 0) is the cell size.
+    pub fn detect(
+        &self,
+        image: ImageView,
+        search: &Search,
+        locations: Option<&[(i64, i64)]>,
+    ) -> Result<Vec<Hit>> {
+        let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
+        let Some(svm) = &self.svm else { return Ok(Vec::new()) };
+        let Some(locations) = locations else {
+            return Ok(self.hits(image, &grid, search.hit_threshold, svm));
+        };
+        let inside =
+            locations.iter().filter_map(|&location| Some((location, grid.to_padded(location, &self.spec)?)));
+        let scored = inside.map(|((x, y), at)| {
+            let weight = reference::window_score(image, &grid, at, &self.spec, svm);
+            Hit { x, y, weight }
+        });
+        Ok(scored.filter(|hit| hit.weight >= search.hit_threshold).collect())
+    }
+
+    /// Rectangles of all hits of the pyramid whose levels shrink by `scale`, grouped and clipped to the image.
+    ///
+    /// Levels are shared among `threads` threads; hits are in level order, whatever their number. The stride (0, 0)
+    /// is the block stride.
+    pub fn detect_multi_scale(
+        &self,
+        image: ImageView,
+        search: &Search,
+        scale: f64,
+        grouping: Grouping,
+        threads: usize,
+    ) -> Result<Vec<(Rect, f64)>> {
+        let steps = self.steps(search, self.spec.stride)?;
+        let Some(svm) = &self.svm else { return Ok(Vec::new()) };
+        let levels = levels(size_of(image), scale, &self.spec);
+        let of_level = |level: &Level| self.level_candidates(image, level, &steps, search.hit_threshold, svm);
+        let mut candidates = Vec::new();
+        for found in in_order(&levels, threads, of_level) {
+            candidates.append(&mut found?);
+        }
+        let win = self.spec.win;
+        let found = match grouping {
+            Grouping::Similar(threshold) => group_candidates(&candidates, threshold),
+            Grouping::MeanShift(threshold) => {
+                mean_shift(&candidates, threshold, (win.width as i32, win.height as i32))
+            }
+        };
+        Ok(clip(found, image.width() as i32, image.height() as i32))
+    }
+
+    fn steps(&self, search: &Search, default_stride: Size) -> Result<Steps> {
+        Steps::new(search.win_stride, search.padding, default_stride, &self.spec)
+    }
+
+    fn level_candidates(
+        &self,
+        image: ImageView,
+        level: &Level,
+        steps: &Steps,
+        hit_threshold: f64,
+        svm: &Svm,
+    ) -> Result<Vec<Candidate>> {
+        let grid = steps.grid(level.size, &self.spec);
+        let hits = if level.size == size_of(image) {
+            self.hits(image, &grid, hit_threshold, svm)
+        } else {
+            let pixels = resize(image, level.size)?;
+            let row = level.size.width * image.channels();
+            let image = ImageView::new(&pixels, level.size.width, level.size.height, image.channels(), row)?;
+            self.hits(image, &grid, hit_threshold, svm)
+        };
+        let candidate = |hit: &Hit| Candidate {
+            rect: to_image(hit.x, hit.y, level.scale, &self.spec),
+            weight: hit.weight,
+            scale: level.scale,
+        };
+        Ok(hits.iter().map(candidate).collect())
+    }
+
+    /// The hits among all windows of an image, row by row.
+    fn hits(&self, image: ImageView, grid: &Grid, hit_threshold: f64, svm: &Svm) -> Vec<Hit> {
+        let scores = reference::scores(image, grid, &self.spec, svm);
+        let mut hits = Vec::new();
+        for (index, weight) in scores.into_iter().enumerate() {
+            if weight >= hit_threshold {
+                let (i, j) = (index % grid.windows.width, index / grid.windows.width);
+                let (x, y) = grid.to_image(i * grid.stride.width, j * grid.stride.height);
+                hits.push(Hit { x, y, weight });
+            }
+        }
+        hits
+    }
+}
+
+fn size_of(image: ImageView) -> Size {
+    Size::new(image.width(), image.height())
+}
+
+/// `work` of every item, on up to `threads` threads fed from one queue; results in the items' order.
+fn in_order<T: Sync, R: Send>(items: &[T], threads: usize, work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let threads = threads.clamp(1, items.len().max(1));
+    if threads == 1 {
+        return items.iter().map(work).collect();
+    }
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::with_capacity(items.len()));
+    let worker = || {
+        while let Some((index, item)) = {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            items.get(index).map(|item| (index, item))
+        } {
+            let result = work(item);
+            done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, result));
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(worker);
+        }
+        worker();
+    });
+    let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    done.sort_unstable_by_key(|&(index, _)| index);
+    done.into_iter().map(|(_, result)| result).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_whatever_the_number_of_threads() {
+        let items: Vec<usize> = (0..100).collect();
+        for threads in [1, 2, 8, 200] {
+            assert_eq!(
+                in_order(&items, threads, |&i| i * i),
+                items.iter().map(|i| i * i).collect::<Vec<_>>()
+            );
+        }
+        assert!(in_order(&[] as &[u8], 4, |_| 0).is_empty());
+    }
+}

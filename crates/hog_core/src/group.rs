@@ -1,0 +1,268 @@
+//! From many overlapping rectangles to one a person: OpenCV's `groupRectangles` and mean-shift.
+
+/// A rectangle [px]: top left corner and size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Rect {
+    /// Left edge.
+    pub x: i32,
+    /// Upper edge.
+    pub y: i32,
+    /// Columns.
+    pub width: i32,
+    /// Rows.
+    pub height: i32,
+}
+
+/// A rectangle with its weight, and the pyramid scale it was found at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// Where, in image pixels.
+    pub rect: Rect,
+    /// SVM score.
+    pub weight: f64,
+    /// Scale of the level.
+    pub scale: f64,
+}
+
+/// How far apart the edges of two members of a group may lie, relative to their size, in HOG's own grouping.
+pub const HOG_EPS: f64 = 0.2;
+
+/// Groups detections as `HOGDescriptor::groupRectangles` does: the mean rectangle and the largest weight of each
+/// group of more than `threshold` members. A threshold below 1 changes nothing.
+pub fn group_candidates(candidates: &[Candidate], threshold: i32) -> Vec<(Rect, f64)> {
+    let rects: Vec<Rect> = candidates.iter().map(|c| c.rect).collect();
+    if threshold <= 0 || rects.is_empty() {
+        return candidates.iter().map(|c| (c.rect, c.weight)).collect();
+    }
+    let (labels, classes) = partition(&rects, HOG_EPS);
+    let mut weights = vec![f64::NEG_INFINITY; classes];
+    for (candidate, &label) in candidates.iter().zip(&labels) {
+        weights[label] = weights[label].max(candidate.weight);
+    }
+    let mean = |sum: i64, count: usize| (sum as f64 * (1.0 / count as f64)).round_ties_even() as i32;
+    let groups = class_means(&rects, &labels, classes, mean);
+    surviving(&groups, threshold, HOG_EPS).map(|i| (groups[i].0, weights[i])).collect()
+}
+
+/// `cv2.groupRectangles`: the mean rectangle of each group of more than `threshold` members, and how many they were.
+pub fn group_rectangles(rects: &[Rect], threshold: i32, eps: f64) -> Vec<(Rect, i32)> {
+    if threshold <= 0 || rects.is_empty() {
+        return rects.iter().map(|&rect| (rect, 1)).collect();
+    }
+    let (labels, classes) = partition(rects, eps);
+    let mean = |sum: i64, count: usize| (sum as f32 * (1.0 / count as f32)).round_ties_even() as i32;
+    let groups = class_means(rects, &labels, classes, mean);
+    surviving(&groups, threshold, eps).map(|i| (groups[i].0, groups[i].1 as i32)).collect()
+}
+
+fn similar(a: &Rect, b: &Rect, eps: f64) -> bool {
+    let apart = |p: i32, q: i32| (i64::from(p) - i64::from(q)).abs() as f64;
+    let far = |p: i32, length: i32| i64::from(p) + i64::from(length);
+    let apart_far = |p: i64, q: i64| (p - q).abs() as f64;
+    let smaller = i64::from(a.width.min(b.width)) + i64::from(a.height.min(b.height));
+    let delta = eps * smaller as f64 * 0.5;
+    apart(a.x, b.x) <= delta
+        && apart(a.y, b.y) <= delta
+        && apart_far(far(a.x, a.width), far(b.x, b.width)) <= delta
+        && apart_far(far(a.y, a.height), far(b.y, b.height)) <= delta
+}
+
+/// The connected components of [`similar`]: each rectangle's class, numbered by first member, and how many there are.
+fn partition(rects: &[Rect], eps: f64) -> (Vec<usize>, usize) {
+    let mut parent: Vec<usize> = (0..rects.len()).collect();
+    fn root(parent: &mut [usize], mut node: usize) -> usize {
+        while parent[node] != node {
+            parent[node] = parent[parent[node]];
+            node = parent[node];
+        }
+        node
+    }
+    for i in 0..rects.len() {
+        for j in 0..i {
+            if similar(&rects[i], &rects[j], eps) {
+                let (a, b) = (root(&mut parent, i), root(&mut parent, j));
+                parent[a.max(b)] = a.min(b);
+            }
+        }
+    }
+    // The root of a class is its first member, so classes are met in the order of their first members.
+    let mut labels = vec![0; rects.len()];
+    let mut classes = 0;
+    for i in 0..rects.len() {
+        let first = root(&mut parent, i);
+        labels[i] = if first == i {
+            classes += 1;
+            classes - 1
+        } else {
+            labels[first]
+        };
+    }
+    (labels, classes)
+}
+
+/// Mean rectangle and size of each class.
+fn class_means(
+    rects: &[Rect],
+    labels: &[usize],
+    classes: usize,
+    mean: impl Fn(i64, usize) -> i32,
+) -> Vec<(Rect, usize)> {
+    let mut sums = vec![([0i64; 4], 0usize); classes];
+    for (rect, &label) in rects.iter().zip(labels) {
+        let (sum, count) = &mut sums[label];
+        for (total, value) in sum.iter_mut().zip([rect.x, rect.y, rect.width, rect.height]) {
+            *total += i64::from(value);
+        }
+        *count += 1;
+    }
+    let rect_of = |&([x, y, width, height], count): &([i64; 4], usize)| {
+        let of = |sum| mean(sum, count);
+        (Rect { x: of(x), y: of(y), width: of(width), height: of(height) }, count)
+    };
+    sums.iter().map(rect_of).collect()
+}
+
+/// The classes with more than `threshold` members that do not lie within a much stronger one.
+fn surviving(groups: &[(Rect, usize)], threshold: i32, eps: f64) -> impl Iterator<Item = usize> {
+    let threshold = usize::try_from(threshold).unwrap_or(0);
+    let swallowed = move |i: usize| {
+        let (inner, count) = groups[i];
+        groups.iter().enumerate().any(|(j, &(outer, outer_count))| {
+            let dx = (f64::from(outer.width) * eps).round_ties_even() as i64;
+            let dy = (f64::from(outer.height) * eps).round_ties_even() as i64;
+            let end = |start: i32, length: i32| i64::from(start) + i64::from(length);
+            j != i
+                && outer_count > threshold
+                && i64::from(inner.x) >= i64::from(outer.x) - dx
+                && i64::from(inner.y) >= i64::from(outer.y) - dy
+                && end(inner.x, inner.width) <= end(outer.x, outer.width) + dx
+                && end(inner.y, inner.height) <= end(outer.y, outer.height) + dy
+                && (outer_count > count.max(3) || count < 3)
+        })
+    };
+    (0..groups.len()).filter(move |&i| groups[i].1 > threshold && !swallowed(i))
+}
+
+/// The part of each rectangle inside an image of `width` by `height`; those outside are dropped with their weights.
+pub fn clip(found: Vec<(Rect, f64)>, width: i32, height: i32) -> Vec<(Rect, f64)> {
+    let clipped = found.into_iter().filter_map(|(rect, weight)| {
+        let (x, y) = (rect.x.max(0), rect.y.max(0));
+        let right = rect.x.saturating_add(rect.width).min(width);
+        let bottom = rect.y.saturating_add(rect.height).min(height);
+        (right > x && bottom > y).then_some((Rect { x, y, width: right - x, height: bottom - y }, weight))
+    });
+    clipped.collect()
+}
+
+/// A place in the space that mean-shift climbs: centre [px] and logarithm of the scale.
+type Place = [f64; 3];
+
+/// Bandwidth of the kernel at scale 1; ln 1.3 along the scale.
+fn bandwidth(log_scale: f64) -> Place {
+    [8.0 * log_scale.exp(), 16.0 * log_scale.exp(), 1.3_f64.ln()]
+}
+
+/// The modes of the candidates' density whose weight exceeds `threshold`, as rectangles of the window `win`.
+///
+/// Non-maximum suppression after Dalal's thesis (2006), chapter 5, with OpenCV's bandwidths and rounding.
+pub fn mean_shift(candidates: &[Candidate], threshold: f64, win: (i32, i32)) -> Vec<(Rect, f64)> {
+    let points: Vec<Point> = candidates.iter().map(Point::new).collect();
+    let mut modes: Vec<Place> = Vec::new();
+    for point in &points {
+        let mut place = shifted(&points, point.place);
+        for _ in 0..100 {
+            let previous = place;
+            place = shifted(&points, previous);
+            if distance(place, previous) <= 1e-5 {
+                break;
+            }
+        }
+        if !modes.iter().any(|&mode| distance(place, mode) < 1.0) {
+            modes.push(place);
+        }
+    }
+    let weighted = modes.into_iter().map(|mode| (mode, points.iter().map(|p| p.density(mode)).sum::<f64>()));
+    let kept = weighted.filter(|&(_, weight)| weight > threshold);
+    kept.map(|(mode, weight)| (mode_rect(mode, win), weight)).collect()
+}
+
+struct Point {
+    place: Place,
+    bandwidth: Place,
+    weight: f64,
+}
+
+impl Point {
+    fn new(candidate: &Candidate) -> Self {
+        let Rect { x, y, width, height } = candidate.rect;
+        let middle =
+            |start: i32, length: i32| ((2.0 * f64::from(start) + f64::from(length)) / 2.0).round_ties_even();
+        let log_scale = candidate.scale.ln();
+        Self {
+            place: [middle(x, width), middle(y, height), log_scale],
+            bandwidth: bandwidth(log_scale),
+            weight: candidate.weight,
+        }
+    }
+
+    fn density(&self, at: Place) -> f64 {
+        let squared: f64 = (0..3).map(|i| ((self.place[i] - at[i]) / self.bandwidth[i]).powi(2)).sum();
+        self.weight * (-0.5 * squared).exp() / self.bandwidth.iter().sum::<f64>().sqrt()
+    }
+}
+
+/// One mean-shift step from `at`.
+fn shifted(points: &[Point], at: Place) -> Place {
+    let (mut sum, mut total) = ([0.0; 3], [0.0; 3]);
+    for point in points {
+        let density = point.density(at);
+        for i in 0..3 {
+            sum[i] += density * point.place[i] / point.bandwidth[i];
+            total[i] += density / point.bandwidth[i];
+        }
+    }
+    std::array::from_fn(|i| sum[i] / total[i])
+}
+
+/// Squared distance of `a` from `b` in bandwidths at `b`.
+fn distance(a: Place, b: Place) -> f64 {
+    let bandwidth = bandwidth(b[2]);
+    (0..3).map(|i| ((b[i] - a[i]) / bandwidth[i]).powi(2)).sum()
+}
+
+fn mode_rect([x, y, log_scale]: Place, win: (i32, i32)) -> Rect {
+    let scale = log_scale.exp();
+    let (width, height) = ((f64::from(win.0) * scale) as i32, (f64::from(win.1) * scale) as i32);
+    Rect { x: (x - f64::from(width / 2)) as i32, y: (y - f64::from(height / 2)) as i32, width, height }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rect(x: i32, y: i32, width: i32, height: i32) -> Rect {
+        Rect { x, y, width, height }
+    }
+
+    #[test]
+    fn three_alike_become_one_and_a_loner_is_dropped() {
+        let rects = [rect(0, 0, 10, 20), rect(1, 0, 10, 20), rect(2, 0, 10, 20), rect(50, 50, 10, 20)];
+        assert_eq!(group_rectangles(&rects, 2, 0.2), [(rect(1, 0, 10, 20), 3)]);
+        assert_eq!(group_rectangles(&rects, 0, 0.2).len(), 4);
+    }
+
+    #[test]
+    fn classes_are_connected_through_their_members() {
+        let chain: Vec<Rect> = (0..20).map(|i| rect(i * 2, 0, 10, 20)).collect();
+        assert_eq!(partition(&chain, 0.2), (vec![0; 20], 1));
+    }
+
+    #[test]
+    fn extreme_coordinates_do_not_overflow() {
+        let far =
+            [rect(i32::MAX, i32::MIN, i32::MAX, i32::MAX), rect(i32::MIN, i32::MAX, i32::MAX, i32::MIN)];
+        assert!(group_rectangles(&far, 1, 0.2).is_empty());
+        let found = clip(vec![(far[0], 1.0), (far[1], 1.0), (rect(-5, -5, 10, 10), 2.0)], 8, 8);
+        assert_eq!(found, [(rect(0, 0, 5, 5), 2.0)]);
+    }
+}

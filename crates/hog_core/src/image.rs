@@ -1,0 +1,96 @@
+//! Borrowed views of 8-bit images, and the border rule.
+
+use crate::error::{HogError, Result};
+
+/// A borrowed 8-bit image: rows of interleaved pixels, `row_stride` bytes apart.
+#[derive(Debug, Clone, Copy)]
+pub struct ImageView<'a> {
+    data: &'a [u8],
+    width: usize,
+    height: usize,
+    channels: usize,
+    row_stride: usize,
+}
+
+impl<'a> ImageView<'a> {
+    /// A view of `data`; the image has 1 or 3 channels, at least one pixel, and lies within `data`.
+    pub fn new(
+        data: &'a [u8],
+        width: usize,
+        height: usize,
+        channels: usize,
+        row_stride: usize,
+    ) -> Result<Self> {
+        if channels != 1 && channels != 3 {
+            return Err(HogError::Image(format!("the image has {channels} channels; 1 or 3 are wanted")));
+        }
+        if width == 0 || height == 0 {
+            return Err(HogError::Image(format!("the image is empty: {width} x {height} pixels")));
+        }
+        if width > i32::MAX as usize / 4 || height > i32::MAX as usize / 4 {
+            return Err(HogError::Image(format!("the image is too large: {width} x {height} pixels")));
+        }
+        let row = width * channels;
+        let needed = row_stride.checked_mul(height - 1).and_then(|bytes| bytes.checked_add(row));
+        if row_stride < row || needed.is_none_or(|bytes| bytes > data.len()) {
+            return Err(HogError::Image(format!(
+                "{} bytes with a row stride of {row_stride} do not hold {width} x {height} x {channels} pixels",
+                data.len()
+            )));
+        }
+        Ok(Self { data, width, height, channels, row_stride })
+    }
+
+    /// Width [px].
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height [px].
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// 1 (gray) or 3 (colour, in any order).
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// The `width * channels` bytes of row `y`.
+    pub fn row(&self, y: usize) -> &'a [u8] {
+        &self.data[y * self.row_stride..][..self.width * self.channels]
+    }
+}
+
+/// Mirrors `index` into `0..len` without repeating the edge pixel (reflect-101), as often as it takes.
+pub fn reflect_101(index: i64, len: usize) -> usize {
+    if len == 1 {
+        return 0;
+    }
+    let period = 2 * (len as i64 - 1);
+    let folded = index.rem_euclid(period);
+    folded.min(period - folded) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reflection_repeats_until_inside() {
+        //           image 0 1 2 |  ...2 1 0 1 2 1 0...
+        let mirrored: Vec<_> = (-5..8).map(|i| reflect_101(i, 3)).collect();
+        assert_eq!(mirrored, [1, 0, 1, 2, 1, 0, 1, 2, 1, 0, 1, 2, 1]);
+        assert_eq!(reflect_101(-7, 1), 0);
+    }
+
+    #[test]
+    fn a_view_that_leaves_its_data_is_refused() {
+        assert!(ImageView::new(&[0; 12], 4, 3, 1, 4).is_ok());
+        assert!(ImageView::new(&[0; 11], 4, 3, 1, 4).is_err());
+        assert!(ImageView::new(&[0; 12], 4, 3, 1, 3).is_err());
+        assert!(ImageView::new(&[0; 12], 1, 3, 4, 4).is_err());
+        assert!(ImageView::new(&[], 0, 3, 1, 4).is_err());
+        assert!(ImageView::new(&[0; 12], 4, 3, 1, usize::MAX).is_err());
+    }
+}

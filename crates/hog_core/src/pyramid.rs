@@ -1,0 +1,147 @@
+//! The image pyramid: scales, level sizes, the exact linear resize, and boxes back to the image.
+
+use crate::error::{HogError, Result};
+use crate::group::Rect;
+use crate::image::ImageView;
+use crate::params::{HogSpec, Size};
+
+/// One level: the image shrunk by `scale`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// How many image pixels a level pixel spans.
+    pub scale: f64,
+    /// Size of the level's image [px].
+    pub size: Size,
+}
+
+/// The levels of an image: scale 1, then `step` times more each, while the window still fits.
+///
+/// A step that does not shrink (≤ 1, NaN, infinite) leaves level 0 alone. Level 0 is there even if the image is
+/// smaller than the window.
+pub fn levels(image: Size, step: f64, spec: &HogSpec) -> Vec<Level> {
+    let mut levels = vec![Level { scale: 1.0, size: image }];
+    let mut scale = 1.0;
+    while step > 1.0 && levels.len() < spec.nlevels {
+        scale *= step;
+        let width = (image.width as f64 / scale).round_ties_even();
+        let height = (image.height as f64 / scale).round_ties_even();
+        if !(width >= spec.win.width as f64 && height >= spec.win.height as f64) {
+            break;
+        }
+        levels.push(Level { scale, size: Size::new(width as usize, height as usize) });
+    }
+    levels
+}
+
+/// The window at (`x`, `y`) of a level, in image pixels.
+pub fn to_image(x: i64, y: i64, scale: f64, spec: &HogSpec) -> Rect {
+    let back = |value: f64| (value * scale).round_ties_even() as i32;
+    Rect {
+        x: back(x as f64),
+        y: back(y as f64),
+        width: back(spec.win.width as f64),
+        height: back(spec.win.height as f64),
+    }
+}
+
+/// Where one output pixel reads along one axis: two neighbours and the weight of the second, in 1/256.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tap {
+    /// First source pixel.
+    pub first: usize,
+    /// Second source pixel; the first again at the edges.
+    pub second: usize,
+    /// Weight of the second, 0..=256; the first has the rest.
+    pub weight: u32,
+}
+
+/// The taps of OpenCV's INTER_LINEAR_EXACT from `from` pixels to `to`.
+pub fn taps(from: usize, to: usize) -> Vec<Tap> {
+    let step = 1.0 / (to as f64 / from as f64);
+    let tap = |index: usize| {
+        let position = step * (index as f64 + 0.5) - 0.5;
+        let first = position.floor();
+        if first < 0.0 || from == 1 {
+            return Tap { first: 0, second: 0, weight: 0 };
+        }
+        if first >= (from - 1) as f64 {
+            return Tap { first: from - 1, second: from - 1, weight: 0 };
+        }
+        let weight = ((position - first) * 256.0).round_ties_even() as u32;
+        Tap { first: first as usize, second: first as usize + 1, weight }
+    };
+    (0..to).map(tap).collect()
+}
+
+/// `image` at `size`, bit for bit as OpenCV's INTER_LINEAR_EXACT; rows without gaps, channels interleaved.
+pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
+    let channels = image.channels();
+    if size.width == 0 || size.height == 0 {
+        return Err(HogError::Image(format!("cannot resize to {} x {} pixels", size.width, size.height)));
+    }
+    let across = taps(image.width(), size.width);
+    let down = taps(image.height(), size.height);
+    let shrink_row = |y: usize, out: &mut Vec<u32>| {
+        let row = image.row(y);
+        out.clear();
+        for tap in &across {
+            let (first, second) = (&row[tap.first * channels..], &row[tap.second * channels..]);
+            for c in 0..channels {
+                out.push(u32::from(first[c]) * (256 - tap.weight) + u32::from(second[c]) * tap.weight);
+            }
+        }
+    };
+    let mut out = Vec::with_capacity(size.width * size.height * channels);
+    let (mut upper, mut lower) = (Vec::new(), Vec::new());
+    let (mut upper_row, mut lower_row) = (usize::MAX, usize::MAX);
+    for tap in &down {
+        if tap.first != upper_row {
+            if tap.first == lower_row {
+                std::mem::swap(&mut upper, &mut lower);
+                lower_row = usize::MAX;
+            } else {
+                shrink_row(tap.first, &mut upper);
+            }
+            upper_row = tap.first;
+        }
+        if tap.second != lower_row {
+            shrink_row(tap.second, &mut lower);
+            lower_row = tap.second;
+        }
+        let mixed = upper.iter().zip(&lower);
+        out.extend(mixed.map(|(a, b)| ((a * (256 - tap.weight) + b * tap.weight + (1 << 15)) >> 16) as u8));
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::HogParams;
+
+    #[test]
+    fn halving_averages_four_pixels_rounding_up() {
+        let data = [1, 2, 10, 10, 3, 4, 10, 11];
+        let image = ImageView::new(&data, 4, 2, 1, 4).unwrap();
+        assert_eq!(resize(image, Size::new(2, 1)).unwrap(), [(1 + 2 + 3 + 4 + 2) / 4, (41 + 2) / 4]);
+    }
+
+    #[test]
+    fn the_same_size_gives_the_same_image() {
+        let data: Vec<u8> = (0..60).collect();
+        let image = ImageView::new(&data, 5, 4, 3, 15).unwrap();
+        assert_eq!(resize(image, Size::new(5, 4)).unwrap(), data);
+    }
+
+    #[test]
+    fn levels_shrink_until_the_window_no_longer_fits() {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let of = |w, h, step| levels(Size::new(w, h), step, &spec);
+        assert_eq!(of(640, 480, 1.05).len(), 28);
+        assert_eq!(of(640, 480, 1.0).len(), 1);
+        assert_eq!(of(640, 480, f64::NAN).len(), 1);
+        assert_eq!(of(640, 480, f64::INFINITY).len(), 1);
+        assert_eq!(of(10, 10, 1.05).len(), 1);
+        assert_eq!(of(64, 128, 1.001).len(), 4); // 128 / 1.001³ still rounds to 128, 127.5 no longer
+    }
+}

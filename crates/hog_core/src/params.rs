@@ -114,7 +114,7 @@ fn positive(name: &str, (x, y): (i64, i64)) -> Result<Size> {
 
 /// Blocks along one axis; the window must hold a whole number of strides beyond the first block.
 fn blocks_along(axis: &str, win: usize, block: usize, stride: usize) -> Result<usize> {
-    if win.abs_diff(block) % stride != 0 {
+    if !win.abs_diff(block).is_multiple_of(stride) {
         return Err(HogError::Geometry(format!(
             "window {axis} {win} minus block {axis} {block} must be a multiple of block stride {stride}"
         )));
@@ -132,7 +132,7 @@ impl HogSpec {
         if !(1..=256).contains(&params.nbins) {
             return Err(HogError::Geometry(format!("nbins is {}; it must be 1 to 256", params.nbins)));
         }
-        if block.width % cell.width != 0 || block.height % cell.height != 0 {
+        if !block.width.is_multiple_of(cell.width) || !block.height.is_multiple_of(cell.height) {
             return Err(HogError::Geometry(format!(
                 "blockSize ({}, {}) must be a multiple of cellSize ({}, {})",
                 block.width, block.height, cell.width, cell.height

@@ -1,3 +1,63 @@
 """OpenCV's HOG people detector, many times faster, and a follower to use it with."""
 
 from __future__ import annotations
+
+from limo_hog._core import get_num_threads, set_num_threads
+from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.exceptions import (
+    BackendError,
+    DetectorSizeError,
+    GeometryError,
+    HogError,
+    ImageError,
+    ImageTypeError,
+    LimoHogError,
+    ModelFormatError,
+    ParameterError,
+    ParameterTypeError,
+)
+from limo_hog.hog import (
+    HOGDESCRIPTOR_DEFAULT_NLEVELS,
+    HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL,
+    HOGDESCRIPTOR_DESCR_FORMAT_ROW_BY_ROW,
+    HOGDESCRIPTOR_L2HYS,
+    HOGDescriptor,
+    HOGDescriptor_DEFAULT_NLEVELS,
+    HOGDescriptor_DESCR_FORMAT_COL_BY_COL,
+    HOGDescriptor_DESCR_FORMAT_ROW_BY_ROW,
+    HOGDescriptor_getDaimlerPeopleDetector,
+    HOGDescriptor_getDefaultPeopleDetector,
+    HOGDescriptor_L2Hys,
+    groupRectangles,
+)
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "HOGDESCRIPTOR_DEFAULT_NLEVELS",
+    "HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL",
+    "HOGDESCRIPTOR_DESCR_FORMAT_ROW_BY_ROW",
+    "HOGDESCRIPTOR_L2HYS",
+    "BackendError",
+    "Detections",
+    "DetectorSizeError",
+    "GeometryError",
+    "HOGDescriptor",
+    "HOGDescriptor_DEFAULT_NLEVELS",
+    "HOGDescriptor_DESCR_FORMAT_COL_BY_COL",
+    "HOGDescriptor_DESCR_FORMAT_ROW_BY_ROW",
+    "HOGDescriptor_L2Hys",
+    "HOGDescriptor_getDaimlerPeopleDetector",
+    "HOGDescriptor_getDefaultPeopleDetector",
+    "HogError",
+    "ImageError",
+    "ImageTypeError",
+    "LimoHogError",
+    "ModelFormatError",
+    "ParameterError",
+    "ParameterTypeError",
+    "PeopleDetector",
+    "get_num_threads",
+    "groupRectangles",
+    "set_num_threads",
+]

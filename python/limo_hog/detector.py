@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from limo_hog import _core
+from limo_hog.hog import pixels
 
 #: The person inside a window: x + .1 w, y + .07 h, .8 w, .8 h. The rest is the margin it was trained with.
 _PERSON_IN_WINDOW = (0.1, 0.07, 0.8, 0.8)
@@ -41,3 +46,68 @@ class Detections:
         x, y, w, h = self.boxes.T.astype(np.float64)
         person = np.stack([x + dx * w, y + dy * h, sw * w, sh * h], axis=1)
         return np.asarray(np.rint(person), np.int32)
+
+
+#: Window and coefficients of each model.
+_MODELS = {
+    "default": ((64, 128), _core.default_people_detector),
+    "daimler": ((48, 96), _core.daimler_people_detector),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeopleDetector:
+    """Finds standing and walking people in images; immutable, may be shared between threads.
+
+    Attributes
+    ----------
+    model
+        "default" (INRIA, window 64 × 128) or "daimler" (window 48 × 96).
+    threshold
+        Least SVM margin of a hit; raise it for fewer false alarms.
+    win_stride
+        Distance of neighbouring windows (x, y) [px of each pyramid level].
+    padding
+        Mirrored border around each level (x, y) [px].
+    scale
+        How much each level is smaller than the one before.
+    group_threshold
+        Similar hits must be more than this to make a detection; 0 returns every hit.
+    """
+
+    model: Literal["default", "daimler"] = "default"
+    threshold: float = 0.0
+    win_stride: tuple[int, int] = (8, 8)
+    padding: tuple[int, int] = (4, 4)
+    scale: float = 1.05
+    group_threshold: int = 2
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        """People in `image`, best first.
+
+        Parameters
+        ----------
+        image
+            uint8 (H, W), (H, W, 1) or (H, W, 3), colours in any order.
+
+        Raises
+        ------
+        ImageError
+            The array is not such an image.
+        """
+        boxes, scores = self._hog.detect_multi_scale(
+            pixels(image),
+            self.threshold,
+            self.win_stride,
+            self.padding,
+            self.scale,
+            self.group_threshold,
+            False,
+        )
+        best_first = np.argsort(-scores, kind="stable")
+        return Detections(boxes[best_first], scores[best_first])
+
+    @cached_property
+    def _hog(self) -> _core.Hog:
+        win_size, coefficients = _MODELS[self.model]
+        return _core.Hog(win_size, (16, 16), (8, 8), (8, 8), 9, -1.0, 0.2, True, 64, False, coefficients())

@@ -5,3 +5,39 @@ from __future__ import annotations
 
 class LimoHogError(Exception):
     """Whatever limo-hog refuses to do, with one line that says why."""
+
+
+class HogError(LimoHogError, ValueError):
+    """What the detector refuses."""
+
+
+class GeometryError(HogError):
+    """Window, block, stride and cell sizes do not fit together, or bins or levels are out of range."""
+
+
+class DetectorSizeError(HogError):
+    """The SVM has not one coefficient per descriptor element (and perhaps a bias after them)."""
+
+
+class ImageError(HogError):
+    """The array is not an image the detector reads: uint8, (H, W), (H, W, 1) or (H, W, 3), not empty."""
+
+
+class ImageTypeError(ImageError, TypeError):
+    """The image is no array, or its elements are not uint8."""
+
+
+class ParameterError(HogError):
+    """A search parameter is out of its range."""
+
+
+class ParameterTypeError(ParameterError, TypeError):
+    """A search parameter is of the wrong type."""
+
+
+class ModelFormatError(HogError):
+    """A model file is not one of OpenCV's HOG files."""
+
+
+class BackendError(HogError):
+    """The instruction set asked for is unknown, or this CPU has not got it."""

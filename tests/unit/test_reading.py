@@ -120,9 +120,7 @@ def test_a_camera_that_is_not_there_is_named() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".mp4"])
-def test_standard_input_holds_an_image_or_a_video(
-    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_standard_input_holds_an_image_or_a_video(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / f"thing{suffix}"
     if suffix == ".png":
         write_image(path, np.zeros((8, 8, 3), np.uint8))

@@ -60,9 +60,7 @@ def annotate(
     return canvas
 
 
-def _text(
-    canvas: NDArray[np.uint8], text: str, x: int, y: int, unit: float, ground: tuple[int, int, int]
-) -> None:
+def _text(canvas: NDArray[np.uint8], text: str, x: int, y: int, unit: float, ground: tuple[int, int, int]) -> None:
     """Write on a filled strip whose lower left corner is at (x, y), moved so that it stays in the picture."""
     size, stroke, pad = max(0.32, 0.45 * unit), max(1, round(1.2 * unit)), max(2, round(4 * unit))
     (width, height), below = cv2.getTextSize(text, _FONT, size, stroke)

@@ -131,9 +131,7 @@ class Video:
     frame_count: int
     _capture: cv2.VideoCapture
 
-    def frames(
-        self, every: int = 1, skip: Container[int] = frozenset()
-    ) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    def frames(self, every: int = 1, skip: Container[int] = frozenset()) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Yield (number, uint8 (height, width, 3) BGR) of every `every`-th frame not in `skip`.
 
         Raises
@@ -151,9 +149,7 @@ class Video:
             number += 1
         # Containers estimate their frame count from duration and rate: a few frames less are no loss.
         if number < 0.98 * self.frame_count - 2:
-            raise ReadError(
-                f"{self.source.name}: cut off: {number} of {self.frame_count} frames could be read"
-            )
+            raise ReadError(f"{self.source.name}: cut off: {number} of {self.frame_count} frames could be read")
 
 
 @contextmanager

@@ -43,9 +43,7 @@ class ApproachController:
         target = int(np.argmax(observation.detections.scores))
         error = observation.width // 2 - box_centre(observation.detections.boxes[target])[0]
         angular = 0.0 if abs(error) < self.dead_band_px else self.angular_gain * error
-        return Decision(
-            Twist(self.linear_speed, angular), True, Mode.FOLLOW, "driving towards a person", target
-        )
+        return Decision(Twist(self.linear_speed, angular), True, Mode.FOLLOW, "driving towards a person", target)
 
 
 def nobody_seen(seen_before: bool) -> Decision[bool]:

@@ -7,6 +7,7 @@ from enum import Enum
 from typing import Generic, Protocol, TypeVar
 
 from limo_hog.follow.observation import Observation
+from limo_hog.follow.region import Region
 from limo_hog.follow.twist import Twist
 
 S = TypeVar("S")
@@ -25,25 +26,6 @@ class Mode(str, Enum):
     """Something is in the way, or the senses cannot be trusted: the robot may not do what it wanted to."""
     LOST = "lost"
     """Somebody was followed and is not seen any more."""
-
-
-@dataclass(frozen=True, slots=True)
-class Region:
-    """Where in the next image the followed person is expected.
-
-    Attributes
-    ----------
-    x, y, width, height
-        Part of the image worth searching [px], top left corner first, clipped to the image.
-    window_height
-        Expected height of the detection window [px]: the person's, with the margin HOG was trained with.
-    """
-
-    x: int
-    y: int
-    width: int
-    height: int
-    window_height: float
 
 
 @dataclass(frozen=True, slots=True)

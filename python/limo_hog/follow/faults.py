@@ -25,12 +25,7 @@ def find_fault(observation: Observation, last_stamp: float | None) -> str:
         return f"the frame's stamp is {observation.stamp}, not a time"
     if last_stamp is not None and observation.stamp < last_stamp:
         return f"time runs backwards: a frame of {observation.stamp:.3f} s after one of {last_stamp:.3f} s"
-    return (
-        _boxes(observation)
-        or _depth(observation)
-        or _scan(observation.scan)
-        or _odometry(observation.odometry)
-    )
+    return _boxes(observation) or _depth(observation) or _scan(observation.scan) or _odometry(observation.odometry)
 
 
 def _boxes(observation: Observation) -> str:

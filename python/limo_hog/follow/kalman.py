@@ -115,9 +115,7 @@ class Innovation:
         return float(self.difference @ np.linalg.solve(self.covariance, self.difference))
 
 
-def innovation(
-    track: Track, bearing: float, distance: float | None, pose: Odometry, noise: Noise
-) -> Innovation:
+def innovation(track: Track, bearing: float, distance: float | None, pose: Odometry, noise: Noise) -> Innovation:
     """Compare a measurement with the track at the same stamp; `distance` None measures the bearing alone."""
     expected_bearing, expected_range = bearing_range(track, pose)
     dx, dy = track.mean[0] - pose.x, track.mean[1] - pose.y

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
+from limo_hog.follow.region import Region
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,8 @@ class Observation:
         Focal length of the camera [px]; the principal point is the image centre.
     detections
         People found in the frame, best first.
+    region
+        Part of the image that was searched; None where all of it was.
     depth
         float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; or None.
     scan
@@ -78,6 +81,7 @@ class Observation:
     height: int
     focal_px: float
     detections: Detections
+    region: Region | None = None
     depth: NDArray[np.float32] | None = None
     scan: Scan | None = None
     odometry: Odometry | None = None

@@ -114,9 +114,7 @@ class Guard(Generic[S]):
         near = NO_POINTS
         if observation.depth is not None:
             near = depth_points(observation.depth, observation.focal_px, reach, self.body)
-        state = replace(
-            state, inner=wish.state, wish=wish, stamp=observation.stamp, heard=observation.now, near=near
-        )
+        state = replace(state, inner=wish.state, wish=wish, stamp=observation.stamp, heard=observation.now, near=near)
         return self._allowed(wish, state, observation.scan, observation.odometry, observation.now)
 
     def recheck(

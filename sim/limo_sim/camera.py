@@ -1,0 +1,126 @@
+"""The pinhole camera: its geometry, and what one exposure yields.
+
+Camera frame: X right, Y down, Z forward [m]; whole numbers are pixel centres, the principal
+point is the image centre.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+WIDTH, HEIGHT = 640, 480
+FIELD = 1.23918
+"""Horizontal field of view [rad]."""
+FOCAL_PX = WIDTH / 2 / math.tan(FIELD / 2)
+CENTRE_X, CENTRE_Y = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
+MOUNT_AHEAD, MOUNT_HEIGHT = 0.084, 0.175
+"""Where the camera sits: ahead of the base centre and above the floor [m]; it looks level, straight ahead."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraPose:
+    """Where the camera is in the arena's frame and which way it looks [m, m, rad]."""
+
+    x: float
+    y: float
+    yaw: float
+
+    @classmethod
+    def on_robot(cls, x: float, y: float, yaw: float) -> CameraPose:
+        """Return the pose of the camera on a robot whose base centre is at (x, y, yaw)."""
+        return cls(x + MOUNT_AHEAD * math.cos(yaw), y + MOUNT_AHEAD * math.sin(yaw), yaw)
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Float64 (3, 3): arena directions to camera directions."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return np.array([[sin, -cos, 0.0], [0.0, 0.0, -1.0], [cos, sin, 0.0]])
+
+    def to_camera(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Take points (N, 3) from the arena's frame to the camera's [m]."""
+        offset: NDArray[np.float64] = (points - np.array([self.x, self.y, MOUNT_HEIGHT])) @ self.rotation.T
+        return offset
+
+
+@dataclass(frozen=True, slots=True)
+class PersonTruth:
+    """One person as the arena knows them.
+
+    Attributes
+    ----------
+    x, y, yaw
+        In the arena's frame [m, m, rad].
+    distance, bearing
+        From the robot's base centre to the person's axis [m], and its direction from straight ahead,
+        left positive [rad].
+    visible
+        Share of the person's silhouette that the camera sees: 0 hidden or out of the image … 1.
+    box
+        x, y, w, h [px] around the silhouette as if nothing stood in front of it, cut at the image's edge;
+        None when all of it is outside.
+    """
+
+    x: float
+    y: float
+    yaw: float
+    distance: float
+    bearing: float
+    visible: float
+    box: tuple[int, int, int, int] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """How often the robot has touched a person, and a wall or furniture, since the start."""
+
+    person: int = 0
+    wall: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """How things really are at one instant.
+
+    Attributes
+    ----------
+    stamp
+        The instant [s].
+    robot
+        x, y, yaw of the base centre in the arena's frame [m, m, rad].
+    people
+        In the scenario's order; None for somebody who has not arrived.
+    contacts
+        Of the robot so far.
+    """
+
+    stamp: float
+    robot: tuple[float, float, float]
+    people: tuple[PersonTruth | None, ...]
+    contacts: Contacts
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One exposure of the colour and the depth camera.
+
+    Attributes
+    ----------
+    stamp
+        When it was taken [s].
+    image
+        uint8 (480, 640, 3), BGR.
+    depth
+        float32 (480, 640), distance along the optical axis [m]; inf too far, -inf too near, NaN unknown
+        (REP 118).
+    truth
+        The arena at that instant.
+    """
+
+    stamp: float
+    image: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    truth: Truth

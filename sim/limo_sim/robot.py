@@ -1,0 +1,74 @@
+"""The Limo: a differential drive with wheels that can only speed up so fast, and a watchdog that stops it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from limo_hog.follow.twist import Twist
+
+WHEEL_SEPARATION = 0.172
+HALF_LENGTH, HALF_WIDTH = 0.145, 0.11
+"""Of the body, about the base centre [m]."""
+
+
+@dataclass(slots=True)
+class Drive:
+    """Commands in, wheel speeds out.
+
+    Attributes
+    ----------
+    wheel_speed, wheel_acceleration
+        Limits of each wheel [m/s, m/s²].
+    watchdog_s
+        The robot stops when no command came for so long [s]; the next command arms it again.
+    left, right
+        Speeds of the wheels' rims [m/s].
+    rejected, watchdog_stops
+        How many commands were not numbers, and how often the watchdog stopped the robot.
+    """
+
+    wheel_speed: float
+    wheel_acceleration: float
+    watchdog_s: float
+    left: float = 0.0
+    right: float = 0.0
+    rejected: int = 0
+    watchdog_stops: int = 0
+    _wanted: Twist = field(default_factory=Twist)
+    _commanded_at: float | None = None
+
+    def command(self, twist: Twist, time: float) -> None:
+        """Take a command at `time` [s]; one that is not finite stops the robot and is counted."""
+        if not twist.is_finite:
+            self.rejected += 1
+            twist = Twist()
+        self._wanted = twist
+        self._commanded_at = time
+
+    def advance(self, time: float, dt: float) -> None:
+        """Move the wheel speeds towards the command over the step that begins at `time` [s]."""
+        if self._commanded_at is not None and time - self._commanded_at >= self.watchdog_s - 1e-9:
+            self._wanted = Twist()
+            self._commanded_at = None
+            self.watchdog_stops += 1
+        turn = self._wanted.angular * WHEEL_SEPARATION / 2
+        wanted_left, wanted_right = self._wanted.linear - turn, self._wanted.linear + turn
+        # a command too fast for one wheel is slowed as a whole, so that the robot keeps to its curve
+        excess = max(abs(wanted_left), abs(wanted_right)) / self.wheel_speed
+        if excess > 1.0:
+            wanted_left, wanted_right = wanted_left / excess, wanted_right / excess
+        most = self.wheel_acceleration * dt
+        self.left += min(max(wanted_left - self.left, -most), most)
+        self.right += min(max(wanted_right - self.right, -most), most)
+
+    @property
+    def twist(self) -> Twist:
+        """How fast the wheels move the robot when they do not slip."""
+        return Twist((self.left + self.right) / 2, (self.right - self.left) / WHEEL_SEPARATION)
+
+
+def integrate(x: float, y: float, yaw: float, forward: float, turn: float) -> tuple[float, float, float]:
+    """Move a pose along the arc of `forward` metres that turns by `turn` [rad]."""
+    chord = forward * (math.sin(turn / 2) / (turn / 2) if turn else 1.0)
+    return x + chord * math.cos(yaw + turn / 2), y + chord * math.sin(yaw + turn / 2), yaw + turn

@@ -86,9 +86,7 @@ class Arena:
             drop_probability=camera.drop_probability,
             drops=self._stream(_DROP_STREAM),
         )
-        self._lidar = Channel(
-            scenario.lidar.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.lidar.latency_s
-        )
+        self._lidar = Channel(scenario.lidar.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.lidar.latency_s)
         self._wheels = Channel(
             scenario.odometry.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.odometry.latency_s
         )
@@ -146,7 +144,7 @@ class Arena:
             yaw=robot.angle,
             velocity=(robot.velocity.x, robot.velocity.y),
             turn_rate=robot.angular_velocity,
-            odometry=Odometry(x, y, yaw, twist.linear, twist.angular),
+            odometry=Odometry(step / STEPS_PER_SECOND, x, y, yaw, twist.linear, twist.angular),
         )
         for channel in (self._camera, self._lidar, self._wheels):
             channel.advance(step, self._state)
@@ -179,7 +177,7 @@ class Arena:
                 self.scenario.lidar.noise_m,
                 self._stream(_LIDAR_STREAM, exposure),
             )
-            scan = Scan(ranges, -lidar.ANGLE_MAX, lidar.ANGLE_MAX, lidar.RANGE_MIN, lidar.RANGE_MAX)
+            scan = Scan(state.time, ranges, -lidar.ANGLE_MAX, lidar.ANGLE_MAX, lidar.RANGE_MIN, lidar.RANGE_MAX)
             self._scan = exposure.index, scan
         return self._scan[1]
 
@@ -249,9 +247,9 @@ class Arena:
     def _add_obstacles(self) -> None:
         ground = self._space.static_body
         middle, half = ROOM_HALF + _WALL_HALF, ROOM_HALF + 2 * _WALL_HALF
-        walls = [(middle, 0, _WALL_HALF, half), (-middle, 0, _WALL_HALF, half)]
-        walls += [(0, middle, half, _WALL_HALF), (0, -middle, half, _WALL_HALF)]
-        footprints: list[Disc | Rectangle] = [Rectangle(*wall) for wall in walls]
+        footprints: list[Disc | Rectangle] = []
+        for side in (middle, -middle):
+            footprints += [Rectangle(side, 0, _WALL_HALF, half), Rectangle(0, side, half, _WALL_HALF)]
         footprints += [piece.footprint for piece in self.scenario.furniture]
         for footprint in footprints:
             shape: pymunk.Shape

@@ -68,9 +68,7 @@ class Walk:
         self._legs: list[_Leg] = []
         clock = walked = 0.0
         corners = person.route
-        for (x, y, pause), (next_x, next_y, next_pause) in zip(
-            corners, corners[1:] + corners[:1], strict=True
-        ):
+        for (x, y, pause), (next_x, next_y, next_pause) in zip(corners, corners[1:] + corners[:1], strict=True):
             length = math.hypot(next_x - x, next_y - y)
             heading = math.atan2(next_y - y, next_x - x) if length else person.facing
             duration = length / person.speed
@@ -191,7 +189,7 @@ def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
         ]
         soles.append(min(heel[2] - 0.026, toe[2] - 0.021))
     hips = -min(soles)
-    capsules = [(_raise(a, hips), _raise(b, hips), *rest) for a, b, *rest in capsules]
+    capsules = [(_raise(a, hips), _raise(b, hips), r0, r1, name) for a, b, r0, r1, name in capsules]
 
     cos, sin = math.cos(twist), math.sin(twist)
     shoulders = hips + 0.285
@@ -255,13 +253,13 @@ def body(person: Person, pose: Pose) -> Body:
     points = np.array([point for capsule in capsules for point in capsule[:2]]) @ turn.T + origin
     radii = np.array([capsule[2:4] for capsule in capsules]) * (height * girth)
     twists = [(math.cos(twist), math.sin(twist)) for _, _, twist, _ in ellipsoids]
-    wide = (girth, girth, 1.0)
     axes = np.array(
         [
-            [[c * a * wide[0], -s * b * wide[1], 0.0], [s * a * wide[0], c * b * wide[1], 0.0], [0.0, 0.0, h]]
+            [[c * a * girth, -s * b * girth, 0.0], [s * a * girth, c * b * girth, 0.0], [0.0, 0.0, h]]
             for (_, (a, b, h), _, _), (c, s) in zip(ellipsoids, twists, strict=True)
         ]
     )
+    colours = [capsule[4] for capsule in capsules] + [ellipsoid[3] for ellipsoid in ellipsoids]
     return Body(
         start=points[0::2],
         end=points[1::2],
@@ -269,5 +267,7 @@ def body(person: Person, pose: Pose) -> Body:
         end_radius=radii[:, 1],
         centre=np.array([ellipsoid[0] for ellipsoid in ellipsoids]) @ turn.T + origin,
         axes=turn @ axes,
-        colours=np.array([palette[solid[-1]] for solid in (*capsules, *ellipsoids)], dtype=np.float64),
+        colours=np.array(
+            [palette[name] for name in (*(c[4] for c in capsules), *(e[3] for e in ellipsoids))], dtype=np.float64
+        ),
     )

@@ -168,9 +168,7 @@ class Renderer:
                 cast_frustum(canvas, solid, camera, seen_sun, part)
         _blend(image, depth, canvas, palette)
 
-    def _cast_shadow(
-        self, image: U8, depth: F32, camera: CameraPose, at: tuple[float, float], radius: float
-    ) -> None:
+    def _cast_shadow(self, image: U8, depth: F32, camera: CameraPose, at: tuple[float, float], radius: float) -> None:
         """Darken the floor softly around something that stands on it."""
         [[across, _, ahead]] = camera.to_camera(np.array([[*at, 0.0]])).tolist()
         window = _window(upright_bounds(across, ahead, radius, 0.0, 0.0))
@@ -224,7 +222,8 @@ def _three(grey: F32) -> U8:
 
 
 def _bgr(colours: Sequence[Sequence[float]]) -> F32:
-    return np.array(colours, dtype=np.float32)[:, ::-1].copy()
+    bgr: F32 = np.array(colours, dtype=np.float32)[:, ::-1].copy()
+    return bgr
 
 
 def _pixels(bounds: Bounds) -> Window:
@@ -256,7 +255,7 @@ def _blend(image: U8, depth: F32, canvas: Canvas, palette: F32) -> None:
 def _measure(canvas: Canvas, depth: F32, shape: Outline, sun: Sun) -> Seen:
     """Visible share and box of a silhouette, once everything is drawn."""
     left, top, right, bottom = canvas.window
-    visible = np.count_nonzero((depth[top:bottom, left:right] == canvas.surface) & canvas.inside)
+    visible = int(np.count_nonzero((depth[top:bottom, left:right] == canvas.surface) & canvas.inside))
     whole = _pixels(shape.bounds)
     if (left, top, right, bottom) == whole:
         area = float(np.count_nonzero(canvas.inside))

@@ -17,7 +17,7 @@ from limo_sim.schema import ScenarioError, build, check_fields, one_of, required
 if sys.version_info >= (3, 11):
     import tomllib
 else:
-    import tomli as tomllib
+    import tomli as tomllib  # type: ignore[import-not-found]
 
 ROOM_HALF = 4.9
 """The walls' inner faces stand at ± this [m] (0.2 m thick, centred on ± 5 m)."""
@@ -214,8 +214,7 @@ class Scenario:
     def _check_robot_free(self, distance: float, where: str) -> None:
         if distance < ROBOT_RADIUS:
             raise ScenarioError(
-                f"{where}: is {max(distance, 0.0):.2f} m from the robot's centre, "
-                f"want at least {ROBOT_RADIUS} m"
+                f"{where}: is {max(distance, 0.0):.2f} m from the robot's centre, want at least {ROBOT_RADIUS} m"
             )
 
     def _check_person(self, person: Person, where: str) -> None:
@@ -244,13 +243,10 @@ class Scenario:
                     )
 
 
-def _gap(
-    start: tuple[float, float, float], end: tuple[float, float, float], shape: Disc | Rectangle
-) -> float:
+def _gap(start: tuple[float, float, float], end: tuple[float, float, float], shape: Disc | Rectangle) -> float:
     """Smallest distance [m] from the straight way between two corners to a shape, to within a centimetre."""
     steps = max(1, math.ceil(math.dist(start[:2], end[:2]) / 0.02))
     ways = (index / steps for index in range(steps + 1))
     return min(
-        distance_to(shape, start[0] + way * (end[0] - start[0]), start[1] + way * (end[1] - start[1]))
-        for way in ways
+        distance_to(shape, start[0] + way * (end[0] - start[0]), start[1] + way * (end[1] - start[1])) for way in ways
     )

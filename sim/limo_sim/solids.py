@@ -92,7 +92,8 @@ class Canvas:
     @property
     def surface(self) -> F32:
         """Depth of the object per pixel [m], where it covers the pixel at all."""
-        return self.depth - _FRINGE * (self.cover < 0.5)
+        surface: F32 = self.depth - _FRINGE * (self.cover < 0.5)
+        return surface
 
     @property
     def inside(self) -> NDArray[np.bool_]:
@@ -315,7 +316,5 @@ def upright_bounds(x: float, z: float, radius: float, low: float, high: float) -
         return -1e6, -1e6, 1e6, 1e6
     far = z + radius
     sides = [CENTRE_X + FOCAL_PX * (x + side) / depth for side in (-radius, radius) for depth in (near, far)]
-    ends = [
-        CENTRE_Y + FOCAL_PX * (MOUNT_HEIGHT - end) / depth for end in (low, high) for depth in (near, far)
-    ]
+    ends = [CENTRE_Y + FOCAL_PX * (MOUNT_HEIGHT - end) / depth for end in (low, high) for depth in (near, far)]
     return min(sides) - 1, min(ends) - 1, max(sides) + 1, max(ends) + 1

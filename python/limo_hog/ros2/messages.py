@@ -1,0 +1,306 @@
+"""ROS 2 messages from the follower's own types, and back; definitions and CDR bytes are rosbags'.
+
+The messages built here have not changed between ROS 2 Humble and Jazzy. Stamps are seconds since the arena's start
+or since 1970, as the clock that took them; frames are the Limo's: x forward, y left, z up, metres and radians, but
+`depth_link`, which Gazebo's camera uses for images, carries optical data (X right, Y down, Z forward).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+from rosbags.typesys.stores.ros2_humble import builtin_interfaces__msg__Time as Time
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Point as Point
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Pose as Pose
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseWithCovariance as PoseWithCovariance
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Quaternion as Quaternion
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Twist as RosTwist
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__TwistWithCovariance as TwistWithCovariance
+from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Vector3 as Vector3
+from rosbags.typesys.stores.ros2_humble import nav_msgs__msg__Odometry as RosOdometry
+from rosbags.typesys.stores.ros2_humble import rosgraph_msgs__msg__Clock as Clock
+from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__CameraInfo as CameraInfo
+from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__CompressedImage as CompressedImage
+from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__Image as Image
+from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__Imu as Imu
+from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__LaserScan as LaserScan
+from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__RegionOfInterest as RegionOfInterest
+from rosbags.typesys.stores.ros2_humble import std_msgs__msg__Header as Header
+
+from limo_hog.exceptions import LimoHogError
+from limo_hog.extras import needed
+from limo_hog.follow.observation import Odometry, Scan
+from limo_hog.follow.twist import Twist
+
+CAMERA_FRAME = "depth_link"
+LIDAR_FRAME = "laser_link"
+IMU_FRAME = "imu_link"
+ODOMETRY_FRAME = "odom"
+BASE_FRAME = "base_link"
+
+#: Encodings of sensor_msgs/Image that are read and written: element type and channels.
+ENCODINGS: dict[str, tuple[type[np.generic], int]] = {
+    "mono8": (np.uint8, 1),
+    "8UC1": (np.uint8, 1),
+    "bgr8": (np.uint8, 3),
+    "rgb8": (np.uint8, 3),
+    "8UC3": (np.uint8, 3),
+    "bgra8": (np.uint8, 4),
+    "rgba8": (np.uint8, 4),
+    "8UC4": (np.uint8, 4),
+    "mono16": (np.uint16, 1),
+    "16UC1": (np.uint16, 1),
+    "32FC1": (np.float32, 1),
+}
+
+
+class MessageError(LimoHogError):
+    """A message does not hold what its fields say."""
+
+
+@cache
+def typestore() -> Typestore:
+    """Return the message definitions."""
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def serialize(message: Any) -> bytes:
+    """Return a message's CDR bytes, little endian, with the four bytes that say so in front."""
+    return bytes(typestore().serialize_cdr(message, message.__msgtype__))
+
+
+def deserialize(data: bytes, type_name: str) -> Any:
+    """Read a message from its CDR bytes.
+
+    Raises
+    ------
+    MessageError
+        The bytes are no such message.
+    """
+    try:
+        return typestore().deserialize_cdr(data, type_name)
+    except Exception as error:  # rosbags raises whatever struct, numpy or its own checks raise
+        raise MessageError(f"{len(data)} bytes are no {type_name}: {error}") from error
+
+
+def default_message(type_name: str) -> Any:
+    """Return a message with ROS's defaults: zeros, empty strings and sequences, and a quaternion's w of 1."""
+    values = {name: _default(desc) for name, desc in typestore().fielddefs[type_name][1]}
+    if type_name == "geometry_msgs/msg/Quaternion":
+        values["w"] = 1.0
+    return typestore().types[type_name](**values)
+
+
+def _default(desc: Any) -> Any:
+    kind, of = desc
+    if kind == Nodetype.NAME:
+        return default_message(of)
+    if kind == Nodetype.BASE:
+        return {"string": "", "wstring": "", "bool": False}.get(of[0], 0.0 if of[0].startswith("float") else 0)
+    (item_kind, item), length = of
+    length = length if kind == Nodetype.ARRAY else 0
+    if item_kind == Nodetype.BASE and not item[0].endswith("string"):
+        return np.zeros(length, element_type(item[0]))
+    return [_default((item_kind, item)) for _ in range(length)]
+
+
+def element_type(base: str) -> np.dtype[Any]:
+    """Return the numpy type of a message's elementary number; ROS's char and byte are octets."""
+    return np.dtype(np.uint8 if base in ("char", "byte", "octet") else base)
+
+
+def to_time(stamp: float) -> Time:
+    """Split seconds into whole seconds and nanoseconds."""
+    nanoseconds = round(stamp * 1e9)
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+def to_seconds(time: Any) -> float:
+    """Return a stamp in seconds."""
+    return cast(float, time.sec + time.nanosec * 1e-9)
+
+
+def _header(stamp: float, frame: str) -> Header:
+    return Header(stamp=to_time(stamp), frame_id=frame)
+
+
+def image(stamp: float, pixels: NDArray[Any], frame: str = CAMERA_FRAME) -> Image:
+    """Return an image: uint8 (H, W, 3) is bgr8, uint8 (H, W) mono8, uint16 (H, W) 16UC1 [mm], float32 (H, W) 32FC1 [m].
+
+    Raises
+    ------
+    MessageError
+        The array is none of these.
+    """
+    kinds = {("uint8", 3): "bgr8", ("uint8", 2): "mono8", ("uint16", 2): "16UC1", ("float32", 2): "32FC1"}
+    encoding = kinds.get((pixels.dtype.name, pixels.ndim))
+    if encoding is None or (encoding == "bgr8" and pixels.shape[2] != 3):
+        raise MessageError(
+            f"an image of {pixels.dtype} {pixels.shape} has no encoding: give uint8 (H, W, 3) or (H, W), "
+            "uint16 (H, W) or float32 (H, W)"
+        )
+    pixels = np.ascontiguousarray(pixels)
+    return Image(
+        header=_header(stamp, frame),
+        height=pixels.shape[0],
+        width=pixels.shape[1],
+        encoding=encoding,
+        is_bigendian=0,
+        step=pixels.strides[0] if pixels.size else 0,
+        data=pixels.view(np.uint8).reshape(-1),
+    )
+
+
+def pixels_of(message: Any) -> NDArray[Any]:
+    """Return an Image's pixels as its encoding says: (H, W) or (H, W, channels), a view where that can be.
+
+    Raises
+    ------
+    MessageError
+        The encoding is unknown, or `step` or `data` do not fit the size.
+    """
+    if message.encoding not in ENCODINGS:
+        raise MessageError(f"image encoding {message.encoding!r} is not read; known are {', '.join(ENCODINGS)}")
+    kind, channels = ENCODINGS[message.encoding]
+    dtype = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
+    row = message.width * channels * dtype.itemsize
+    data = np.frombuffer(message.data, np.uint8)
+    if message.step < row or len(data) < message.step * message.height:
+        raise MessageError(
+            f"an image of {message.width}x{message.height} {message.encoding} needs rows of {row} bytes; "
+            f"came step {message.step} and {len(data)} bytes"
+        )
+    rows = data[: message.step * message.height].reshape(message.height, message.step)[:, :row]
+    shape = (message.height, message.width) + ((channels,) if channels > 1 else ())
+    # A padded row cannot be viewed as wider elements.
+    pixels: NDArray[Any] = np.ascontiguousarray(rows).view(dtype).reshape(shape)
+    return pixels
+
+
+def compressed_image(stamp: float, pixels: NDArray[np.uint8], quality: int = 90) -> CompressedImage:
+    """Return a JPEG of uint8 (H, W, 3) BGR, as image_transport's "compressed" topics carry; needs OpenCV."""
+    with needed(by="a compressed image", what="OpenCV", install="'limo-hog[cv]'"):
+        import cv2
+    data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return CompressedImage(
+        header=_header(stamp, CAMERA_FRAME), format="bgr8; jpeg compressed bgr8", data=data.reshape(-1)
+    )
+
+
+def camera_info(stamp: float, width: int, height: int, focal_px: float) -> CameraInfo:
+    """Return the calibration of an undistorted pinhole camera whose principal point is the image centre."""
+    cx, cy = (width - 1) / 2, (height - 1) / 2
+    return CameraInfo(
+        header=_header(stamp, CAMERA_FRAME),
+        height=height,
+        width=width,
+        distortion_model="plumb_bob",
+        d=np.zeros(5),
+        k=np.array([focal_px, 0, cx, 0, focal_px, cy, 0, 0, 1.0]),
+        r=np.eye(3).reshape(-1),
+        p=np.array([focal_px, 0, cx, 0, 0, focal_px, cy, 0, 0, 0, 1.0, 0]),
+        binning_x=0,
+        binning_y=0,
+        roi=RegionOfInterest(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
+    )
+
+
+def laser_scan(scan: Scan, period: float = 0.125) -> LaserScan:
+    """Return a scan; `period` is the time between two of them [s]."""
+    steps = max(len(scan.ranges) - 1, 1)
+    return LaserScan(
+        header=_header(scan.stamp, LIDAR_FRAME),
+        angle_min=scan.angle_min,
+        angle_max=scan.angle_max,
+        angle_increment=(scan.angle_max - scan.angle_min) / steps,
+        time_increment=0.0,
+        scan_time=period,
+        range_min=scan.range_min,
+        range_max=scan.range_max,
+        ranges=np.ascontiguousarray(scan.ranges, np.float32),
+        intensities=np.zeros(0, np.float32),
+    )
+
+
+def to_scan(message: Any) -> Scan:
+    """Read a LaserScan."""
+    ranges = np.asarray(message.ranges, np.float32)
+    return Scan(
+        stamp=to_seconds(message.header.stamp),
+        ranges=ranges,
+        angle_min=float(message.angle_min),
+        angle_max=float(message.angle_min + message.angle_increment * max(len(ranges) - 1, 0)),
+        range_min=float(message.range_min),
+        range_max=float(message.range_max),
+    )
+
+
+def odometry(reading: Odometry) -> RosOdometry:
+    """Return an odometry message: pose in `odom`, speeds in `base_link`, covariances unknown (zero)."""
+    return RosOdometry(
+        header=_header(reading.stamp, ODOMETRY_FRAME),
+        child_frame_id=BASE_FRAME,
+        pose=PoseWithCovariance(
+            pose=Pose(
+                position=Point(x=reading.x, y=reading.y, z=0.0),
+                orientation=Quaternion(x=0.0, y=0.0, z=math.sin(reading.yaw / 2), w=math.cos(reading.yaw / 2)),
+            ),
+            covariance=np.zeros(36),
+        ),
+        twist=TwistWithCovariance(twist=twist(Twist(reading.linear, reading.angular)), covariance=np.zeros(36)),
+    )
+
+
+def to_odometry(message: Any) -> Odometry:
+    """Read an Odometry: the yaw of its orientation, -pi … pi."""
+    pose, speed = message.pose.pose, message.twist.twist
+    q = pose.orientation
+    return Odometry(
+        stamp=to_seconds(message.header.stamp),
+        x=float(pose.position.x),
+        y=float(pose.position.y),
+        yaw=math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z)),
+        linear=float(speed.linear.x),
+        angular=float(speed.angular.z),
+    )
+
+
+def imu(stamp: float, angular_velocity: tuple[float, float, float], acceleration: tuple[float, float, float]) -> Imu:
+    """Return an IMU sample: rates [rad/s], accelerations with gravity's reaction [m/s²], no orientation."""
+    no_orientation = np.zeros(9)
+    # ROS's way to say that there is none
+    no_orientation[0] = -1.0
+    return Imu(
+        header=_header(stamp, IMU_FRAME),
+        orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
+        orientation_covariance=no_orientation,
+        angular_velocity=Vector3(*angular_velocity),
+        angular_velocity_covariance=np.zeros(9),
+        linear_acceleration=Vector3(*acceleration),
+        linear_acceleration_covariance=np.zeros(9),
+    )
+
+
+def twist(command: Twist) -> RosTwist:
+    """Return a velocity command."""
+    return RosTwist(
+        linear=Vector3(x=float(command.linear), y=0.0, z=0.0),
+        angular=Vector3(x=0.0, y=0.0, z=float(command.angular)),
+    )
+
+
+def to_twist(message: Any) -> Twist:
+    """Read a velocity command: a differential drive knows x and yaw alone."""
+    return Twist(float(message.linear.x), float(message.angular.z))
+
+
+def clock(stamp: float) -> Clock:
+    """Return the arena's time."""
+    return Clock(clock=to_time(stamp))

@@ -1,0 +1,149 @@
+"""ROS 2 messages built from arena data, compared with bytes and hashes that ROS 2 itself publishes."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from limo_hog.follow.observation import Odometry, Scan
+from limo_hog.follow.twist import Twist
+from limo_hog.ros2 import messages
+
+
+def test_a_twist_is_a_header_and_six_little_endian_doubles() -> None:
+    data = messages.serialize(messages.twist(Twist(0.2, -0.5)))
+    assert data == b"\x00\x01\x00\x00" + struct.pack("<6d", 0.2, 0, 0, 0, 0, -0.5)
+
+
+def test_a_twist_comes_back_from_its_bytes() -> None:
+    data = messages.serialize(messages.twist(Twist(0.25, 0.75)))
+    assert messages.to_twist(messages.deserialize(data, "geometry_msgs/msg/Twist")) == Twist(0.25, 0.75)
+
+
+def test_an_image_is_laid_out_as_cdr_says() -> None:
+    pixels = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
+    data = messages.serialize(messages.image(1.5, pixels))
+    frame, encoding = b"depth_link\0", b"bgr8\0"
+    expected = struct.pack("<4xiII", 1, 500_000_000, len(frame)) + frame + b"\0"
+    expected += struct.pack("<III", 2, 2, len(encoding)) + encoding + b"\0" + b"\0\0" + struct.pack("<II", 6, 12)
+    assert data[4:] == expected[4:] + pixels.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("dtype", "shape", "encoding"),
+    [
+        ("uint8", (4, 5, 3), "bgr8"),
+        ("uint8", (4, 5), "mono8"),
+        ("uint16", (4, 5), "16UC1"),
+        ("float32", (4, 5), "32FC1"),
+    ],
+)
+def test_pixels_come_back_as_they_went(dtype: str, shape: tuple[int, ...], encoding: str) -> None:
+    pixels = np.random.default_rng(0).integers(0, 255, shape).astype(dtype)
+    message = messages.deserialize(messages.serialize(messages.image(0.0, pixels)), "sensor_msgs/msg/Image")
+    assert message.encoding == encoding
+    back = messages.pixels_of(message)
+    assert back.dtype == pixels.dtype
+    np.testing.assert_array_equal(back, pixels)
+
+
+def test_a_view_with_a_stride_is_copied_row_by_row() -> None:
+    pixels = np.random.default_rng(0).integers(0, 255, (6, 8, 3)).astype(np.uint8)[::2, ::-1]
+    np.testing.assert_array_equal(messages.pixels_of(messages.image(0.0, pixels)), pixels)
+
+
+def test_padded_rows_and_big_endian_depth_are_read() -> None:
+    depth = np.array([[1.0, 2.5], [3.5, np.inf]], ">f4")
+    message = messages.default_message("sensor_msgs/msg/Image")
+    message.height, message.width, message.encoding, message.is_bigendian, message.step = 2, 2, "32FC1", 1, 11
+    message.data = np.frombuffer(b"".join(row.tobytes() + b"pad" for row in depth), np.uint8)
+    np.testing.assert_array_equal(messages.pixels_of(message), depth)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [("encoding", "yuv422", "yuv422"), ("step", 3, "step 3"), ("height", 9, "bytes"), ("width", 10**9, "rows")],
+)
+def test_an_image_that_contradicts_itself_is_refused(field: str, value: object, said: str) -> None:
+    message = messages.image(0.0, np.zeros((2, 4, 3), np.uint8))
+    setattr(message, field, value)
+    with pytest.raises(messages.MessageError, match=said):
+        messages.pixels_of(message)
+
+
+@pytest.mark.parametrize("pixels", [np.zeros((2, 2)), np.zeros((2, 2, 4), np.uint8), np.zeros(5, np.float32)])
+def test_an_array_without_an_encoding_is_refused(pixels: np.ndarray) -> None:
+    with pytest.raises(messages.MessageError, match="no encoding"):
+        messages.image(0.0, pixels)
+
+
+def test_half_a_message_is_refused_by_name() -> None:
+    data = messages.serialize(messages.image(0.0, np.zeros((4, 4, 3), np.uint8)))
+    with pytest.raises(messages.MessageError, match="sensor_msgs/msg/Image"):
+        messages.deserialize(data[:40], "sensor_msgs/msg/Image")
+
+
+def test_a_scan_comes_back_with_its_angles() -> None:
+    ranges = np.array([1.0, np.inf, 3.0], np.float32)
+    scan = Scan(2.0, ranges, -2.0, 2.0, 0.12, 8.0)
+    message = messages.deserialize(messages.serialize(messages.laser_scan(scan)), "sensor_msgs/msg/LaserScan")
+    back = messages.to_scan(message)
+    np.testing.assert_array_equal(back.ranges, ranges)
+    assert (back.stamp, back.angle_min) == (2.0, -2.0)
+    assert back.angle_max == pytest.approx(2.0)
+    assert back.range_max == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, -3.1, math.pi / 2])
+def test_odometry_keeps_its_yaw_through_the_quaternion(yaw: float) -> None:
+    reading = Odometry(3.25, 1.0, -2.0, yaw, 0.2, -0.4)
+    message = messages.deserialize(messages.serialize(messages.odometry(reading)), "nav_msgs/msg/Odometry")
+    back = messages.to_odometry(message)
+    assert back.yaw == pytest.approx(yaw)
+    assert (back.stamp, back.x, back.y, back.linear, back.angular) == (3.25, 1.0, -2.0, 0.2, -0.4)
+
+
+def test_a_jpeg_looks_like_its_picture() -> None:
+    cv2 = pytest.importorskip("cv2")
+    pixels = np.full((32, 48, 3), (200, 100, 50), np.uint8)
+    message = messages.compressed_image(0.0, pixels)
+    assert "jpeg" in message.format
+    back = cv2.imdecode(message.data, cv2.IMREAD_COLOR)
+    assert np.abs(back.astype(int) - pixels).max() < 6
+
+
+def test_stamps_round_to_the_nearest_nanosecond() -> None:
+    time = messages.to_time(0.1 + 0.2)
+    assert (time.sec, time.nanosec) == (0, 300_000_000)
+    assert messages.to_time(1.9999999999).sec == 2
+
+
+def test_every_message_has_the_hash_ros_2_jazzy_gives_it() -> None:
+    # from the .json files of ROS 2 Jazzy's packages
+    store = messages.typestore()
+    assert store.hash_rihs01("std_msgs/msg/String").endswith(
+        "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+    )
+    assert store.hash_rihs01("geometry_msgs/msg/Twist").endswith(
+        "9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a"
+    )
+
+
+def test_defaults_are_ros_defaults() -> None:
+    message = messages.default_message("sensor_msgs/msg/Imu")
+    assert (message.orientation.w, message.orientation.x) == (1.0, 0.0)
+    assert message.orientation_covariance.shape == (9,)
+    assert messages.default_message("sensor_msgs/msg/Image").encoding == ""
+    assert messages.default_message("sensor_msgs/msg/JointState").name == []
+    for name in messages.typestore().fielddefs:
+        messages.serialize(messages.default_message(name))
+
+
+def test_camera_info_holds_the_focal_length_where_ros_wants_it() -> None:
+    info = messages.camera_info(0.0, 640, 480, 448.6)
+    assert info.k.tolist() == [448.6, 0, 319.5, 0, 448.6, 239.5, 0, 0, 1]
+    assert info.p.reshape(3, 4)[:, :3].reshape(-1).tolist() == info.k.tolist()
+    messages.serialize(info)

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Sequence
 
+from limo_hog.cli.output import UsageError, one_line
 from limo_hog.exceptions import LimoHogError
 
 #: Every command and its line in `limo-hog --help`.
@@ -41,15 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "--debug" in arguments:
             raise
         print(f"limo-hog: {one_line(error)}", file=sys.stderr)
-        return 1
+        return 2 if isinstance(error, UsageError) else 1
     return code
-
-
-def one_line(error: Exception) -> str:
-    """Tell an error in one line, with the file it is about."""
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
-    return " ".join(str(error).split())
 
 
 def _run(arguments: list[str]) -> int:

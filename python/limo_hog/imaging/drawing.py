@@ -44,8 +44,8 @@ def annotate(
     uint8 (height, width, 3) BGR.
     """
     canvas = np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image.copy()
-    # Strokes and letters keep their share of the picture from a thumbnail to a wall.
-    unit = max(canvas.shape[:2]) / 640
+    # Strokes and letters grow with the picture, but slower, from a thumbnail to a wall.
+    unit = (max(canvas.shape[:2]) / 640) ** 0.7
     thick = max(1, round(2 * unit))
     for i, (x, y, w, h) in enumerate(boxes.tolist()):
         colour = RED if i == target else GREEN

@@ -1,0 +1,226 @@
+"""`limo-hog bench`: this detector against OpenCV's, timed in turn, with parity checked on the same images."""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+import limo_hog
+from limo_hog.cli.arguments import size, threads
+from limo_hog.cli.environment import cores, environment
+from limo_hog.cli.output import STDOUT, write_json
+from limo_hog.cli.progress import progress
+from limo_hog.cli.scene import street
+from limo_hog.exceptions import LimoHogError
+
+#: The workshop's parameters.
+PARAMETERS: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
+SIZES = [(640, 480), (1280, 720), (1920, 1080)]
+SECONDS_A_ROW, LEAST_ROUNDS, MOST_ROUNDS = 3.0, 5, 200
+
+Image = NDArray[np.uint8]
+
+
+class ParityError(LimoHogError):
+    """The two detectors do not agree."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Milliseconds of a call: the least, and the median."""
+
+    min: float
+    p50: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """One size, channel count and thread count; what concerns cv2 is None where there is no cv2 with HOG."""
+
+    size: tuple[int, int]
+    channels: int
+    threads: int
+    backend: str
+    limo_ms: Timing
+    cv2_ms: Timing | None
+    ratio: float | None
+    rects_equal: bool | None
+    max_weight_diff: float | None
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `bench`."""
+    parser = subparsers.add_parser(
+        "bench",
+        description="Time this detector against OpenCV's, call by call in turn, and check on the same images "
+        "that both find the same rectangles. Without an OpenCV that has HOG, this detector is timed alone.",
+    )
+    parser.add_argument("--size", type=size, nargs="+", metavar="WxH", help="image sizes (640x480 1280x720 1920x1080)")
+    parser.add_argument("--channels", choices=["gray", "bgr"], help="only this kind of image (both)")
+    parser.add_argument("--threads", type=threads, nargs="+", metavar="N", help="thread counts, 0 for all cores (1 0)")
+    parser.add_argument("--image", type=Path, metavar="FILE", help="a picture instead of the drawn street")
+    parser.add_argument("--json", metavar="FILE", help="write the result as JSON; - is standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Bench every combination, print a table and, if asked, JSON."""
+    facts = environment()
+    rival = _rival() if facts["opencv_has_hog"] else None
+    images = [
+        (_picture(size, channels, args.image))
+        for size in (args.size or ([None] if args.image else SIZES))
+        for channels in ([1, 3] if args.channels is None else [3 if args.channels == "bgr" else 1])
+    ]
+    # All cores may be one core: each count once.
+    counts = list(dict.fromkeys(n or cores() for n in args.threads or [1, 0]))
+    rows = []
+    with progress("rows") as bar:
+        task = bar.add_task("timing", total=len(images) * len(counts))
+        for image in images:
+            for count in counts:
+                rows.append(_row(image, count, str(facts["backend"]), rival))
+                bar.advance(task)
+    if args.json:
+        write_json(args.json, {"environment": facts, "rows": [asdict(row) for row in rows]})
+    if args.json != STDOUT:
+        _print(facts, rows)
+    wrong = [row for row in rows if row.rects_equal is False]
+    if wrong:
+        where = ", ".join(f"{r.size[0]}x{r.size[1]}x{r.channels} on {r.threads} threads" for r in wrong)
+        raise ParityError(f"other rectangles than OpenCV {facts['opencv']}: {where}")
+    return 0
+
+
+def _picture(size: tuple[int, int] | None, channels: int, path: Path | None) -> Image:
+    if path is None:
+        width, height = size or SIZES[0]
+        return street(width, height, channels)
+    from limo_hog.imaging.reading import Kind, Source, read_image
+
+    image = read_image(Source(str(path), path, Kind.IMAGE))
+    import cv2
+
+    if size is not None:
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+    return image if channels == 3 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
+
+
+def _rival() -> Any:
+    import cv2
+
+    hog = cv2.HOGDescriptor()
+    hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
+    return hog
+
+
+def _row(image: Image, threads: int, backend: str, rival: Any) -> Row:
+    hog = limo_hog.HOGDescriptor()
+    hog.setSVMDetector(limo_hog.HOGDescriptor_getDefaultPeopleDetector())
+    limo_hog.set_num_threads(threads)
+    height, width = image.shape[:2]
+    size, channels = (width, height), 1 if image.ndim == 2 else 3
+    if rival is None:
+        (ours,) = _race([lambda: hog.detectMultiScale(image, **PARAMETERS)])
+        return Row(size, channels, threads, backend, ours, None, None, None, None)
+    import cv2
+
+    # With several threads cv2 now and then pairs a rectangle with another's weight: it is judged with one.
+    cv2.setNumThreads(1)
+    equal, difference = _parity(hog, rival, image)
+    cv2.setNumThreads(threads)
+    ours, theirs = _race(
+        [
+            lambda: hog.detectMultiScale(image, **PARAMETERS),
+            lambda: rival.detectMultiScale(image, **PARAMETERS),
+        ]
+    )
+    return Row(size, channels, threads, backend, ours, theirs, theirs.min / ours.min, equal, difference)
+
+
+def _race(calls: list[Callable[[], object]]) -> list[Timing]:
+    """Time calls in turn, so that whatever slows the machine down slows them all."""
+    times: list[list[float]] = [[] for _ in calls]
+    for call in calls:
+        call()
+    gc.disable()
+    start = time.perf_counter()
+    try:
+        while len(times[0]) < LEAST_ROUNDS or (
+            len(times[0]) < MOST_ROUNDS and time.perf_counter() - start < SECONDS_A_ROW
+        ):
+            for call, spent in zip(calls, times, strict=True):
+                before = time.perf_counter()
+                call()
+                spent.append(1e3 * (time.perf_counter() - before))
+    finally:
+        gc.enable()
+    return [Timing(min(spent), statistics.median(spent)) for spent in times]
+
+
+def _parity(hog: Any, rival: Any, image: Image) -> tuple[bool, float | None]:
+    """Compare rectangles, grouped and raw, and the weights of equal ones."""
+    worst = 0.0
+    for group in (2, 0):
+        ours, theirs = (_found(h.detectMultiScale(image, **PARAMETERS, groupThreshold=group)) for h in (hog, rival))
+        if [rect for rect, _ in ours] != [rect for rect, _ in theirs]:
+            return False, None
+        for (_, a), (_, b) in zip(ours, theirs, strict=True):
+            worst = max(worst, abs(a - b))
+    return True, worst
+
+
+def _found(result: tuple[Any, Any]) -> list[tuple[tuple[int, ...], float]]:
+    """Sort by place, then weight: the order of cv2's levels is not defined."""
+    rects, weights = result
+    return sorted((tuple(map(int, r)), float(w)) for r, w in zip(rects, weights, strict=True))
+
+
+def _print(facts: dict[str, Any], rows: list[Row]) -> None:
+    console = Console(highlight=False)
+    rival = f"OpenCV {facts['opencv']}" if facts["opencv_has_hog"] else "nothing"
+    console.print(f"[bold]limo-hog {facts['limo_hog']} ({facts['backend']}) against {rival}[/]")
+    console.print(f"{facts['cpu']}, {facts['cores']} cores, Python {facts['python']}")
+    if not facts["opencv_has_hog"]:
+        console.print(
+            "No OpenCV with HOGDescriptor here: pip install 'opencv-python-headless<5' to compare.", soft_wrap=True
+        )
+    table = Table(
+        caption="ms a call: least (median); winStride 8, padding 4, scale 1.05",
+        box=box.SIMPLE_HEAD,
+        padding=0,
+    )
+    for name in ("size", "image", "threads", "limo-hog", "OpenCV", "faster", "rectangles"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in rows:
+        table.add_row(
+            f"{row.size[0]}×{row.size[1]}",
+            "gray" if row.channels == 1 else "BGR",
+            str(row.threads),
+            _ms(row.limo_ms),
+            _ms(row.cv2_ms),
+            "" if row.ratio is None else f"[bold]{row.ratio:.1f}×[/]",
+            _agreement(row),
+        )
+    console.print(table)
+
+
+def _ms(timing: Timing | None) -> str:
+    return "" if timing is None else f"{timing.min:.1f} ({timing.p50:.1f})"
+
+
+def _agreement(row: Row) -> str:
+    if row.rects_equal is None:
+        return ""
+    return f"equal ±{row.max_weight_diff:.0e}" if row.rects_equal else "[bold red]differ[/]"

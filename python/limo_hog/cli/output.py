@@ -1,0 +1,34 @@
+"""JSON to a file or to standard output, and errors in one line."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from limo_hog.atomic import whole_file
+from limo_hog.exceptions import LimoHogError
+
+#: The file name that stands for standard output.
+STDOUT = "-"
+
+
+class UsageError(LimoHogError):
+    """Arguments that do not go together."""
+
+
+def write_json(target: str, value: object) -> None:
+    """Write one JSON value, indented, to a file, or to standard output where the target is "-"."""
+    text = json.dumps(value, indent=2) + "\n"
+    if target == STDOUT:
+        sys.stdout.write(text)
+        return
+    with whole_file(Path(target)) as part:
+        part.write_text(text)
+
+
+def one_line(error: Exception) -> str:
+    """Tell an error in one line, with the file it is about."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split())

@@ -1,0 +1,222 @@
+"""`limo-hog detect` finds people in whatever it is given, and keeps what is done whatever happens."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from limo_hog.cli.main import main
+from limo_hog.cli.scene import street
+from limo_hog.detector import PeopleDetector
+from limo_hog.imaging.writing import video_writer, write_image
+
+LIMO_HOG = Path(sys.executable).with_name("limo-hog")
+REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
+PICTURE = street(192, 256, 3)
+
+
+@pytest.fixture
+def pictures(tmp_path: Path) -> Path:
+    folder = tmp_path / "in"
+    write_image(folder / "a.png", PICTURE)
+    write_image(folder / "deep" / "b.png", np.ascontiguousarray(PICTURE[:, ::-1]))
+    write_image(folder / "c.png", np.zeros((20, 20, 3), np.uint8))
+    return folder
+
+
+def _film(path: Path, frames: int = 12) -> None:
+    with video_writer(path, fps=10) as write:
+        for i in range(frames):
+            write(np.ascontiguousarray(np.roll(PICTURE, 4 * i, axis=1)))
+
+
+def _lines(text: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_results_are_lines_in_the_order_of_the_inputs(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["detect", str(pictures), "--json", "-"]) == 0
+    results = _lines(capsys.readouterr().out)
+    assert [Path(r["source"]).name for r in results] == ["a.png", "c.png", "b.png"]
+    expected = PeopleDetector().detect(PICTURE)
+    assert len(expected) > 0
+    first = results[0]
+    assert first["boxes"] == expected.boxes.tolist()
+    assert first["scores"] == expected.scores.tolist()
+    assert (first["frame"], first["width"], first["height"]) == (0, 192, 256)
+    assert results[1]["boxes"] == []
+
+
+def test_annotated_copies_lie_as_the_pictures_lie(pictures: Path, tmp_path: Path) -> None:
+    write_image(pictures / "a.bmp", PICTURE)
+    out = tmp_path / "out"
+    assert main(["detect", str(pictures), "--out", str(out)]) == 0
+    copies = sorted(str(p.relative_to(out)) for p in out.rglob("*") if p.is_file())
+    assert copies == ["a.bmp.png", "a.png.png", "c.png", "deep/b.png"]
+    drawn = np.asarray(cv2.imread(str(out / "a.png.png")))
+    assert drawn.shape == PICTURE.shape
+    assert (drawn != PICTURE).any()
+
+
+def test_what_cannot_be_read_is_named_and_the_rest_is_done(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (pictures / "broken.jpg").write_bytes(b"no picture")
+    (pictures / "empty.mp4").write_bytes(b"")
+    (tmp_path / "nothing").mkdir()
+    inputs = [str(pictures), str(tmp_path / "nothing"), "missing.png"]
+    assert main(["detect", *inputs, "--json", "-"]) == 1
+    shown = capsys.readouterr()
+    assert len(_lines(shown.out)) == 3
+    complaints = [line for line in shown.err.splitlines() if line.startswith("limo-hog: ")]
+    assert len(complaints) == 4
+    for words in ("nothing: no image", "missing.png: no such", "broken.jpg: not an", "empty.mp4: the file is empty"):
+        assert sum(words in line for line in complaints) == 1
+
+
+def test_a_video_gives_a_line_a_frame_and_an_annotated_copy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    film, out = tmp_path / "film.mp4", tmp_path / "out"
+    _film(film)
+    assert main(["detect", str(film), "--every", "3", "--json", "-", "--out", str(out)]) == 0
+    assert [r["frame"] for r in _lines(capsys.readouterr().out)] == [0, 3, 6, 9]
+    with av.open(out / "film.mp4") as container:
+        stream = container.streams.video[0]
+        assert (stream.codec_context.name, stream.width, stream.height) == ("h264", 192, 256)
+        assert len(list(container.decode(stream))) == 4
+
+
+def test_a_small_person_is_found_by_enlarging(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "small.png"
+    write_image(path, np.asarray(cv2.resize(PICTURE, None, fx=0.4, fy=0.4, interpolation=cv2.INTER_AREA), np.uint8))
+    assert main(["detect", str(path), "--json", "-"]) == 0
+    assert main(["detect", str(path), "--json", "-", "--min-height", "36"]) == 0
+    assert main(["detect", str(path), "--json", "-", "--min-height", "36", "--max-height", "20"]) == 0
+    plain, enlarged, none = _lines(capsys.readouterr().out)
+    assert plain["boxes"] == []
+    assert len(enlarged["boxes"]) > 0
+    x, y, w, h = enlarged["boxes"][0]
+    assert 0 <= x < x + w <= 77
+    assert 0 <= y < y + h <= 102
+    assert none["boxes"] == []
+
+
+def test_person_boxes_lie_within_the_windows(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(pictures / "a.png")
+    assert main(["detect", path, "--json", "-"]) == 0
+    assert main(["detect", path, "--json", "-", "--person-box"]) == 0
+    window, person = (r["boxes"][0] for r in _lines(capsys.readouterr().out))
+    x, y, w, h = window
+    assert person == [round(x + 0.1 * w), round(y + 0.07 * h), round(0.8 * w), round(0.8 * h)]
+
+
+def test_overlapping_hits_leave_only_the_best(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(pictures / "a.png")
+    for overlap in ("0", "1"):
+        assert main(["detect", path, "--json", "-", "--nms", overlap]) == 0
+    few, all_ = _lines(capsys.readouterr().out)
+    raw = PeopleDetector(group_threshold=0).detect(PICTURE)
+    assert len(all_["boxes"]) == len(raw)
+    assert 0 < len(few["boxes"]) < len(raw)
+    assert few["boxes"][0] == raw.boxes[0].tolist()
+
+
+def test_resuming_does_only_what_is_left(pictures: Path, tmp_path: Path) -> None:
+    file, film = tmp_path / "out.json", tmp_path / "film.mp4"
+    _film(film)
+    arguments = ["detect", str(pictures), str(film), "--json", str(file), "--resume"]
+    assert main(arguments[:-1]) == 0
+    whole = file.read_text().splitlines()
+    assert len(whole) == 3 + 12
+    # As a killed run leaves it: beside, with half a line.
+    file.unlink()
+    (tmp_path / ".out.part.json").write_text("\n".join([whole[0], *whole[3:8], whole[8][:20]]))
+    assert main(arguments) == 0
+    key = [(r["source"], r["frame"]) for r in _lines("\n".join(whole))]
+    again = _lines(file.read_text())
+    assert sorted((r["source"], r["frame"]) for r in again) == sorted(key)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["film.mp4", "in", "out.json"]
+
+
+def test_resuming_what_was_not_kept_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["detect", "a.png", "--resume"]) == 2
+    assert "--json FILE or --out DIR" in capsys.readouterr().err
+
+
+def test_resuming_from_another_file_leaves_it_alone(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "notes.json"
+    file.write_text("my notes\n")
+    assert main(["detect", str(pictures), "--json", str(file), "--resume"]) == 1
+    assert "not the JSON lines of an earlier run" in capsys.readouterr().err
+    assert file.read_text() == "my notes\n"
+
+
+def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
+    film, file, out = tmp_path / "film.mp4", tmp_path / "out.json", tmp_path / "out"
+    _film(film, frames=2000)
+    command = [str(LIMO_HOG), "detect", str(film), "--json", str(file), "--out", str(out)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    part = tmp_path / ".out.part.json"
+    deadline = time.monotonic() + 30
+    while not (part.exists() and part.stat().st_size) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert said.splitlines()[-1] == "limo-hog: stopped"
+    assert "Traceback" not in said
+    frames = [r["frame"] for r in _lines(file.read_text())]
+    assert frames == list(range(len(frames)))
+    assert 0 < len(frames) < 2000
+    assert list(out.iterdir()) == []
+    assert not part.exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a tiny disk needs root")
+def test_a_full_disk_is_one_line_and_leaves_nothing_half_written(pictures: Path, tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)], check=False, capture_output=True
+    )
+    if mounted.returncode:
+        pytest.skip("no tmpfs can be mounted here")
+    try:
+        command = [str(LIMO_HOG), "detect", str(pictures), "--out", str(disk), "--json", str(disk / "o.json")]
+        done = subprocess.run(command, check=False, capture_output=True, text=True)
+        assert done.returncode == 1
+        assert "No space left on device" in done.stderr
+        assert "Traceback" not in done.stderr
+        for path in disk.rglob("*.png"):
+            assert cv2.imread(str(path)) is not None
+        assert _lines((disk / "o.json").read_text()) is not None
+        assert not list(disk.rglob(".*"))
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+@pytest.mark.skipif(not REAL.exists(), reason="needs ../shared/data/real")
+def test_photographs_give_opencvs_rectangles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    golden = json.loads((REAL / "golden_cv2_4.14.json").read_text())["images"]
+    assert main(["detect", str(REAL / "pedestrians"), "--out", str(tmp_path), "--json", "-"]) == 0
+    results = _lines(capsys.readouterr().out)
+    assert len(results) == 12
+    for result in results:
+        wanted = golden[str(Path(result["source"]).relative_to(REAL))]["ws8_pad4_s1.05_group2"]
+        found = sorted(zip(result["boxes"], result["scores"], strict=True))
+        expected = sorted(zip(wanted["rects"], wanted["weights"], strict=True))
+        assert [box for box, _ in found] == [box for box, _ in expected]
+        assert [score for _, score in found] == pytest.approx([score for _, score in expected], abs=1e-5)
+    assert len(list(tmp_path.iterdir())) == 12

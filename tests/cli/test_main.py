@@ -1,0 +1,51 @@
+"""`limo-hog` routes to commands, answers errors in one line, and says so by its exit code."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from limo_hog.cli.main import COMMANDS, main
+
+LIMO_HOG = Path(sys.executable).with_name("limo-hog")
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if find_spec(f"limo_hog.cli.{name}")])
+def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    assert f"limo-hog {command}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("arguments", [[], ["nonsense"], ["detect"], ["bench", "--size", "large"]])
+def test_wrong_arguments_end_with_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    assert "usage: limo-hog" in capsys.readouterr().err
+
+
+def test_a_named_error_is_one_line_and_with_debug_a_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["bench", "--image", "no-such-file.jpg"]
+    assert main(arguments) == 1
+    assert capsys.readouterr().err == "limo-hog: no-such-file.jpg: No such file or directory\n"
+    with pytest.raises(FileNotFoundError):
+        main([*arguments, "--debug"])
+    with pytest.raises(FileNotFoundError):
+        main(["--debug", *arguments])
+
+
+def test_help_imports_no_library() -> None:
+    code = (
+        "import sys; from limo_hog.cli.main import main; main(['--help']);"
+        "sys.exit(any(name in sys.modules for name in ('cv2', 'rich', 'av', 'limo_sim', 'aiohttp')))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 0
+
+
+def test_a_reader_that_has_seen_enough_is_no_error() -> None:
+    command = f"{LIMO_HOG} --help | true; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], check=True, capture_output=True, text=True)
+    assert done.stderr == ""
+    assert done.stdout.strip() in ("0", "1")

@@ -267,7 +267,5 @@ def body(person: Person, pose: Pose) -> Body:
         end_radius=radii[:, 1],
         centre=np.array([ellipsoid[0] for ellipsoid in ellipsoids]) @ turn.T + origin,
         axes=turn @ axes,
-        colours=np.array(
-            [palette[name] for name in (*(c[4] for c in capsules), *(e[3] for e in ellipsoids))], dtype=np.float64
-        ),
+        colours=np.array([palette[name] for name in colours], dtype=np.float64),
     )

@@ -59,9 +59,10 @@ impl<'a> Pixels<'a> {
                 return Err(raised(py, &HogError::Image(text)));
             }
         };
+        // `as_slice` also succeeds on Fortran order, with the pixels in that order.
         let data = match array.as_slice() {
-            Ok(slice) => Cow::Borrowed(slice),
-            Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
+            Ok(slice) if array.is_c_contiguous() => Cow::Borrowed(slice),
+            _ => Cow::Owned(array.as_array().iter().copied().collect()),
         };
         Ok(Self { data, width, height, channels })
     }

@@ -21,6 +21,7 @@ from limo_sim.person import Pose, body
 from limo_sim.scenario import ROOM_HALF, WALL_HEIGHT, Furniture, Scenario
 from limo_sim.solids import (
     F32,
+    TONES,
     Bounds,
     Canvas,
     Outline,
@@ -39,6 +40,7 @@ Seen = tuple[float, tuple[int, int, int, int] | None]
 
 _SHADOW = 0.35
 _BANK_MARGIN = 64
+_LEVELS = 128
 _COARSE = 64  # a silhouette that the image's edge cuts is measured on about so many rows
 
 _COLUMNS = ((np.arange(WIDTH) - CENTRE_X) / FOCAL_PX).astype(np.float32)
@@ -55,7 +57,7 @@ class Renderer:
         self._sun = Sun.above(scenario.light)
         self._backdrop = self._make_backdrop()
         self._wall_greys = self._make_wall_greys()
-        self._palettes = [_bgr(body(person, Pose(0, 0, 0)).colours.tolist()) for person in scenario.people]
+        self._palettes = [_palette(body(person, Pose(0, 0, 0)).colours.tolist()) for person in scenario.people]
         self._models = {piece: _model(piece) for piece in scenario.furniture}
         shape = (HEIGHT + _BANK_MARGIN, WIDTH + _BANK_MARGIN)
         unit = noise.standard_normal(shape, dtype=np.float32)
@@ -201,7 +203,7 @@ class Renderer:
         return [min(wall * (0.895 + 0.095 * facing), 255.0) for facing in (-x, x, -y, y)]
 
 
-def _model(piece: Furniture) -> tuple[list[Frustum | Box], F32, tuple[float, float]]:
+def _model(piece: Furniture) -> tuple[list[Frustum | Box], U8, tuple[float, float]]:
     """Solids of a piece where it stands, their colours, and the radius and height of all of it [m]."""
     cos, sin = math.cos(piece.yaw), math.sin(piece.yaw)
     solids: list[Frustum | Box] = []
@@ -214,16 +216,18 @@ def _model(piece: Furniture) -> tuple[list[Frustum | Box], F32, tuple[float, flo
             solids.append(dataclasses.replace(solid, x=x, y=y, yaw=solid.yaw + piece.yaw))
         else:
             solids.append(dataclasses.replace(solid, x=x, y=y))
-    return solids, _bgr([solid.colour for solid in solids]), (radius, max(solid.z1 for solid in solids))
+    return solids, _palette([solid.colour for solid in solids]), (radius, max(solid.z1 for solid in solids))
 
 
 def _three(grey: F32) -> U8:
     return np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
 
 
-def _bgr(colours: Sequence[Sequence[float]]) -> F32:
-    bgr: F32 = np.array(colours, dtype=np.float32)[:, ::-1].copy()
-    return bgr
+def _palette(colours: Sequence[Sequence[float]]) -> U8:
+    """Table from a canvas's tone, in steps of 1 / `_LEVELS`, to BGR."""
+    shades = np.arange(TONES * _LEVELS) / _LEVELS
+    table = np.array(colours)[:, None, ::-1] * shades[None, :, None]
+    return np.rint(np.minimum(table, 255)).astype(np.uint8).reshape(-1, 3)
 
 
 def _pixels(bounds: Bounds) -> Window:
@@ -240,22 +244,24 @@ def _window(bounds: Bounds | None) -> Window | None:
     return (left, top, right, bottom) if left < right and top < bottom else None
 
 
-def _blend(image: U8, depth: F32, canvas: Canvas, palette: F32) -> None:
+def _blend(image: U8, depth: F32, canvas: Canvas, palette: U8) -> None:
     """Lay an object over the picture wherever it is nearer than what is there."""
     left, top, right, bottom = canvas.window
-    there, surface = depth[top:bottom, left:right], canvas.surface
-    nearer = surface < there
-    alpha = np.clip(canvas.cover, 0.0, 1.0) * nearer
-    colour = np.minimum(palette[canvas.part] * canvas.shade[..., None], 255.0)
+    there = depth[top:bottom, left:right]
+    nearer = canvas.depth < there
+    alpha = np.minimum(canvas.cover, 1.0)
+    alpha *= nearer
+    colour = palette.take((canvas.tone * _LEVELS).astype(np.int32), axis=0, mode="clip")
     patch = image[top:bottom, left:right]
-    patch[:] = np.rint(patch + (colour - patch) * alpha[..., None])
-    np.copyto(there, surface, where=nearer & canvas.inside)
+    patch[:] = patch * (1.0 - alpha)[..., None] + (colour * alpha[..., None] + 0.5)
+    nearer &= canvas.inside
+    np.copyto(there, canvas.depth, where=nearer)
 
 
 def _measure(canvas: Canvas, depth: F32, shape: Outline, sun: Sun) -> Seen:
     """Visible share and box of a silhouette, once everything is drawn."""
     left, top, right, bottom = canvas.window
-    visible = int(np.count_nonzero((depth[top:bottom, left:right] == canvas.surface) & canvas.inside))
+    visible = int(np.count_nonzero((depth[top:bottom, left:right] == canvas.depth) & canvas.inside))
     whole = _pixels(shape.bounds)
     if (left, top, right, bottom) == whole:
         area = float(np.count_nonzero(canvas.inside))

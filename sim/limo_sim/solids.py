@@ -25,7 +25,9 @@ Window = tuple[int, int, int, int]
 
 NEAR = 0.08
 """Nothing nearer than this is drawn [m]."""
-_FRINGE = np.float32(1.0)  # a pixel less than half covered yields to any solid within a metre behind it
+_UPRIGHT = 0.2
+TONES = 2.0
+"""Brightness stays below this, so that a solid's number and its brightness fit in one value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,17 @@ class Sun:
 class Canvas:
     """A z-buffer over a window of the image, on which the solids of one object are cast.
 
-    `stride` casts every so many pixels only, which is enough to measure an area.
+    `stride` casts every so many pixels only, which is enough to measure an area. Solids are cast half a pixel
+    too wide, and `cover` falls from 1 to 0 over the last pixel: the edges come out smooth.
+
+    Attributes
+    ----------
+    depth
+        float32 [m], of the nearest solid; inf where there is none.
+    cover
+        float32, how much of a pixel is covered: its depth [px] inside the silhouette.
+    tone
+        float32, number of the solid x `TONES` + brightness.
     """
 
     def __init__(self, window: Window, stride: int = 1) -> None:
@@ -64,8 +76,7 @@ class Canvas:
         shape = (len(self.ys), len(self.xs))
         self.depth: F32 = np.full(shape, np.inf, np.float32)
         self.cover: F32 = np.zeros(shape, np.float32)
-        self.shade: F32 = np.zeros(shape, np.float32)
-        self.part: NDArray[np.uint8] = np.zeros(shape, np.uint8)
+        self.tone: F32 = np.zeros(shape, np.float32)
 
     def crop(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice] | None:
         """Rows and columns of the canvas that a box in image pixels touches."""
@@ -77,23 +88,13 @@ class Canvas:
         r1 = min(rows, math.ceil((bottom - y0) / self.stride) + 1)
         return (slice(r0, r1), slice(c0, c1)) if c0 < c1 and r0 < r1 else None
 
-    def put(self, at: tuple[slice, slice], depth: F32, cover: F32, shade: F32, part: int) -> None:
-        """Draw one solid where it is nearest; `cover` may leave 0 … 1."""
-        order = depth + _FRINGE * (cover < 0.5)
-        target = self.depth[at]
-        wins = order < target
-        wins &= cover > 0
-        np.copyto(target, order, where=wins)
-        np.copyto(self.shade[at], shade, where=wins)
-        np.copyto(self.part[at], part, where=wins)
+    def put(self, at: tuple[slice, slice], depth: F32, cover: F32, tone: F32) -> None:
+        """Draw one solid where it is nearest; its depth is NaN, or its cover not above 0, where it is not."""
+        wins = depth < self.depth[at]
+        np.copyto(self.depth[at], depth, where=wins)
+        np.copyto(self.tone[at], tone, where=wins)
         covered = self.cover[at]
-        np.maximum(covered, cover, out=covered)
-
-    @property
-    def surface(self) -> F32:
-        """Depth of the object per pixel [m], where it covers the pixel at all."""
-        surface: F32 = self.depth - _FRINGE * (self.cover < 0.5)
-        return surface
+        np.fmax(covered, cover, out=covered)
 
     @property
     def inside(self) -> NDArray[np.bool_]:
@@ -108,7 +109,8 @@ class Outline:
     Attributes
     ----------
     strips
-        Per capsule: part, u, v, axis u, axis v, length, radius [px], taper, depth [m], its slope, m per px.
+        Per capsule: part, u, v, axis u, axis v, length, radius [px], taper, depth [m], depth per px, m per px,
+        sine of the angle between axis and image.
     ellipses
         Per ellipsoid: part, u, v, the three entries of the lower-triangular whitening matrix, half height and
         half width [px], depth [m], depth per canonical x and y, bulge [m].
@@ -130,56 +132,29 @@ def outline(body: Body, camera: CameraPose) -> Outline | None:
     z0, z1, zc = np.maximum(z0, NEAR), np.maximum(z1, NEAR), np.maximum(zc, NEAR)
     u0, v0 = CENTRE_X + FOCAL_PX * start[:, 0] / z0, CENTRE_Y + FOCAL_PX * start[:, 1] / z0
     u1, v1 = CENTRE_X + FOCAL_PX * end[:, 0] / z1, CENTRE_Y + FOCAL_PX * end[:, 1] / z1
-    r0, r1 = FOCAL_PX * body.start_radius / z0, FOCAL_PX * body.end_radius / z1
+    r0, r1 = FOCAL_PX * body.start_radius / z0 + 0.5, FOCAL_PX * body.end_radius / z1 + 0.5
     length = np.maximum(np.hypot(u1 - u0, v1 - v0), 1e-3)
     axis_u, axis_v = (u1 - u0) / length, (v1 - v0) / length
-    parts = np.arange(len(z0))
-    strips = np.stack(
-        [
-            parts,
-            u0,
-            v0,
-            axis_u,
-            axis_v,
-            length,
-            r0,
-            (r1 - r0) / length,
-            z0,
-            (z1 - z0) / length,
-            (z0 + z1) / (2 * FOCAL_PX),
-        ],
-        axis=1,
-    )[strip_ok]
+    metre = (z0 + z1) / (2 * FOCAL_PX)
+    lean = (z1 - z0) / np.hypot(z1 - z0, length * metre)
+    parts, taper, slope = np.arange(len(z0)), (r1 - r0) / length, (z1 - z0) / length
+    strips = np.stack([parts, u0, v0, axis_u, axis_v, length, r0, taper, z0, slope, metre, lean], axis=1)
 
     axes = camera.rotation @ body.axes
     spread = axes @ axes.transpose(0, 2, 1)
-    metre = FOCAL_PX / zc
+    pixels = FOCAL_PX / zc
     a, b, c = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
     l00 = np.sqrt(a)
     l10 = b / l00
     l11 = np.sqrt(c - l10 * l10)
-    g0 = spread[:, 0, 2] / l00
-    g1 = (spread[:, 1, 2] - l10 * g0) / l11
-    bulge = np.sqrt(np.maximum(spread[:, 2, 2] - g0 * g0 - g1 * g1, 1e-9))
+    slope_x = spread[:, 0, 2] / l00
+    slope_y = (spread[:, 1, 2] - l10 * slope_x) / l11
+    bulge = np.sqrt(np.maximum(spread[:, 2, 2] - slope_x**2 - slope_y**2, 1e-9))
+    l00, l10, l11 = pixels * l00 + 0.5, pixels * l10, pixels * l11 + 0.5
     uc, vc = CENTRE_X + FOCAL_PX * centre[:, 0] / zc, CENTRE_Y + FOCAL_PX * centre[:, 1] / zc
-    half_w, half_h = metre * np.sqrt(a), metre * np.sqrt(c)
-    ellipses = np.stack(
-        [
-            np.arange(len(zc)) + len(z0),
-            uc,
-            vc,
-            1 / (metre * l00),
-            -l10 / (metre * l00 * l11),
-            1 / (metre * l11),
-            half_h,
-            half_w,
-            zc,
-            g0,
-            g1,
-            bulge,
-        ],
-        axis=1,
-    )[ellipse_ok]
+    half_w, half_h = l00, np.hypot(l10, l11)
+    parts, w10 = len(z0) + np.arange(len(zc)), -l10 / (l00 * l11)
+    ellipses = np.stack([parts, uc, vc, 1 / l00, w10, 1 / l11, half_h, half_w, zc, slope_x, slope_y, bulge], axis=1)
     if not strip_ok.any() and not ellipse_ok.any():
         return None
     left = np.concatenate([np.minimum(u0 - r0, u1 - r1)[strip_ok], (uc - half_w)[ellipse_ok]])
@@ -187,19 +162,20 @@ def outline(body: Body, camera: CameraPose) -> Outline | None:
     top = np.concatenate([np.minimum(v0 - r0, v1 - r1)[strip_ok], (vc - half_h)[ellipse_ok]])
     bottom = np.concatenate([np.maximum(v0 + r0, v1 + r1)[strip_ok], (vc + half_h)[ellipse_ok]])
     bounds = (float(left.min()), float(top.min()), float(right.max()), float(bottom.max()))
-    return Outline(strips.tolist(), ellipses.tolist(), bounds)
+    return Outline(strips[strip_ok].tolist(), ellipses[ellipse_ok].tolist(), bounds)
 
 
 def cast_body(canvas: Canvas, shape: Outline, sun: Sun) -> None:
     """Cast a body; `sun` in the camera's frame."""
-    for strip in shape.strips:
-        _cast_strip(canvas, strip, sun)
-    for ellipse in shape.ellipses:
-        _cast_ellipse(canvas, ellipse, sun)
+    with np.errstate(invalid="ignore"):  # the root of a negative number is NaN: a miss
+        for strip in shape.strips:
+            _cast_strip(canvas, strip, sun)
+        for ellipse in shape.ellipses:
+            _cast_ellipse(canvas, ellipse, sun)
 
 
 def _cast_strip(canvas: Canvas, strip: list[float], sun: Sun) -> None:
-    part, u, v, axis_u, axis_v, length, radius, taper, near, slope, metre = strip
+    part, u, v, axis_u, axis_v, length, radius, taper, near, slope, metre, lean = strip
     end_u, end_v, end_radius = u + axis_u * length, v + axis_v * length, radius + taper * length
     at = canvas.crop(
         min(u - radius, end_u - end_radius),
@@ -213,18 +189,31 @@ def _cast_strip(canvas: Canvas, strip: list[float], sun: Sun) -> None:
     along = axis_u * dx + axis_v * dy
     across = axis_u * dy - axis_v * dx
     on_axis = np.minimum(np.maximum(along, 0.0), length)
-    radii = radius + taper * on_axis
-    along -= on_axis
-    along /= radii
-    across /= radii
-    inner = 1.0 - along * along - across * across
-    root = np.sqrt(np.maximum(inner, 0.0))
-    depth = near + slope * on_axis - metre * radii * root
-    cover = inner * (0.25 * (radius + end_radius) / canvas.stride) + 0.5
+    radii = taper * on_axis
+    radii += radius
+    beyond = along - on_axis
+    room = radii * radii
+    room -= across * across
+    inner = room - beyond * beyond
+    root = np.sqrt(inner)
+    if abs(lean) > _UPRIGHT:
+        # the ray meets a leaning capsule first in a ball that is not the one beneath the pixel
+        on_axis = np.minimum(np.maximum(along - lean * root, 0.0), length)
+        beyond = along - on_axis
+        room -= beyond * beyond
+        root = np.sqrt(np.maximum(room, 0.0 * root))
+    depth = slope * on_axis
+    depth += near
+    depth -= metre * root
     x, y, z = sun.towards
-    lit_along, lit_across = sun.gain * (x * axis_u + y * axis_v), sun.gain * (y * axis_u - x * axis_v)
-    shade = sun.base + lit_along * along + lit_across * across - (sun.gain * z) * root
-    canvas.put(at, depth, cover, shade, int(part))
+    beyond *= sun.gain * (x * axis_u + y * axis_v)
+    across *= sun.gain * (y * axis_u - x * axis_v)
+    beyond += across
+    beyond -= (sun.gain * z) * root
+    beyond /= radii
+    beyond += TONES * part + sun.base
+    inner *= 1.0 / (radius + end_radius)
+    canvas.put(at, depth, inner, beyond)
 
 
 def _cast_ellipse(canvas: Canvas, ellipse: list[float], sun: Sun) -> None:
@@ -236,12 +225,15 @@ def _cast_ellipse(canvas: Canvas, ellipse: list[float], sun: Sun) -> None:
     x = w00 * dx
     y = w10 * dx + w11 * dy
     inner = 1.0 - x * x - y * y
-    root = np.sqrt(np.maximum(inner, 0.0))
-    depth = centre + slope_x * x + slope_y * y - bulge * root
-    cover = inner * (0.25 * (half_w + half_h) / canvas.stride) + 0.5
+    root = np.sqrt(inner)
+    depth = (slope_x * x + centre) + slope_y * y
+    depth -= bulge * root
     sun_x, sun_y, sun_z = sun.towards
-    shade = sun.base + (sun.gain * sun_x) * x + (sun.gain * sun_y) * y - (sun.gain * sun_z) * root
-    canvas.put(at, depth, cover, shade, int(part))
+    tone = (sun.gain * sun_x) * x + (sun.gain * sun_y) * y
+    tone -= (sun.gain * sun_z) * root
+    tone += TONES * part + sun.base
+    inner *= 0.25 * (half_w + half_h)
+    canvas.put(at, depth, inner, tone)
 
 
 def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, part: int) -> None:
@@ -254,23 +246,24 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
         return
     right, down = (canvas.xs[at[1]] - CENTRE_X) / FOCAL_PX, (canvas.ys[at[0]] - CENTRE_Y) / FOCAL_PX
     taper = (solid.r1 - solid.r0) / (solid.z1 - solid.z0)
-    level = solid.r0 + taper * (MOUNT_HEIGHT - solid.z0)  # radius at the camera's height
+    half_pixel = 0.5 * max(z0, NEAR) / FOCAL_PX
+    level = solid.r0 + taper * (MOUNT_HEIGHT - solid.z0) + half_pixel  # radius at the camera's height
     a = right * right + (1.0 - (taper * down) ** 2)
     b = right * x0 + (z0 - (level * taper) * down)
     c = x0 * x0 + z0 * z0 - level * level
-    discriminant = b * b - a * c
-    depth = (b - np.sqrt(np.maximum(discriminant, 0.0))) / a
-    np.maximum(depth, NEAR, out=depth)
-    height = MOUNT_HEIGHT - down * depth
-    radii = np.maximum(level - taper * down * depth, 1e-3)
-    pixels = FOCAL_PX / canvas.stride / depth
-    cover = discriminant / (a * radii) * (0.5 * pixels) + 0.5
-    np.minimum(cover, (solid.z1 - height) * pixels + 0.5, out=cover)
-    np.minimum(cover, (height - solid.z0) * pixels + 0.5, out=cover)
-    cover[depth <= NEAR] = 0.0
+    with np.errstate(invalid="ignore"):
+        discriminant = b * b - a * c
+        depth = (b - np.sqrt(discriminant)) / a
+        height = MOUNT_HEIGHT - down * depth
+        radii = level - taper * down * depth
+        pixels = FOCAL_PX / depth
+        cover = 0.5 * pixels * discriminant / (a * radii)
+        np.minimum(cover, (solid.z1 - height) * pixels + 0.5, out=cover)
+        np.minimum(cover, (height - solid.z0) * pixels + 0.5, out=cover)
+        depth[~((cover > 0) & (depth > NEAR))] = np.nan
     x, _, z = sun.towards
-    shade = sun.base + sun.gain * (x * (right * depth - x0) + z * (depth - z0)) / radii
-    canvas.put(at, depth, cover, shade, part)
+    tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)
+    canvas.put(at, depth, cover, tone)
 
 
 def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int) -> None:
@@ -291,13 +284,14 @@ def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int
     in_side = np.maximum(in_x, in_y)
     depth = np.maximum(in_side, in_z)
     hit = (depth < np.minimum(np.minimum(out_x, out_y), out_z)) & (depth > NEAR)
+    depth[~hit] = np.nan
     x, y, z = sun.towards
     facing_x = math.copysign(1.0, cos * from_x + sin * from_y) * (cos * x + sin * y)
     facing_y = math.copysign(1.0, cos * from_y - sin * from_x) * (cos * y - sin * x)
     facing_z = math.copysign(1.0, MOUNT_HEIGHT - middle) * z
     side = np.where(in_x > in_y, facing_x, facing_y)
-    shade = sun.base + sun.gain * np.where(in_z > in_side, facing_z, side)
-    canvas.put(at, depth, hit.astype(np.float32), shade.astype(np.float32), part)
+    tone = sun.gain * np.where(in_z > in_side, facing_z, side) + (TONES * part + sun.base)
+    canvas.put(at, depth, hit.astype(np.float32), tone.astype(np.float32))
 
 
 def _slab(origin: float, direction: F32, half: float) -> tuple[F32, F32]:

@@ -11,14 +11,24 @@ use crate::image::ImageView;
 use crate::params::{HogParams, HogSpec, Size};
 use crate::pyramid::{Level, levels, resize, to_image};
 use crate::reference;
+use crate::simd::{self, Backend};
 use crate::svm::Svm;
+use crate::workspace::Pool;
 
 /// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
 #[derive(Debug, Clone)]
 pub struct Hog {
     spec: HogSpec,
     svm: Option<Svm>,
+    /// The fast path, where the geometry has one.
+    fast: Option<simd::Plan>,
+    backend: Backend,
 }
+
+/// The image as the fast path wants it, shared by all levels of a call.
+static PLANES: Pool<simd::Planes> = Pool::new();
+/// Scratch memory of the fast path, one per thread at work.
+static SCRATCH: Pool<simd::Scratch> = Pool::new();
 
 /// Where and how densely to look.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +66,9 @@ impl Hog {
     pub fn new(params: &HogParams, coefficients: Option<&[f32]>) -> Result<Self> {
         let spec = HogSpec::new(params)?;
         let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
-        Ok(Self { spec, svm })
+        let backend = Backend::current()?;
+        let fast = svm.as_ref().and_then(|svm| simd::Plan::new(&spec, svm, backend));
+        Ok(Self { spec, svm, fast, backend })
     }
 
     /// The checked geometry.
@@ -136,7 +148,10 @@ impl Hog {
         let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
-            return Ok(self.hits(image, &grid, search.hit_threshold, svm));
+            let hits = |planes: Option<&simd::Planes>| {
+                self.hits(image, planes, size_of(image), &grid, search.hit_threshold, svm)
+            };
+            return self.with_planes(image, hits);
         };
         let inside =
             locations.iter().filter_map(|&location| Some((location, grid.to_padded(location, &self.spec)?)));
@@ -162,11 +177,16 @@ impl Hog {
         let steps = self.steps(search, self.spec.stride)?;
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
         let levels = levels(size_of(image), scale, &self.spec);
-        let of_level = |level: &Level| self.level_candidates(image, level, &steps, search.hit_threshold, svm);
         let mut candidates = Vec::new();
-        for found in in_order(&levels, threads, of_level) {
-            candidates.append(&mut found?);
-        }
+        self.with_planes(image, |planes| {
+            let of_level = |level: &Level| {
+                self.level_candidates(image, planes, level, &steps, search.hit_threshold, svm)
+            };
+            for found in in_order(&levels, threads, of_level) {
+                candidates.append(&mut found?);
+            }
+            Ok(())
+        })?;
         let win = self.spec.win;
         let found = match grouping {
             Grouping::Similar(threshold) => group_candidates(&candidates, threshold),
@@ -181,23 +201,28 @@ impl Hog {
         Steps::new(search.win_stride, search.padding, default_stride, &self.spec)
     }
 
+    /// Runs `work` with the image's planes if there is a fast path.
+    fn with_planes<R>(&self, image: ImageView, work: impl FnOnce(Option<&simd::Planes>) -> R) -> R {
+        if self.fast.is_none() {
+            return work(None);
+        }
+        PLANES.with(|planes| {
+            planes.fill(image);
+            work(Some(planes))
+        })
+    }
+
     fn level_candidates(
         &self,
         image: ImageView,
+        planes: Option<&simd::Planes>,
         level: &Level,
         steps: &Steps,
         hit_threshold: f64,
         svm: &Svm,
     ) -> Result<Vec<Candidate>> {
         let grid = steps.grid(level.size, &self.spec);
-        let hits = if level.size == size_of(image) {
-            self.hits(image, &grid, hit_threshold, svm)
-        } else {
-            let pixels = resize(image, level.size)?;
-            let row = level.size.width * image.channels();
-            let image = ImageView::new(&pixels, level.size.width, level.size.height, image.channels(), row)?;
-            self.hits(image, &grid, hit_threshold, svm)
-        };
+        let hits = self.hits(image, planes, level.size, &grid, hit_threshold, svm)?;
         let candidate = |hit: &Hit| Candidate {
             rect: to_image(hit.x, hit.y, level.scale, &self.spec),
             weight: hit.weight,
@@ -206,18 +231,73 @@ impl Hog {
         Ok(hits.iter().map(candidate).collect())
     }
 
-    /// The hits among all windows of an image, row by row.
-    fn hits(&self, image: ImageView, grid: &Grid, hit_threshold: f64, svm: &Svm) -> Vec<Hit> {
-        let scores = reference::scores(image, grid, &self.spec, svm);
-        let mut hits = Vec::new();
-        for (index, weight) in scores.into_iter().enumerate() {
-            if weight >= hit_threshold {
-                let (i, j) = (index % grid.windows.width, index / grid.windows.width);
-                let (x, y) = grid.to_image(i * grid.stride.width, j * grid.stride.height);
-                hits.push(Hit { x, y, weight });
-            }
+    /// The hits among all windows of the image shrunk to `size`, row by row.
+    fn hits(
+        &self,
+        image: ImageView,
+        planes: Option<&simd::Planes>,
+        size: Size,
+        grid: &Grid,
+        hit_threshold: f64,
+        svm: &Svm,
+    ) -> Result<Vec<Hit>> {
+        let hit = |(x, y): (usize, usize), weight: f64| {
+            let (x, y) = grid.to_image(x, y);
+            Hit { x, y, weight }
+        };
+        if let (Some(planes), Some(plan)) = (planes, &self.fast)
+            && simd::serves(grid)
+        {
+            return SCRATCH.with(|scratch| {
+                simd::detect(self.backend, plan, planes, size, grid, hit_threshold, scratch);
+                let mut level = None;
+                let mut hits = Vec::new();
+                for &(x, y, score) in &scratch.found {
+                    let weight = if (score - hit_threshold).abs() > plan.noise() {
+                        score
+                    } else {
+                        // Too close to call: the exact sums decide, as OpenCV orders them.
+                        let level = match &mut level {
+                            Some(level) => level,
+                            none => none.insert(Shrunk::new(image, size)?),
+                        };
+                        reference::window_score(level.view()?, grid, (x, y), &self.spec, svm)
+                    };
+                    if weight >= hit_threshold {
+                        hits.push(hit((x, y), weight));
+                    }
+                }
+                Ok(hits)
+            });
         }
-        hits
+        let level = Shrunk::new(image, size)?;
+        let scores = reference::scores(level.view()?, grid, &self.spec, svm);
+        let place = |index: usize| {
+            let (i, j) = (index % grid.windows.width, index / grid.windows.width);
+            (i * grid.stride.width, j * grid.stride.height)
+        };
+        let found = scores.into_iter().enumerate().filter(|&(_, weight)| weight >= hit_threshold);
+        Ok(found.map(|(index, weight)| hit(place(index), weight)).collect())
+    }
+}
+
+/// The image at a level's size.
+struct Shrunk<'a> {
+    image: ImageView<'a>,
+    /// Its size and pixels, unless it is the image itself.
+    pixels: Option<(Size, Vec<u8>)>,
+}
+
+impl<'a> Shrunk<'a> {
+    fn new(image: ImageView<'a>, size: Size) -> Result<Self> {
+        let pixels = if size == size_of(image) { None } else { Some((size, resize(image, size)?)) };
+        Ok(Self { image, pixels })
+    }
+
+    fn view(&self) -> Result<ImageView<'_>> {
+        let Some((size, pixels)) = &self.pixels else { return Ok(self.image) };
+        let channels = self.image.channels();
+        ImageView::new(pixels, size.width, size.height, channels, size.width * channels)
     }
 }
 

@@ -23,6 +23,7 @@ pub mod reference;
 pub mod svm;
 
 mod simd;
+mod workspace;
 
 #[cfg(feature = "python")]
 mod python;
@@ -32,3 +33,4 @@ pub use error::{HogError, Result};
 pub use group::{Candidate, Rect};
 pub use image::ImageView;
 pub use params::{HogParams, HogSpec, Size};
+pub use simd::Backend;

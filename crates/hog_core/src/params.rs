@@ -98,6 +98,8 @@ pub struct HogSpec {
     pub nlevels: usize,
     /// Bins over 2π instead of π.
     pub signed_gradient: bool,
+    /// The block's Gaussian [px].
+    pub sigma: f32,
     /// Which pixel of a block adds how much to which cell.
     pub weights: BlockWeights,
 }
@@ -165,6 +167,7 @@ impl HogSpec {
             gamma_correction: params.gamma_correction,
             nlevels: params.nlevels.min(i64::from(i32::MAX)) as usize,
             signed_gradient: params.signed_gradient,
+            sigma,
             weights: BlockWeights::new(block, cell, nbins, sigma),
         })
     }

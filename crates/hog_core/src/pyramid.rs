@@ -56,9 +56,9 @@ pub struct Tap {
 }
 
 /// The taps of OpenCV's INTER_LINEAR_EXACT from `from` pixels to `to`.
-pub fn taps(from: usize, to: usize) -> Vec<Tap> {
+pub fn taps(from: usize, to: usize) -> impl ExactSizeIterator<Item = Tap> + Clone {
     let step = 1.0 / (to as f64 / from as f64);
-    let tap = |index: usize| {
+    let tap = move |index: usize| {
         let position = step * (index as f64 + 0.5) - 0.5;
         let first = position.floor();
         if first < 0.0 || from == 1 {
@@ -70,7 +70,7 @@ pub fn taps(from: usize, to: usize) -> Vec<Tap> {
         let weight = ((position - first) * 256.0).round_ties_even() as u32;
         Tap { first: first as usize, second: first as usize + 1, weight }
     };
-    (0..to).map(tap).collect()
+    (0..to).map(tap)
 }
 
 /// `image` at `size`, bit for bit as OpenCV's INTER_LINEAR_EXACT; rows without gaps, channels interleaved.
@@ -79,7 +79,7 @@ pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
     if size.width == 0 || size.height == 0 {
         return Err(HogError::Image(format!("cannot resize to {} x {} pixels", size.width, size.height)));
     }
-    let across = taps(image.width(), size.width);
+    let across: Vec<Tap> = taps(image.width(), size.width).collect();
     let down = taps(image.height(), size.height);
     let shrink_row = |y: usize, out: &mut Vec<u32>| {
         let row = image.row(y);
@@ -94,7 +94,7 @@ pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
     let mut out = Vec::with_capacity(size.width * size.height * channels);
     let (mut upper, mut lower) = (Vec::new(), Vec::new());
     let (mut upper_row, mut lower_row) = (usize::MAX, usize::MAX);
-    for tap in &down {
+    for tap in down {
         if tap.first != upper_row {
             if tap.first == lower_row {
                 std::mem::swap(&mut upper, &mut lower);

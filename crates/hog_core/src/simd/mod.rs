@@ -1,6 +1,21 @@
 //! Everything that is compiled for more than one instruction set, and the crate's only `unsafe`.
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod backend;
+mod lane;
+mod level;
+mod plan;
 mod polar;
+mod rows;
+mod score;
+mod strip;
 
+pub use backend::Backend;
+pub(crate) use level::{Scratch, detect, serves};
+pub(crate) use plan::Plan;
 pub(crate) use polar::polar;
+pub(crate) use rows::Planes;

@@ -1,0 +1,276 @@
+//! AVX-512 (F, BW, VL, DQ, VBMI, VNNI): 16 lanes, 32 registers, masks.
+
+use std::arch::x86_64::*;
+
+use super::lane::Lane;
+use super::rows::Columns;
+
+/// Proof that the CPU has AVX-512 F, BW, VL, DQ, VBMI and VNNI.
+#[derive(Clone, Copy)]
+pub(super) struct Avx512(());
+
+impl Avx512 {
+    /// # Safety
+    /// The CPU has AVX-512 F, BW, VL, DQ, VBMI and VNNI.
+    #[inline(always)]
+    pub(super) unsafe fn new() -> Self {
+        Self(())
+    }
+}
+
+/// Runs intrinsics that the token allows.
+macro_rules! isa {
+    ($e:expr) => {{
+        // SAFETY: `self` proves that the CPU has the instruction set; pointers are the caller's promise.
+        unsafe { $e }
+    }};
+}
+
+impl Lane for Avx512 {
+    const LANES: usize = 16;
+    const WIDE: bool = true;
+    const GROUP: usize = 32;
+    const REACH: usize = 128;
+    const COARSE_VECTORS: usize = 2;
+    type F = __m512;
+    type I = __m512i;
+    type M = __mmask16;
+    type Masked = (__m512, __mmask16);
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> __m512 {
+        isa!(_mm512_set1_ps(x))
+    }
+    #[inline(always)]
+    unsafe fn load(self, from: *const f32) -> __m512 {
+        isa!(_mm512_loadu_ps(from))
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32, x: __m512) {
+        isa!(_mm512_storeu_ps(to, x));
+    }
+    #[inline(always)]
+    fn add(self, a: __m512, b: __m512) -> __m512 {
+        isa!(_mm512_add_ps(a, b))
+    }
+    #[inline(always)]
+    fn sub(self, a: __m512, b: __m512) -> __m512 {
+        isa!(_mm512_sub_ps(a, b))
+    }
+    #[inline(always)]
+    fn mul(self, a: __m512, b: __m512) -> __m512 {
+        isa!(_mm512_mul_ps(a, b))
+    }
+    #[inline(always)]
+    fn min(self, a: __m512, b: __m512) -> __m512 {
+        isa!(_mm512_min_ps(a, b))
+    }
+    #[inline(always)]
+    fn mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+        isa!(_mm512_fmadd_ps(a, b, c))
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+        isa!(_mm512_fnmadd_ps(a, b, c))
+    }
+    #[inline(always)]
+    fn abs(self, x: __m512) -> __m512 {
+        isa!(_mm512_abs_ps(x))
+    }
+    #[inline(always)]
+    fn min_abs(self, a: __m512, b: __m512) -> __m512 {
+        isa!(_mm512_range_ps::<0b1010>(a, b)) // the smaller absolute value, sign cleared
+    }
+    #[inline(always)]
+    fn max_abs(self, a: __m512, b: __m512) -> __m512 {
+        isa!(_mm512_range_ps::<0b1011>(a, b))
+    }
+    #[inline(always)]
+    fn floor(self, x: __m512) -> __m512 {
+        isa!(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(x))
+    }
+    #[inline(always)]
+    fn round(self, x: __m512) -> __m512 {
+        isa!(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(x))
+    }
+    #[inline(always)]
+    fn sqrt(self, x: __m512) -> __m512 {
+        isa!(_mm512_sqrt_ps(x))
+    }
+    #[inline(always)]
+    fn root(self, x: __m512) -> __m512 {
+        // One Newton step from a 14-bit estimate; zeroing the estimate of 0 keeps infinity out.
+        let some = isa!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(x, _mm512_setzero_ps()));
+        let r = isa!(_mm512_maskz_rsqrt14_ps(some, x));
+        let s = self.mul(x, r);
+        let rest = self.neg_mul_add(s, s, x);
+        self.mul_add(rest, self.mul(r, self.splat(0.5)), s)
+    }
+    #[inline(always)]
+    fn ratio(self, a: __m512, b: __m512) -> __m512 {
+        let some = isa!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(b, _mm512_setzero_ps()));
+        let r = isa!(_mm512_maskz_rcp14_ps(some, b));
+        let c = self.mul(a, r);
+        self.mul_add(self.neg_mul_add(c, b, a), r, c)
+    }
+    #[inline(always)]
+    fn div(self, a: __m512, b: __m512) -> __m512 {
+        isa!(_mm512_div_ps(a, b))
+    }
+    #[inline(always)]
+    fn less(self, a: __m512, b: __m512) -> __mmask16 {
+        isa!(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b))
+    }
+    #[inline(always)]
+    fn negate_where(self, mask: __mmask16, x: __m512) -> __m512 {
+        isa!(_mm512_mask_xor_ps(x, mask, x, _mm512_set1_ps(-0.0)))
+    }
+    #[inline(always)]
+    fn zero_where(self, mask: __mmask16, x: __m512) -> __m512 {
+        isa!(_mm512_maskz_mov_ps(!mask, x))
+    }
+    #[inline(always)]
+    fn select(self, mask: __mmask16, yes: __m512, no: __m512) -> __m512 {
+        isa!(_mm512_mask_blend_ps(mask, no, yes))
+    }
+    #[inline(always)]
+    fn flip_by_signs(self, x: __m512, a: __m512, b: __m512) -> __m512 {
+        isa!({
+            let sign = _mm512_set1_epi32(i32::MIN);
+            let (a, b) = (_mm512_castps_si512(a), _mm512_castps_si512(b));
+            let flip = _mm512_ternarylogic_epi32::<0x28>(a, b, sign); // (a ^ b) & sign
+            _mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(x), flip))
+        })
+    }
+    #[inline(always)]
+    fn keep(self, x: __m512, key: __m512, wanted: f32) -> (__m512, __mmask16) {
+        (x, isa!(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(key, _mm512_set1_ps(wanted))))
+    }
+    #[inline(always)]
+    fn keep_either(self, one: (__m512, __m512, f32), other: (__m512, __m512, f32)) -> (__m512, __mmask16) {
+        let (x, mask) = self.keep(one.0, one.1, one.2);
+        let (y, other) = self.keep(other.0, other.1, other.2);
+        (isa!(_mm512_mask_mov_ps(x, other, y)), mask | other)
+    }
+    #[inline(always)]
+    fn mul_add_masked(self, (x, mask): (__m512, __mmask16), weight: __m512, sum: __m512) -> __m512 {
+        isa!(_mm512_mask3_fmadd_ps(x, weight, sum, mask))
+    }
+    #[inline(always)]
+    fn shift_in(self, x: __m512, next: f32) -> __m512 {
+        isa!({
+            let next = _mm512_castps_si512(_mm512_set1_ps(next));
+            _mm512_castsi512_ps(_mm512_alignr_epi32::<1>(next, _mm512_castps_si512(x)))
+        })
+    }
+    #[inline(always)]
+    fn first(self, x: __m512) -> f32 {
+        isa!(_mm512_cvtss_f32(x))
+    }
+    #[inline(always)]
+    unsafe fn low_words(self, from: *const u8) -> __m512i {
+        isa!({
+            let even = _mm512_set_epi32(30, 28, 26, 24, 22, 20, 18, 16, 14, 12, 10, 8, 6, 4, 2, 0);
+            let (a, b) = (_mm512_loadu_si512(from.cast()), _mm512_loadu_si512(from.add(64).cast()));
+            _mm512_permutex2var_epi32(a, even, b)
+        })
+    }
+    #[inline(always)]
+    unsafe fn high_words(self, from: *const u8) -> __m512i {
+        isa!({
+            let odd = _mm512_set_epi32(31, 29, 27, 25, 23, 21, 19, 17, 15, 13, 11, 9, 7, 5, 3, 1);
+            let (a, b) = (_mm512_loadu_si512(from.cast()), _mm512_loadu_si512(from.add(64).cast()));
+            _mm512_permutex2var_epi32(a, odd, b)
+        })
+    }
+    #[inline(always)]
+    fn byte<const K: u32>(self, words: __m512i) -> __m512 {
+        isa!({
+            let low = _mm512_set1_epi32(0xff);
+            _mm512_cvtepi32_ps(match K {
+                0 => _mm512_and_si512(words, low),
+                1 => _mm512_and_si512(_mm512_srli_epi32::<8>(words), low),
+                2 => _mm512_and_si512(_mm512_srli_epi32::<16>(words), low),
+                _ => _mm512_srli_epi32::<24>(words),
+            })
+        })
+    }
+    #[inline(always)]
+    unsafe fn store_bytes(self, to: *mut u32, [a, b, c, d]: [__m512; 4]) {
+        isa!({
+            let (a, b) = (_mm512_cvtps_epi32(a), _mm512_slli_epi32::<8>(_mm512_cvtps_epi32(b)));
+            let (c, d) = (
+                _mm512_slli_epi32::<16>(_mm512_cvtps_epi32(c)),
+                _mm512_slli_epi32::<24>(_mm512_cvtps_epi32(d)),
+            );
+            let low = _mm512_ternarylogic_epi32::<0xfe>(a, b, c);
+            _mm512_storeu_si512(to.cast(), _mm512_or_si512(low, d));
+        });
+    }
+    #[inline(always)]
+    unsafe fn load_words(self, from: *const u32) -> __m512i {
+        isa!(_mm512_loadu_si512(from.cast()))
+    }
+    #[inline(always)]
+    fn splat_word(self, word: u32) -> __m512i {
+        isa!(_mm512_set1_epi32(word.cast_signed()))
+    }
+    #[inline(always)]
+    fn begin_block(self, total: __m512i) -> __m512i {
+        total
+    }
+    #[inline(always)]
+    fn dot_bytes(self, sum: __m512i, bytes: __m512i, weights: __m512i) -> __m512i {
+        isa!(_mm512_dpbusd_epi32(sum, bytes, weights))
+    }
+    #[inline(always)]
+    fn end_block(self, _total: __m512i, sum: __m512i, _multiple: i32) -> __m512i {
+        sum // every multiple is 1
+    }
+    #[inline(always)]
+    fn at_least(self, words: __m512i, least: i32) -> u32 {
+        isa!(u32::from(_mm512_cmpge_epi32_mask(words, _mm512_set1_epi32(least))))
+    }
+
+    #[inline(always)]
+    unsafe fn mix_columns(self, source: *const u8, columns: &Columns, to: *mut i16) {
+        // One shuffle brings 32 pairs of neighbours together, one instruction weighs and adds them.
+        isa!({
+            let one_vector = columns.span <= 64;
+            for (group, &base) in columns.base.iter().enumerate() {
+                let index = _mm512_loadu_si512(columns.index.as_ptr().add(64 * group).cast());
+                let weight = _mm512_loadu_si512(columns.weight.as_ptr().add(64 * group).cast());
+                let from = source.add(base as usize);
+                let low = _mm512_loadu_si512(from.cast());
+                let pixels = if one_vector {
+                    _mm512_permutexvar_epi8(index, low)
+                } else {
+                    _mm512_permutex2var_epi8(low, index, _mm512_loadu_si512(from.add(64).cast()))
+                };
+                _mm512_storeu_si512(to.add(32 * group).cast(), _mm512_maddubs_epi16(weight, pixels));
+            }
+        });
+    }
+    #[inline(always)]
+    unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize) {
+        isa!({
+            let weights = _mm512_set1_epi32(i32::from(weight) << 16 | i32::from(256 - weight));
+            let bias = _mm512_set1_epi32((1 << 23) + (1 << 15)); // undoes −2¹⁵ of both rows, rounds half up
+            let order = _mm512_set_epi64(7, 5, 3, 1, 6, 4, 2, 0);
+            for at in (0..len).step_by(64) {
+                let mut halves = [_mm512_setzero_si512(); 2];
+                for (half, mixed) in halves.iter_mut().enumerate() {
+                    let a = _mm512_loadu_si512(upper.add(at + 32 * half).cast());
+                    let b = _mm512_loadu_si512(lower.add(at + 32 * half).cast());
+                    let low = _mm512_madd_epi16(_mm512_unpacklo_epi16(a, b), weights);
+                    let high = _mm512_madd_epi16(_mm512_unpackhi_epi16(a, b), weights);
+                    let low = _mm512_srli_epi32::<16>(_mm512_add_epi32(low, bias));
+                    let high = _mm512_srli_epi32::<16>(_mm512_add_epi32(high, bias));
+                    *mixed = _mm512_packus_epi32(low, high);
+                }
+                let bytes = _mm512_packus_epi16(halves[0], halves[1]);
+                _mm512_storeu_si512(to.add(at).cast(), _mm512_permutexvar_epi64(order, bytes));
+            }
+        });
+    }
+}

@@ -1,0 +1,119 @@
+//! The vector a kernel is written for: one trait, an implementation per instruction set.
+
+use super::rows::Columns;
+
+/// The operations of one instruction set on vectors of [`LANES`](Self::LANES) single precision numbers.
+///
+/// A value of an implementing type is the proof that the CPU has the instruction set: it can only be made (unsafely)
+/// after detection. Methods are `#[inline(always)]`, so that a kernel generic over `Lane` is compiled whole inside the
+/// one function that enables the instruction set; called elsewhere they are right, but slow.
+pub(super) trait Lane: Copy {
+    /// Numbers in a vector.
+    const LANES: usize;
+    /// Whether there are registers for all 27 sums of a cell (32 registers), or only for a third of them (16).
+    const WIDE: bool;
+    /// Single precision numbers.
+    type F: Copy;
+    /// 32-bit words.
+    type I: Copy;
+    /// One truth value per lane.
+    type M: Copy;
+    /// A vector of which only some lanes count; the others stand for 0.
+    type Masked: Copy;
+    /// Output pixels that `mix_columns` makes at a time ...
+    const GROUP: usize;
+    /// ... and the source pixels they may lie apart.
+    const REACH: usize;
+
+    /// Vectors of windows that the first look takes at a time.
+    const COARSE_VECTORS: usize;
+
+    fn splat(self, x: f32) -> Self::F;
+    /// # Safety
+    /// `from` points at `LANES` readable numbers.
+    unsafe fn load(self, from: *const f32) -> Self::F;
+    /// # Safety
+    /// `to` points at `LANES` writable numbers.
+    unsafe fn store(self, to: *mut f32, x: Self::F);
+    fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a·b + c.
+    fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// c − a·b.
+    fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    fn abs(self, x: Self::F) -> Self::F;
+    /// min(|a|, |b|).
+    fn min_abs(self, a: Self::F, b: Self::F) -> Self::F;
+    /// max(|a|, |b|).
+    fn max_abs(self, a: Self::F, b: Self::F) -> Self::F;
+    /// The integer below a number in 0..16.
+    fn floor(self, x: Self::F) -> Self::F;
+    /// The integer nearest to a number in 0..16.
+    fn round(self, x: Self::F) -> Self::F;
+    /// The square root, correctly rounded.
+    fn sqrt(self, x: Self::F) -> Self::F;
+    /// The square root within 2 ulp; 0 of 0.
+    fn root(self, x: Self::F) -> Self::F;
+    /// a / b within 2 ulp for 0 ≤ a ≤ b; 0 where both are 0.
+    fn ratio(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a / b, correctly rounded.
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    fn less(self, a: Self::F, b: Self::F) -> Self::M;
+    /// −x where `mask`, else x.
+    fn negate_where(self, mask: Self::M, x: Self::F) -> Self::F;
+    /// 0 where `mask`, else x.
+    fn zero_where(self, mask: Self::M, x: Self::F) -> Self::F;
+    /// `yes` where `mask`, else `no`.
+    fn select(self, mask: Self::M, yes: Self::F, no: Self::F) -> Self::F;
+    /// `x` with its sign flipped where exactly one of `a`, `b` is negative.
+    fn flip_by_signs(self, x: Self::F, a: Self::F, b: Self::F) -> Self::F;
+    /// `x` in those lanes whose `key` is the small integer `wanted`.
+    fn keep(self, x: Self::F, key: Self::F, wanted: f32) -> Self::Masked;
+    /// `x` where `key` is `wanted`, `other` where `other_key` is `other_wanted`; never both.
+    fn keep_either(self, one: (Self::F, Self::F, f32), other: (Self::F, Self::F, f32)) -> Self::Masked;
+    /// sum + x·weight.
+    fn mul_add_masked(self, x: Self::Masked, weight: Self::F, sum: Self::F) -> Self::F;
+    /// Lanes 1.. of `x`, then `next`.
+    fn shift_in(self, x: Self::F, next: f32) -> Self::F;
+    /// Lane 0.
+    fn first(self, x: Self::F) -> f32;
+    /// The low halves of `LANES` 8-byte words.
+    /// # Safety
+    /// `from` points at `8 * LANES` readable bytes.
+    unsafe fn low_words(self, from: *const u8) -> Self::I;
+    /// The high halves of `LANES` 8-byte words.
+    /// # Safety
+    /// `from` points at `8 * LANES` readable bytes.
+    unsafe fn high_words(self, from: *const u8) -> Self::I;
+    /// Byte `K` of every word, as a number.
+    fn byte<const K: u32>(self, words: Self::I) -> Self::F;
+    /// Four numbers of 0..=255 per lane, rounded, as the four bytes of a word.
+    /// # Safety
+    /// `to` points at `LANES` writable words.
+    unsafe fn store_bytes(self, to: *mut u32, x: [Self::F; 4]);
+    /// # Safety
+    /// `from` points at `LANES` readable words.
+    unsafe fn load_words(self, from: *const u32) -> Self::I;
+    fn splat_word(self, word: u32) -> Self::I;
+    /// What a block's sum of `dot_bytes` begins with, if it is to be added to `total`.
+    fn begin_block(self, total: Self::I) -> Self::I;
+    /// sum + the products of the four unsigned bytes with the four signed weights of each word.
+    fn dot_bytes(self, sum: Self::I, bytes: Self::I, weights: Self::I) -> Self::I;
+    /// The total with a block's sum, counted `multiple` times.
+    fn end_block(self, total: Self::I, sum: Self::I, multiple: i32) -> Self::I;
+    /// One bit per lane: whether the word is at least `least`.
+    fn at_least(self, words: Self::I, least: i32) -> u32;
+
+    /// Mixes neighbouring pixels of a row (`source`, each byte flipped by 0x80) as `columns` tells: Σ weight·pixel −
+    /// 2¹⁵, for every output pixel (rounded up to a whole group).
+    /// # Safety
+    /// The taps of `columns` and [`rows::SLACK`](super::rows::SLACK) bytes after them are readable in `source`; `to`
+    /// has room for all groups.
+    unsafe fn mix_columns(self, source: *const u8, columns: &Columns, to: *mut i16);
+    /// (upper·(256 − weight) + lower·weight) / 2¹⁶, rounded half up, of rows made by `mix_columns`.
+    /// # Safety
+    /// Rows hold `len` rounded up to 64 elements.
+    unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize);
+}

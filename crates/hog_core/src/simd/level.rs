@@ -1,0 +1,190 @@
+//! One level, from planes to hits: lattices, strips, scores, and the choice of instruction set.
+
+use crate::grid::Grid;
+use crate::image::reflect_101;
+use crate::params::Size;
+
+use super::backend::Backend;
+use super::lane::Lane;
+use super::plan::{Plan, WORDS};
+use super::rows::{LevelImage, Planes, Shrink};
+use super::score::{Windows, score};
+use super::strip::{BLOCK, Job, strip};
+
+/// Scratch memory of one level, used again from level to level and call to call.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch {
+    image: LevelImage,
+    shrink: Shrink,
+    rows: Vec<usize>,
+    blocks: Lines,
+    bytes: Lines,
+    edge: Vec<[f32; BLOCK]>,
+    masks: Vec<u32>,
+    sums: Vec<f32>,
+    /// Windows found: padded x, padded y, score.
+    pub(crate) found: Vec<(usize, usize, f64)>,
+}
+
+/// Words in cache lines, so that vectors do not straddle them.
+#[derive(Debug, Default)]
+struct Lines(Vec<Line>);
+
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Line(#[allow(dead_code, reason = "read through a pointer")] [u32; 16]);
+
+impl Lines {
+    /// Room for `len` words; old ones stay.
+    fn reserve(&mut self, len: usize) -> *mut u32 {
+        let lines = len.div_ceil(16);
+        if self.0.len() < lines {
+            self.0.resize(lines, Line([0; 16]));
+        }
+        self.0.as_mut_ptr().cast()
+    }
+}
+
+/// What to look at.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    plan: &'a Plan,
+    source: &'a Planes,
+    size: Size,
+    grid: &'a Grid,
+    threshold: f64,
+}
+
+/// Whether the kernels can serve windows of this stride.
+pub(crate) fn serves(grid: &Grid) -> bool {
+    grid.stride.width.is_multiple_of(4) && grid.stride.height.is_multiple_of(4)
+}
+
+/// Puts into `scratch.found` every window of `grid` whose score is at least `threshold`, up to the plan's noise: x, y
+/// in padded pixels, row by row.
+pub(crate) fn detect(
+    backend: Backend,
+    plan: &Plan,
+    source: &Planes,
+    size: Size,
+    grid: &Grid,
+    threshold: f64,
+    scratch: &mut Scratch,
+) {
+    scratch.found.clear();
+    if grid.is_empty() {
+        return;
+    }
+    let task = Task { plan, source, size, grid, threshold };
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available.
+        Backend::Avx512 => unsafe { avx512(task, scratch) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Avx2 => unsafe { avx2(task, scratch) },
+        _ => {}
+    }
+    scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
+fn avx512(task: Task, scratch: &mut Scratch) {
+    use super::{avx2::Avx2, avx512::Avx512};
+    // SAFETY: this function's features are the tokens'.
+    unsafe { level(Avx512::new(), Avx2::new(), task, scratch) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2(task: Task, scratch: &mut Scratch) {
+    use super::avx2::Avx2;
+    // SAFETY: this function's features are the token's.
+    let l = unsafe { Avx2::new() };
+    level(l, l, task, scratch);
+}
+
+/// `tail` serves a level's last strip where that is at most half a vector of `l`.
+#[inline(always)]
+fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) {
+    scratch.image.fill(l, task.source, task.size, task.grid.pad.width, &mut scratch.shrink);
+    let Task { grid, .. } = task;
+    // Windows whose distance is no multiple of 8 lie on several lattices of blocks.
+    let lattices = |stride: usize| if stride.is_multiple_of(8) { 0..1 } else { 0..2 };
+    for y in lattices(grid.stride.height) {
+        for x in lattices(grid.stride.width) {
+            lattice(l, tail, task, (4 * x, 4 * y), scratch);
+        }
+    }
+}
+
+#[inline(always)]
+fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usize), scratch: &mut Scratch) {
+    let Task { plan, source, size, grid, threshold } = task;
+    let along = |padded: usize, blocks: usize, origin: usize| {
+        (padded - origin).checked_sub(8 * (blocks + 1)).map_or(0, |room| room / 8 + 1)
+    };
+    let width = along(grid.padded.width, plan.blocks.width, left);
+    let height = along(grid.padded.height, plan.blocks.height, top);
+    if width == 0 || height == 0 {
+        return;
+    }
+    let (cells_x, cells_y) = (width + plan.blocks.width, height + plan.blocks.height);
+    let lanes = cells_x.next_multiple_of(32) + 32 + plan.blocks.width.next_multiple_of(16);
+    let Scratch { image, rows, blocks, bytes, edge, masks, sums, found, .. } = scratch;
+    let blocks: *mut f32 = blocks.reserve((cells_y - 1) * BLOCK * lanes + 64).cast();
+    let bytes = bytes.reserve((cells_y - 1) * WORDS * lanes + 64);
+    rows.clear();
+    rows.extend((0..8 * cells_y + 2).map(|y| {
+        let y = (top + y) as i64 - 1 - grid.pad.height as i64;
+        reflect_101(y, size.height) * image.stride
+    }));
+    edge.clear();
+    edge.resize(cells_y, [0.0; BLOCK]);
+    let mut origin = [image.pixels().as_ptr(); 3];
+    for (channel, origin) in origin.iter_mut().enumerate().take(source.channels()) {
+        let at = channel * image.plane + image.left + left - grid.pad.width;
+        *origin = image.pixels()[at..].as_ptr();
+    }
+    let mut job = Job { plan, origin, rows, cells_y, blocks, bytes, lanes, edge };
+    // From right to left: a strip adds to the last blocks of the strip left of it.
+    let rest = cells_x % L::LANES;
+    let mut end = cells_x - rest;
+    if rest > T::LANES {
+        strip_of(l, &mut job, end, source.channels());
+    } else if rest > 0 {
+        strip_of(tail, &mut job, end, source.channels());
+    }
+    while end > 0 {
+        end -= L::LANES;
+        strip_of(l, &mut job, end, source.channels());
+    }
+    let before = found.len();
+    let windows = Windows { plan, blocks, bytes, lanes, width, height };
+    // SAFETY: the strips have filled the blocks of all windows; `lanes` is as wide as wanted.
+    unsafe { score(l, &windows, threshold, masks, sums, found) };
+    let mut kept = before;
+    for index in before..found.len() {
+        let (x, y, score) = found[index];
+        let (x, y) = (left + 8 * x, top + 8 * y);
+        if x.is_multiple_of(grid.stride.width) && y.is_multiple_of(grid.stride.height) {
+            found[kept] = (x, y, score);
+            kept += 1;
+        }
+    }
+    found.truncate(kept);
+}
+
+#[inline(always)]
+fn strip_of<L: Lane>(l: L, job: &mut Job, first: usize, channels: usize) {
+    // SAFETY: the level's rows have 16 bytes more on the left and OVERREAD on the right than the padded image;
+    // blocks and bytes were reserved for all lanes.
+    unsafe {
+        if channels == 1 {
+            strip::<L, 1>(l, job, first);
+        } else {
+            strip::<L, 3>(l, job, first);
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! One strip of a level, from pixels to normalised blocks. Lanes are neighbouring cells.
+//!
+//! Eight pixels lie between the same pixel of neighbouring cells: a vector holds pixel column `phase` (0..8) of
+//! `LANES` cells. Every stage then works lane by lane; only where a block joins two cells does a lane look at the next.
+//!
+//! The weight of a pixel in a cell of its block is a Gaussian times a bilinear share, both products of a function of x
+//! and one of y. So the votes of a column are first summed down the rows ([`spread`]), then across the columns
+//! ([`finish`]). A row of cells takes part in two rows of blocks and, per row of blocks, in two cells; a pixel row
+//! reaches three of these four sums.
+
+#![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
+
+use super::lane::Lane;
+use super::plan::Plan;
+
+/// Pixels of a cell along one axis.
+const CELL: usize = 8;
+const BINS: usize = 9;
+/// Elements of a block: 2 × 2 cells.
+pub(super) const BLOCK: usize = 4 * BINS;
+
+/// What the strips of a level read and write.
+pub(super) struct Job<'a> {
+    pub plan: &'a Plan,
+    /// The pixel at the lattice's origin, of each channel.
+    pub origin: [*const u8; 3],
+    /// For each padded row from one above the lattice's origin to one below its last cell: where it begins, relative
+    /// to the first row of the plane.
+    pub rows: &'a [usize],
+    /// Cells of the lattice along y.
+    pub cells_y: usize,
+    /// Normalised blocks: `[block row][element][lane]`, and the same as bytes (1 stands for 255).
+    pub blocks: *mut f32,
+    pub bytes: *mut u32,
+    /// Lanes of a row of blocks.
+    pub lanes: usize,
+    /// For each row of blocks, what the first cells of the strip to the right add to the blocks left of them.
+    pub edge: &'a mut [[f32; BLOCK]],
+}
+
+/// A gradient's two votes. Of two neighbouring bins one is even and one is odd, so each vote is kept by parity and a
+/// bin has to look at one of them only. Bins 8 and 0 are neighbours too: there the odd vote belongs to the other one.
+#[derive(Clone, Copy)]
+struct Votes<F> {
+    even: F,
+    odd: F,
+    /// Half the even bin.
+    even_key: F,
+    /// Half of the odd bin plus one; 0 stands for bin 8, 5 for bin 0.
+    odd_key: F,
+}
+
+/// Computes the blocks of the strip of cells that begins at lane `first`.
+///
+/// # Safety
+/// For every channel and row of `job`, the bytes from 8 before to 8 behind the strip's cells are readable; `blocks`
+/// and `bytes` have `cells_y - 1` rows of `lanes` lanes, the strip's among them.
+#[inline(always)]
+pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, first: usize) {
+    let zero = l.splat(0.0);
+    // Two rows from the cell above, eight of the cell, each with one neighbour on both sides.
+    let mut rows = [[[zero; CELL + 2]; CHANNELS]; CELL + 2];
+    let mut carry = [[[zero; 2]; BINS]; CELL];
+    let mut sums = [[zero; CELL]; 2 * BINS];
+    // SAFETY: promised by the caller.
+    unsafe {
+        fill(l, job, first, 0, &mut rows[0]);
+        fill(l, job, first, 1, &mut rows[1]);
+    }
+    for cell_y in 0..job.cells_y {
+        for (i, to) in rows[2..].iter_mut().enumerate() {
+            // SAFETY: promised by the caller.
+            unsafe { fill(l, job, first, CELL * cell_y + i + 2, to) };
+        }
+        for phase in 0..CELL {
+            let mut votes = [Votes { even: zero, odd: zero, even_key: zero, odd_key: zero }; CELL];
+            for (y, votes) in votes.iter_mut().enumerate() {
+                *votes = vote::<L, CHANNELS>(l, &rows, phase, y);
+            }
+            if L::WIDE {
+                spread::<L, 0, 9>(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
+            } else {
+                spread::<L, 0, 3>(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
+                spread::<L, 3, 6>(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
+                spread::<L, 6, 9>(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
+            }
+        }
+        rows.copy_within(CELL.., 0);
+        if cell_y > 0 {
+            // SAFETY: the strip's lanes of this row of blocks are the caller's promise.
+            unsafe { finish(l, job, &sums, cell_y - 1, first) };
+        }
+    }
+}
+
+/// The pixels of padded row `y` of every channel.
+#[inline(always)]
+unsafe fn fill<L: Lane, const CHANNELS: usize>(
+    l: L,
+    job: &Job,
+    first: usize,
+    y: usize,
+    to: &mut [[L::F; CELL + 2]; CHANNELS],
+) {
+    for (channel, to) in to.iter_mut().enumerate() {
+        // SAFETY: promised by the caller of `strip`.
+        unsafe { row(l, job.plan.gamma, job.origin[channel].add(job.rows[y] + CELL * first), to) };
+    }
+}
+
+/// One row of pixels as ten vectors: columns -1..=8 of every cell, after gamma.
+#[inline(always)]
+unsafe fn row<L: Lane>(l: L, gamma: bool, from: *const u8, to: &mut [L::F; CELL + 2]) {
+    // SAFETY: the strip and 8 bytes on both sides are readable.
+    let (before, low, high, after) = unsafe {
+        (l.high_words(from.sub(8)), l.low_words(from), l.high_words(from), l.low_words(from.add(8)))
+    };
+    *to = [
+        l.byte::<3>(before),
+        l.byte::<0>(low),
+        l.byte::<1>(low),
+        l.byte::<2>(low),
+        l.byte::<3>(low),
+        l.byte::<0>(high),
+        l.byte::<1>(high),
+        l.byte::<2>(high),
+        l.byte::<3>(high),
+        l.byte::<0>(after),
+    ];
+    if gamma {
+        for value in to {
+            *value = l.sqrt(*value);
+        }
+    }
+}
+
+/// The votes of pixel (`phase`, `y`) of every cell.
+#[inline(always)]
+fn vote<L: Lane, const CHANNELS: usize>(
+    l: L,
+    rows: &[[[L::F; CELL + 2]; CHANNELS]; CELL + 2],
+    phase: usize,
+    y: usize,
+) -> Votes<L::F> {
+    let [mut dx, mut dy, mut xx, mut yy, mut squared] = derive(l, rows, 0, phase, y);
+    for channel in 1..CHANNELS {
+        let other = derive(l, rows, channel, phase, y);
+        let stronger = l.less(squared, other[4]);
+        dx = l.select(stronger, other[0], dx);
+        dy = l.select(stronger, other[1], dy);
+        xx = l.select(stronger, other[2], xx);
+        yy = l.select(stronger, other[3], yy);
+        squared = l.select(stronger, other[4], squared);
+    }
+    let magnitude = l.root(squared);
+    // OpenCV's polynomial for the arctangent of 0..=1, in units of two bins.
+    let c = l.ratio(l.min_abs(dx, dy), l.max_abs(dx, dy));
+    let cc = l.mul(c, c);
+    let p = l.mul_add(cc, l.splat(ARC[3]), l.splat(ARC[2]));
+    let p = l.mul_add(p, cc, l.splat(ARC[1]));
+    let p = l.mul_add(p, cc, l.splat(ARC[0]));
+    // The position along the bins is 2.5 ± (arc − 2.25) up to 45°, 2.5 ∓ arc beyond, where the signs of dx and dy
+    // are (not) equal; half a bin is added so that bin b lies around (b + 1) / 2.
+    let steep = l.less(xx, yy);
+    let arc = l.mul_add(p, l.negate_where(steep, c), l.zero_where(steep, l.splat(-2.25)));
+    let position = l.add(l.splat(2.5), l.flip_by_signs(arc, dx, dy));
+    // A triangle wave: how near the even bin is. Votes are halved here, the weights doubled.
+    let odd_key = l.round(position);
+    let share = l.abs(l.sub(position, odd_key));
+    Votes {
+        even: l.mul(magnitude, share),
+        odd: l.mul(magnitude, l.sub(l.splat(0.5), share)),
+        even_key: l.floor(position),
+        odd_key,
+    }
+}
+
+/// dx, dy, their squares, and the sum of these. Two products and a sum, never fused: a fused step would make another
+/// channel the strongest than OpenCV's.
+#[inline(always)]
+fn derive<L: Lane, const CHANNELS: usize>(
+    l: L,
+    rows: &[[[L::F; CELL + 2]; CHANNELS]; CELL + 2],
+    channel: usize,
+    phase: usize,
+    y: usize,
+) -> [L::F; 5] {
+    let dx = l.sub(rows[y + 1][channel][phase + 2], rows[y + 1][channel][phase]);
+    let dy = l.sub(rows[y + 2][channel][phase + 1], rows[y][channel][phase + 1]);
+    let (xx, yy) = (l.mul(dx, dx), l.mul(dy, dy));
+    [dx, dy, xx, yy, l.add(xx, yy)]
+}
+
+/// The polynomial's coefficients: radians to units of two bins of π/9.
+const ARC: [f32; 4] = {
+    const UNIT: f64 = 4.5 / std::f64::consts::PI;
+    [
+        (0.9997878412794807 * UNIT) as f32,
+        (-0.3258083974640975 * UNIT) as f32,
+        (0.1555786518463281 * UNIT) as f32,
+        (-0.04432655554792128 * UNIT) as f32,
+    ]
+};
+
+/// Sums the votes of bins `FROM..TO` of one pixel column down a cell's rows, weighted.
+///
+/// `carry` holds what the row of cells above gave to the row of blocks it begins; with this row of cells that is whole
+/// and goes to `sums`. What this row of cells begins goes to `carry`.
+#[inline(always)]
+fn spread<L: Lane, const FROM: usize, const TO: usize>(
+    l: L,
+    weights: &[[f32; 3]; CELL],
+    votes: &[Votes<L::F>; CELL],
+    carry: &mut [[L::F; 2]; BINS],
+    sums: &mut [[L::F; CELL]; 2 * BINS],
+    phase: usize,
+) {
+    let zero = l.splat(0.0);
+    // Per bin: upper cell of the blocks that begin here; of the blocks that end here the upper (in the first four
+    // rows, then the lower cell of the blocks that begin here); the lower cell of the blocks that end here.
+    let mut acc = [[zero; 3]; BINS];
+    for bin in FROM..TO {
+        acc[bin] = [zero, carry[bin][0], carry[bin][1]];
+    }
+    for half in 0..2 {
+        for y in 4 * half..4 * half + 4 {
+            let w = [l.splat(weights[y][0]), l.splat(weights[y][1]), l.splat(weights[y][2])];
+            for bin in FROM..TO {
+                let kept = of_bin(l, &votes[y], bin);
+                for k in 0..3 {
+                    acc[bin][k] = l.mul_add_masked(kept, w[k], acc[bin][k]);
+                }
+            }
+        }
+        if half == 0 {
+            for bin in FROM..TO {
+                sums[bin][phase] = acc[bin][1];
+                acc[bin][1] = zero;
+            }
+        }
+    }
+    for bin in FROM..TO {
+        carry[bin] = [acc[bin][0], acc[bin][1]];
+        sums[BINS + bin][phase] = acc[bin][2];
+    }
+}
+
+/// What the votes give to `bin`.
+#[inline(always)]
+fn of_bin<L: Lane>(l: L, votes: &Votes<L::F>, bin: usize) -> L::Masked {
+    match bin {
+        0 => l.keep_either((votes.even, votes.even_key, 0.0), (votes.odd, votes.odd_key, 5.0)),
+        8 => l.keep_either((votes.even, votes.even_key, 4.0), (votes.odd, votes.odd_key, 0.0)),
+        _ if bin.is_multiple_of(2) => l.keep(votes.even, votes.even_key, (bin / 2) as f32),
+        _ => l.keep(votes.odd, votes.odd_key, bin.div_ceil(2) as f32),
+    }
+}
+
+/// Sums across the columns of each block's two cells, normalises (L2-Hys) and stores the blocks of one row.
+#[inline(always)]
+unsafe fn finish<L: Lane>(
+    l: L,
+    job: &mut Job,
+    sums: &[[L::F; CELL]; 2 * BINS],
+    block_y: usize,
+    first: usize,
+) {
+    let zero = l.splat(0.0);
+    let mut block = [zero; BLOCK];
+    let mut squares = [zero; 4];
+    let across = &job.plan.across;
+    let edge = &mut job.edge[block_y];
+    for (i, sums) in sums.iter().enumerate() {
+        // Left cell from this and the next column of cells, right cell likewise.
+        let [mut left, mut left_next, mut right, mut right_next] = [zero; 4];
+        for (x, &sum) in sums.iter().enumerate() {
+            left = l.mul_add(sum, l.splat(across[x][0]), left);
+            right_next = l.mul_add(sum, l.splat(across[x][2]), right_next);
+            if x < CELL / 2 {
+                left_next = l.mul_add(sum, l.splat(across[x][1]), left_next);
+            } else {
+                right = l.mul_add(sum, l.splat(across[x][1]), right);
+            }
+        }
+        for (k, (own, next)) in [(left, left_next), (right, right_next)].into_iter().enumerate() {
+            let at = k * 2 * BINS + i;
+            let value = l.add(own, l.shift_in(next, edge[at]));
+            edge[at] = l.first(next);
+            squares[2 * k + i % 2] = l.mul_add(value, value, squares[2 * k + i % 2]);
+            block[at] = value;
+        }
+    }
+    let total = l.add(l.add(squares[0], squares[1]), l.add(squares[2], squares[3]));
+    let scale = l.div(l.splat(1.0), l.add(l.sqrt(total), l.splat(BLOCK as f32 * 0.1)));
+    let limit = l.splat(job.plan.l2_hys_threshold);
+    let mut squares = [zero; 4];
+    for (i, value) in block.iter_mut().enumerate() {
+        *value = l.min(l.mul(*value, scale), limit);
+        squares[i % 4] = l.mul_add(*value, *value, squares[i % 4]);
+    }
+    let total = l.add(l.add(squares[0], squares[1]), l.add(squares[2], squares[3]));
+    let scale = l.div(l.splat(1.0), l.add(l.sqrt(total), l.splat(1e-3)));
+    let byte_scale = l.mul(scale, l.splat(255.0));
+    for (group, values) in block.as_chunks::<4>().0.iter().enumerate() {
+        for (i, &value) in values.iter().enumerate() {
+            let at = (block_y * BLOCK + 4 * group + i) * job.lanes + first;
+            // SAFETY: the strip's lanes of this row of blocks.
+            unsafe { l.store(job.blocks.add(at), l.mul(value, scale)) };
+        }
+        let at = (block_y * (BLOCK / 4) + group) * job.lanes + first;
+        let bytes = [
+            l.mul(values[0], byte_scale),
+            l.mul(values[1], byte_scale),
+            l.mul(values[2], byte_scale),
+            l.mul(values[3], byte_scale),
+        ];
+        // SAFETY: as above.
+        unsafe { l.store_bytes(job.bytes.add(at), bytes) };
+    }
+}

@@ -1,4 +1,4 @@
-"""A walking person as a point that keeps its velocity: a Kalman filter of four states.
+"""A walking person as a point that keeps its velocity, for a while: a Kalman filter of four states.
 
 The track lives in the odometry frame, so the robot's own motion drops out of it by itself; a measurement is a
 bearing and a range as seen from the robot's pose at the moment the picture was taken. See Bar-Shalom, Li and
@@ -30,12 +30,15 @@ class Noise:
         Standard deviations of a measurement [rad, m].
     velocity
         Standard deviation of the speed of somebody just found [m/s].
+    persistence
+        How long somebody keeps walking, unseen: time constant of the velocity's decay [s].
     """
 
     acceleration: float = 0.6
-    bearing: float = 0.015
-    range: float = 0.12
+    bearing: float = 0.02
+    range: float = 0.15
     velocity: float = 0.6
+    persistence: float = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +84,10 @@ def predicted(track: Track, stamp: float, noise: Noise) -> Track:
     if dt <= 0:
         return track
     eye = np.eye(2)
+    kept = math.exp(-dt / noise.persistence)
     move = np.eye(4)
-    move[:2, 2:] = dt * eye
+    move[:2, 2:] = noise.persistence * (1 - kept) * eye
+    move[2:, 2:] = kept * eye
     q = noise.acceleration**2
     spread = np.block([[q * dt**3 / 3 * eye, q * dt**2 / 2 * eye], [q * dt**2 / 2 * eye, q * dt * eye]])
     return Track(stamp, move @ track.mean, move @ track.covariance @ move.T + spread)

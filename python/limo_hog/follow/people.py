@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.body import Body
 from limo_hog.follow.kalman import (
-    Innovation,
     Noise,
     Track,
     bearing_range,
@@ -18,6 +18,7 @@ from limo_hog.follow.kalman import (
     innovation,
     predicted,
     updated,
+    wrapped,
 )
 from limo_hog.follow.observation import Observation, Odometry
 from limo_hog.follow.proxemics import box_centre, person_depth
@@ -25,6 +26,8 @@ from limo_hog.follow.region import Region
 
 #: How much one frame counts in a person's trust.
 _TRUST_STEP = 0.1
+#: Boxes nearer than this to a person are never somebody else [m].
+_SAME_PERSON = 0.5
 #: How much one box counts in a person's size.
 _SIZE_STEP = 0.2
 #: Distance assumed for somebody whose distance no sensor tells [m], and its standard deviation [m].
@@ -41,8 +44,8 @@ class Person:
         Tells people apart; never used twice.
     track
         Where they are and how they walk.
-    seen
-        Stamp of the last frame they were found in [s].
+    seen, felt
+        Stamp of the last frame they were found in, and of the last scan with their legs [s].
     trust
         0..1: share of the latest frames in which they were found where they should be. A pillar may look like a
         person now and then; a person looks like one all the time.
@@ -56,6 +59,7 @@ class Person:
     trust: float
     window: float
     centre: float
+    felt: float = -math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,24 +94,32 @@ def measure(observation: Observation, body: Body) -> list[Measurement]:
 
 def associate(
     people: tuple[Person, ...], measurements: list[Measurement], pose: Odometry, noise: Noise, gate: float
-) -> dict[int, tuple[int, Innovation]]:
+) -> dict[int, int]:
     """Pair people with boxes, the best fit first; a fit further off than `gate` (chi-squared) is none.
 
-    Returns person index -> (measurement index, innovation). Every track must be at the frame's stamp.
+    Returns index of the person -> index of the measurement. Every track must be at the frame's stamp.
     """
     fits = []
     for who, person in enumerate(people):
         for which, seen in enumerate(measurements):
-            fit = innovation(person.track, seen.bearing, seen.range, pose, noise)
-            if fit.distance2 <= gate:
-                fits.append((fit.distance2, who, which, fit))
-    pairs: dict[int, tuple[int, Innovation]] = {}
-    taken: set[int] = set()
-    for _, who, which, fit in sorted(fits, key=lambda fit: fit[:3]):
-        if who not in pairs and which not in taken:
-            pairs[who] = (which, fit)
-            taken.add(which)
+            fit = innovation(person.track, seen.bearing, seen.range, pose, noise).distance2
+            # Somebody who changed direction sharply is still who they were, if nobody else could be meant.
+            if fit <= gate or apart(person, seen, pose) < _SAME_PERSON:
+                fits.append((fit, who, which))
+    pairs: dict[int, int] = {}
+    for _, who, which in sorted(fits):
+        if who not in pairs and which not in pairs.values():
+            pairs[who] = which
     return pairs
+
+
+def apart(person: Person, seen: Measurement, pose: Odometry) -> float:
+    """Return the distance [m] between a person's track and a box; across the line of sight where that is all."""
+    bearing, distance = bearing_range(person.track, pose)
+    turn = wrapped(seen.bearing - bearing)
+    if seen.range is None:
+        return abs(distance * math.tan(turn)) if abs(turn) < 1 else math.inf
+    return math.sqrt(distance**2 + seen.range**2 - 2 * distance * seen.range * math.cos(turn))
 
 
 def should_be_seen(person: Person, pose: Odometry, observation: Observation) -> bool:
@@ -116,8 +128,12 @@ def should_be_seen(person: Person, pose: Odometry, observation: Observation) -> 
     if abs(bearing) > 1.2:
         return False
     column = observation.width / 2 - observation.focal_px * math.tan(bearing)
-    whole = Region(0, 0, observation.width, observation.height, person.window / max(distance, 0.3))
-    return (observation.region or whole).holds(column)
+    window = person.window / max(distance, 0.3)
+    middle = observation.height / 2 + person.centre / max(distance, 0.3)
+    # Near by, the head and the room HOG wants above it are out of the image.
+    if middle < 0.48 * window or observation.height - middle < 0.48 * window:
+        return False
+    return (observation.region or Region(0, 0, observation.width, observation.height, window)).holds(column)
 
 
 def begin(number: int, seen: Measurement, stamp: float, pose: Odometry, noise: Noise) -> Person:
@@ -129,8 +145,18 @@ def begin(number: int, seen: Measurement, stamp: float, pose: Odometry, noise: N
     return Person(number, track, stamp, _TRUST_STEP, seen.height * distance, seen.centre * distance)
 
 
-def seen_again(person: Person, seen: Measurement, fit: Innovation) -> Person:
-    """Correct a person by the box that is theirs."""
+def is_new(seen: Measurement, people: Sequence[Person], pose: Odometry) -> bool:
+    """Whether a box is somebody unknown, not a second box on somebody known."""
+    return all(apart(person, seen, pose) >= _SAME_PERSON for person in people)
+
+
+def seen_again(person: Person, seen: Measurement, pose: Odometry, noise: Noise, gate: float) -> Person:
+    """Correct a person by the box that is theirs; a box beyond `gate` says that they changed their ways."""
+    fit = innovation(person.track, seen.bearing, seen.range, pose, noise)
+    if fit.distance2 > gate:
+        loose = person.track.covariance + np.diag([_SAME_PERSON**2, _SAME_PERSON**2, 1.0, 1.0])
+        person = replace(person, track=replace(person.track, covariance=loose))
+        fit = innovation(person.track, seen.bearing, seen.range, pose, noise)
     window, centre = person.window, person.centre
     if seen.range is not None:
         window += _SIZE_STEP * (seen.height * seen.range - window)

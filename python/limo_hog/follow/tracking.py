@@ -8,11 +8,13 @@ from dataclasses import dataclass, field, replace
 from limo_hog.follow.body import LIMO, Body
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.kalman import Noise, bearing_range, predicted, rates
+from limo_hog.follow.legs import felt
 from limo_hog.follow.observation import Observation, Odometry
 from limo_hog.follow.people import (
     Person,
     associate,
     begin,
+    is_new,
     measure,
     moved_on,
     not_seen,
@@ -131,6 +133,7 @@ class TrackingController:
                 return Decision(turn, state, Mode.LOST, "looking all around for the person")
             return Decision(turn, state, Mode.SEARCH, "looking all around for somebody")
         unseen = observation.stamp - person.seen
+        person, state = self._feel(person, state, observation, unseen)
         twist, mode, reason = self._steer(person, state, now, unseen)
         bearing, _ = bearing_range(predicted(person.track, now, self.noise), pose_at(state.poses, now))
         region = self._region(person, state, observation) if unseen == 0 else None
@@ -152,25 +155,43 @@ class TrackingController:
     def _track(self, observation: Observation, state: TrackingState) -> tuple[TrackingState, dict[int, int]]:
         """Pair boxes with people; returns the new state and each found person's box, number -> index."""
         stamp, pose = observation.stamp, pose_at(state.poses, observation.stamp)
-        known = tuple(moved_on(one, stamp, self.noise) for one in state.people if stamp - one.seen < self.forget)
+        known = tuple(
+            moved_on(one, stamp, self.noise) for one in state.people if stamp - max(one.seen, one.felt) < self.forget
+        )
         seen = measure(observation, self.body)
         pairs = associate(known, seen, pose, self.noise, self.gate)
         people: list[Person] = []
         for who, person in enumerate(known):
             if who in pairs:
-                which, fit = pairs[who]
-                people.append(seen_again(person, seen[which], fit))
+                people.append(seen_again(person, seen[pairs[who]], pose, self.noise, self.gate))
             elif should_be_seen(person, pose, observation):
                 people.append(not_seen(person))
             else:
                 people.append(person)
-        boxes = {people[who].number: which for who, (which, _) in pairs.items()}
+        boxes = {people[who].number: which for who, which in pairs.items()}
         number = state.next_number
-        for which in sorted(set(range(len(seen))) - set(boxes.values())):
-            people.append(begin(number, seen[which], stamp, pose, self.noise))
-            boxes[number] = which
-            number += 1
+        for which, one in enumerate(seen):
+            if which not in boxes.values() and is_new(one, people, pose):
+                people.append(begin(number, one, stamp, pose, self.noise))
+                boxes[number] = which
+                number += 1
         return replace(state, people=tuple(people), next_number=number), boxes
+
+    def _feel(
+        self, person: Person, state: TrackingState, observation: Observation, unseen: float
+    ) -> tuple[Person, TrackingState]:
+        """Bring the followed person up to the newest scan, if their legs are in it."""
+        scan = observation.scan
+        if scan is None or scan.stamp <= person.felt:
+            return person, state
+        track = felt(person.track, scan, pose_at(state.poses, scan.stamp), self.body, self.noise)
+        if track is None:
+            return person, state
+        now = replace(person, track=track, felt=scan.stamp)
+        # What the camera follows stays at the camera's time, which may be earlier, as long as it does.
+        kept = replace(person, felt=scan.stamp) if unseen == 0 else now
+        people = tuple(kept if one.number == person.number else one for one in state.people)
+        return now, replace(state, people=people)
 
     def _choose(self, state: TrackingState) -> TrackingState:
         """Stay with the person who is followed while they are remembered; else take the most trusted."""
@@ -190,19 +211,20 @@ class TrackingController:
         angular = self.angular_gain * bearing + bearing_rate
         angular = min(max(angular, -self.max_angular), self.max_angular)
         error = distance - self.body.camera_x - self.target_distance
-        if unseen > self.coast:
+        # Sideways the robot would only lose sight: turn first, then drive.
+        linear = (self.linear_gain * error + range_rate) * max(math.cos(2 * bearing), 0.0)
+        linear = min(max(linear, -self.max_linear), self.max_linear)
+        if min(unseen, now - person.felt) > self.coast:
             return Twist(0.0, angular), Mode.LOST, "turning where the person went"
-        if person.trust < self.trusted:
+        if person.trust < self.trusted and linear > 0:
             return Twist(0.0, angular), Mode.FOLLOW, "facing somebody, not sure yet"
         if abs(error) < self.near_enough and abs(range_rate) < 0.1:
             if abs(bearing) < self.straight_enough and abs(bearing_rate) < 0.05:
                 return Twist(), Mode.HOLD, "the person is where they should be"
             return Twist(0.0, angular), Mode.HOLD, "turning with the person"
-        # Turn first, then drive: sideways the robot would only lose sight.
-        linear = (self.linear_gain * error + range_rate) * max(math.cos(2 * bearing), 0.0)
-        linear = min(max(linear, -self.max_linear), self.max_linear)
-        reason = "following a person" if unseen == 0 else "following where the person should be"
-        return Twist(linear, angular), Mode.FOLLOW, reason
+        if unseen == 0:
+            return Twist(linear, angular), Mode.FOLLOW, "following a person"
+        return Twist(linear, angular), Mode.FOLLOW, "following legs, or where the person should be"
 
     def _region(self, person: Person, state: TrackingState, observation: Observation) -> Region | None:
         """Where the person should be in the next frame."""

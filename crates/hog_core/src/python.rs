@@ -8,7 +8,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use crate::{Grouping, HogError, HogParams, ImageView, Rect, Search};
+use crate::{Backend, Grouping, HogError, HogParams, ImageView, Rect, Search};
 
 type Pair = (i64, i64);
 type Array1<'py, T> = Bound<'py, PyArray1<T>>;
@@ -239,5 +239,15 @@ mod _core {
     #[pyfunction]
     fn get_num_threads() -> usize {
         threads()
+    }
+
+    #[pyfunction]
+    fn backend(py: Python<'_>) -> PyResult<&'static str> {
+        Backend::current().map(Backend::name).map_err(|error| raised(py, &error))
+    }
+
+    #[pyfunction]
+    fn available_backends() -> Vec<&'static str> {
+        Backend::ALL.into_iter().filter(|backend| backend.is_available()).map(Backend::name).collect()
     }
 }

@@ -9,6 +9,7 @@ import platform
 from pathlib import Path
 
 import limo_hog
+from limo_hog import _core
 
 
 def environment() -> dict[str, str | int | bool | list[str] | None]:
@@ -16,8 +17,8 @@ def environment() -> dict[str, str | int | bool | list[str] | None]:
     opencv, has_hog = _opencv()
     return {
         "limo_hog": importlib.metadata.version("limo-hog"),
-        "backend": "scalar",
-        "cpu_features": _features(),
+        "backend": _core.backend(),
+        "cpu_features": [name for name in _core.available_backends() if name != "scalar"],
         "cpu": _cpu(),
         "cores": cores(),
         "threads": limo_hog.get_num_threads(),
@@ -47,15 +48,6 @@ def _cpu() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()
-
-
-def _features() -> list[str]:
-    """Instruction sets that the detector has code for."""
-    info = Path("/proc/cpuinfo")
-    flags = set(info.read_text().split()) if info.exists() else set()
-    return [
-        name for name in ("avx2", "fma", "avx512f", "avx512bw", "avx512vbmi", "avx512_vnni", "asimd") if name in flags
-    ]
 
 
 def cores() -> int:

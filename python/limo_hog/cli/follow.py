@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from limo_hog.cli.arguments import number
 from limo_hog.cli.output import STDOUT, write_json
 from limo_hog.cli.progress import progress
+from limo_hog.cli.watching import add_watching, watching
 from limo_hog.extras import needed
 from limo_hog.follow.detectors import NAMES, detector_named
 from limo_hog.follow.naming import CONTROLLERS, controller_named
@@ -35,6 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="who finds people: ours, ours on the half image, OpenCV's, or a network (%(default)s)",
     )
     parser.add_argument("--json", metavar="FILE", help="write the score card as JSON; - is standard output")
+    add_watching(parser)
 
 
 def metres(text: str) -> float:
@@ -60,25 +62,29 @@ def run(args: argparse.Namespace) -> int:
         from limo_sim.episode import run_episode
         from limo_sim.scenario import Scenario
         from limo_sim.score import score
+        from limo_sim.view.tuning import Tunable
     scenario = Scenario.load(args.scenario)
-    controller = controller_named(args.controller, args.target)
+    controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
-    with progress("s") as bar:
-        task = bar.add_task("search", total=args.seconds)
+    with watching(args, scenario, controller) as audience:
+        with progress("s") as bar:
+            task = bar.add_task("search", total=args.seconds)
 
-        def watch(moment: Moment) -> None:
-            bar.update(task, completed=round(moment.step.time, 1), description=moment.step.mode.value)
+            def watch(moment: Moment) -> None:
+                bar.update(task, completed=round(moment.step.time, 1), description=moment.step.mode.value)
+                audience.watch(moment)
 
-        episode = run_episode(
-            scenario,
-            controller,
-            detector,
-            args.seconds,
-            args.seed,
-            names=(args.controller, args.detector),
-            watch=watch,
-        )
-    card = score(episode)
+            episode = run_episode(
+                scenario,
+                controller,
+                detector,
+                args.seconds,
+                args.seed,
+                names=(args.controller, args.detector),
+                watch=watch,
+            )
+        card = score(episode)
+        audience.end(episode, card)
     if args.json:
         write_json(args.json, card.to_json())
     if args.json != STDOUT:

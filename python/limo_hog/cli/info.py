@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 
 from rich.console import Console
 from rich.table import Table
@@ -22,11 +23,12 @@ def run(args: argparse.Namespace) -> int:  # noqa: ARG001
     facts = environment()
     opencv = f"{facts['opencv']} ({'with' if facts['opencv_has_hog'] else 'without'} HOGDescriptor)"
     features = facts["cpu_features"]
+    forced = os.environ.get("LIMO_HOG_BACKEND")
     rows = {
         "limo-hog": facts["limo_hog"],
-        "backend": facts["backend"],
+        "backend": f"{facts['backend']} (LIMO_HOG_BACKEND={forced})" if forced else facts["backend"],
         "CPU": facts["cpu"],
-        "CPU features": ", ".join(features) if isinstance(features, list) and features else "none of use here",
+        "CPU features": ", ".join(features) if isinstance(features, list) and features else "none that count",
         "threads": f"{facts['threads']} of {facts['cores']} cores",
         "OpenCV": opencv if facts["opencv"] else "not installed: pip install 'limo-hog[cv]'",
         "numpy": facts["numpy"],

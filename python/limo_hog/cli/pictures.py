@@ -24,7 +24,7 @@ from limo_hog.cli.environment import cores
 from limo_hog.cli.output import one_line
 from limo_hog.cli.results import Results
 from limo_hog.detector import PeopleDetector
-from limo_hog.exceptions import LimoHogError
+from limo_hog.exceptions import ImageError
 from limo_hog.imaging.drawing import annotate
 from limo_hog.imaging.reading import (
     STDIN,
@@ -132,7 +132,7 @@ class Run:
         def work(source: Source) -> Found | str:
             try:
                 found, picture = self._find(source, 0, read_image(source))
-            except (LimoHogError, OSError) as error:
+            except (ReadError, ImageError, OSError) as error:
                 return one_line(error)
             if picture is not None:
                 write_image(self._copies[source], picture)
@@ -155,7 +155,7 @@ class Run:
         with ExitStack() as stack:
             try:
                 video = stack.enter_context(open_video(source))
-            except (LimoHogError, OSError) as error:
+            except (ReadError, OSError) as error:
                 self._fail(one_line(error))
                 return
             every, done = self._args.every, (self._results.done or {}).get(source.name, set())

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections, PeopleDetector
 from limo_hog.extras import needed
+from limo_hog.suppression import suppress
 
 with needed(by="enlarging pictures", what="OpenCV", install="'limo-hog[cv]'"):
     import cv2
@@ -57,11 +58,8 @@ class Search:
         keep = np.arange(len(scores))
         if self.max_height is not None:
             keep = keep[_SHARE * boxes[:, 3] <= self.max_height]
-        if self.nms is not None and len(keep):
-            # OpenCV takes positive scores only; their order is what counts.
-            ranks = scores[keep] - scores[keep].min() + 1
-            kept = cv2.dnn.NMSBoxes(boxes[keep].tolist(), ranks.tolist(), 0, self.nms)
-            keep = keep[np.asarray(kept, np.intp)]
+        if self.nms is not None:
+            keep = keep[suppress(boxes[keep], scores[keep], self.nms)]
         return Detections(boxes[keep], scores[keep])
 
 

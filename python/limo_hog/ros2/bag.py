@@ -1,0 +1,137 @@
+"""Recordings: ROS 2 messages in an MCAP file, which `ros2 bag play` and Foxglove read; and any ROS 2 bag read back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from limo_hog.atomic import whole_file
+from limo_hog.detector import Detections
+from limo_hog.exceptions import LimoHogError
+from limo_hog.extras import needed
+from limo_hog.ros2.messages import default_message, serialize, to_time, typestore
+
+with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
+    from mcap.writer import CompressionType, Writer
+    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.typesys import get_types_from_msg
+
+DETECTIONS = "vision_msgs/msg/Detection2DArray"
+
+#: The parts of vision_msgs that hold boxes: name -> definition (ROS 2 Humble on). rosbags does not bring them.
+_VISION = {
+    "vision_msgs/msg/Point2D": "float64 x\nfloat64 y",
+    "vision_msgs/msg/Pose2D": "vision_msgs/Point2D position\nfloat64 theta",
+    "vision_msgs/msg/BoundingBox2D": "vision_msgs/Pose2D center\nfloat64 size_x\nfloat64 size_y",
+    "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score",
+    "vision_msgs/msg/ObjectHypothesisWithPose": (
+        "vision_msgs/ObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose"
+    ),
+    "vision_msgs/msg/Detection2D": (
+        "std_msgs/Header header\nvision_msgs/ObjectHypothesisWithPose[] results\n"
+        "vision_msgs/BoundingBox2D bbox\nstring id"
+    ),
+    DETECTIONS: "std_msgs/Header header\nvision_msgs/Detection2D[] detections",
+}
+
+
+class BagError(LimoHogError):
+    """A file is no recording that can be read."""
+
+
+class Record(NamedTuple):
+    """One message of a recording: its topic, when it was written [s], and what it says."""
+
+    topic: str
+    time: float
+    message: Any
+
+
+@cache
+def _with_vision() -> None:
+    """Teach the message definitions about boxes, once."""
+    for name, definition in _VISION.items():
+        typestore().register(get_types_from_msg(definition, name))
+
+
+def detections_message(stamp: float, found: Detections, frame: str) -> Any:
+    """Return boxes as vision_msgs/Detection2DArray: centre and size [px], score as the SVM gave it."""
+    _with_vision()
+    array = default_message(DETECTIONS)
+    array.header.stamp, array.header.frame_id = to_time(stamp), frame
+    for box, score in found:
+        one = default_message("vision_msgs/msg/Detection2D")
+        result = default_message("vision_msgs/msg/ObjectHypothesisWithPose")
+        result.hypothesis.class_id, result.hypothesis.score = "person", score
+        x, y, w, h = (float(value) for value in box)
+        one.header = array.header
+        one.results = [result]
+        one.bbox.center.position.x, one.bbox.center.position.y = x + w / 2, y + h / 2
+        one.bbox.size_x, one.bbox.size_y = w, h
+        array.detections.append(one)
+    return array
+
+
+def to_detections(message: Any) -> Detections:
+    """Read a Detection2DArray."""
+    boxes = [
+        (
+            one.bbox.center.position.x - one.bbox.size_x / 2,
+            one.bbox.center.position.y - one.bbox.size_y / 2,
+            one.bbox.size_x,
+            one.bbox.size_y,
+        )
+        for one in message.detections
+    ]
+    scores = [one.results[0].hypothesis.score for one in message.detections]
+    return Detections(np.rint(np.array(boxes).reshape(-1, 4)).astype(np.int32), np.array(scores, np.float64))
+
+
+@contextmanager
+def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
+    """Give a function that writes a message to a topic at a time [s].
+
+    The file has its name only when it is whole.
+    """
+    _with_vision()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as part, part.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2", library="limo-hog")
+        channels: dict[str, int] = {}
+
+        def write(topic: str, time: float, message: Any) -> None:
+            if topic not in channels:
+                name = message.__msgtype__
+                definition, _ = typestore().generate_msgdef(name, ros_version=2)
+                schema = writer.register_schema(name, "ros2msg", definition.encode())
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            nanoseconds = round(time * 1e9)
+            writer.add_message(channels[topic], nanoseconds, serialize(message), nanoseconds)
+
+        yield write
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def read_bag(path: Path) -> Iterator[Record]:
+    """Read a ROS 2 recording in the order it was written: an MCAP file, or a rosbag2 folder.
+
+    Raises
+    ------
+    BagError
+        If it is none, or cut off.
+    """
+    _with_vision()
+    if not path.exists():
+        raise BagError(f"{path}: no such recording")
+    try:
+        with AnyReader([path], default_typestore=typestore()) as reader:
+            for connection, nanoseconds, data in reader.messages():
+                yield Record(connection.topic, nanoseconds * 1e-9, reader.deserialize(data, connection.msgtype))
+    except (AnyReaderError, ValueError, KeyError, IndexError, AssertionError) as error:
+        raise BagError(f"{path}: no ROS 2 recording that can be read, or cut off: {error}") from error

@@ -1,0 +1,1 @@
+"""Watching a run: the live page, pictures, plots and recordings. Everything here looks on; nothing steers."""

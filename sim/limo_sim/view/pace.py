@@ -1,0 +1,84 @@
+"""How fast a run goes: paused, step by step, at a multiple of real time, or as fast as it can."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+#: How often somebody who waits looks up, so that Ctrl-C is heard everywhere [s].
+_LOOK_UP = 0.5
+
+
+class Pace:
+    """Holds a run back as those who watch it wish; set from any thread.
+
+    Attributes
+    ----------
+    speed
+        Simulated seconds in a second; 0 is as fast as it can.
+    """
+
+    def __init__(self, speed: float = 1.0) -> None:
+        self._changed = threading.Condition()
+        self._speed = speed
+        self._paused = False
+        self._steps = 0
+        # Simulated and wall time from which the speed counts.
+        self._since: tuple[float, float] | None = None
+
+    @property
+    def speed(self) -> float:
+        """Simulated seconds in a second; 0 is as fast as it can."""
+        return self._speed
+
+    @property
+    def paused(self) -> bool:
+        """Whether the run stands still."""
+        return self._paused
+
+    def set_speed(self, speed: float) -> None:
+        """Go on at another speed."""
+        with self._changed:
+            self._speed, self._since = speed, None
+            self._changed.notify()
+
+    def pause(self) -> None:
+        """Stand still."""
+        with self._changed:
+            self._paused, self._steps = True, 0
+
+    def resume(self) -> None:
+        """Go on."""
+        with self._changed:
+            self._paused, self._since = False, None
+            self._changed.notify()
+
+    def step(self) -> None:
+        """Stand still, after one more control period."""
+        with self._changed:
+            self._paused = True
+            self._steps += 1
+            self._changed.notify()
+
+    def wait(self, now: float) -> None:
+        """Return when it is time for what comes after the simulated second `now`."""
+        with self._changed:
+            while True:
+                if self._paused:
+                    self._since = None
+                    if self._steps:
+                        self._steps -= 1
+                        return
+                    left = _LOOK_UP
+                elif not self._speed:
+                    return
+                else:
+                    if self._since is None:
+                        self._since = now, time.monotonic()
+                    then, wall = self._since
+                    left = wall + (now - then) / self._speed - time.monotonic()
+                    if left <= 0:
+                        # Who falls behind does not hurry later.
+                        self._since = now, time.monotonic()
+                        return
+                self._changed.wait(min(left, _LOOK_UP))

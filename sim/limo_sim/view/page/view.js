@@ -1,0 +1,311 @@
+// The page of a running episode: shows what the run sends, and sends back what its reader wishes.
+"use strict";
+
+const $ = (id) => document.getElementById(id);
+const WINDOW_S = 60; // what the plots show
+const KEPT = 6000; // control periods kept for the trails
+const [TIME, ERROR, DISTANCE, LINEAR, ANGULAR, X, Y, PERSON_X, PERSON_Y] = [...Array(9).keys()];
+
+let scene = null; // what stays the same: room, furniture, zones
+let now = null; // the newest state
+let history = []; // one row a control period
+let socket = null;
+let ended = false;
+let colours = {};
+let drawing = false;
+
+function connect() {
+  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = ({ data }) => (typeof data === "string" ? read(JSON.parse(data)) : show(data));
+  socket.onclose = () => {
+    if (ended) return;
+    notice("The run is over, or was stopped. What you see is the last it showed.");
+    setTimeout(connect, 2000);
+  };
+}
+
+function read(message) {
+  if (message.history) welcome(message);
+  if (message.state) state(message.state);
+  if (message.complaint) $("complaint").textContent = message.complaint;
+  if (message.ended) end(message.ended);
+}
+
+function welcome(message) {
+  scene = message;
+  history = message.history;
+  ended = false;
+  notice("");
+  $("scenario").textContent = scene.scenario;
+  parameters(scene.parameters);
+}
+
+function state(next) {
+  now = next;
+  const last = history.length ? history[history.length - 1][TIME] : -1;
+  if (now.time > last) {
+    const person = now.people[0] || [null, null];
+    const row = [now.time, now.error_px, now.distance_m, now.linear_m_s, now.angular_rad_s];
+    history.push([...row, now.robot[0], now.robot[1], ...person]);
+    if (history.length > KEPT) history.splice(0, history.length - KEPT);
+  }
+  $("clock").textContent = `${now.time.toFixed(1)} s`;
+  $("mode").textContent = now.mode;
+  $("mode").className = `chip ${now.mode}`;
+  $("reason").textContent = now.reason;
+  $("pause").textContent = now.paused ? "Go on" : "Pause";
+  if (document.activeElement !== $("speed")) $("speed").value = String(now.speed);
+  $("distance").textContent = number(now.distance_m, 2, "m");
+  $("zone").textContent = now.distance_m === null ? "–" : zone(now.distance_m);
+  $("error").textContent = number(now.error_px, 0, "px");
+  $("linear").textContent = number(now.linear_m_s, 2, "m/s");
+  $("angular").textContent = number(now.angular_rad_s, 2, "rad/s");
+  $("boxes").textContent = now.boxes;
+  if (now.detect_ms !== null) $("detect").textContent = number(now.detect_ms, 1, "ms");
+  $("contacts").textContent = now.contacts.person + now.contacts.wall;
+  redraw();
+}
+
+function show(data) {
+  const picture = $({ c: "camera", d: "depth" }[String.fromCharCode(new Uint8Array(data, 0, 1)[0])]);
+  const old = picture.src;
+  picture.src = URL.createObjectURL(new Blob([new Uint8Array(data, 1)], { type: "image/jpeg" }));
+  if (old) URL.revokeObjectURL(old);
+  picture.dataset.count = Number(picture.dataset.count || 0) + 1;
+}
+
+function end(card) {
+  ended = true;
+  const parts = ["The run has ended."];
+  if (card.in_view !== undefined) {
+    parts.push(`In view ${percent(card.in_view)}, found ${percent(card.detected)} of that,`);
+    parts.push(`contacts ${card.contacts_person + card.contacts_wall}.`);
+  }
+  notice(parts.join(" "));
+  for (const control of document.querySelectorAll("button, select, input")) control.disabled = true;
+}
+
+function notice(text) {
+  $("notice").textContent = text;
+  $("notice").hidden = !text;
+}
+
+const number = (value, digits, unit) => {
+  if (value === null) return "–";
+  const text = value.toFixed(digits);
+  return `${Number(text) === 0 ? text.replace("-", "") : text} ${unit}`;
+};
+const percent = (share) => (share === undefined ? "–" : `${(100 * share).toFixed(0)} %`);
+const ZONES = ["intimate", "personal", "social", "public"];
+const zone = (distance) => ZONES[scene.zones.filter((end) => distance > end).length];
+
+// Wishes
+
+const wish = (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+const pause = () => wish({ do: now && now.paused ? "resume" : "pause" });
+$("pause").onclick = pause;
+$("step").onclick = () => wish({ do: "step" });
+$("speed").onchange = (event) => wish({ do: "speed", value: Number(event.target.value) });
+document.onkeydown = (event) => {
+  if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName)) return;
+  if (event.key === " ") pause();
+  else if (event.key === ".") wish({ do: "step" });
+  else return;
+  event.preventDefault();
+};
+$("parameters").onsubmit = (event) => event.preventDefault();
+
+function parameters(values) {
+  $("parameters").hidden = !Object.keys(values).length;
+  $("fields").replaceChildren(
+    ...Object.entries(values).map(([name, value]) => {
+      const input = Object.assign(document.createElement("input"), { type: "number", step: "any", min: 0, name, value });
+      input.onchange = () => {
+        $("complaint").textContent = "";
+        wish({ set: name, value: input.valueAsNumber });
+      };
+      const label = document.createElement("label");
+      label.append(name.replaceAll("_", " "), input);
+      return label;
+    }),
+  );
+}
+
+// Drawing
+
+function redraw() {
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(() => {
+    drawing = false;
+    if (!now || !scene) return;
+    drawMap();
+    const seen = Math.max(...history.slice(-600).map((row) => Math.abs(row[ERROR] || 0)), 50);
+    plot("plot-error", [[ERROR, "error"]], -seen * 1.1, seen * 1.1);
+    const far = Math.max(...history.slice(-600).map((row) => row[DISTANCE] || 0), 4);
+    plot("plot-distance", [[DISTANCE, "distance"]], 0, far * 1.05, [0, ...scene.zones, far * 1.05]);
+    const fast = Math.max(...history.slice(-600).map((row) => Math.max(Math.abs(row[LINEAR]), Math.abs(row[ANGULAR]))), 0.3);
+    plot("plot-speed", [[LINEAR, "linear"], [ANGULAR, "angular"]], -fast * 1.1, fast * 1.1);
+  });
+}
+
+function sheet(id) {
+  const canvas = $(id);
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+  }
+  const pen = canvas.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  pen.lineJoin = pen.lineCap = "round";
+  pen.font = "11px system-ui, sans-serif";
+  return [pen, width, height];
+}
+
+function plot(id, series, low, high, bands = []) {
+  const [pen, width, height] = sheet(id);
+  const [left, bottom] = [38, 16];
+  const end = Math.max(now.time, WINDOW_S);
+  const x = (t) => left + ((t - end + WINDOW_S) / WINDOW_S) * (width - left - 4);
+  const y = (v) => 4 + ((high - v) / (high - low)) * (height - bottom - 8);
+  for (let i = 0; i + 1 < bands.length; i++) {
+    pen.fillStyle = colours[`zone-${i}`];
+    const top = y(Math.min(bands[i + 1], high));
+    pen.fillRect(left, top, width - left - 4, y(bands[i]) - top);
+  }
+  pen.fillStyle = colours.faint;
+  pen.strokeStyle = colours.line;
+  pen.lineWidth = 1;
+  pen.textAlign = "right";
+  pen.textBaseline = "middle";
+  const step = nice((high - low) / 6);
+  for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
+    line(pen, [[left, y(v)], [width - 4, y(v)]]);
+    pen.fillText(String(Number(v.toFixed(6))), left - 5, y(v));
+  }
+  pen.textAlign = "center";
+  pen.textBaseline = "bottom";
+  for (let t = Math.ceil((end - WINDOW_S) / 15) * 15; t <= end; t += 15) {
+    pen.fillText(`${t} s`, Math.min(Math.max(x(t), left + 8), width - 14), height);
+  }
+  pen.lineWidth = 1.75;
+  for (const [column, colour] of series) {
+    pen.strokeStyle = colours[colour];
+    let points = [];
+    for (const row of history) {
+      if (row[TIME] < end - WINDOW_S) continue;
+      if (row[column] === null) {
+        line(pen, points);
+        points = [];
+      } else points.push([x(row[TIME]), y(row[column])]);
+    }
+    line(pen, points);
+  }
+}
+
+function nice(step) {
+  const power = 10 ** Math.floor(Math.log10(step));
+  return power * [1, 2, 5, 10].find((factor) => factor * power >= step);
+}
+
+function line(pen, points) {
+  if (points.length < 2) return;
+  pen.beginPath();
+  for (const [x, y] of points) pen.lineTo(x, y);
+  pen.stroke();
+}
+
+function drawMap() {
+  const [pen, width, height] = sheet("map");
+  const scale = Math.min(width, height) / (2 * scene.room + 0.5);
+  const at = (x, y) => [width / 2 + x * scale, height / 2 - y * scale];
+  const disc = (x, y, radius) => {
+    pen.beginPath();
+    pen.arc(...at(x, y), radius * scale, 0, 7);
+  };
+  pen.strokeStyle = colours.line;
+  pen.lineWidth = 1;
+  for (let m = -4; m <= 4; m++) {
+    line(pen, [at(m, -scene.room), at(m, scene.room)]);
+    line(pen, [at(-scene.room, m), at(scene.room, m)]);
+  }
+  pen.strokeStyle = colours.faint;
+  pen.lineWidth = 3;
+  const side = 2 * scene.room * scale;
+  pen.strokeRect(...at(-scene.room, scene.room), side, side);
+  pen.fillStyle = colours.faint;
+  for (const piece of scene.furniture) {
+    if (piece.length === 3) {
+      disc(...piece);
+      pen.fill();
+      continue;
+    }
+    const [x, y, halfX, halfY, yaw] = piece;
+    pen.save();
+    pen.translate(...at(x, y));
+    pen.rotate(-yaw);
+    pen.fillRect(-halfX * scale, -halfY * scale, 2 * halfX * scale, 2 * halfY * scale);
+    pen.restore();
+  }
+  if (now.people.length) {
+    const [x, y] = now.people[0];
+    pen.save();
+    pen.beginPath();
+    pen.rect(...at(-scene.room, scene.room), side, side);
+    pen.clip();
+    scene.zones.forEach((radius, i) => {
+      disc(x, y, radius);
+      pen.fillStyle = colours[`zone-${i}`];
+      pen.fill();
+    });
+    pen.restore();
+  }
+  const [robotX, robotY, yaw] = now.robot;
+  pen.fillStyle = colours.robot;
+  pen.globalAlpha = 0.1;
+  pen.beginPath();
+  pen.moveTo(...at(robotX, robotY));
+  pen.arc(...at(robotX, robotY), 5 * scale, -yaw - scene.field / 2, -yaw + scene.field / 2);
+  pen.fill();
+  pen.globalAlpha = 0.6;
+  pen.lineWidth = 1.5;
+  for (const [column, colour] of [[X, "robot"], [PERSON_X, "person"]]) {
+    pen.strokeStyle = colours[colour];
+    line(pen, history.filter((row) => row[column] !== null).slice(-1200).map((row) => at(row[column], row[column + 1])));
+  }
+  pen.globalAlpha = 1;
+  pen.fillStyle = colours.scan;
+  for (const [x, y] of now.scan) pen.fillRect(at(x, y)[0] - 1, at(x, y)[1] - 1, 2, 2);
+  pen.fillStyle = colours.person;
+  for (const [x, y] of now.people) {
+    disc(x, y, 0.15);
+    pen.fill();
+  }
+  pen.save();
+  pen.translate(...at(robotX, robotY));
+  pen.rotate(-yaw);
+  pen.fillStyle = colours.robot;
+  pen.beginPath();
+  pen.roundRect(-0.145 * scale, -0.11 * scale, 0.29 * scale, 0.22 * scale, 3);
+  pen.fill();
+  pen.fillStyle = colours.card;
+  pen.fillRect(0.06 * scale, -0.07 * scale, 0.05 * scale, 0.14 * scale);
+  pen.restore();
+}
+
+function readColours() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of style.length ? [...document.styleSheets[0].cssRules[0].style] : []) {
+    if (name.startsWith("--")) colours[name.slice(2)] = style.getPropertyValue(name).trim();
+  }
+  redraw();
+}
+
+readColours();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColours);
+window.addEventListener("resize", redraw);
+connect();

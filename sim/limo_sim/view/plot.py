@@ -1,0 +1,130 @@
+"""A run in one figure: the path from above, the error, the distance and the speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limo_hog.atomic import whole_file
+from limo_hog.extras import needed
+from limo_hog.follow.proxemics import ZONE_ENDS, Zone
+from limo_sim.episode import Episode, Step
+from limo_sim.furniture import Disc
+from limo_sim.scenario import ROOM_HALF, Scenario
+from limo_sim.view.reading import reading
+
+with needed(by="--plot", what="matplotlib", install="'limo-hog[plot]'"):
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Circle, Polygon
+    from matplotlib.patches import Rectangle as Bar
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_ROBOT, _PERSON, _INK, _FAINT = "#1f6feb", "#d1242f", "#1d2329", "#8a949e"
+_ZONES = {
+    Zone.INTIMATE: "#d1242f",
+    Zone.PERSONAL: "#e8a317",
+    Zone.SOCIAL: "#2da44e",
+    Zone.PUBLIC: "#8a949e",
+}
+
+
+def plot(episode: Episode, path: Path) -> None:
+    """Draw an episode into a picture of the kind the path's suffix says."""
+    figure = Figure(figsize=(11, 6.4), layout="constrained", dpi=150)
+    figure.suptitle(
+        f"{episode.scenario.name} · {episode.controller} · {episode.detector} · seed {episode.seed}",
+        color=_INK,
+        fontweight="bold",
+    )
+    grid = figure.add_gridspec(3, 2, width_ratios=[1, 1.1], height_ratios=[1, 1.2, 1])
+    _path(figure.add_subplot(grid[:, 0]), episode.scenario, episode.steps)
+    error, distance, speed = (figure.add_subplot(grid[row, 1]) for row in range(3))
+    readings = [reading(step) for step in episode.steps]
+    time = [r.time for r in readings]
+    _line(error, time, [r.error_px for r in readings], "#1f6feb")
+    error.set_title("off centre [px], left positive", **_TITLE)
+    error.axhline(0, color=_FAINT, linewidth=0.8)
+    _distance(distance, time, [r.distance_m for r in readings])
+    _line(speed, time, [r.linear_m_s for r in readings], "#b35900", "forward [m/s]")
+    _line(speed, time, [r.angular_rad_s for r in readings], "#7a4fd0", "turn [rad/s]")
+    speed.set_title("command", **_TITLE)
+    speed.legend(loc="lower right", bbox_to_anchor=(1, 0.97), frameon=False, fontsize=8, ncols=2)
+    speed.set_xlabel("time [s]")
+    for axes in (error, distance, speed):
+        _tidy(axes)
+        axes.set_xlim(0, episode.seconds)
+    for axes in (error, distance):
+        axes.set_xticklabels([])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as part:
+        figure.savefig(part)
+
+
+_TITLE: dict[str, Any] = {"loc": "left", "fontsize": 10, "color": _INK}
+
+
+def _path(axes: Axes, scenario: Scenario, steps: Sequence[Step]) -> None:
+    for piece in scenario.furniture:
+        shape = piece.footprint
+        if isinstance(shape, Disc):
+            axes.add_patch(Circle((shape.x, shape.y), shape.radius, color=_FAINT))
+        else:
+            corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (shape.half_x, shape.half_y)
+            cos, sin = np.cos(shape.yaw), np.sin(shape.yaw)
+            axes.add_patch(Polygon(corners @ [[cos, sin], [-sin, cos]] + (shape.x, shape.y), color=_FAINT))
+    robot = np.array([step.truth.robot for step in steps]).reshape(-1, 3)
+    for who in range(len(scenario.people)):
+        walk = [(p.x, p.y) for step in steps if (p := step.truth.people[who]) is not None]
+        people = np.array(walk).reshape(-1, 2)
+        axes.plot(*people.T, color=_PERSON, linewidth=1.2, alpha=0.8, label="person" if who == 0 else None)
+        axes.plot(*people[-1:].T, "o", color=_PERSON)
+    axes.plot(robot[:, 0], robot[:, 1], color=_ROBOT, linewidth=1.8, label="robot")
+    every = max(1, len(robot) // 12)
+    looks = robot[::every]
+    axes.quiver(
+        looks[:, 0], looks[:, 1], np.cos(looks[:, 2]), np.sin(looks[:, 2]),
+        color=_ROBOT, scale=22, width=0.005, alpha=0.7,
+    )  # fmt: skip
+    axes.add_patch(Bar((-ROOM_HALF, -ROOM_HALF), 2 * ROOM_HALF, 2 * ROOM_HALF, fill=False, color=_INK, linewidth=2))
+    axes.set_aspect("equal")
+    axes.set_xlim(-ROOM_HALF - 0.1, ROOM_HALF + 0.1)
+    axes.set_ylim(-ROOM_HALF - 0.1, ROOM_HALF + 0.1)
+    axes.set_xticks(range(-4, 5, 2))
+    axes.set_yticks(range(-4, 5, 2))
+    axes.set_title("path from above [m]; arrows: where the robot looks", **_TITLE)
+    axes.legend(loc="lower left", frameon=False, fontsize=8, ncols=2)
+    _tidy(axes)
+
+
+def _distance(axes: Axes, time: Sequence[float], values: Sequence[float | None]) -> None:
+    top = max([4.5, *(1.05 * value for value in values if value is not None)])
+    begins = 0.0
+    for zone, colour in _ZONES.items():
+        ends = min(ZONE_ENDS.get(zone, top), top)
+        axes.axhspan(begins, ends, color=colour, alpha=0.13, linewidth=0)
+        axes.text(1.01, (begins + ends) / 2, zone.value, transform=axes.get_yaxis_transform(), fontsize=8, va="center")
+        begins = ends
+    _line(axes, time, values, "#0b7a5e")
+    axes.set_ylim(0, top)
+    axes.set_title("distance to the nearest person [m], in Hall's zones", **_TITLE)
+
+
+def _line(
+    axes: Axes, time: Sequence[float], values: Sequence[float | None], colour: str, label: str | None = None
+) -> None:
+    # A gap where there is nothing to say.
+    heights = [np.nan if value is None else value for value in values]
+    axes.plot(time, heights, color=colour, linewidth=1.4, label=label)
+
+
+def _tidy(axes: Axes) -> None:
+    axes.grid(color="#d9dde2", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=8, color=_FAINT)
+    for side in axes.spines.values():
+        side.set_visible(False)

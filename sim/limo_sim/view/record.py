@@ -1,0 +1,45 @@
+"""A run as ROS 2 messages on the workshop's topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from limo_hog.ros2 import messages
+from limo_hog.ros2.bag import bag_writer, detections_message
+from limo_sim.camera import FOCAL_PX
+from limo_sim.episode import Moment
+
+IMAGE, DEPTH, CAMERA_INFO = "/limo_camera/image", "/limo_camera/depth/image_raw", "/limo_camera/camera_info"
+SCAN, ODOMETRY, COMMAND, DETECTIONS = "/scan", "/odom", "/cmd_vel", "/limo_camera/detections"
+
+
+@contextmanager
+def recorded(path: Path) -> Iterator[Callable[[Moment], None]]:
+    """Give a function that records a moment: what was sensed, what was found in it, and then the command."""
+    with bag_writer(path) as write:
+        stamps: dict[str, float] = {}
+
+        def once(topic: str, stamp: float) -> bool:
+            fresh = stamps.get(topic) != stamp
+            stamps[topic] = stamp
+            return fresh
+
+        def watch(moment: Moment) -> None:
+            step, frame = moment.step, moment.frame
+            now = step.time
+            if moment.scan is not None and once(SCAN, moment.scan.stamp):
+                write(SCAN, now, messages.laser_scan(moment.scan))
+            if moment.odometry is not None and once(ODOMETRY, moment.odometry.stamp):
+                write(ODOMETRY, now, messages.odometry(moment.odometry))
+            if frame is not None:
+                height, width = frame.image.shape[:2]
+                write(CAMERA_INFO, now, messages.camera_info(frame.stamp, width, height, FOCAL_PX))
+                write(DEPTH, now, messages.image(frame.stamp, frame.depth))
+                write(IMAGE, now, messages.image(frame.stamp, frame.image))
+                found = detections_message(frame.stamp, step.detections, messages.CAMERA_FRAME)
+                write(DETECTIONS, now, found)
+            write(COMMAND, now, messages.twist(step.twist))
+
+        yield watch

@@ -1,0 +1,59 @@
+"""A run as a log for the Rerun viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from limo_hog.atomic import whole_file
+from limo_hog.extras import needed
+from limo_sim.episode import Moment
+from limo_sim.scenario import ROOM_HALF
+from limo_sim.view.reading import reading
+
+with needed(by="--rerun", what="the Rerun SDK", install="'limo-hog[viz]'"):
+    import rerun as rr
+
+_ROBOT, _PERSON, _WALL = (31, 111, 235), (209, 36, 47), (138, 148, 158)
+_GREEN, _RED = (60, 200, 80), (235, 60, 60)
+
+
+@contextmanager
+def logged(path: Path) -> Iterator[Callable[[Moment], None]]:
+    """Give a function that logs a moment: camera with boxes, depth, map and series."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as part:
+        log = rr.RecordingStream("limo-hog")
+        log.save(part)
+        corners = ROOM_HALF * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+        log.log("map/walls", rr.LineStrips2D([corners], colors=[_WALL]), static=True)
+        trail: list[tuple[float, float]] = []
+
+        def watch(moment: Moment) -> None:
+            step, frame, now = moment.step, moment.frame, reading(moment.step)
+            log.set_time("arena", duration=step.time)
+            if frame is not None:
+                log.log("camera", rr.Image(frame.image, color_model="BGR").compress(jpeg_quality=85))
+                log.log("depth", rr.DepthImage(frame.depth, meter=1.0))
+                colours = [_RED if i == step.target else _GREEN for i in range(len(step.detections))]
+                labels = [f"{score:.1f}" for score in step.detections.scores]
+                boxes = rr.Boxes2D(
+                    array=step.detections.boxes, array_format=rr.Box2DFormat.XYWH, labels=labels, colors=colours
+                )
+                log.log("camera/people", boxes)
+            trail.append(step.truth.robot[:2])
+            log.log("map/robot", rr.LineStrips2D([trail], colors=[_ROBOT]))
+            people = [(p.x, p.y) for p in step.truth.people if p is not None]
+            log.log("map/people", rr.Points2D(people, colors=[_PERSON], radii=0.15))
+            for name in ("error_px", "distance_m", "linear_m_s", "angular_rad_s"):
+                value = getattr(now, name)
+                if value is not None:
+                    log.log(f"series/{name}", rr.Scalars(value))
+            log.log("mode", rr.TextLog(f"{step.mode.value}: {step.reason}"))
+
+        yield watch
+        log.flush()
+        log.disconnect()

@@ -1,0 +1,120 @@
+"""The page of a running episode, in a real browser; its pictures are kept in `out/view/` to look at."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+from tests.sim.chromium import CHROMIUM, Tab, chromium, open_tab
+
+from limo_hog.detector import PeopleDetector
+from limo_hog.follow.naming import controller_named
+from limo_sim.episode import run_episode
+from limo_sim.scenario import Scenario
+from limo_sim.score import score
+from limo_sim.view.pace import Pace
+from limo_sim.view.server import View
+from limo_sim.view.tuning import Tunable
+
+PICTURES = Path(__file__).parents[2] / "out" / "view"
+SECONDS = 12.0
+SCENARIO = Scenario.load("workshop")
+
+
+@pytest.fixture
+def running() -> Iterator[tuple[View, Tunable[Any]]]:
+    controller = Tunable(controller_named("tracking", None))
+    with View(SCENARIO, controller, pace=Pace(0)) as view:
+
+        def episode() -> None:
+            # A coarse search: this is about the page.
+            detector = PeopleDetector(scale=1.2)
+            view.end(score(run_episode(SCENARIO, controller, detector, SECONDS, 0, watch=view.watch)).to_json())
+
+        run = threading.Thread(target=episode)
+        run.start()
+        try:
+            yield view, controller
+        finally:
+            view.pace.set_speed(0)
+            view.pace.resume()
+            run.join()
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
+def test_a_browser_sees_the_run_move_and_steers_it(running: tuple[View, Tunable[Any]], tmp_path: Path) -> None:
+    view, controller = running
+
+    async def look() -> None:
+        with chromium(tmp_path / "profile") as port:
+            async with aiohttp.ClientSession() as session:
+                await _see_it_move(tab := await open_tab(session, port, view.url))
+                await _steer_it(tab, view, controller)
+                await _see_it_end(tab)
+
+    asyncio.run(look())
+
+
+async def _see_it_move(tab: Tab) -> None:
+    await tab.look(1280, 900)
+    await tab.until("document.querySelector('#camera').dataset.count > 2 && now.boxes > 0 && now.time > 5")
+    before = await tab.value("[document.querySelector('#camera').src, document.querySelector('#depth').src]")
+    await tab.until(f"document.querySelector('#camera').src !== {before[0]!r}")
+    await tab.until(f"document.querySelector('#depth').src !== {before[1]!r}")
+    assert await tab.value("document.querySelector('#camera').naturalWidth") == 640
+    # Boxes: the arena itself has nothing that is as green or as red.
+    await tab.until(
+        """(() => {
+            const sheet = Object.assign(document.createElement("canvas"), { width: 640, height: 480 });
+            const pen = sheet.getContext("2d");
+            pen.drawImage(document.querySelector("#camera"), 0, 0);
+            const p = pen.getImageData(0, 0, 640, 480).data;
+            let coloured = 0;
+            for (let i = 0; i < p.length; i += 4) coloured += Math.max(p[i], p[i + 1]) > 2 * Math.min(p[i], p[i + 1]);
+            return coloured > 200;
+        })()"""
+    )
+    for canvas in ("map", "plot-error", "plot-distance", "plot-speed"):
+        await tab.until(
+            f"""(() => {{
+                const canvas = document.querySelector("#{canvas}");
+                const {{ data }} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+                return new Set(new Uint32Array(data.buffer)).size > 5;
+            }})()"""
+        )
+
+
+async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
+    await tab.value("document.querySelector('#pause').click()")
+    await tab.until("now.paused")
+    assert view.pace.paused
+    await asyncio.sleep(0.3)
+    stood = await tab.value("now.time")
+    await asyncio.sleep(0.5)
+    assert await tab.value("now.time") == stood
+    await tab.value("document.querySelector('#step').click()")
+    await tab.until(f"now.time > {stood}")
+    assert await tab.value("now.time") - stood == pytest.approx(0.1, abs=0.03)
+    for width, height, dark in ((1280, 900, False), (1280, 900, True), (390, 844, False), (390, 844, True)):
+        await tab.look(width, height, dark)
+        await tab.screenshot(PICTURES / f"{'phone' if width < 600 else 'desk'}-{'dark' if dark else 'light'}.png")
+        assert await tab.value("document.documentElement.scrollWidth") <= width
+    set_field = "Object.assign(document.querySelector('[name=target_distance]'), {value: %s}).onchange()"
+    await tab.value(set_field % "2.5")
+    await tab.value(set_field % "-1")
+    await tab.until("document.querySelector('#complaint').textContent.includes('want a number from 0 on')")
+    assert controller.parameters["target_distance"] == 2.5
+    await tab.value("document.querySelector('#pause').click()")
+
+
+async def _see_it_end(tab: Tab) -> None:
+    await tab.until("document.querySelector('#notice').textContent.startsWith('The run has ended')", 60)
+    await tab.screenshot(PICTURES / "ended.png")
+    # The page keeps what it showed last.
+    assert await tab.value("document.querySelector('#camera').naturalWidth") == 640
+    assert await tab.value("document.querySelector('#pause').disabled") is True

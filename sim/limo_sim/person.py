@@ -7,6 +7,7 @@ fractions of the stature; the body's own frame is x forward, y left, z up from t
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +76,7 @@ class Walk:
             self._legs.append(_Leg(clock, duration, walked, length, heading, pause, next_pause))
             clock += duration + next_pause
             walked += length
+        self._begins = [leg.begins for leg in self._legs]
         self._lap_s, self._lap_m = clock, walked
 
     def pose(self, time: float) -> Pose | None:
@@ -86,7 +88,7 @@ class Walk:
         if self._lap_m == 0:
             return Pose(person.route[0][0], person.route[0][1], person.facing)
         laps, clock = divmod(since, self._lap_s)
-        index = max(number for number, leg in enumerate(self._legs) if leg.begins <= clock)
+        index = bisect_right(self._begins, clock) - 1
         leg = self._legs[index]
         clock -= leg.begins
         walked = min(clock * person.speed, leg.length)

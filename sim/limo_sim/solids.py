@@ -137,6 +137,7 @@ def outline(body: Body, camera: CameraPose) -> Outline | None:
     axis_u, axis_v = (u1 - u0) / length, (v1 - v0) / length
     metre = (z0 + z1) / (2 * FOCAL_PX)
     lean = (z1 - z0) / np.hypot(z1 - z0, length * metre)
+    metre *= 1.0 - 1.0 / (r0 + r1)  # the half pixel by which it is too wide adds no depth
     parts, taper, slope = np.arange(len(z0)), (r1 - r0) / length, (z1 - z0) / length
     strips = np.stack([parts, u0, v0, axis_u, axis_v, length, r0, taper, z0, slope, metre, lean], axis=1)
 
@@ -253,7 +254,7 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
     c = x0 * x0 + z0 * z0 - level * level
     with np.errstate(invalid="ignore"):
         discriminant = b * b - a * c
-        depth = (b - np.sqrt(discriminant)) / a
+        depth = (b - np.sqrt(discriminant)) / a + half_pixel
         height = MOUNT_HEIGHT - down * depth
         radii = level - taper * down * depth
         pixels = FOCAL_PX / depth

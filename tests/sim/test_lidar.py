@@ -1,0 +1,82 @@
+"""The lidar measures what a ray in the physics engine meets."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pymunk
+import pytest
+
+from limo_sim import lidar
+from limo_sim.arena import Arena
+from limo_sim.furniture import Disc, Rectangle
+from limo_sim.person import Pose, body
+from limo_sim.scenario import Person, Scenario
+
+
+def by_physics(x: float, y: float, yaw: float, shapes: list[Disc | Rectangle]) -> list[float]:
+    space = pymunk.Space()
+    ground = space.static_body
+    corners = [(-4.9, -4.9), (4.9, -4.9), (4.9, 4.9), (-4.9, 4.9)]
+    for corner, after in zip(corners, corners[1:] + corners[:1], strict=True):
+        space.add(pymunk.Segment(ground, corner, after, 0.0))
+    for shape in shapes:
+        if isinstance(shape, Disc):
+            space.add(pymunk.Circle(ground, shape.radius, (shape.x, shape.y)))
+        else:
+            turned = pymunk.Transform.translation(shape.x, shape.y).rotated(shape.yaw)
+            a, b = shape.half_x, shape.half_y
+            space.add(pymunk.Poly(ground, [(-a, -b), (a, -b), (a, b), (-a, b)], turned))
+    ranges = []
+    for angle in np.linspace(-2, 2, 292) + yaw:
+        end = x + 20 * math.cos(angle), y + 20 * math.sin(angle)
+        hit = space.segment_query_first((x, y), end, 0.0, pymunk.ShapeFilter())
+        assert hit is not None
+        ranges.append(20 * hit.alpha)
+    return ranges
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_ranges_equal_the_physics_engines_ray_casts(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    shapes: list[Disc | Rectangle] = []
+    for x, y, size, yaw in random.uniform((-4, -4, 0.02, 0), (4, 4, 0.4, 6), size=(8, 4)).tolist():
+        if math.hypot(x - 0.5, y + 0.3) > 0.6:
+            shapes += [Disc(x, y, size), Rectangle(-x, y, size, 0.5 * size, yaw)]
+    shapes = [shape for shape in shapes if math.hypot(shape.x - 0.5, shape.y + 0.3) > 0.6]
+    yaw = float(random.uniform(-3, 3))
+    expected = by_physics(0.5, -0.3, yaw, shapes)
+    np.testing.assert_allclose(lidar.cast(0.5, -0.3, yaw, shapes), expected, atol=2e-3)
+
+
+def test_an_axis_aligned_beam_is_not_a_division_by_zero() -> None:
+    ranges = lidar.cast(0.0, 0.0, 2.0, [Rectangle(3, 0, 0.1, 0.1)])
+    assert ranges[0] == pytest.approx(2.9)
+    assert np.isfinite(ranges).all()
+
+
+def test_a_walking_person_shows_two_shins_of_a_shins_width() -> None:
+    person = Person(route=((2, 0, 0),))
+    shins = lidar.shins(body(person, Pose(2, 0, 0.3, 1.2, 1.0)))
+    assert len(shins) == 2
+    for shin in shins:
+        assert 0.02 < shin.radius < 0.05
+        assert math.hypot(shin.x - 2, shin.y) < 0.3
+
+
+def test_noise_has_the_spread_asked_for_and_ranges_keep_their_limits() -> None:
+    random = np.random.default_rng(0)
+    true = np.full(20_000, 3.0)
+    assert lidar.measure(true, 0.01, random).std() == pytest.approx(0.01, rel=0.03)
+    limits = lidar.measure(np.array([0.05, 0.5, 7.9, 8.1]), 0.0, random)
+    np.testing.assert_array_equal(limits, np.array([np.inf, 0.5, 7.9, np.inf], np.float32))
+
+
+def test_a_scan_has_the_robots_beams_and_sees_the_walls() -> None:
+    scan = Arena(Scenario.load("empty"), 0).scan()
+    assert scan.ranges.shape == (292,)
+    assert scan.ranges.dtype == np.float32
+    assert (scan.angle_min, scan.angle_max, scan.range_min, scan.range_max) == (-2.0, 2.0, 0.12, 8.0)
+    ahead = scan.ranges[140:152]
+    assert ahead == pytest.approx(4.9 - 0.103, abs=0.05)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog import _core
-from limo_hog.hog import pixels
+from limo_hog.arguments import pixels
 
 #: The person inside a window: x + .1 w, y + .07 h, .8 w, .8 h. The rest is the margin it was trained with.
 _PERSON_IN_WINDOW = (0.1, 0.07, 0.8, 0.8)

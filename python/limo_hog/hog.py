@@ -1,174 +1,160 @@
-"""`cv2.HOGDescriptor` as OpenCV 4.14 has it: a program moves by writing `limo_hog.` for `cv2.`."""
+"""`cv2.HOGDescriptor` as OpenCV 4.14 has it: a program moves by writing `limo_hog.` for `cv2.`.
+
+`docs/parity.md` lists where it differs on purpose.
+"""
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Sequence
-from typing import Any
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limo_hog import _core
-from limo_hog.exceptions import ImageError, ImageTypeError, ParameterTypeError
+from limo_hog import _core, model_files
+from limo_hog.arguments import Pair, Pairs, coefficients, integer, pair, pixels, places, real, rectangles
+from limo_hog.exceptions import ParameterTypeError
+from limo_hog.geometry import Geometry
 
-#: Two integers: width and height, or x and y [px].
-Pair = Sequence[int] | NDArray[np.integer[Any]]
 #: OpenCV's way to say "nothing": an empty tuple where an array would stand.
 Nothing = tuple[()]
+#: Rectangles or places and their weights.
+Found = tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]
 
 HOGDescriptor_L2Hys = HOGDESCRIPTOR_L2HYS = 0
 HOGDescriptor_DEFAULT_NLEVELS = HOGDESCRIPTOR_DEFAULT_NLEVELS = 64
 HOGDescriptor_DESCR_FORMAT_COL_BY_COL = HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL = 0
 HOGDescriptor_DESCR_FORMAT_ROW_BY_ROW = HOGDESCRIPTOR_DESCR_FORMAT_ROW_BY_ROW = 1
 
-_DEFAULT_STRIDE = (0, 0)
-
-
-def pixels(image: Any) -> NDArray[np.uint8]:
-    """`image` as the uint8 array the detector reads, or an `ImageError` that says what came instead.
-
-    Accepts (H, W), (H, W, 1) and (H, W, 3) arrays in any memory layout, 1-D arrays as one column, and `cv2.UMat`.
-    """
-    if type(image).__name__ == "UMat":
-        image = image.get()
-    if not isinstance(image, np.ndarray):
-        raise ImageTypeError(f"an image is a uint8 numpy array; this is a {type(image).__name__}")
-    if image.size == 0:
-        raise ImageError(f"the image is empty: its shape is {image.shape}")
-    if image.dtype != np.uint8:
-        raise ImageTypeError(f"the image's pixels are {image.dtype}; uint8 (0 to 255) is wanted")
-    if image.ndim == 1:
-        return image[:, None]
-    if image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] not in (1, 3)):
-        raise ImageError(f"the image's shape is {image.shape}; (H, W), (H, W, 1) or (H, W, 3) is wanted")
-    return image
-
-
-def _pair(name: str, value: Pair) -> tuple[int, int]:
-    try:
-        x, y = value
-        return operator.index(x), operator.index(y)
-    except (TypeError, ValueError):
-        raise ParameterTypeError(f"{name} is {value!r}; two integers (x, y) are wanted") from None
-
-
-def _pair_or(name: str, value: Pair | None, default: tuple[int, int]) -> tuple[int, int]:
-    return default if value is None or len(value) == 0 else _pair(name, value)
-
-
-def _places(name: str, value: Sequence[Pair] | NDArray[np.integer[Any]] | None) -> list[tuple[int, int]] | None:
-    if value is None or len(value) == 0:
-        return None
-    return [_pair(f"{name}[{i}]", place) for i, place in enumerate(value)]
-
 
 class HOGDescriptor:
     """Histograms of oriented gradients, and a linear SVM that finds people by them.
 
     `HOGDescriptor()` has the geometry of OpenCV's default people detector, gamma correction on. With arguments the
-    first five are mandatory and gamma correction is off unless asked for, as in OpenCV 4.14.
+    first five are mandatory and gamma correction is off unless asked for, as in OpenCV 4.14; None stands for a
+    default. `HOGDescriptor(filename)` loads a file. Sizes are (width, height) [px]. The geometry is checked at its
+    first use: what does not fit raises `GeometryError`.
     """
+
+    __slots__ = ("_armed", "_bare", "_geometry", "_svm")
 
     def __init__(
         self,
-        _winSize: Pair | None = None,
+        _winSize: Pair | str | os.PathLike[str] | None = None,
         _blockSize: Pair | None = None,
         _blockStride: Pair | None = None,
         _cellSize: Pair | None = None,
-        _nbins: int | None = None,
-        _derivAperture: int = 1,
-        _winSigma: float = -1.0,
-        _histogramNormType: int = HOGDescriptor_L2Hys,
-        _L2HysThreshold: float = 0.2,
+        _nbins: SupportsIndex | None = None,
+        _derivAperture: SupportsIndex | None = None,
+        _winSigma: SupportsFloat | None = None,
+        _histogramNormType: SupportsIndex | None = None,
+        _L2HysThreshold: SupportsFloat | None = None,
         _gammaCorrection: bool | None = None,
-        _nlevels: int = HOGDescriptor_DEFAULT_NLEVELS,
-        _signedGradient: bool = False,
+        _nlevels: SupportsIndex | None = None,
+        _signedGradient: bool | None = None,
+        *,
+        filename: str | os.PathLike[str] | None = None,
     ) -> None:
-        given = {
+        if isinstance(_winSize, (str, os.PathLike)):
+            filename, _winSize = _winSize, None
+        sizes = {
             "_winSize": _winSize,
             "_blockSize": _blockSize,
             "_blockStride": _blockStride,
             "_cellSize": _cellSize,
             "_nbins": _nbins,
         }
-        missing = [name for name, value in given.items() if value is None]
-        if 0 < len(missing) < len(given):
-            raise ParameterTypeError(f"HOGDescriptor(...) needs {', '.join(given)}; missing: {', '.join(missing)}")
-        self._win_size = _pair_or("_winSize", _winSize, (64, 128))
-        self._block_size = _pair_or("_blockSize", _blockSize, (16, 16))
-        self._block_stride = _pair_or("_blockStride", _blockStride, (8, 8))
-        self._cell_size = _pair_or("_cellSize", _cellSize, (8, 8))
-        self._nbins = 9 if _nbins is None else operator.index(_nbins)
-        self._deriv_aperture = operator.index(_derivAperture)
-        self._win_sigma = float(_winSigma)
-        self._histogram_norm_type = operator.index(_histogramNormType)
-        self._l2_hys_threshold = float(_L2HysThreshold)
-        self._gamma_correction = bool(missing) if _gammaCorrection is None else bool(_gammaCorrection)
-        self._nlevels = operator.index(_nlevels)
-        self._signed_gradient = bool(_signedGradient)
+        missing = [name for name, value in sizes.items() if value is None]
+        if 0 < len(missing) < len(sizes):
+            raise ParameterTypeError(f"HOGDescriptor(...) needs {', '.join(sizes)}; missing: {', '.join(missing)}")
+        default = Geometry()
         self._svm: NDArray[np.float32] | None = None
-        self._built: _core.Hog | None = None
+        self._set(
+            Geometry(
+                pair("_winSize", _winSize, default.winSize),
+                pair("_blockSize", _blockSize, default.blockSize),
+                pair("_blockStride", _blockStride, default.blockStride),
+                pair("_cellSize", _cellSize, default.cellSize),
+                integer("_nbins", _nbins, default.nbins),
+                integer("_derivAperture", _derivAperture, default.derivAperture),
+                real("_winSigma", _winSigma, default.winSigma),
+                integer("_histogramNormType", _histogramNormType, default.histogramNormType),
+                real("_L2HysThreshold", _L2HysThreshold, default.L2HysThreshold),
+                bool(missing) if _gammaCorrection is None else bool(_gammaCorrection),
+                integer("_nlevels", _nlevels, default.nlevels),
+                bool(_signedGradient),
+            )
+        )
+        if filename is not None:
+            self.load(filename)
+
+    def _set(self, geometry: Geometry) -> None:
+        self._geometry = geometry
+        # The compiled detector without and with its SVM, each made when first needed.
+        self._bare: _core.Hog | None = None
+        self._armed: _core.Hog | None = None
 
     @property
     def winSize(self) -> tuple[int, int]:
         """Detection window (width, height) [px]."""
-        return self._win_size
+        return self._geometry.winSize
 
     @property
     def blockSize(self) -> tuple[int, int]:
         """Block (width, height) [px]."""
-        return self._block_size
+        return self._geometry.blockSize
 
     @property
     def blockStride(self) -> tuple[int, int]:
         """Distance of neighbouring blocks (x, y) [px]."""
-        return self._block_stride
+        return self._geometry.blockStride
 
     @property
     def cellSize(self) -> tuple[int, int]:
         """Cell (width, height) [px]."""
-        return self._cell_size
+        return self._geometry.cellSize
 
     @property
     def nbins(self) -> int:
         """Orientation bins of a cell."""
-        return self._nbins
+        return self._geometry.nbins
 
     @property
     def derivAperture(self) -> int:
         """Kept and saved, never used, as in OpenCV."""
-        return self._deriv_aperture
+        return self._geometry.derivAperture
 
     @property
     def winSigma(self) -> float:
         """Gaussian window of a block [px]; -1 stands for the default, see `getWinSigma`."""
-        return self._win_sigma
+        return self._geometry.winSigma
 
     @property
     def histogramNormType(self) -> int:
         """Kept and saved, never used, as in OpenCV: L2-Hys is the only one."""
-        return self._histogram_norm_type
+        return self._geometry.histogramNormType
 
     @property
     def L2HysThreshold(self) -> float:
         """Clipping value of the block normalisation."""
-        return self._l2_hys_threshold
+        return self._geometry.L2HysThreshold
 
     @property
     def gammaCorrection(self) -> bool:
         """Whether the gradient is taken of the square root of the pixels."""
-        return self._gamma_correction
+        return self._geometry.gammaCorrection
 
     @property
     def nlevels(self) -> int:
         """Most levels of a pyramid."""
-        return self._nlevels
+        return self._geometry.nlevels
 
     @property
     def signedGradient(self) -> bool:
         """Whether the bins cover 2π instead of π."""
-        return self._signed_gradient
+        return self._geometry.signedGradient
 
     @property
     def svmDetector(self) -> NDArray[np.float32] | Nothing:
@@ -177,17 +163,16 @@ class HOGDescriptor:
 
     def getDescriptorSize(self) -> int:
         """Elements of one window's descriptor: bins × cells of a block × blocks of a window."""
-        return self._hog.descriptor_len
+        return self._features.descriptor_len
 
     def getWinSigma(self) -> float:
         """Gaussian window in force [px]: `winSigma`, or (block width + block height) / 8 where that is not positive."""
-        width, height = self._block_size
-        return self._win_sigma if self._win_sigma > 0 else (width + height) / 8.0
+        return self._geometry.sigma
 
     def checkDetectorSize(self) -> bool:
-        """Whether the detector, if any, fits the geometry; always true here, where a wrong one is refused."""
-        self.getDescriptorSize()
-        return True
+        """Whether the detector, if any, fits the geometry; false only after `load` of a file without a detector."""
+        size = self.getDescriptorSize()
+        return self._svm is None or len(self._svm) in (size, size + 1)
 
     def setSVMDetector(self, svmdetector: ArrayLike | None) -> None:
         """Set the coefficients of the SVM: one per descriptor element, and perhaps the bias after them.
@@ -202,14 +187,9 @@ class HOGDescriptor:
         DetectorSizeError
             `n` is neither the descriptor's size nor one more; the detector in force stays.
         """
-        if type(svmdetector).__name__ == "UMat":
-            svmdetector = svmdetector.get()  # type: ignore[union-attr]
-        svm = np.asarray(() if svmdetector is None else svmdetector)
-        if svm.ndim > 2 or (svm.ndim == 2 and 1 not in svm.shape and svm.size):
-            raise ParameterTypeError(f"the detector's shape is {svm.shape}; (n,), (n, 1) or (1, n) is wanted")
-        coefficients = svm.astype(np.float32).ravel() if svm.size else None
-        self._built = self._build(coefficients)
-        self._svm = coefficients
+        svm = coefficients(svmdetector)
+        self._armed = None if svm is None else self._compiled(svm)
+        self._svm = svm
 
     @staticmethod
     def getDefaultPeopleDetector() -> NDArray[np.float32]:
@@ -224,11 +204,11 @@ class HOGDescriptor:
     def computeGradient(
         self,
         img: NDArray[np.uint8],
-        grad: None = None,
-        angleOfs: None = None,
+        grad: NDArray[np.float32] | None = None,
+        angleOfs: NDArray[np.uint8] | None = None,
         paddingTL: Pair | None = None,
         paddingBR: Pair | None = None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]] | tuple[Nothing, Nothing]:
         """Gradient magnitudes shared between the two nearest orientation bins.
 
         Parameters
@@ -236,26 +216,28 @@ class HOGDescriptor:
         img
             uint8 (H, W), (H, W, 1) or (H, W, 3).
         grad, angleOfs
-            None; they stand where OpenCV takes output arrays.
+            Arrays to fill, of the results' shapes and types; others, and None, are left alone.
         paddingTL, paddingBR
             Columns and rows (x, y) to add (or, if negative, to drop) at the top left and the bottom right [px].
 
         Returns
         -------
         grad, angleOfs
-            float32 (H', W', 2) magnitudes and uint8 (H', W', 2) bins.
+            float32 (H', W', 2) magnitudes and uint8 (H', W', 2) bins; `((), ())` where no pixel is left.
         """
-        del grad, angleOfs
-        left, top = _pair_or("paddingTL", paddingTL, (0, 0))
-        right, bottom = _pair_or("paddingBR", paddingBR, (0, 0))
-        return self._hog.gradient(pixels(img), (left, top, right, bottom))
+        image = pixels(img)
+        (left, top), (right, bottom) = pair("paddingTL", paddingTL), pair("paddingBR", paddingBR)
+        if 0 in (image.shape[0] + top + bottom, image.shape[1] + left + right):
+            return (), ()
+        shares, bins = self._features.gradient(image, (left, top, right, bottom))
+        return _filled(grad, shares), _filled(angleOfs, bins)
 
     def compute(
         self,
         img: NDArray[np.uint8],
         winStride: Pair | None = None,
         padding: Pair | None = None,
-        locations: Sequence[Pair] | NDArray[np.integer[Any]] | None = None,
+        locations: Pairs | None = None,
     ) -> NDArray[np.float32] | Nothing:
         """Descriptors of the windows of an image.
 
@@ -276,22 +258,22 @@ class HOGDescriptor:
             float32 (windows × descriptor size,), blocks column by column; zeros for a location outside. `()` when
             no window fits.
         """
-        descriptors = self._hog.compute(
+        descriptors = self._features.compute(
             pixels(img),
-            _pair_or("winStride", winStride, _DEFAULT_STRIDE),
-            _pair_or("padding", padding, (0, 0)),
-            _places("locations", locations),
+            pair("winStride", winStride),
+            pair("padding", padding),
+            places("locations", locations),
         )
         return descriptors if len(descriptors) else ()
 
     def detect(
         self,
         img: NDArray[np.uint8],
-        hitThreshold: float = 0.0,
+        hitThreshold: SupportsFloat | None = 0.0,
         winStride: Pair | None = None,
         padding: Pair | None = None,
-        searchLocations: Sequence[Pair] | NDArray[np.integer[Any]] | None = None,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]:
+        searchLocations: Pairs | None = None,
+    ) -> Found:
         """Windows of an image, at its own size, that the SVM takes for a person.
 
         Parameters
@@ -315,25 +297,27 @@ class HOGDescriptor:
         """
         if self._svm is None:
             return (), ()
-        places, weights = self._hog.detect(
+        found, weights = self._detector.detect(
             pixels(img),
-            float(hitThreshold),
-            _pair_or("winStride", winStride, _DEFAULT_STRIDE),
-            _pair_or("padding", padding, (0, 0)),
-            _places("searchLocations", searchLocations),
+            real("hitThreshold", hitThreshold, 0.0),
+            pair("winStride", winStride),
+            pair("padding", padding),
+            places("searchLocations", searchLocations),
         )
-        return (places, weights) if len(places) else ((), ())
+        return (found, weights) if len(found) else ((), ())
 
     def detectMultiScale(
         self,
         img: NDArray[np.uint8],
-        hitThreshold: float = 0.0,
+        hitThreshold: SupportsFloat | None = 0.0,
         winStride: Pair | None = None,
         padding: Pair | None = None,
-        scale: float = 1.05,
-        groupThreshold: float = 2.0,
+        scale: SupportsFloat | None = 1.05,
+        groupThreshold: SupportsFloat | None = 2.0,
         useMeanshiftGrouping: bool = False,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]:
+        *,
+        finalThreshold: SupportsFloat | None = None,
+    ) -> Found:
         """People of any size in an image.
 
         Parameters
@@ -353,6 +337,8 @@ class HOGDescriptor:
             `useMeanshiftGrouping`, the least weight of a mode.
         useMeanshiftGrouping
             Group by mean-shift instead.
+        finalThreshold
+            The old name of `groupThreshold`; used in its place when given.
 
         Returns
         -------
@@ -362,37 +348,162 @@ class HOGDescriptor:
         """
         if self._svm is None:
             return (), ()
-        boxes, weights = self._hog.detect_multi_scale(
+        boxes, weights = self._detector.detect_multi_scale(
             pixels(img),
-            float(hitThreshold),
-            _pair_or("winStride", winStride, _DEFAULT_STRIDE),
-            _pair_or("padding", padding, (0, 0)),
-            float(scale),
-            float(groupThreshold),
+            real("hitThreshold", hitThreshold, 0.0),
+            pair("winStride", winStride),
+            pair("padding", padding),
+            real("scale", scale, 1.05),
+            real("groupThreshold", groupThreshold if finalThreshold is None else finalThreshold, 2.0),
             bool(useMeanshiftGrouping),
         )
         return (boxes, weights) if len(boxes) else ((), ())
 
-    @property
-    def _hog(self) -> _core.Hog:
-        if self._built is None:
-            self._built = self._build(self._svm)
-        return self._built
+    def detectROI(
+        self,
+        img: NDArray[np.uint8],
+        regions: Sequence[Sequence[int]] | NDArray[np.integer[Any]],
+        hitThreshold: SupportsFloat | None = 0.0,
+        **options: Any,
+    ) -> Found:
+        """People of any size in regions of an image, each searched as if it were an image of its own.
 
-    def _build(self, svm: NDArray[np.float32] | None) -> _core.Hog:
+        (For single windows at given places, as OpenCV's C++ method of this name has it, use `detect` with
+        `searchLocations`.)
+
+        Parameters
+        ----------
+        img
+            uint8 (H, W), (H, W, 1) or (H, W, 3).
+        regions
+            (n, 4) integers: x, y, width, height [px]; what lies outside the image is passed over.
+        hitThreshold
+            Least score of a hit.
+        **options
+            The other arguments of `detectMultiScale`, by name.
+
+        Returns
+        -------
+        foundLocations, foundWeights
+            As of `detectMultiScale`, in pixels of the whole image, region by region.
+        """
+        image = pixels(img)
+        boxes, weights = [np.empty((0, 4), np.int32)], [np.empty(0)]
+        for x, y, width, height in rectangles("regions", regions):
+            left, top = max(x, 0), max(y, 0)
+            region = image[top : max(y + height, 0), left : max(x + width, 0)]
+            if region.size:
+                found, scores = self.detectMultiScale(region, hitThreshold, **options)
+                boxes.append(np.reshape(np.asarray(found, np.int32), (-1, 4)) + np.array([left, top, 0, 0], np.int32))
+                weights.append(np.asarray(scores, np.float64))
+        return (np.concatenate(boxes), np.concatenate(weights)) if len(boxes) > 1 else ((), ())
+
+    def save(self, filename: str | os.PathLike[str], objname: str = "") -> None:
+        """Write geometry and detector to a file that OpenCV reads, too.
+
+        Parameters
+        ----------
+        filename
+            .xml, .yml, .yaml or .json, with .gz after it compressed; YAML under any other suffix.
+        objname
+            Name of the object in the file; by default the file's stem.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        """
+        model_files.save(Path(filename), self._geometry, self._svm, objname)
+
+    def load(self, filename: str | os.PathLike[str], objname: str = "") -> bool:
+        """Take geometry and detector from a file of OpenCV's or of `save`; true, or an error.
+
+        As in OpenCV a file without a detector keeps the one in force, and what else is missing counts as 0.
+
+        Parameters
+        ----------
+        filename
+            XML, YAML or JSON, plain or gzipped, whatever its suffix.
+        objname
+            Name of the object in the file; by default the first.
+
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        ModelFormatError
+            It holds no HOG detector.
+        DetectorSizeError
+            Its detector does not fit its geometry.
+        """
+        geometry, svm = model_files.load(Path(filename), objname)
+        loaded = HOGDescriptor()
+        loaded._set(geometry)
+        loaded.getDescriptorSize()
+        loaded.setSVMDetector(svm)
+        self._set(geometry)
+        if svm:
+            self._svm = loaded._svm
+        return True
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, HOGDescriptor):
+            return NotImplemented
+        return self._geometry == other._geometry and np.array_equal(self.svmDetector, other.svmDetector)
+
+    def __hash__(self) -> int:
+        # It may change while it is a key, so nothing it holds may go in.
+        return hash(HOGDescriptor)
+
+    def __repr__(self) -> str:
+        held = ", ".join(f"{name}={value}" for name, value in self._geometry._asdict().items())
+        svm = "no detector" if self._svm is None else f"a detector of {len(self._svm)} coefficients"
+        return f"<{type(self).__name__} {held}; {svm}>"
+
+    def __reduce__(self) -> tuple[Callable[..., HOGDescriptor], tuple[Any, ...]]:
+        return _restored, (type(self), tuple(self._geometry), self._svm)
+
+    @property
+    def _features(self) -> _core.Hog:
+        if self._bare is None:
+            self._bare = self._compiled(None)
+        return self._bare
+
+    @property
+    def _detector(self) -> _core.Hog:
+        if self._armed is None:
+            self._armed = self._compiled(self._svm)
+        return self._armed
+
+    def _compiled(self, svm: NDArray[np.float32] | None) -> _core.Hog:
+        g = self._geometry
         return _core.Hog(
-            self._win_size,
-            self._block_size,
-            self._block_stride,
-            self._cell_size,
-            self._nbins,
-            self._win_sigma,
-            self._l2_hys_threshold,
-            self._gamma_correction,
-            self._nlevels,
-            self._signed_gradient,
+            g.winSize,
+            g.blockSize,
+            g.blockStride,
+            g.cellSize,
+            g.nbins,
+            g.winSigma,
+            g.L2HysThreshold,
+            g.gammaCorrection,
+            g.nlevels,
+            g.signedGradient,
             svm,
         )
+
+
+def _restored(kind: type[HOGDescriptor], geometry: tuple[Any, ...], svm: NDArray[np.float32] | None) -> HOGDescriptor:
+    hog = kind(*geometry)
+    hog._svm = svm
+    return hog
+
+
+def _filled(target: Any, result: Any) -> Any:
+    """Return `target` holding `result` where it can, else `result` itself."""
+    if isinstance(target, np.ndarray) and target.shape == result.shape and target.dtype == result.dtype:
+        target[...] = result
+        return target
+    return result
 
 
 def HOGDescriptor_getDefaultPeopleDetector() -> NDArray[np.float32]:
@@ -406,7 +517,9 @@ def HOGDescriptor_getDaimlerPeopleDetector() -> NDArray[np.float32]:
 
 
 def groupRectangles(
-    rectList: Sequence[Sequence[int]] | NDArray[np.integer[Any]], groupThreshold: int, eps: float = 0.2
+    rectList: Sequence[Sequence[int]] | NDArray[np.integer[Any]],
+    groupThreshold: SupportsIndex | None,
+    eps: SupportsFloat | None = 0.2,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]] | tuple[Nothing, Nothing]:
     """Mean rectangles of groups of similar ones.
 
@@ -424,6 +537,7 @@ def groupRectangles(
     rectList, weights
         int32 (m, 4) rectangles and int32 (m,) numbers of members; `((), ())` when none are left.
     """
-    rects = [[operator.index(side) for side in rect] for rect in rectList]
-    grouped, counts = _core.group_rectangles(rects, operator.index(groupThreshold), float(eps))
-    return (grouped, counts) if len(grouped) else ((), ())
+    found, counts = _core.group_rectangles(
+        rectangles("rectList", rectList), integer("groupThreshold", groupThreshold, 0), real("eps", eps, 0.2)
+    )
+    return (found, counts) if len(found) else ((), ())

@@ -1,0 +1,145 @@
+"""What callers pass in, as OpenCV's bindings would take it, or a named error that says what came instead."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import Any, SupportsFloat, SupportsIndex
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limo_hog.exceptions import ImageError, ImageTypeError, ParameterError, ParameterTypeError
+
+#: Two integers: width and height, or x and y [px].
+Pair = Sequence[int] | NDArray[np.integer[Any]]
+#: Many of them: (n, 2) integers.
+Pairs = Sequence[Pair] | NDArray[np.integer[Any]]
+
+_INT_MAX = 2**31 - 1
+
+
+def pixels(image: Any) -> NDArray[np.uint8]:
+    """Return `image` as the uint8 array the detector reads.
+
+    Accepts (H, W), (H, W, 1) and (H, W, 3) arrays in any memory layout, 1-D arrays as one column, and `cv2.UMat`.
+
+    Raises
+    ------
+    ImageError
+        It is anything else, or empty.
+    """
+    image = _downloaded(image)
+    if not isinstance(image, np.ndarray):
+        raise ImageTypeError(f"an image is a uint8 numpy array; this is a {type(image).__name__}")
+    if image.size == 0:
+        raise ImageError(f"the image is empty: its shape is {image.shape}")
+    if image.dtype != np.uint8:
+        raise ImageTypeError(
+            f"the image's pixels are {image.dtype}; uint8 (0 to 255) is wanted: scale and astype(uint8)"
+        )
+    if image.ndim == 1:
+        return image[:, None]
+    if image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] not in (1, 3)):
+        raise ImageError(f"the image's shape is {image.shape}; (H, W), (H, W, 1) or (H, W, 3) is wanted")
+    return image
+
+
+def coefficients(svm: ArrayLike | None) -> NDArray[np.float32] | None:
+    """Return the coefficients of an SVM as float32 (n,); None where there are none.
+
+    Raises
+    ------
+    ParameterTypeError
+        They are no numbers of shape (n,), (n, 1) or (1, n).
+    """
+    try:
+        given = np.asarray(() if svm is None else _downloaded(svm))
+    except ValueError:
+        raise ParameterTypeError("the detector's coefficients are ragged; one row of numbers is wanted") from None
+    if given.size == 0:
+        return None
+    if given.dtype.kind not in "biuf":
+        raise ParameterTypeError(f"the detector's coefficients are {given.dtype}; real numbers are wanted")
+    if given.ndim > 2 or (given.ndim == 2 and 1 not in given.shape):
+        raise ParameterTypeError(f"the detector's shape is {given.shape}; (n,), (n, 1) or (1, n) is wanted")
+    with np.errstate(over="ignore"):
+        return given.astype(np.float32).ravel()
+
+
+def pair(name: str, value: Pair | None, default: tuple[int, int] = (0, 0)) -> tuple[int, int]:
+    """Return two integers; None or nothing stands for `default`."""
+    if value is None or (hasattr(value, "__len__") and len(value) == 0):
+        return default
+    try:
+        x, y = value
+        found = operator.index(x), operator.index(y)
+    except (TypeError, ValueError):
+        raise ParameterTypeError(f"{name} is {value!r}; two integers (x, y) are wanted") from None
+    if max(map(abs, found)) > _INT_MAX:
+        raise ParameterError(f"{name} is {found}; at most {_INT_MAX} is allowed")
+    return found
+
+
+def places(name: str, value: Pairs | None) -> list[tuple[int, int]] | None:
+    """Return (x, y) integers; None or nothing stands for no choice."""
+    if value is None:
+        return None
+    try:
+        given = np.asarray(value)
+    except ValueError:
+        given = np.asarray(None)
+    if given.size == 0:
+        return None
+    if given.dtype.kind not in "iu" or given.ndim != 2 or given.shape[1] != 2:
+        raise ParameterTypeError(
+            f"{name} has shape {given.shape} and type {given.dtype}; integers of shape (n, 2), each x, y, are wanted"
+        )
+    return [(x, y) for x, y in given.tolist()]
+
+
+def rectangles(name: str, value: Sequence[Sequence[int]] | NDArray[np.integer[Any]] | None) -> list[list[int]]:
+    """Return [x, y, width, height] integers."""
+    try:
+        given = np.asarray(() if value is None else value)
+    except ValueError:
+        given = np.asarray(None)
+    if given.size and (given.dtype.kind not in "iu" or given.ndim != 2 or given.shape[1] != 4):
+        raise ParameterTypeError(
+            f"{name} has shape {given.shape} and type {given.dtype}; integers of shape (n, 4), each x, y, width, "
+            "height, are wanted"
+        )
+    if given.size and max(abs(int(given.min())), abs(int(given.max()))) > _INT_MAX:
+        raise ParameterError(f"{name} has a coordinate beyond {_INT_MAX}")
+    found: list[list[int]] = given.tolist()
+    return found
+
+
+def real(name: str, value: SupportsFloat | None, default: float) -> float:
+    """Return a number; None stands for `default`."""
+    if value is None:
+        return default
+    if not isinstance(value, (SupportsFloat, SupportsIndex)):
+        raise ParameterTypeError(f"{name} is {value!r}; a number is wanted")
+    try:
+        return float(value)
+    except TypeError:  # an array of more than one number
+        raise ParameterTypeError(f"{name} is {value!r}; one number is wanted") from None
+
+
+def integer(name: str, value: SupportsIndex | None, default: int) -> int:
+    """Return an integer; None stands for `default`."""
+    if value is None:
+        return default
+    try:
+        found = operator.index(value)
+    except TypeError:
+        raise ParameterTypeError(f"{name} is {value!r}; an integer is wanted") from None
+    if abs(found) > _INT_MAX:
+        raise ParameterError(f"{name} is {found}; at most {_INT_MAX} is allowed")
+    return found
+
+
+def _downloaded(value: Any) -> Any:
+    """Return the array inside a `cv2.UMat`, or else `value` itself; OpenCV need not be there."""
+    return value.get() if type(value).__name__ == "UMat" else value

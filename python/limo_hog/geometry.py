@@ -1,0 +1,27 @@
+"""The parameters of a HOG descriptor, as OpenCV names and orders them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Geometry(NamedTuple):
+    """What `HOGDescriptor` was made with; the defaults are those of OpenCV's people detector. Sizes are (x, y) [px]."""
+
+    winSize: tuple[int, int] = (64, 128)
+    blockSize: tuple[int, int] = (16, 16)
+    blockStride: tuple[int, int] = (8, 8)
+    cellSize: tuple[int, int] = (8, 8)
+    nbins: int = 9
+    derivAperture: int = 1
+    winSigma: float = -1.0
+    histogramNormType: int = 0
+    L2HysThreshold: float = 0.2
+    gammaCorrection: bool = True
+    nlevels: int = 64
+    signedGradient: bool = False
+
+    @property
+    def sigma(self) -> float:
+        """Gaussian window of a block in force [px]."""
+        return self.winSigma if self.winSigma > 0 else sum(self.blockSize) / 8.0

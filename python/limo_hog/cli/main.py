@@ -19,6 +19,7 @@ from limo_hog.exceptions import LimoHogError
 COMMANDS = {
     "follow": "watch a robot find and follow a walking person in the arena, and score it",
     "detect": "find people in photographs, folders and videos",
+    "replay": "let detector and follower look at a recording",
     "bench": "time this detector against OpenCV's, with parity checked in the same run",
     "info": "versions, CPU features, chosen backend, and what OpenCV is installed",
 }

@@ -25,12 +25,25 @@ class RateColumn(ProgressColumn):
         return Text(f"{task.speed:.4g}/s" if task.speed else "", style="progress.data.speed")
 
 
+class CountColumn(ProgressColumn):
+    """Steps done, and of how many where that is known."""
+
+    def __init__(self, unit: str) -> None:
+        super().__init__()
+        self._unit = unit
+
+    def render(self, task: Task) -> Text:
+        """Say how far it is."""
+        of = "" if task.total is None else f" of {task.total:g}"
+        return Text(f"{task.completed:g}{of} {self._unit}")
+
+
 def progress(unit: str) -> Progress:
     """Make a progress display on standard error: shown only on a terminal, gone when it ends."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
-        TextColumn("{task.completed:g} of {task.total:g} " + unit),
+        CountColumn(unit),
         RateColumn(),
         TimeElapsedColumn(),
         TextColumn("left"),

@@ -31,20 +31,22 @@ def add_watching(parser: argparse.ArgumentParser) -> None:
         metavar="[HOST:]PORT",
         help=f"show the run, in real time, on a page of its own ({PORT}); without HOST to this machine alone",
     )
-    group.add_argument("--video", type=_file(".mp4"), metavar="FILE.mp4", help="film what the follower saw (H.264)")
+    group.add_argument(
+        "--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="film what the follower saw (H.264)"
+    )
     group.add_argument(
         "--record",
-        type=_file(".mcap"),
+        type=file_ending(".mcap"),
         metavar="FILE.mcap",
         help="record everything sensed, found and commanded as ROS 2 messages (8 MB/s)",
     )
     group.add_argument(
         "--plot",
-        type=_file(".png", ".svg", ".pdf"),
+        type=file_ending(".png", ".svg", ".pdf"),
         metavar="FILE.png",
         help="draw path, error, distance and speed in one figure",
     )
-    group.add_argument("--rerun", type=_file(".rrd"), metavar="FILE.rrd", help="log the run for the Rerun viewer")
+    group.add_argument("--rerun", type=file_ending(".rrd"), metavar="FILE.rrd", help="log the run for the Rerun viewer")
 
 
 def _address(text: str) -> tuple[str, int]:
@@ -54,7 +56,9 @@ def _address(text: str) -> tuple[str, int]:
     return host.strip("[]") or "127.0.0.1", int(port)
 
 
-def _file(*suffixes: str) -> Callable[[str], Path]:
+def file_ending(*suffixes: str) -> Callable[[str], Path]:
+    """Read a file name that ends in one of some suffixes."""
+
     def file(text: str) -> Path:
         if Path(text).suffix.lower() not in suffixes:
             raise argparse.ArgumentTypeError(f"{text!r}: wanted is a name that ends in {' or '.join(suffixes)}")

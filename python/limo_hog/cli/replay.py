@@ -1,0 +1,119 @@
+"""`limo-hog replay`: the detector and a follower over a recording."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from limo_hog.cli.output import STDOUT, write_json
+from limo_hog.cli.progress import progress
+from limo_hog.cli.watching import file_ending
+from limo_hog.detector import Detections
+from limo_hog.follow.detectors import NAMES, Detector, detector_named
+from limo_hog.follow.naming import CONTROLLERS, controller_named
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `replay`."""
+    parser = subparsers.add_parser(
+        "replay",
+        description="Let the detector and a follower look at a recording (an MCAP file of --record, or any ROS 2 bag), "
+        "and compare what they find and decide with what was recorded.",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE")
+    parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="who decides (%(default)s)")
+    parser.add_argument("--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="who finds (hog)")
+    parser.add_argument("--image", metavar="TOPIC", help="topic of the camera (/limo_camera/image)")
+    parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="film what is found (H.264)")
+    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - is standard output")
+
+
+class Timed:
+    """A detector with a watch."""
+
+    def __init__(self, detector: Detector) -> None:
+        self._detector = detector
+        self.ms: list[float] = []
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        """Find people, and note how long it took."""
+        began = time.perf_counter()
+        found = self._detector.detect(image)
+        self.ms.append(1e3 * (time.perf_counter() - began))
+        return found
+
+
+def run(args: argparse.Namespace) -> int:
+    """Replay a recording and show the figures."""
+    from limo_hog.ros2.bag import read_bag
+    from limo_hog.ros2.replay import IMAGE_TOPIC, Replayed, replay
+
+    detector = Timed(detector_named(args.detector))
+    controller = controller_named(args.controller)
+    frames: list[dict[str, Any]] = []
+    with ExitStack() as stack:
+        bar = stack.enter_context(progress("frames"))
+        task = bar.add_task("replaying", total=None)
+        write = None
+        if args.video is not None:
+            from limo_hog.imaging.writing import video_writer
+
+            write = stack.enter_context(video_writer(args.video, fps=10))
+
+        def draw(frame: Replayed) -> NDArray[np.uint8]:
+            from limo_hog.imaging.drawing import annotate
+
+            labels = [f"{score:.1f}" for score in frame.found.scores]
+            return annotate(frame.image, frame.found.boxes, labels, frame.target, f"{frame.stamp:.1f} s")
+
+        for frame in replay(read_bag(args.file), controller, detector, args.image or IMAGE_TOPIC):
+            frames.append(_compared(frame))
+            if write is not None:
+                write(draw(frame))
+            bar.advance(task)
+    card = _card(args, frames, detector.ms)
+    if args.json:
+        write_json(args.json, card)
+    if args.json != STDOUT:
+        table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+        for name, value in card.items():
+            shown = f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)
+            table.add_row(name.replace("_", " "), shown)
+        Console(highlight=False).print(table)
+    return 0
+
+
+def _compared(frame: Any) -> dict[str, Any]:
+    row: dict[str, Any] = {"found": len(frame.found) > 0, "same": None, "linear": None, "angular": None}
+    if frame.recorded is not None:
+        boxes = np.array_equal(frame.found.boxes, frame.recorded.boxes)
+        row["same"] = boxes and bool(np.allclose(frame.found.scores, frame.recorded.scores, rtol=0, atol=1e-5))
+    if frame.recorded_twist is not None:
+        row["linear"] = abs(frame.twist.linear - frame.recorded_twist.linear)
+        row["angular"] = abs(frame.twist.angular - frame.recorded_twist.angular)
+    return row
+
+
+def _card(args: argparse.Namespace, frames: list[dict[str, Any]], ms: list[float]) -> dict[str, Any]:
+    compared = [frame["same"] for frame in frames if frame["same"] is not None]
+    return {
+        "file": str(args.file),
+        "controller": args.controller,
+        "detector": args.detector,
+        "frames": len(frames),
+        "frames_with_people": sum(frame["found"] for frame in frames),
+        "frames_recorded_with_detections": len(compared),
+        "same_detections": sum(compared),
+        "linear_difference_max": max((f["linear"] for f in frames if f["linear"] is not None), default=None),
+        "angular_difference_max": max((f["angular"] for f in frames if f["angular"] is not None), default=None),
+        "detect_ms_p50": median(ms),
+    }

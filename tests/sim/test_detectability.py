@@ -1,0 +1,106 @@
+"""OpenCV's own HOG sees the person as it sees people, and sees nobody where nobody is."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_sim.camera import CameraPose
+from limo_sim.person import Pose
+from limo_sim.renderer import Renderer
+from limo_sim.scenario import Person, Scenario
+from limo_sim.variants import varied
+
+DISTANCES = (1.75, 2.0, 2.5, 3.0, 3.5, 4.0)
+SOMEBODY = Scenario(people=(Person(route=((2, 0, 0),)),))
+
+if not hasattr(cv2, "HOGDescriptor"):
+    pytest.skip("this OpenCV has no HOGDescriptor", allow_module_level=True)
+
+
+def found(image: NDArray[np.uint8]) -> NDArray[np.int32]:
+    """Boxes of OpenCV's detector with the workshop's parameters, int32 (N, 4)."""
+    hog = cv2.HOGDescriptor()
+    hog.setSVMDetector(np.array(cv2.HOGDescriptor.getDefaultPeopleDetector(), np.float32))
+    boxes, _ = hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)
+    return np.asarray(boxes, np.int32).reshape(-1, 4)
+
+
+def holds(box: NDArray[np.int32], person: tuple[int, int, int, int]) -> bool:
+    """Whether a detection is this person: intersection over union with the box and its margin at least a half."""
+    x, y, w, h = person
+    middle, tall = x + w / 2, h / 0.75
+    ideal = middle - tall / 4, y + h / 2 - tall / 2, tall / 2, tall
+    across = min(box[0] + box[2], ideal[0] + ideal[2]) - max(box[0], ideal[0])
+    down = min(box[1] + box[3], ideal[1] + ideal[3]) - max(box[1], ideal[1])
+    shared = max(across, 0) * max(down, 0)
+    return bool(shared / (box[2] * box[3] + ideal[2] * ideal[3] - shared) >= 0.5)
+
+
+def rate(scenario: Scenario, distance: float, phases: int, seed: int) -> float:
+    """Share of 8 directions × some phases in which the person, so far from the camera, is found."""
+    renderer, camera, hits = Renderer(scenario, np.random.default_rng(seed)), CameraPose(0, 0, 0), []
+    for direction in range(8):
+        for phase in range(phases):
+            pose = Pose(distance, 0.0, direction * math.tau / 8, phase * math.tau / phases, 1.0)
+            image, _, [(_, box)] = renderer.render(camera, [pose], np.random.default_rng([seed, direction, phase]))
+            assert box is not None
+            hits.append(any(holds(candidate, box) for candidate in found(image)))
+    return float(np.mean(hits))
+
+
+def false_rate(frames: int, seed: int) -> float:
+    """Share of frames of the empty arena, from anywhere in it, in which somebody is found."""
+    renderer, random = Renderer(Scenario(), np.random.default_rng(seed)), np.random.default_rng(seed)
+    hits = []
+    for _ in range(frames):
+        x, y, yaw = random.uniform((-4, -4, -math.pi), (4, 4, math.pi)).tolist()
+        image, _, _ = renderer.render(CameraPose(x, y, yaw), [], random)
+        hits.append(len(found(image)) > 0)
+    return float(np.mean(hits))
+
+
+@pytest.mark.parametrize("distance", DISTANCES)
+def test_the_person_is_found_from_every_side_in_any_phase(distance: float) -> None:
+    assert rate(SOMEBODY, distance, phases=2, seed=round(100 * distance)) >= 0.95
+
+
+@pytest.mark.parametrize("distance", [2.5])
+def test_somebody_who_stands_is_found_from_every_side(distance: float) -> None:
+    renderer = Renderer(SOMEBODY, np.random.default_rng(0))
+    for direction in range(8):
+        pose = Pose(distance, 0.0, direction * math.tau / 8)
+        image, _, [(_, box)] = renderer.render(CameraPose(0, 0, 0), [pose], np.random.default_rng(direction))
+        assert box is not None
+        assert any(holds(candidate, box) for candidate in found(image)), direction
+
+
+def test_nobody_is_found_in_the_empty_arena() -> None:
+    assert false_rate(20, seed=1) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("distance", DISTANCES)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_person_is_found_in_99_of_100_frames(distance: float, seed: int) -> None:
+    assert rate(SOMEBODY, distance, phases=12, seed=seed) >= 0.99
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("seed", range(2))
+def test_nobody_is_found_in_500_frames_of_the_empty_arena(seed: int) -> None:
+    assert false_rate(500, seed) <= 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("seed", range(6))
+def test_other_clothes_and_other_light_change_little(seed: int) -> None:
+    rates = [rate(varied(SOMEBODY, seed), distance, phases=3, seed=seed) for distance in (2.0, 3.0)]
+    assert np.mean(rates) >= 0.9

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
 from limo_hog.follow.decision import Controller, Decision, Mode
@@ -65,12 +66,16 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """A step with the pictures it was decided on, for those who watch."""
+    """A step with the pictures it was decided on, for those who watch.
+
+    `windows` are the pictures a node shows with `cv2.imshow`, by name: uint8 (H, W, 3) BGR or (H, W).
+    """
 
     step: Step
     frame: Frame | None
     scan: Scan | None
     odometry: Odometry | None
+    windows: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from limo_hog.exceptions import LimoHogError
 #: Every command and its line in `limo-hog --help`.
 COMMANDS = {
     "follow": "watch a robot find and follow a walking person in the arena, and score it",
+    "run": "run an ordinary ROS 2 Python node against the arena, without ROS",
     "detect": "find people in photographs, folders and videos",
     "replay": "let detector and follower look at a recording",
     "bench": "time this detector against OpenCV's, with parity checked in the same run",

@@ -230,12 +230,17 @@ class View:
         }
 
     def _pictures(self, moment: Moment) -> list[bytes]:
-        """Encode the two pictures of a moment; a letter in front says which."""
+        """Encode the pictures of a moment: the camera's, the depth's and a node's windows; a letter tells which."""
         if moment.frame is None:
             return []
         depth = depth_picture(moment.frame.depth[::2, ::2], self._scenario.depth.far_m)
         pictures = {b"c": annotated(moment.frame, moment.step), b"d": depth}
-        return [letter + cv2.imencode(".jpg", p, _JPEG)[1].tobytes() for letter, p in pictures.items()]
+        encoded = [letter + cv2.imencode(".jpg", p, _JPEG)[1].tobytes() for letter, p in pictures.items()]
+        # A window's name stands between its letter and its picture, ended by a line feed.
+        return encoded + [
+            b"w" + " ".join(name.split()).encode() + b"\n" + cv2.imencode(".jpg", p, _JPEG)[1].tobytes()
+            for name, p in moment.windows.items()
+        ]
 
     def _obey(self, text: str) -> str | None:
         """Do what a page wishes; returns what is wrong with the wish."""

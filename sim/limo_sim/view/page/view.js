@@ -68,11 +68,30 @@ function state(next) {
 }
 
 function show(data) {
-  const picture = $({ c: "camera", d: "depth" }[String.fromCharCode(new Uint8Array(data, 0, 1)[0])]);
+  const bytes = new Uint8Array(data);
+  const kind = String.fromCharCode(bytes[0]);
+  // A node's window says its name before its picture.
+  const start = kind === "w" ? bytes.indexOf(10) + 1 : 1;
+  const picture =
+    kind === "w" ? nodeWindow(new TextDecoder().decode(bytes.subarray(1, start - 1))) : $({ c: "camera", d: "depth" }[kind]);
   const old = picture.src;
-  picture.src = URL.createObjectURL(new Blob([new Uint8Array(data, 1)], { type: "image/jpeg" }));
+  picture.src = URL.createObjectURL(new Blob([bytes.subarray(start)], { type: "image/jpeg" }));
   if (old) URL.revokeObjectURL(old);
   picture.dataset.count = Number(picture.dataset.count || 0) + 1;
+}
+
+// The picture of one cv2.imshow window; its figure is made when it first shows something.
+function nodeWindow(name) {
+  const known = [...document.querySelectorAll("#windows img")].find((picture) => picture.alt === name);
+  if (known) return known;
+  const figure = document.createElement("figure");
+  const caption = document.createElement("figcaption");
+  const picture = document.createElement("img");
+  caption.textContent = name;
+  picture.alt = name;
+  figure.append(caption, picture);
+  $("windows").append(figure);
+  return picture;
 }
 
 function end(card) {

@@ -1,0 +1,30 @@
+"""The workshop's topics: names and types."""
+
+from __future__ import annotations
+
+IMAGE = "/limo_camera/image"
+IMAGE_COMPRESSED = "/limo_camera/image/compressed"
+DEPTH = "/limo_camera/depth/image_raw"
+#: The name the LCAS/limo_ros2 model gives to the same depth image.
+DEPTH_LCAS = "/limo_camera/depth/camera_image_depth"
+CAMERA_INFO = "/limo_camera/camera_info"
+ANNOTATED = "/limo_camera/image_annotated"
+SCAN = "/scan"
+ODOMETRY = "/odom"
+IMU = "/imu"
+COMMAND = "/cmd_vel"
+CLOCK = "/clock"
+
+TYPES = {
+    IMAGE: "sensor_msgs/msg/Image",
+    IMAGE_COMPRESSED: "sensor_msgs/msg/CompressedImage",
+    DEPTH: "sensor_msgs/msg/Image",
+    DEPTH_LCAS: "sensor_msgs/msg/Image",
+    CAMERA_INFO: "sensor_msgs/msg/CameraInfo",
+    ANNOTATED: "sensor_msgs/msg/Image",
+    SCAN: "sensor_msgs/msg/LaserScan",
+    ODOMETRY: "nav_msgs/msg/Odometry",
+    IMU: "sensor_msgs/msg/Imu",
+    COMMAND: "geometry_msgs/msg/Twist",
+    CLOCK: "rosgraph_msgs/msg/Clock",
+}

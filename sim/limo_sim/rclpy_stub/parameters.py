@@ -1,0 +1,158 @@
+"""Node parameters: declared with a value, overridden on the command line, of one type for good."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+
+class ParameterException(Exception):  # noqa: N818 — rclpy's names
+    """A parameter is not declared, or not of its type."""
+
+
+class ParameterNotDeclaredException(ParameterException):
+    """A parameter was asked for before it was declared."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"parameter {name!r} is not declared: call declare_parameter({name!r}, default) first")
+
+
+class ParameterAlreadyDeclaredException(ParameterException):
+    """A parameter was declared twice."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"parameter {name!r} is declared already")
+
+
+class InvalidParameterTypeException(ParameterException):
+    """A parameter was given a value of another type."""
+
+
+class ParameterType(IntEnum):
+    """What a parameter holds."""
+
+    NOT_SET = 0
+    BOOL = 1
+    INTEGER = 2
+    DOUBLE = 3
+    STRING = 4
+    BYTE_ARRAY = 5
+    BOOL_ARRAY = 6
+    INTEGER_ARRAY = 7
+    DOUBLE_ARRAY = 8
+    STRING_ARRAY = 9
+
+    @classmethod
+    def from_parameter_value(cls, value: Any) -> ParameterType:
+        """Return the type of a value."""
+        single = {type(None): cls.NOT_SET, bool: cls.BOOL, int: cls.INTEGER, float: cls.DOUBLE, str: cls.STRING}
+        if type(value) in single:
+            return single[type(value)]
+        if isinstance(value, bytes):
+            return cls.BYTE_ARRAY
+        if isinstance(value, list | tuple):
+            arrays = {bool: cls.BOOL_ARRAY, int: cls.INTEGER_ARRAY, float: cls.DOUBLE_ARRAY, str: cls.STRING_ARRAY}
+            kinds = {type(item) for item in value}
+            if not kinds:
+                return cls.BYTE_ARRAY
+            if len(kinds) == 1 and (kind := kinds.pop()) in arrays:
+                return arrays[kind]
+        raise TypeError(f"a parameter cannot hold {type(value).__name__} {value!r}")
+
+
+class Parameter:
+    """A name with a value."""
+
+    Type = ParameterType
+
+    def __init__(self, name: str, type_: ParameterType | None = None, value: Any = None) -> None:
+        self.name = name
+        self.type_ = ParameterType.from_parameter_value(value) if type_ is None else type_
+        self.value = value
+
+    def __repr__(self) -> str:
+        return f"Parameter(name={self.name!r}, type_={self.type_.name}, value={self.value!r})"
+
+
+@dataclass
+class SetParametersResult:
+    """Whether a change was taken, and why not."""
+
+    successful: bool = True
+    reason: str = ""
+
+
+class Parameters:
+    """The parameters of one node."""
+
+    def __init__(self, overrides: dict[str, Any]) -> None:
+        self._overrides = overrides
+        self._values: dict[str, Parameter] = {}
+        self.callbacks: list[Callable[[list[Parameter]], Any]] = []
+
+    def declare(self, name: str, default: Any, descriptor: Any = None, ignore_override: bool = False) -> Parameter:
+        """Add a parameter; the command line's value wins.
+
+        A type may be given in place of a value, as in rclpy: the command line must then give the value.
+        """
+        if name in self._values:
+            raise ParameterAlreadyDeclaredException(name)
+        value = default
+        wanted = default if isinstance(default, ParameterType) else ParameterType.from_parameter_value(default)
+        if isinstance(default, ParameterType):
+            value = None
+        if not ignore_override and name in self._overrides:
+            value = self._overrides[name]
+            dynamic = wanted == ParameterType.NOT_SET or getattr(descriptor, "dynamic_typing", False)
+            came = ParameterType.from_parameter_value(value)
+            if not dynamic and came != wanted:
+                raise InvalidParameterTypeException(
+                    f"parameter {name!r} is {wanted.name}, came {came.name} {value!r} from the command line"
+                    + (f": write {name}:={float(value)}" if (wanted.name, came.name) == ("DOUBLE", "INTEGER") else "")
+                )
+        self._values[name] = Parameter(name, value=value)
+        return self._values[name]
+
+    def has(self, name: str) -> bool:
+        """Whether a parameter is declared."""
+        return name in self._values
+
+    def get(self, name: str) -> Parameter:
+        """Return a declared parameter."""
+        if name not in self._values:
+            raise ParameterNotDeclaredException(name)
+        return self._values[name]
+
+    def names(self) -> list[str]:
+        """Return the names of all declared parameters."""
+        return list(self._values)
+
+    def set(self, changes: Iterable[Parameter]) -> list[SetParametersResult]:
+        """Change parameters one by one, each if every callback agrees and its type stays."""
+        results = []
+        for change in changes:
+            before = self.get(change.name)
+            if before.type_ not in (ParameterType.NOT_SET, change.type_):
+                reason = f"{change.name} is {before.type_.name}, came {change.type_.name}"
+                results.append(SetParametersResult(False, reason))
+                continue
+            answers = [callback([change]) for callback in self.callbacks]
+            refused = next((answer for answer in answers if not answer.successful), None)
+            results.append(SetParametersResult() if refused is None else refused)
+            if refused is None:
+                self._values[change.name] = change
+        return results
+
+
+@dataclass
+class ParameterDescriptor:
+    """What is said about a parameter; of this, `dynamic_typing` alone changes anything."""
+
+    name: str = ""
+    type: int = 0
+    description: str = ""
+    additional_constraints: str = ""
+    read_only: bool = False
+    dynamic_typing: bool = False

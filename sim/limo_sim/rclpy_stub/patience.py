@@ -1,0 +1,56 @@
+"""Interrupts a script that hangs: one that lets no simulated time pass for too long of the wall's."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+class HungError(BaseException):
+    """The script hangs; not an Exception, so that `except Exception` in a script does not hide it."""
+
+
+class Patience:
+    """A timer that is wound up again whenever time passes.
+
+    It needs the main thread and a system with interval timers; elsewhere (Windows) a hanging script must be stopped
+    with Ctrl-C.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self._running = False
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Raise `HungError` inside when nothing moves for too long."""
+        if not hasattr(signal, "setitimer"):
+            yield
+            return
+        handler = signal.signal(signal.SIGALRM, self._alarm)
+        left = signal.setitimer(signal.ITIMER_REAL, self.seconds)[0]
+        self._running = True
+        try:
+            yield
+        finally:
+            self._running = False
+            signal.setitimer(signal.ITIMER_REAL, left)
+            signal.signal(signal.SIGALRM, handler)
+
+    @contextmanager
+    def suspended(self) -> Iterator[None]:
+        """Let others take their time: a paused live view is not the script's fault."""
+        if self._running:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        yield
+        self.progress()
+
+    def progress(self) -> None:
+        """Time has passed."""
+        if self._running:
+            signal.setitimer(signal.ITIMER_REAL, self.seconds)
+
+    def _alarm(self, _signal: int, _frame: FrameType | None) -> None:
+        raise HungError(f"no simulated time has passed for {self.seconds:g} s: a loop or a call that never ends")

@@ -1,0 +1,332 @@
+"""`limo-hog run`: ordinary nodes in lock step with the arena, and what happens to bad ones."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limo_hog.cli.main import main
+from limo_hog.ros2 import names
+from limo_sim.rclpy_stub.script import run_script, score_of
+from limo_sim.rclpy_stub.world import StubError
+from limo_sim.scenario import Person
+
+from .conftest import NOBODY, STANDING, Run, node
+
+DRIVE = "twist = Twist(); twist.linear.x = 0.2; self.pub.publish(twist)"
+
+FOLLOW = """
+import cv2
+import numpy as np
+from cv_bridge import CvBridge
+image = CvBridge().imgmsg_to_cv2(msg, 'bgr8')
+if not hasattr(self, 'hog'):
+    self.hog = cv2.HOGDescriptor()
+    self.hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
+rects, weights = self.hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)
+twist = Twist()
+if len(rects):
+    x, y, w, h = rects[int(np.argmax(weights))]
+    twist.angular.z = 0.005 * (320 - (x + w // 2))
+self.pub.publish(twist)
+cv2.imshow('camera', image)
+cv2.waitKey(1)
+"""
+
+
+def test_a_node_that_drives_moves_the_robot(run: Run) -> None:
+    outcome = run(node(DRIVE))
+    assert outcome.failure == ""
+    assert outcome.world.arena.truth().robot[0] == pytest.approx(0.2 * 2.0, abs=0.05)
+    assert [round(command.time, 2) for command in outcome.world.commands[:3]] == [0.0, 0.1, 0.2]
+
+
+def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
+    outcome = run(node(FOLLOW), STANDING, 3.0)
+    card = score_of(outcome)
+    assert outcome.failure == ""
+    assert card.first_detection_s == 0.0
+    assert card.detected == 1.0
+    assert card.frames == 30
+    person = outcome.episode.steps[-1].truth.people[0]
+    assert person is not None
+    assert abs(person.bearing) < 0.05
+    assert outcome.world.shown["camera"] == 30
+
+
+def test_the_same_node_gives_the_same_run(run: Run) -> None:
+    def log() -> list[tuple[object, ...]]:
+        steps = run(node(FOLLOW), STANDING, 1.0).episode.steps
+        return [(step.time, step.truth.robot, step.twist, step.detections.boxes.tolist()) for step in steps]
+
+    assert log() == log()
+
+
+def test_a_half_size_image_is_scored_in_the_cameras_pixels(run: Run) -> None:
+    half = FOLLOW.replace("detectMultiScale(image,", "detectMultiScale(cv2.resize(image, (0, 0), fx=0.5, fy=0.5),")
+    near = dataclasses.replace(STANDING, people=(Person(route=((1.9, 0.0, 3600.0),)),))
+    assert score_of(run(node(half), near, 0.5)).detected == 1.0
+
+
+def test_a_node_without_a_watched_detector_has_no_figures_of_detection(run: Run) -> None:
+    card = score_of(run(node(DRIVE), STANDING))
+    assert (card.detected, card.first_detection_s, card.detect_ms_p50) == (None, None, None)
+    assert card.in_view == 1.0
+
+
+@pytest.mark.parametrize(
+    ("body", "said", "line"),
+    [
+        ("1 / 0", "ZeroDivisionError", "1 / 0"),
+        ("twist = Twist(); twist.linear.x = 1", "must be 'float', came int 1", "twist.linear.x = 1"),
+        ("twist = Twist(); twist.linear.x = float('nan'); self.pub.publish(twist)", "linear.x is nan", "publish"),
+        ("twist = Twist(); twist.angular.z = float('inf'); self.pub.publish(twist)", "angular.z is inf", "publish"),
+        ("self.pub.publish(msg)", "came Image", "self.pub.publish(msg)"),
+        ("self.pub.publish('go')", "came str", "self.pub.publish('go')"),
+        ("raise SystemExit(3)", "sys.exit(3)", ""),
+        ("while True: pass", "hung", "while True: pass"),
+        ("import threading; threading.Event().wait()", "hung", "wait()"),
+        ("try:\n    1 / 0\nfinally:\n    self.pub.publish(Twist())", "ZeroDivisionError", "1 / 0"),
+    ],
+)
+def test_a_bad_callback_ends_in_its_own_traceback_and_a_robot_that_stands(
+    run: Run, body: str, said: str, line: str
+) -> None:
+    later = f"self.n = getattr(self, 'n', 0) + 1\nif self.n < 10:\n    {DRIVE}\n    return\n" + body
+    outcome = run(node(later), patience=0.5)
+    assert said in outcome.failure
+    assert "the watchdog stopped the robot" in outcome.failure
+    assert line in outcome.traceback
+    assert "rclpy_stub" not in outcome.traceback.replace("limo_sim.rclpy_stub.world.StubError", "").replace(
+        "limo_sim.rclpy_stub.patience.HungError", ""
+    )
+    assert outcome.world.arena.odometry().linear == 0.0
+
+
+def test_a_fault_that_the_script_hides_is_found_all_the_same(run: Run) -> None:
+    hidden = node("1 / 0").replace("except KeyboardInterrupt", "except Exception")
+    assert "ZeroDivisionError" in run(hidden).failure
+
+
+def test_a_node_that_never_publishes_is_told_where_it_published(run: Run) -> None:
+    outcome = run(node(DRIVE).replace("'/cmd_vel'", "'/cmd_vell'"))
+    assert "never published on /cmd_vel (it published /cmd_vell)" in outcome.failure
+    assert outcome.traceback == ""
+
+
+def test_a_script_that_waits_without_spinning_is_stopped(run: Run) -> None:
+    assert "hung" in run("rclpy.init()\nwhile rclpy.ok(): pass", patience=0.5).failure
+
+
+def test_the_watchdog_stops_a_robot_whose_node_falls_silent(run: Run) -> None:
+    body = f"self.n = getattr(self, 'n', 0) + 1\nif self.n <= 5:\n    {DRIVE}"
+    outcome = run(node(body))
+    speeds = {step.time: step.truth.robot[0] for step in outcome.episode.steps}
+    assert outcome.world.arena.watchdog_stops == 1
+    assert speeds[1.9] - speeds[1.5] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_sleep_in_a_callback_lets_the_arenas_time_pass_not_the_walls(run: Run) -> None:
+    began = time.perf_counter()
+    outcome = run(node("import time; time.sleep(5.0); " + DRIVE), seconds=20.0)
+    assert [round(c.time, 2) for c in outcome.world.commands] == [5.0, 10.0, 15.0, 20.0]
+    assert outcome.world.arena.watchdog_stops >= 3
+    assert time.perf_counter() - began < 15.0
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("from rclpy.action import ActionClient", "rclpy.action"),
+        ("from rclpy.node import LifecycleNode", "rclpy.node.LifecycleNode"),
+        ("rclpy.spin_until_future_complete()", "rclpy.spin_until_future_complete"),
+        ("import tf2_ros", "tf2_ros"),
+        ("from std_srvs.srv import Empty", "std_srvs"),
+        ("from sensor_msgs.msg import Imagee", "sensor_msgs.msg.Imagee"),
+        ("rclpy.init(); Node('n').create_service()", "Node.create_service"),
+    ],
+)
+def test_what_is_not_offered_is_named(run: Run, line: str, named: str) -> None:
+    assert f"does not offer {named}" in run(line).failure
+
+
+def test_the_scripts_own_mistakes_stay_its_own(run: Run) -> None:
+    assert "no attribute 'immage'" in run(node("self.immage")).failure
+
+
+def test_ros_arguments_set_parameters_and_names(run: Run, tmp_path: Path) -> None:
+    lines: list[str] = []
+    parameters = tmp_path / "p.yaml"
+    parameters.write_text("follower:\n  ros__parameters:\n    speed: 0.1\n    nested: {a: 2}\n")
+    make = (
+        "s = self.declare_parameter('speed', 0.3).value; n = self.declare_parameter('nested.a', 1).value\n"
+        "g = self.declare_parameter('gain', 1.0).value\n"
+        "self.get_logger().info(f'{s} {n} {g} {self.pub.topic_name} {self.get_name()}')"
+    )
+    arguments = ["--ros-args", "--params-file", str(parameters), "-p", "gain:=2.5", "-r", "/cmd_vel:=/other"]
+    run(node("pass", make), arguments=arguments, log=lambda _t, _l, _n, m: lines.append(m), seconds=0.2)
+    assert lines == ["0.1 2 2.5 /other follower"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["-p", "speed"], "want -p name:=value"),
+        (["-p", "speed:=2"], "is DOUBLE, came INTEGER 2 from the command line: write speed:=2.0"),
+        (["-p", "speed:=[1"], "not YAML"),
+        (["--params-file", "none.yaml"], "no such file"),
+        (["--wrong"], "--ros-args --wrong"),
+    ],
+)
+def test_wrong_ros_arguments_say_what_is_wanted(run: Run, arguments: list[str], said: str) -> None:
+    make = "self.declare_parameter('speed', 1.0)"
+    assert said in run(node(DRIVE, make), arguments=["--ros-args", *arguments]).failure
+
+
+def test_timers_keep_their_period_in_the_arenas_time(run: Run) -> None:
+    lines: list[float] = []
+    make = "self.create_timer(0.25, lambda: self.get_logger().info('tick'))"
+    run(node("pass", make), log=lambda t, _l, _n, _m: lines.append(t))
+    assert lines == pytest.approx([0.26, 0.5, 0.76, 1.0, 1.26, 1.5, 1.76], abs=1e-9)
+
+
+def test_colour_and_depth_are_paired_by_their_stamps(run: Run) -> None:
+    lines: list[str] = []
+    make = """
+    import message_filters
+    self.subs = [message_filters.Subscriber(self, Image, t) for t in
+                 ('/limo_camera/image', '/limo_camera/depth/image_raw')]
+    self.sync = message_filters.ApproximateTimeSynchronizer(self.subs, queue_size=10, slop=0.1)
+    self.sync.registerCallback(lambda a, b: self.get_logger().info(
+        f'{a.encoding} {b.encoding} {a.header.stamp == b.header.stamp}'))
+    """
+    run(node("pass", make), seconds=1.0, log=lambda _t, _l, _n, m: lines.append(m))
+    assert lines == ["bgr8 32FC1 True"] * 10
+
+
+def test_every_topic_of_the_workshop_arrives_at_its_rate(run: Run) -> None:
+    counts: dict[str, int] = {}
+    text = "import importlib\nrclpy.init()\nn = Node('n')\n"
+    for topic, kind in names.TYPES.items():
+        if topic not in (names.COMMAND, names.ANNOTATED):
+            package, _, name = kind.split("/")
+            text += f"T = getattr(importlib.import_module('{package}.msg'), '{name}')\n"
+            text += f"n.create_subscription(T, '{topic}', lambda m: n.get_logger().info('{topic}'), 100)\n"
+
+    def log(_t: float, _l: str, _n: str, message: str) -> None:
+        counts[message] = counts.get(message, 0) + 1
+
+    run(text + "rclpy.spin(n)", seconds=2.0, log=log)
+    assert {topic: round(n / 2) for topic, n in counts.items()} == {
+        names.IMAGE: 10,
+        names.IMAGE_COMPRESSED: 10,
+        names.DEPTH: 10,
+        names.DEPTH_LCAS: 10,
+        names.CAMERA_INFO: 10,
+        names.SCAN: 8,
+        names.ODOMETRY: 50,
+        names.IMU: 100,
+        names.CLOCK: 50,
+    }
+
+
+def test_polling_and_spinning_with_a_timeout_let_time_pass(run: Run) -> None:
+    text = """
+    rclpy.init()
+    n = Node('n')
+    pub = n.create_publisher(Twist, 'cmd_vel', 1)
+    while rclpy.ok():
+        rclpy.spin_once(n, timeout_sec=0)
+        pub.publish(Twist())
+    """
+    assert len(run(text).world.commands) == 101
+
+
+def test_a_run_leaves_python_as_it_was(run: Run) -> None:
+    cv2 = pytest.importorskip("cv2")
+    before = (time.sleep, cv2.imshow, getattr(cv2, "HOGDescriptor", None), list(sys.path), list(sys.argv))
+    run(node(FOLLOW), seconds=0.2)
+    after = (time.sleep, cv2.imshow, getattr(cv2, "HOGDescriptor", None), list(sys.path), list(sys.argv))
+    assert before == after
+    assert importlib.util.find_spec("message_filters") is None
+
+
+def test_a_callback_may_draw_on_its_picture_without_touching_anybody_elses(run: Run) -> None:
+    body = """
+    from cv_bridge import CvBridge
+    image = CvBridge().imgmsg_to_cv2(msg)
+    image[:] = 0
+    msg.data[0] = 7
+    """
+    outcome = run(node(body + DRIVE), STANDING, 0.3)
+    assert outcome.failure == ""
+    assert outcome.world.arena.frame().image.mean() > 50
+
+
+def test_a_script_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StubError, match="no such file"):
+        run_script(tmp_path / "none.py", NOBODY, 1.0)
+
+
+def test_the_command_line_ends_with_1_and_the_students_traceback(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    script = tmp_path / "bad.py"
+    script.write_text("import rclpy\nrclpy.init()\nraise RuntimeError('no camera')\n")
+    assert main(["run", str(script), "--seconds", "1"]) == 1
+    err = capfd.readouterr().err
+    assert 'bad.py", line 3' in err
+    assert err.rstrip().splitlines()[-1].startswith("limo-hog: bad.py failed with RuntimeError at 0.00 s: no camera")
+
+
+def test_the_command_line_prints_a_card_and_json(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    import json
+
+    script = tmp_path / "drive.py"
+    script.write_text(
+        "print('hello')\nimport rclpy\nfrom rclpy.node import Node\nfrom geometry_msgs.msg import Twist\n"
+        "rclpy.init()\nn = Node('n')\np = n.create_publisher(Twist, 'cmd_vel', 1)\n"
+        "n.create_timer(0.1, lambda: p.publish(Twist()))\nrclpy.spin(n)\n"
+    )
+    assert main(["run", str(script), "--seconds", "1", "--json", "-"]) == 0
+    card = json.loads(capfd.readouterr().out)
+    assert card["controller"] == "drive.py"
+    assert card["seconds"] == 1.0
+
+
+def test_images_go_through_cv_bridge_and_back(run: Run) -> None:
+    body = """
+    import numpy as np
+    from cv_bridge import CvBridge, CvBridgeError
+    bridge = CvBridge()
+    image = bridge.imgmsg_to_cv2(msg, 'bgr8')
+    for encoding, picture in (('bgr8', image), ('mono8', image[..., 0]), ('32FC1', image[..., 0].astype(np.float32))):
+        back = bridge.imgmsg_to_cv2(bridge.cv2_to_imgmsg(picture, encoding, msg.header))
+        assert back.dtype == picture.dtype and np.array_equal(back, picture)
+    assert np.array_equal(bridge.imgmsg_to_cv2(msg, 'rgb8'), image[..., ::-1])
+    assert bridge.imgmsg_to_cv2(msg, 'mono8').shape == (480, 640)
+    assert bridge.compressed_imgmsg_to_cv2(bridge.cv2_to_compressed_imgmsg(image)).shape == image.shape
+    try:
+        bridge.cv2_to_imgmsg(image.astype(float), 'bgr8')
+    except CvBridgeError:
+        self.pub.publish(Twist())
+    """
+    assert run(node(body), STANDING, 0.2).failure == ""
+
+
+def test_numpy_seed_and_detections_of_a_frame_belong_together(run: Run) -> None:
+    steps = [step for step in run(node(FOLLOW), STANDING, 0.5).episode.steps if len(step.detections)]
+    assert steps
+    for step in steps:
+        person = step.seen.people[0] if step.seen else None
+        assert person is not None
+        assert person.box is not None
+        box = step.detections.boxes[0]
+        assert abs((box[0] + box[2] / 2) - (person.box[0] + person.box[2] / 2)) < 25
+        assert np.isfinite(step.detections.scores).all()

@@ -82,9 +82,8 @@ KINDS: dict[str, Piece] = {
     "cone": Piece(
         solids=(
             Box(0, 0, 0.15, 0.15, 0.0, 0.03, (48, 48, 50)),
-            Frustum(0, 0, 0.03, 0.22, 0.11, 0.0785, _ORANGE),
-            Frustum(0, 0, 0.22, 0.32, 0.0785, 0.062, _WHITE),
-            Frustum(0, 0, 0.32, 0.55, 0.062, 0.024, _ORANGE),
+            Frustum(0, 0, 0.03, 0.55, 0.11, 0.024, _ORANGE),
+            Frustum(0, 0, 0.22, 0.32, 0.0805, 0.064, _WHITE),
         ),
         footprint=Disc(0, 0, 0.15),
         scanned=(Disc(0, 0, 0.0967),),

@@ -253,7 +253,7 @@ def _blend(image: U8, depth: F32, canvas: Canvas, palette: U8) -> None:
     alpha *= nearer
     colour = palette.take((canvas.tone * _LEVELS).astype(np.int32), axis=0, mode="clip")
     patch = image[top:bottom, left:right]
-    patch[:] = patch * (1.0 - alpha)[..., None] + (colour * alpha[..., None] + 0.5)
+    cv2.blendLinear(colour, patch.copy(), alpha, 1.0 - alpha, dst=patch)
     nearer &= canvas.inside
     np.copyto(there, canvas.depth, where=nearer)
 

@@ -249,19 +249,22 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
     taper = (solid.r1 - solid.r0) / (solid.z1 - solid.z0)
     half_pixel = 0.5 * max(z0, NEAR) / FOCAL_PX
     level = solid.r0 + taper * (MOUNT_HEIGHT - solid.z0) + half_pixel  # radius at the camera's height
-    a = right * right + (1.0 - (taper * down) ** 2)
-    b = right * x0 + (z0 - (level * taper) * down)
+    # a cylinder's rays differ by column only: `lift` is then a number, and most of this one row
+    lift = taper * down if taper else 0.0
+    a = right * right + (1.0 - lift * lift)
+    b = right * x0 + (z0 - level * lift)
     c = x0 * x0 + z0 * z0 - level * level
     with np.errstate(invalid="ignore"):
         discriminant = b * b - a * c
-        depth = (b - np.sqrt(discriminant)) / a + half_pixel
-        height = MOUNT_HEIGHT - down * depth
-        radii = level - taper * down * depth
+        depth = (b - np.sqrt(discriminant)) / a
+        radii = level - lift * depth
+        depth += half_pixel
         pixels = FOCAL_PX / depth
         cover = 0.5 * pixels * discriminant / (a * radii)
-        np.minimum(cover, (solid.z1 - height) * pixels + 0.5, out=cover)
+        height = MOUNT_HEIGHT - down * depth
+        cover = np.minimum(cover, (solid.z1 - height) * pixels + 0.5)
         np.minimum(cover, (height - solid.z0) * pixels + 0.5, out=cover)
-        depth[~((cover > 0) & (depth > NEAR))] = np.nan
+        depth = np.where((cover > 0) & (depth > NEAR), depth, np.float32(np.nan))
     x, _, z = sun.towards
     tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)
     canvas.put(at, depth, cover, tone)
@@ -303,13 +306,13 @@ def _slab(origin: float, direction: F32, half: float) -> tuple[F32, F32]:
 
 
 def upright_bounds(x: float, z: float, radius: float, low: float, high: float) -> Bounds | None:
-    """Image box that holds an upright cylinder; None behind the camera, everything beside it."""
-    near = z - radius
-    if z + radius < NEAR:
+    """Image box that holds an upright cylinder; None behind the camera, all of a side beside it."""
+    near, far = z - radius, z + radius
+    if far < NEAR:
         return None
     if near < NEAR:
-        return -1e6, -1e6, 1e6, 1e6
-    far = z + radius
+        left, right = FOCAL_PX * (x - radius) / far, FOCAL_PX * (x + radius) / far
+        return (CENTRE_X + left if left > 0 else -1e6), -1e6, (CENTRE_X + right if right < 0 else 1e6), 1e6
     sides = [CENTRE_X + FOCAL_PX * (x + side) / depth for side in (-radius, radius) for depth in (near, far)]
     ends = [CENTRE_Y + FOCAL_PX * (MOUNT_HEIGHT - end) / depth for end in (low, high) for depth in (near, far)]
     return min(sides) - 1, min(ends) - 1, max(sides) + 1, max(ends) + 1

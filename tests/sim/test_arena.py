@@ -206,3 +206,10 @@ def test_memory_stays_flat_for_an_hour() -> None:
     before = peak_mb()
     run_for(arena, 3600, 5)
     assert peak_mb() - before < 8
+
+
+def test_the_products_names_are_in_one_place() -> None:
+    import limo_sim
+
+    for name in ("Arena", "Episode", "Scenario", "ScoreCard", "run_episode", "score"):
+        assert callable(getattr(limo_sim, name))

@@ -6,6 +6,7 @@ Points are float64 (N, 2): x forward, y left in the base frame [m].
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ Points = NDArray[np.float64]
 
 NO_POINTS: Points = np.empty((0, 2))
 
+#: Ways around something [rad]: no further off than that the person stays in the picture.
+_DETOURS = tuple(step * 0.08 for step in range(-6, 7))
 #: Depth pixels looked at: every so many rows and columns. An ankle at 0.5 m is 40 px wide.
 _DEPTH_STEP = 8
 #: Depth pixels nearer to the floor than this are the floor [m].
@@ -45,24 +48,53 @@ def depth_points(depth: NDArray[np.float32], focal_px: float, reach: float, body
     return np.stack([body.camera_x + z[near], left[near]], axis=1)
 
 
-def room_ahead(points: Points, clearance: float, body: Body) -> float:
-    """Return how far the robot can drive straight on before a point is nearer than `clearance` [m].
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """The ground kept free around the robot's outline: an ellipse so far ahead (or behind) and beside [m]."""
 
-    Negative where a point ahead is too near already, inf where nothing is in the way. The ground kept free
-    is the body's outline widened by `clearance`, with rounded corners.
+    ahead: float = 0.55
+    beside: float = 0.2
+
+
+def room_ahead(points: Points, margin: Margin, body: Body) -> float:
+    """Return how far the robot can drive straight on before a point comes into the ground kept free [m].
+
+    Negative where a point ahead is too near already, inf where nothing is in the way.
     """
     points = points[points[:, 0] > 0]
-    beside = np.maximum(np.abs(points[:, 1]) - body.half_width, 0)
-    in_the_way = beside < clearance
+    beside = np.maximum(np.abs(points[:, 1]) - body.half_width, 0) / margin.beside
+    in_the_way = beside < 1
     if not in_the_way.any():
         return math.inf
     gap = points[in_the_way, 0] - body.half_length
-    return float(np.min(gap - np.sqrt(clearance**2 - beside[in_the_way] ** 2)))
+    return float(np.min(gap - margin.ahead * np.sqrt(1 - beside[in_the_way] ** 2)))
 
 
-def room_behind(points: Points, clearance: float, body: Body) -> float:
+def room_behind(points: Points, margin: Margin, body: Body) -> float:
     """Return how far the robot can drive straight back, as `room_ahead`."""
-    return room_ahead(-points, clearance, body)
+    return room_ahead(-points, margin, body)
+
+
+def free_heading(points: Points, wanted: float, last: float, reach: float, margin: Margin, body: Body) -> float | None:
+    """Return the direction nearest to `wanted` in which the robot can drive at least `reach` [rad, m].
+
+    None where no direction has so much room.
+
+    Parameters
+    ----------
+    points
+        What is around, without who is driven to.
+    wanted, last
+        The straight direction, and what the answer was the last time less `wanted` then: of two ways around
+        something, the one begun is kept.
+    reach
+        How much room is enough.
+    """
+    for turn in sorted(_DETOURS, key=lambda turn: abs(turn) + 0.5 * abs(turn - last)):
+        cos, sin = math.cos(wanted + turn), math.sin(wanted + turn)
+        if room_ahead(points @ np.array([[cos, -sin], [sin, cos]]), margin, body) >= reach:
+            return wanted + turn
+    return None
 
 
 def speed_within(room: float, braking: float, reaction: float) -> float:

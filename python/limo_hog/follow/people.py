@@ -26,10 +26,20 @@ from limo_hog.follow.region import Region
 
 #: How much one frame counts in a person's trust.
 _TRUST_STEP = 0.1
+#: A range that does not fit the size of the box by more than this share of it is not the person's.
+_MISFIT = 0.35
+#: After so long unseen a person's track begins anew [s].
+_STALE = 1.0
+#: A box with this score [SVM margin] is beyond doubt; pillars and cones rarely reach it.
+_SURE = 1.0
+#: Trust from which somebody is taken for a person, and below which not any more.
+_TRUSTED, _DOUBTED = 0.7, 0.3
 #: Boxes nearer than this to a person are never somebody else [m].
 _SAME_PERSON = 0.5
 #: How much one box counts in a person's size.
 _SIZE_STEP = 0.2
+#: Smaller windows than this HOG cannot find [px].
+SMALLEST_WINDOW = 128
 #: Distance assumed for somebody whose distance no sensor tells [m], and its standard deviation [m].
 _UNKNOWN_RANGE, _UNKNOWN_SPREAD = 3.0, 1.5
 
@@ -47,8 +57,12 @@ class Person:
     seen, felt
         Stamp of the last frame they were found in, and of the last scan with their legs [s].
     trust
-        0..1: share of the latest frames in which they were found where they should be. A pillar may look like a
-        person now and then; a person looks like one all the time.
+        0..1: evidence in the latest frames in which they should have been found. A pillar may look like a
+        person now and then, and not much; a person looks like one all the time.
+    confirmed
+        Whether they have earned trust, and not lost it since.
+    age, misses
+        Frames in which they should have been found, and those since they were.
     window, centre
         Height of their detection window, and its middle below the image's, times their distance [px m].
     """
@@ -59,6 +73,9 @@ class Person:
     trust: float
     window: float
     centre: float
+    confirmed: bool = False
+    age: int = 1
+    misses: int = 0
     felt: float = -math.inf
 
 
@@ -67,28 +84,29 @@ class Measurement:
     """One box as the robot sees it.
 
     Bearing [rad] and range [m] from the robot's centre, range None where unknown; height of the box and its middle
-    below the image's [px].
+    below the image's [px]; its score.
     """
 
     bearing: float
     range: float | None
     height: int
     centre: float
+    score: float
 
 
 def measure(observation: Observation, body: Body) -> list[Measurement]:
     """Turn every box into a bearing and a range, the range from the depth image."""
     measurements = []
-    for box in observation.detections.boxes:
+    for box, score in observation.detections:
         column, row = box_centre(box)
         slope = (observation.width / 2 - column) / observation.focal_px
         height, centre = int(box[3]), row - observation.height / 2
         depth = None if observation.depth is None else person_depth(observation.depth, box)
         if depth is None:
-            measurements.append(Measurement(math.atan(slope), None, height, centre))
+            measurements.append(Measurement(math.atan(slope), None, height, centre, score))
             continue
         x, y = body.camera_x + depth, slope * depth
-        measurements.append(Measurement(math.atan2(y, x), math.hypot(x, y), height, centre))
+        measurements.append(Measurement(math.atan2(y, x), math.hypot(x, y), height, centre, score))
     return measurements
 
 
@@ -102,15 +120,23 @@ def associate(
     fits = []
     for who, person in enumerate(people):
         for which, seen in enumerate(measurements):
+            seen = believed(person, seen)
             fit = innovation(person.track, seen.bearing, seen.range, pose, noise).distance2
-            # Somebody who changed direction sharply is still who they were, if nobody else could be meant.
-            if fit <= gate or apart(person, seen, pose) < _SAME_PERSON:
+            # A person who changed direction sharply is still who they were; a pillar does not.
+            if fit <= gate or (person.confirmed and apart(person, seen, pose) < _SAME_PERSON):
                 fits.append((fit, who, which))
     pairs: dict[int, int] = {}
     for _, who, which in sorted(fits):
         if who not in pairs and which not in pairs.values():
             pairs[who] = which
     return pairs
+
+
+def believed(person: Person, seen: Measurement) -> Measurement:
+    """Return a box without its range where its size belies that: something stands before the person."""
+    if seen.range is None or abs(seen.range * seen.height - person.window) < _MISFIT * person.window:
+        return seen
+    return replace(seen, range=None)
 
 
 def apart(person: Person, seen: Measurement, pose: Odometry) -> float:
@@ -130,10 +156,22 @@ def should_be_seen(person: Person, pose: Odometry, observation: Observation) -> 
     column = observation.width / 2 - observation.focal_px * math.tan(bearing)
     window = person.window / max(distance, 0.3)
     middle = observation.height / 2 + person.centre / max(distance, 0.3)
+    if window < SMALLEST_WINDOW:
+        return False
     # Near by, the head and the room HOG wants above it are out of the image.
     if middle < 0.48 * window or observation.height - middle < 0.48 * window:
         return False
-    return (observation.region or Region(0, 0, observation.width, observation.height, window)).holds(column)
+    if not (observation.region or Region(0, 0, observation.width, observation.height, window)).holds(column):
+        return False
+    return not is_hidden(observation.depth, column, middle, distance)
+
+
+def is_hidden(depth: NDArray[np.float32] | None, column: float, row: float, distance: float) -> bool:
+    """Whether something nearer stands where somebody at a distance [m] should be in the image [px]."""
+    if depth is None:
+        return False
+    there = person_depth(depth, np.array([column, row, 0, 0], np.int32))
+    return there is not None and there < distance - _SAME_PERSON
 
 
 def begin(number: int, seen: Measurement, stamp: float, pose: Odometry, noise: Noise) -> Person:
@@ -142,16 +180,26 @@ def begin(number: int, seen: Measurement, stamp: float, pose: Odometry, noise: N
     if seen.range is None:
         noise = replace(noise, range=_UNKNOWN_SPREAD)
     track = found(stamp, seen.bearing, distance, pose, noise)
-    return Person(number, track, stamp, _TRUST_STEP, seen.height * distance, seen.centre * distance)
+    return Person(number, track, stamp, 0.0, seen.height * distance, seen.centre * distance)
+
+
+def between(one: Person, other: Person) -> float:
+    """Return the distance of two people [m]."""
+    return float(np.hypot(*(one.track.mean[:2] - other.track.mean[:2])))
 
 
 def is_new(seen: Measurement, people: Sequence[Person], pose: Odometry) -> bool:
-    """Whether a box is somebody unknown, not a second box on somebody known."""
-    return all(apart(person, seen, pose) >= _SAME_PERSON for person in people)
+    """Whether a box is somebody unknown, not a second box on somebody just found."""
+    just_found = (person for person in people if person.misses == 0)
+    return all(apart(person, seen, pose) >= _SAME_PERSON for person in just_found)
 
 
 def seen_again(person: Person, seen: Measurement, pose: Odometry, noise: Noise, gate: float) -> Person:
     """Correct a person by the box that is theirs; a box beyond `gate` says that they changed their ways."""
+    seen = believed(person, seen)
+    if seen.range is not None and person.track.stamp - max(person.seen, person.felt) > _STALE:
+        # What they did before is no guide to how they walk now.
+        person = replace(person, track=found(person.track.stamp, seen.bearing, seen.range, pose, noise))
     fit = innovation(person.track, seen.bearing, seen.range, pose, noise)
     if fit.distance2 > gate:
         loose = person.track.covariance + np.diag([_SAME_PERSON**2, _SAME_PERSON**2, 1.0, 1.0])
@@ -162,18 +210,20 @@ def seen_again(person: Person, seen: Measurement, pose: Odometry, noise: Noise, 
         window += _SIZE_STEP * (seen.height * seen.range - window)
         centre += _SIZE_STEP * (seen.centre * seen.range - centre)
     return replace(
-        person,
+        judged(person, min(seen.score / _SURE, 1.0)),
         track=updated(person.track, fit),
         seen=person.track.stamp,
-        trust=person.trust + _TRUST_STEP * (1 - person.trust),
         window=window,
         centre=centre,
     )
 
 
-def not_seen(person: Person) -> Person:
-    """Trust a person less who should have been found and was not."""
-    return replace(person, trust=person.trust * (1 - _TRUST_STEP))
+def judged(person: Person, evidence: float) -> Person:
+    """Count one more frame of evidence, 0 not found … 1 surely found, for or against a person."""
+    trust = person.trust + _TRUST_STEP * (evidence - person.trust)
+    confirmed = trust >= _DOUBTED if person.confirmed else trust >= _TRUSTED
+    misses = 0 if evidence > 0 else person.misses + 1
+    return replace(person, trust=trust, confirmed=confirmed, age=person.age + 1, misses=misses)
 
 
 def moved_on(person: Person, stamp: float, noise: Noise) -> Person:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from limo_hog.follow.body import LIMO, Body
 from limo_hog.follow.clearance import (
     NO_POINTS,
+    Margin,
     Points,
     depth_points,
     from_odometry,
@@ -74,8 +75,8 @@ class Guard(Generic[S]):
     ----------
     controller
         Whose wishes are guarded.
-    clearance
-        Smallest distance kept between the robot's outline and anything ahead or behind [m].
+    margin
+        Ground kept free ahead of the robot's outline, and behind it.
     braking
         Deceleration counted on [m/s²]: half of what the wheels can do.
     reaction
@@ -89,7 +90,7 @@ class Guard(Generic[S]):
     """
 
     controller: Controller[S]
-    clearance: float = 0.5
+    margin: Margin = field(default_factory=Margin)
     braking: float = 0.5
     reaction: float = 0.25
     remember: float = 10.0
@@ -110,7 +111,7 @@ class Guard(Generic[S]):
             after = replace(self.start() if backwards else state, stamp=stamp, wish=None)
             return Decision(Twist(), after, Mode.BLOCKED, fault)
         wish = self.controller.step(observation, state.inner)
-        reach = 2 * self.body.half_length + self.clearance + 1.0
+        reach = 2 * self.body.half_length + self.margin.ahead + 1.0
         near = NO_POINTS
         if observation.depth is not None:
             near = depth_points(observation.depth, observation.focal_px, reach, self.body)
@@ -150,8 +151,8 @@ class Guard(Generic[S]):
         if scan is not None and now - scan.stamp > self.patience:
             return decided(Twist(), Mode.BLOCKED, f"the scan is {now - scan.stamp:.1f} s old")
         around = from_odometry(state.seen, pose)
-        ahead = self._speed(room_ahead(np.concatenate([around, state.near]), self.clearance, self.body))
-        behind = self._speed(room_behind(around, self.clearance, self.body))
+        ahead = self._speed(room_ahead(np.concatenate([around, state.near]), self.margin, self.body))
+        behind = self._speed(room_behind(around, self.margin, self.body))
         linear = min(max(wish.twist.linear, -behind), ahead)
         if linear == wish.twist.linear:
             return decided(wish.twist, wish.mode, wish.reason)

@@ -5,19 +5,24 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from limo_hog.follow.body import LIMO, Body
+from limo_hog.follow.clearance import Margin, free_heading, scan_points
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.kalman import Noise, bearing_range, predicted, rates
 from limo_hog.follow.legs import felt
 from limo_hog.follow.observation import Observation, Odometry
 from limo_hog.follow.people import (
+    SMALLEST_WINDOW,
     Person,
     associate,
     begin,
+    between,
     is_new,
+    judged,
     measure,
     moved_on,
-    not_seen,
     pose_at,
     seen_again,
     should_be_seen,
@@ -25,6 +30,18 @@ from limo_hog.follow.people import (
 from limo_hog.follow.region import Region, region_around
 from limo_hog.follow.twist import Twist
 
+#: Scan points nearer than this to a person are theirs; nearer ones on the way to them hide them [m].
+_PERSONS_OWN = 0.45
+#: Half the width of what hides a person [m].
+_HIDES = 0.12
+#: Slower than this a person's direction does not change [rad/s].
+_STEADY = 0.05
+#: How far ahead the way must be free [m].
+_LOOK_AHEAD = 1.2
+#: Boxes nearer than this, and so much more for each second, may be a person who was lost [m, m/s].
+_SAME_PERSON, _HASTE = 0.5, 1.0
+#: Legs are believed for so many frames in which the camera should see the person and does not.
+_MISSES = 3
 #: How far back the robot's poses are remembered: older frames are not waited for [s].
 _POSES_FOR = 2.0
 
@@ -51,6 +68,8 @@ class TrackingState:
         Which way to search: 1 left, -1 right.
     ever
         Whether anybody was followed before.
+    detour
+        How far off the straight way to the person the robot goes around something [rad].
     """
 
     people: tuple[Person, ...] = ()
@@ -62,6 +81,19 @@ class TrackingState:
     since_full: int = 0
     turn: float = 1.0
     ever: bool = False
+    detour: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Aim:
+    """The followed person now, seen from the robot: where, how that changes, and which way to go there."""
+
+    bearing: float
+    distance: float
+    bearing_rate: float
+    range_rate: float
+    heading: float | None
+    hidden: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,18 +114,24 @@ class TrackingController:
         How far people and sensors stray from the model.
     gate
         Chi-squared beyond which a box is somebody else's; 2 numbers, so 1 in 10 000 of one's own is beyond 18.
-    trusted, doubted
-        Trust from which a person is driven towards, and below which not any more.
+    hint
+        Trust from which somebody too far away for HOG is worth going nearer, and waiting for.
+    doubt
+        Somebody not confirmed after so many frames, and trusted less than `hint`, is given up.
     coast
         How long to drive by the prediction alone [s].
     chase
-        How long to turn where the prediction says before searching all around [s].
+        How long to face where an unseen person should be before searching all around [s].
     forget
-        How long somebody not seen is remembered [s].
+        How long somebody unseen is remembered, and waited for where something hides them [s].
     search_rate
         Turn rate of a search [rad/s].
     full_every
         Every so many frames the whole image is searched.
+    back_off
+        Speed backwards where there is no way around something [m/s].
+    margin
+        Ground kept free on the way; more than the safety layer wants, so that it need not step in.
     body
         Where the camera sits.
     """
@@ -107,13 +145,15 @@ class TrackingController:
     straight_enough: float = 0.02
     noise: Noise = field(default_factory=Noise)
     gate: float = 18.0
-    trusted: float = 0.8
-    doubted: float = 0.5
+    hint: float = 0.4
+    doubt: int = 30
     coast: float = 0.8
-    chase: float = 3.0
+    chase: float = 2.0
     forget: float = 8.0
     search_rate: float = 0.7
     full_every: int = 10
+    back_off: float = 0.15
+    margin: Margin = field(default_factory=lambda: Margin(0.6, 0.25))
     body: Body = LIMO
 
     def start(self) -> TrackingState:
@@ -122,27 +162,34 @@ class TrackingController:
 
     def step(self, observation: Observation, state: TrackingState) -> Decision[TrackingState]:
         """Bring the tracks up to the frame, choose whom to follow, and steer by where they are now."""
-        now = observation.now
         state = self._remember(observation, state)
         state, boxes = self._track(observation, state)
         state = self._choose(state)
         person = next((one for one in state.people if one.number == state.followed), None)
         if person is None:
-            turn = Twist(0.0, state.turn * self.search_rate)
-            if state.ever:
-                return Decision(turn, state, Mode.LOST, "looking all around for the person")
-            return Decision(turn, state, Mode.SEARCH, "looking all around for somebody")
+            return self._search(state)
         unseen = observation.stamp - person.seen
         person, state = self._feel(person, state, observation, unseen)
-        twist, mode, reason = self._steer(person, state, now, unseen)
-        bearing, _ = bearing_range(predicted(person.track, now, self.noise), pose_at(state.poses, now))
+        aim = self._aim(person, state, observation)
+        motion = aim.bearing_rate if abs(aim.bearing_rate) > _STEADY else aim.bearing
+        state = replace(state, turn=math.copysign(1.0, motion))
+        lost = min(unseen, observation.now - person.felt)
+        if lost > (self.forget if aim.hidden else self.chase):
+            return self._search(state)
+        twist, mode, reason = self._steer(person, aim, unseen, lost)
         region = self._region(person, state, observation) if unseen == 0 else None
         state = replace(
             state,
             since_full=0 if region is None else state.since_full + 1,
-            turn=math.copysign(1.0, bearing) if abs(bearing) > self.straight_enough else state.turn,
+            detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
         )
         return Decision(twist, state, mode, reason, boxes.get(person.number), region)
+
+    def _search(self, state: TrackingState) -> Decision[TrackingState]:
+        turn = Twist(0.0, state.turn * self.search_rate)
+        if state.ever:
+            return Decision(turn, state, Mode.LOST, "looking all around for the person")
+        return Decision(turn, state, Mode.SEARCH, "looking all around for somebody")
 
     def _remember(self, observation: Observation, state: TrackingState) -> TrackingState:
         poses = state.poses
@@ -165,7 +212,7 @@ class TrackingController:
             if who in pairs:
                 people.append(seen_again(person, seen[pairs[who]], pose, self.noise, self.gate))
             elif should_be_seen(person, pose, observation):
-                people.append(not_seen(person))
+                people.append(judged(person, 0.0))
             else:
                 people.append(person)
         boxes = {people[who].number: which for who, which in pairs.items()}
@@ -182,7 +229,8 @@ class TrackingController:
     ) -> tuple[Person, TrackingState]:
         """Bring the followed person up to the newest scan, if their legs are in it."""
         scan = observation.scan
-        if scan is None or scan.stamp <= person.felt:
+        # Legs that the camera should see a person on, and does not, are a chair's.
+        if scan is None or not person.confirmed or person.misses > _MISSES or scan.stamp <= person.felt:
             return person, state
         track = felt(person.track, scan, pose_at(state.poses, scan.stamp), self.body, self.noise)
         if track is None:
@@ -194,41 +242,82 @@ class TrackingController:
         return now, replace(state, people=people)
 
     def _choose(self, state: TrackingState) -> TrackingState:
-        """Stay with the person who is followed while they are remembered; else take the most trusted."""
-        if any(one.number == state.followed for one in state.people):
-            return state
-        hopeful = [one for one in state.people if one.seen == state.stamp]
+        """Stay with a person once confirmed, while they are remembered; else take the most trusted."""
+        seen = [one for one in state.people if one.seen == state.stamp]
+        hopeful = [one for one in seen if self._worth(one)]
+        followed = next((one for one in state.people if one.number == state.followed), None)
+        if followed is not None and followed.confirmed:
+            state = replace(state, ever=True)
+            lost = followed.track.stamp - max(followed.seen, followed.felt)
+            if lost <= self.chase:
+                return state
+            # Whoever turns up where the lost person can have got to is them.
+            hopeful = [one for one in hopeful if between(one, followed) < _SAME_PERSON + _HASTE * lost]
+            if not hopeful:
+                return state
+        elif followed is not None and self._worth(followed) and followed not in hopeful:
+            hopeful.append(followed)
         if not hopeful:
             return replace(state, followed=None)
-        best = max(hopeful, key=lambda one: one.trust)
-        return replace(state, followed=best.number, ever=True)
+        # Whoever is faced already keeps a small lead.
+        best = max(hopeful, key=lambda one: one.trust + 0.1 * (one is followed))
+        return replace(state, followed=best.number)
 
-    def _steer(self, person: Person, state: TrackingState, now: float, unseen: float) -> tuple[Twist, Mode, str]:
-        pose = pose_at(state.poses, now)
-        track = predicted(person.track, now, self.noise)
+    def _worth(self, person: Person) -> bool:
+        """Whether somebody is, or may yet turn out to be, a person."""
+        return person.confirmed or person.age < self.doubt or person.trust > self.hint
+
+    def _aim(self, person: Person, state: TrackingState, observation: Observation) -> _Aim:
+        """Work out where the person is now, and which way leads there."""
+        now = observation.now
+        pose, track = pose_at(state.poses, now), predicted(person.track, now, self.noise)
         bearing, distance = bearing_range(track, pose)
-        bearing_rate, range_rate = rates(track, pose)
-        angular = self.angular_gain * bearing + bearing_rate
+        aim = _Aim(bearing, distance, *rates(track, pose), heading=bearing, hidden=False)
+        if observation.scan is None or not person.confirmed:
+            return aim
+        around = scan_points(observation.scan, self.body)
+        here = distance * np.array([math.cos(bearing), math.sin(bearing)])
+        around = around[np.hypot(*(around - here).T) > _PERSONS_OWN]
+        if distance - self.body.camera_x > self.target_distance - self.near_enough:
+            reach = min(distance - 2 * _PERSONS_OWN, _LOOK_AHEAD)
+            heading = free_heading(around, bearing, state.detour, reach, self.margin, self.body)
+            aim = replace(aim, heading=heading)
+        across = np.abs(around @ [-math.sin(bearing), math.cos(bearing)])
+        along = around @ [math.cos(bearing), math.sin(bearing)]
+        hidden = (across < _HIDES) & (along > 0) & (along < distance - _PERSONS_OWN)
+        return replace(aim, hidden=bool(hidden.any()))
+
+    def _steer(self, person: Person, aim: _Aim, unseen: float, lost: float) -> tuple[Twist, Mode, str]:
+        heading = aim.bearing if aim.heading is None else aim.heading
+        angular = self.angular_gain * heading + aim.bearing_rate
         angular = min(max(angular, -self.max_angular), self.max_angular)
-        error = distance - self.body.camera_x - self.target_distance
+        error = aim.distance - self.body.camera_x - self.target_distance
         # Sideways the robot would only lose sight: turn first, then drive.
-        linear = (self.linear_gain * error + range_rate) * max(math.cos(2 * bearing), 0.0)
+        linear = (self.linear_gain * error + aim.range_rate) * max(math.cos(2 * heading), 0.0)
         linear = min(max(linear, -self.max_linear), self.max_linear)
-        if min(unseen, now - person.felt) > self.coast:
+        if lost > self.coast:
             return Twist(0.0, angular), Mode.LOST, "turning where the person went"
-        if person.trust < self.trusted and linear > 0:
-            return Twist(0.0, angular), Mode.FOLLOW, "facing somebody, not sure yet"
-        if abs(error) < self.near_enough and abs(range_rate) < 0.1:
-            if abs(bearing) < self.straight_enough and abs(bearing_rate) < 0.05:
+        if not person.confirmed and linear > 0:
+            if aim.distance * SMALLEST_WINDOW < person.window or person.trust < self.hint:
+                return Twist(0.0, angular), Mode.FOLLOW, "facing somebody, not sure yet"
+            linear = min(linear, self.max_linear / 2)
+            return Twist(linear, angular), Mode.FOLLOW, "going nearer to see who it is"
+        if abs(error) < self.near_enough and abs(aim.range_rate) < 0.1:
+            if abs(aim.bearing) < self.straight_enough and abs(aim.bearing_rate) < _STEADY:
                 return Twist(), Mode.HOLD, "the person is where they should be"
             return Twist(0.0, angular), Mode.HOLD, "turning with the person"
+        if aim.heading is None:
+            return Twist(-self.back_off, angular), Mode.BLOCKED, "backing off: no way around what is ahead"
+        twist = Twist(linear, angular)
+        if aim.heading != aim.bearing:
+            return twist, Mode.FOLLOW, "going around something"
         if unseen == 0:
-            return Twist(linear, angular), Mode.FOLLOW, "following a person"
-        return Twist(linear, angular), Mode.FOLLOW, "following legs, or where the person should be"
+            return twist, Mode.FOLLOW, "following a person"
+        return twist, Mode.FOLLOW, "following legs, or where the person should be"
 
     def _region(self, person: Person, state: TrackingState, observation: Observation) -> Region | None:
         """Where the person should be in the next frame."""
-        if state.since_full + 1 >= self.full_every or person.trust < self.doubted:
+        if state.since_full + 1 >= self.full_every or not person.confirmed:
             return None
         stamp = observation.stamp + state.period
         pose = pose_at(state.poses, stamp)

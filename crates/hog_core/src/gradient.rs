@@ -96,7 +96,8 @@ pub fn gradient_into(image: ImageView, padding: Padding, region: Region, spec: &
     }
 }
 
-fn gamma_table(gamma_correction: bool) -> [f32; 256] {
+/// What each pixel value stands for: its square root, or itself.
+pub(crate) fn gamma_table(gamma_correction: bool) -> [f32; 256] {
     std::array::from_fn(|value| if gamma_correction { (value as f32).sqrt() } else { value as f32 })
 }
 

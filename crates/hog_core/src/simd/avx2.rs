@@ -98,6 +98,10 @@ impl Lane for Avx2 {
         isa!(_mm256_sqrt_ps(x))
     }
     #[inline(always)]
+    fn gamma(self, x: __m256) -> __m256 {
+        self.sqrt(x) // as fast as two Newton steps from an estimate of 12 bits
+    }
+    #[inline(always)]
     fn root(self, x: __m256) -> __m256 {
         isa!(_mm256_sqrt_ps(x))
     }
@@ -147,10 +151,21 @@ impl Lane for Avx2 {
         self.mul_add(x, weight, sum)
     }
     #[inline(always)]
+    fn weigh(self, x: __m256, _product: __m256, weight: __m256, sum: __m256) -> __m256 {
+        self.mul_add(x, weight, sum)
+    }
+    #[inline(always)]
     fn shift_in(self, x: __m256, next: f32) -> __m256 {
         isa!({
             let rotated = _mm256_permutevar8x32_ps(x, _mm256_set_epi32(0, 7, 6, 5, 4, 3, 2, 1));
             _mm256_blend_ps::<0x80>(rotated, _mm256_set1_ps(next))
+        })
+    }
+    #[inline(always)]
+    fn shift_up(self, x: __m256, before: f32) -> __m256 {
+        isa!({
+            let rotated = _mm256_permutevar8x32_ps(x, _mm256_set_epi32(6, 5, 4, 3, 2, 1, 0, 7));
+            _mm256_blend_ps::<0x01>(rotated, _mm256_set1_ps(before))
         })
     }
     #[inline(always)]

@@ -98,20 +98,20 @@ impl Lane for Avx512 {
         isa!(_mm512_sqrt_ps(x))
     }
     #[inline(always)]
-    fn root(self, x: __m512) -> __m512 {
-        // One Newton step from a 14-bit estimate; zeroing the estimate of 0 keeps infinity out.
-        let some = isa!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(x, _mm512_setzero_ps()));
-        let r = isa!(_mm512_maskz_rsqrt14_ps(some, x));
+    fn gamma(self, x: __m512) -> __m512 {
+        // Clamped to a normal number: a subnormal one would make every step slow.
+        let r = isa!(_mm512_rsqrt14_ps(_mm512_max_ps(x, _mm512_set1_ps(1e-30))));
         let s = self.mul(x, r);
         let rest = self.neg_mul_add(s, s, x);
         self.mul_add(rest, self.mul(r, self.splat(0.5)), s)
     }
     #[inline(always)]
+    fn root(self, x: __m512) -> __m512 {
+        self.sqrt(x)
+    }
+    #[inline(always)]
     fn ratio(self, a: __m512, b: __m512) -> __m512 {
-        let some = isa!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(b, _mm512_setzero_ps()));
-        let r = isa!(_mm512_maskz_rcp14_ps(some, b));
-        let c = self.mul(a, r);
-        self.mul_add(self.neg_mul_add(c, b, a), r, c)
+        isa!(_mm512_div_ps(a, _mm512_max_ps(b, _mm512_set1_ps(1e-20))))
     }
     #[inline(always)]
     fn div(self, a: __m512, b: __m512) -> __m512 {
@@ -144,7 +144,13 @@ impl Lane for Avx512 {
     }
     #[inline(always)]
     fn keep(self, x: __m512, key: __m512, wanted: f32) -> (__m512, __mmask16) {
-        (x, isa!(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(key, _mm512_set1_ps(wanted))))
+        (
+            x,
+            isa!(_mm512_cmpeq_epi32_mask(
+                _mm512_castps_si512(key),
+                _mm512_set1_epi32(wanted.to_bits().cast_signed())
+            )),
+        )
     }
     #[inline(always)]
     fn keep_either(self, one: (__m512, __m512, f32), other: (__m512, __m512, f32)) -> (__m512, __mmask16) {
@@ -157,10 +163,21 @@ impl Lane for Avx512 {
         isa!(_mm512_mask3_fmadd_ps(x, weight, sum, mask))
     }
     #[inline(always)]
+    fn weigh(self, (_, mask): (__m512, __mmask16), product: __m512, _weight: __m512, sum: __m512) -> __m512 {
+        isa!(_mm512_mask_add_ps(sum, mask, sum, product))
+    }
+    #[inline(always)]
     fn shift_in(self, x: __m512, next: f32) -> __m512 {
         isa!({
             let next = _mm512_castps_si512(_mm512_set1_ps(next));
             _mm512_castsi512_ps(_mm512_alignr_epi32::<1>(next, _mm512_castps_si512(x)))
+        })
+    }
+    #[inline(always)]
+    fn shift_up(self, x: __m512, before: f32) -> __m512 {
+        isa!({
+            let before = _mm512_castps_si512(_mm512_set1_ps(before));
+            _mm512_castsi512_ps(_mm512_alignr_epi32::<15>(_mm512_castps_si512(x), before))
         })
     }
     #[inline(always)]

@@ -54,6 +54,8 @@ pub(super) trait Lane: Copy {
     fn round(self, x: Self::F) -> Self::F;
     /// The square root, correctly rounded.
     fn sqrt(self, x: Self::F) -> Self::F;
+    /// The square root of a whole number of 0..=255, correctly rounded if the CPU's estimate is good enough.
+    fn gamma(self, x: Self::F) -> Self::F;
     /// The square root within 2 ulp; 0 of 0.
     fn root(self, x: Self::F) -> Self::F;
     /// a / b within 2 ulp for 0 ≤ a ≤ b; 0 where both are 0.
@@ -75,8 +77,13 @@ pub(super) trait Lane: Copy {
     fn keep_either(self, one: (Self::F, Self::F, f32), other: (Self::F, Self::F, f32)) -> Self::Masked;
     /// sum + x·weight.
     fn mul_add_masked(self, x: Self::Masked, weight: Self::F, sum: Self::F) -> Self::F;
+    /// The same, given `product` = vote·weight of the vote that `x` was kept from: addition and multiplication may run
+    /// on different units.
+    fn weigh(self, x: Self::Masked, product: Self::F, weight: Self::F, sum: Self::F) -> Self::F;
     /// Lanes 1.. of `x`, then `next`.
     fn shift_in(self, x: Self::F, next: f32) -> Self::F;
+    /// `before`, then all lanes of `x` but the last.
+    fn shift_up(self, x: Self::F, before: f32) -> Self::F;
     /// Lane 0.
     fn first(self, x: Self::F) -> f32;
     /// The low halves of `LANES` 8-byte words.

@@ -55,6 +55,42 @@ struct Task<'a> {
     threshold: f64,
 }
 
+/// Whether the backend's estimated square root is right for every pixel value; CPUs differ in their estimates.
+pub(super) fn gamma_is_exact(backend: Backend) -> bool {
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available.
+        Backend::Avx512 => unsafe { avx512_gamma_is_exact() },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Avx2 => unsafe { avx2_gamma_is_exact() },
+        _ => false,
+    }
+}
+
+#[inline(always)]
+fn is_exact<L: Lane>(l: L) -> bool {
+    (0..=255u8).all(|value| {
+        let value = f32::from(value);
+        l.first(l.gamma(l.splat(value))) == value.sqrt()
+    })
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
+fn avx512_gamma_is_exact() -> bool {
+    use super::{avx2::Avx2, avx512::Avx512};
+    // SAFETY: this function's features are the tokens'; a level's last strip is AVX2's.
+    unsafe { is_exact(Avx512::new()) && is_exact(Avx2::new()) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2_gamma_is_exact() -> bool {
+    // SAFETY: this function's features are the token's.
+    unsafe { is_exact(super::avx2::Avx2::new()) }
+}
+
 /// Whether the kernels can serve windows of this stride.
 pub(crate) fn serves(grid: &Grid) -> bool {
     grid.stride.width.is_multiple_of(4) && grid.stride.height.is_multiple_of(4)

@@ -1,9 +1,11 @@
 //! What a detector's geometry and SVM mean to the kernels, computed once.
 
+use crate::gradient::gamma_table;
 use crate::params::{HogSpec, Size};
 use crate::svm::Svm;
 
 use super::backend::Backend;
+use super::level;
 use super::strip::BLOCK;
 
 /// Words of a block's bytes.
@@ -12,10 +14,23 @@ pub(super) const WORDS: usize = BLOCK / 4;
 /// More blocks than this in a window might overflow the 32-bit sums of the first look.
 const BLOCKS_MAX: usize = 400;
 
+/// How pixel values are turned into their square roots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Gamma {
+    /// Not at all.
+    Off,
+    /// By Newton's method from the CPU's estimate, which was found right for all 256 values.
+    Estimated,
+    /// By the square root instruction.
+    Exact,
+}
+
 /// The constants of the fast path of one detector.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
-    pub(super) gamma: bool,
+    pub(super) gamma: Gamma,
+    /// What each pixel value stands for.
+    pub(super) table: [f32; 256],
     pub(super) l2_hys_threshold: f32,
     /// Blocks of a window.
     pub(super) blocks: Size,
@@ -75,7 +90,12 @@ impl Plan {
         let norms: f64 = svm.weights().as_chunks::<BLOCK>().0.iter().map(|block| norm(block)).sum();
         let across = profile(spec.sigma);
         Some(Self {
-            gamma: spec.gamma_correction,
+            gamma: match (spec.gamma_correction, level::gamma_is_exact(backend)) {
+                (false, _) => Gamma::Off,
+                (true, true) => Gamma::Estimated,
+                (true, false) => Gamma::Exact,
+            },
+            table: gamma_table(spec.gamma_correction),
             l2_hys_threshold: spec.l2_hys_threshold,
             blocks: spec.blocks,
             down: across.map(|row| row.map(|weight| 2.0 * weight)),

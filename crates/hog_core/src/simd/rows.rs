@@ -105,6 +105,7 @@ impl Columns {
         }
     }
 
+    #[inline(always)]
     fn mix<L: Lane>(&self, l: L, source: &[u8], to: &mut [i16]) {
         if self.span <= L::REACH {
             debug_assert!(to.len() >= L::GROUP * self.base.len());

@@ -10,8 +10,10 @@
 
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
+use std::hint::black_box;
+
 use super::lane::Lane;
-use super::plan::Plan;
+use super::plan::{Gamma, Plan};
 
 /// Pixels of a cell along one axis.
 const CELL: usize = 8;
@@ -62,6 +64,7 @@ pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, 
     let mut rows = [[[zero; CELL + 2]; CHANNELS]; CELL + 2];
     let mut carry = [[[zero; 2]; BINS]; CELL];
     let mut sums = [[zero; CELL]; 2 * BINS];
+    let mut votes = [Votes { even: zero, odd: zero, even_key: zero, odd_key: zero }; CELL];
     // SAFETY: promised by the caller.
     unsafe {
         fill(l, job, first, 0, &mut rows[0]);
@@ -73,17 +76,10 @@ pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, 
             unsafe { fill(l, job, first, CELL * cell_y + i + 2, to) };
         }
         for phase in 0..CELL {
-            let mut votes = [Votes { even: zero, odd: zero, even_key: zero, odd_key: zero }; CELL];
             for (y, votes) in votes.iter_mut().enumerate() {
                 *votes = vote::<L, CHANNELS>(l, &rows, phase, y);
             }
-            if L::WIDE {
-                spread::<L, 0, 9>(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
-            } else {
-                spread::<L, 0, 3>(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
-                spread::<L, 3, 6>(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
-                spread::<L, 6, 9>(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
-            }
+            spread_all(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
         }
         rows.copy_within(CELL.., 0);
         if cell_y > 0 {
@@ -104,19 +100,17 @@ unsafe fn fill<L: Lane, const CHANNELS: usize>(
 ) {
     for (channel, to) in to.iter_mut().enumerate() {
         // SAFETY: promised by the caller of `strip`.
-        unsafe { row(l, job.plan.gamma, job.origin[channel].add(job.rows[y] + CELL * first), to) };
+        unsafe { row(l, job.plan, job.origin[channel].add(job.rows[y] + CELL * first), to) };
     }
 }
 
 /// One row of pixels as ten vectors: columns -1..=8 of every cell, after gamma.
 #[inline(always)]
-unsafe fn row<L: Lane>(l: L, gamma: bool, from: *const u8, to: &mut [L::F; CELL + 2]) {
+unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL + 2]) {
     // SAFETY: the strip and 8 bytes on both sides are readable.
-    let (before, low, high, after) = unsafe {
-        (l.high_words(from.sub(8)), l.low_words(from), l.high_words(from), l.low_words(from.add(8)))
-    };
-    *to = [
-        l.byte::<3>(before),
+    let (low, high, before, after) =
+        unsafe { (l.low_words(from), l.high_words(from), *from.sub(1), *from.add(CELL * L::LANES)) };
+    let mut columns = [
         l.byte::<0>(low),
         l.byte::<1>(low),
         l.byte::<2>(low),
@@ -125,13 +119,24 @@ unsafe fn row<L: Lane>(l: L, gamma: bool, from: *const u8, to: &mut [L::F; CELL 
         l.byte::<1>(high),
         l.byte::<2>(high),
         l.byte::<3>(high),
-        l.byte::<0>(after),
     ];
-    if gamma {
-        for value in to {
-            *value = l.sqrt(*value);
+    match plan.gamma {
+        Gamma::Off => {}
+        Gamma::Estimated => {
+            for value in &mut columns {
+                *value = l.gamma(*value);
+            }
+        }
+        Gamma::Exact => {
+            for value in &mut columns {
+                *value = l.sqrt(*value);
+            }
         }
     }
+    to[1..=CELL].copy_from_slice(&columns);
+    // The neighbours are the same columns one cell on; only the outermost pixels are new.
+    to[0] = l.shift_up(columns[7], plan.table[usize::from(before)]);
+    to[CELL + 1] = l.shift_in(columns[0], plan.table[usize::from(after)]);
 }
 
 /// The votes of pixel (`phase`, `y`) of every cell.
@@ -202,12 +207,33 @@ const ARC: [f32; 4] = {
     ]
 };
 
-/// Sums the votes of bins `FROM..TO` of one pixel column down a cell's rows, weighted.
+/// Sums the votes of all bins, as many at a time as there are registers for.
+#[inline(always)]
+fn spread_all<L: Lane>(
+    l: L,
+    weights: &[[f32; 3]; CELL],
+    votes: &[Votes<L::F>; CELL],
+    carry: &mut [[L::F; 2]; BINS],
+    sums: &mut [[L::F; CELL]; 2 * BINS],
+    phase: usize,
+) {
+    if L::WIDE {
+        spread::<L, 1, 2, 4>(l, weights, votes, carry, sums, phase);
+        spread::<L, 0, 2, 5>(l, weights, votes, carry, sums, phase);
+    } else {
+        spread::<L, 1, 2, 2>(l, weights, votes, carry, sums, phase);
+        spread::<L, 5, 2, 2>(l, weights, votes, carry, sums, phase);
+        spread::<L, 0, 8, 2>(l, weights, votes, carry, sums, phase);
+        spread::<L, 2, 2, 3>(l, weights, votes, carry, sums, phase);
+    }
+}
+
+/// Sums the votes of `COUNT` bins, `STEP` apart, of one pixel column down a cell's rows, weighted.
 ///
 /// `carry` holds what the row of cells above gave to the row of blocks it begins; with this row of cells that is whole
 /// and goes to `sums`. What this row of cells begins goes to `carry`.
 #[inline(always)]
-fn spread<L: Lane, const FROM: usize, const TO: usize>(
+fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
     l: L,
     weights: &[[f32; 3]; CELL],
     votes: &[Votes<L::F>; CELL],
@@ -218,30 +244,40 @@ fn spread<L: Lane, const FROM: usize, const TO: usize>(
     let zero = l.splat(0.0);
     // Per bin: upper cell of the blocks that begin here; of the blocks that end here the upper (in the first four
     // rows, then the lower cell of the blocks that begin here); the lower cell of the blocks that end here.
-    let mut acc = [[zero; 3]; BINS];
-    for bin in FROM..TO {
-        acc[bin] = [zero, carry[bin][0], carry[bin][1]];
+    let mut acc = [[zero; 3]; COUNT];
+    for i in 0..COUNT {
+        acc[i] = [zero, carry[FROM + STEP * i][0], carry[FROM + STEP * i][1]];
     }
     for half in 0..2 {
-        for y in 4 * half..4 * half + 4 {
-            let w = [l.splat(weights[y][0]), l.splat(weights[y][1]), l.splat(weights[y][2])];
-            for bin in FROM..TO {
-                let kept = of_bin(l, &votes[y], bin);
+        // A length that the compiler cannot see keeps the loop rolled; unrolled, its sums spill.
+        let rows: (&[Votes<L::F>], &[[f32; 3]]) =
+            black_box((&votes[CELL / 2 * half..][..CELL / 2], &weights[CELL / 2 * half..][..CELL / 2]));
+        for (votes, weights) in rows.0.iter().zip(rows.1) {
+            let w = [l.splat(weights[0]), l.splat(weights[1]), l.splat(weights[2])];
+            let vote = if FROM.is_multiple_of(2) { votes.even } else { votes.odd };
+            let products = [l.mul(vote, w[0]), l.mul(vote, w[1]), l.mul(vote, w[2])];
+            for i in 0..COUNT {
+                let bin = FROM + STEP * i;
+                let kept = of_bin(l, votes, bin);
                 for k in 0..3 {
-                    acc[bin][k] = l.mul_add_masked(kept, w[k], acc[bin][k]);
+                    acc[i][k] = if bin.is_multiple_of(8) || (bin == 1 && k == 2) {
+                        l.mul_add_masked(kept, w[k], acc[i][k])
+                    } else {
+                        l.weigh(kept, products[k], w[k], acc[i][k])
+                    };
                 }
             }
         }
         if half == 0 {
-            for bin in FROM..TO {
-                sums[bin][phase] = acc[bin][1];
-                acc[bin][1] = zero;
+            for i in 0..COUNT {
+                sums[FROM + STEP * i][phase] = acc[i][1];
+                acc[i][1] = zero;
             }
         }
     }
-    for bin in FROM..TO {
-        carry[bin] = [acc[bin][0], acc[bin][1]];
-        sums[BINS + bin][phase] = acc[bin][2];
+    for i in 0..COUNT {
+        carry[FROM + STEP * i] = [acc[i][0], acc[i][1]];
+        sums[BINS + FROM + STEP * i][phase] = acc[i][2];
     }
 }
 

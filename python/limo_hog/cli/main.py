@@ -20,6 +20,7 @@ COMMANDS = {
     "follow": "watch a robot find and follow a walking person in the arena, and score it",
     "run": "run an ordinary ROS 2 Python node against the arena, without ROS",
     "detect": "find people in photographs, folders and videos",
+    "score": "compare controllers over scenarios and seeds, on all cores",
     "replay": "let detector and follower look at a recording",
     "bench": "time this detector against OpenCV's, with parity checked in the same run",
     "info": "versions, CPU features, chosen backend, and what OpenCV is installed",

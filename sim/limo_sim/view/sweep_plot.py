@@ -1,0 +1,66 @@
+"""Scenarios and controllers compared in one figure: a panel a figure, a dot a controller, its interval as a bar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limo_hog.atomic import whole_file
+from limo_hog.extras import needed
+from limo_sim.sweep import Summary
+
+with needed(by="--plot", what="matplotlib", install="'limo-hog[plot]'"):
+    from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_INK, _FAINT = "#1d2329", "#8a949e"
+_COLOURS = {"approach": "#b35900", "proxemic": "#7a4fd0", "tracking": "#1f6feb"}
+#: A figure of the score card and what it says.
+_PANELS = (
+    ("in_view", "in view [share of frames]"),
+    ("pixel_error_mean", "off centre [px]"),
+    ("distance_rms_error_m", "error to 1.5 m [m]"),
+    ("zone_social", "at 1.2–3.6 m [share of time]"),
+)
+
+
+def plot(summaries: Sequence[Summary], path: Path) -> None:
+    """Draw summaries into a picture of the kind the path's suffix says."""
+    scenarios = list(dict.fromkeys(one.scenario for one in summaries))
+    controllers = list(dict.fromkeys(one.controller for one in summaries))
+    figure = Figure(figsize=(3.2 * len(_PANELS), 1.6 + 0.45 * len(scenarios)), layout="constrained", dpi=150)
+    panels = figure.subplots(1, len(_PANELS), sharey=True, squeeze=False)[0]
+    for axes, (name, title) in zip(panels, _PANELS, strict=True):
+        for place, controller in enumerate(controllers):
+            shift = 0.22 * (place - (len(controllers) - 1) / 2)
+            _dots(axes, [one for one in summaries if one.controller == controller], name, scenarios, shift)
+        axes.set_title(title, loc="left", fontsize=10, color=_INK)
+        axes.set_yticks(range(len(scenarios)), scenarios)
+        axes.set_ylim(len(scenarios) - 0.5, -0.5)
+        axes.set_xlim(0, 1.02 if name in ("in_view", "zone_social") else None)
+        axes.grid(axis="x", color=_FAINT, alpha=0.3, linewidth=0.6)
+        axes.tick_params(length=0, labelsize=9, colors=_INK)
+        axes.spines[["top", "right", "left"]].set_visible(False)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=len(controllers), frameon=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as part:
+        figure.savefig(part)
+
+
+def _dots(axes: Axes, summaries: Sequence[Summary], name: str, scenarios: Sequence[str], shift: float) -> None:
+    found = [(one.scenario, one.measures[name]) for one in summaries]
+    dots = [(scenarios.index(where) + shift, estimate) for where, estimate in found if estimate is not None]
+    axes.errorbar(
+        [estimate.mean for _, estimate in dots],
+        [row for row, _ in dots],
+        xerr=[estimate.interval or 0.0 for _, estimate in dots],
+        fmt="o",
+        markersize=5,
+        linewidth=1.5,
+        color=_COLOURS.get(summaries[0].controller, _INK),
+        label=summaries[0].controller,
+    )

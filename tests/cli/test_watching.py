@@ -163,6 +163,15 @@ def test_ctrl_c_leaves_whole_files(tmp_path: Path) -> None:
         assert abs(frames - images) <= 1
 
 
+def test_a_log_for_the_rerun_viewer_is_one(tmp_path: Path) -> None:
+    pytest.importorskip("rerun", reason="needs the extra viz: pip install 'limo-hog[viz]'")
+    assert main(["follow", "--seconds", "2", "--rerun", str(tmp_path / "run.rrd")]) == 0
+    log = tmp_path / "run.rrd"
+    assert log.read_bytes()[:3] == b"RRF"
+    assert log.stat().st_size > 100_000
+    assert list(tmp_path.iterdir()) == [log]
+
+
 def test_a_missing_library_is_named_with_what_brings_it() -> None:
     with (
         pytest.raises(MissingExtraError, match=r"^--rerun needs the Rerun SDK: pip install 'limo-hog\[viz\]'$"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -172,7 +173,10 @@ class OnnxDetector:
         likely = score >= self.threshold
         boxes = np.stack([x - w / 2, y - h / 2, w, h], axis=1)[likely] / shrink
         kept = suppress(boxes, score[likely], self.overlap)
-        return best_first(np.rint(boxes[kept]), score[likely][kept])
+        # As an SVM's margin: 0 at the threshold, and without an upper end.
+        sure = np.clip(score[likely][kept], 1e-6, 1 - 1e-6).astype(np.float64)
+        margin = np.log(sure / (1 - sure)) - math.log(self.threshold / (1 - self.threshold))
+        return best_first(np.rint(boxes[kept]), margin)
 
     @cached_property
     def _network(self) -> cv2.dnn.Net:

@@ -103,7 +103,7 @@ def rates(track: Track, pose: Odometry) -> tuple[float, float]:
     """Return how fast the person's walk alone changes bearing and range [rad/s, m/s]."""
     dx, dy, vx, vy = track.mean - (pose.x, pose.y, 0.0, 0.0)
     distance = max(math.hypot(dx, dy), 1e-3)
-    return (dx * vy - dy * vx) / distance**2, (dx * vx + dy * vy) / distance
+    return float(dx * vy - dy * vx) / distance**2, float(dx * vx + dy * vy) / distance
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,133 @@
+"""HOG, OpenCV's HOG and a network stand behind one protocol, on whole images and on parts of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.follow.onnx_file import dark_cells
+
+from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.follow.detectors import (
+    Cv2Detector,
+    DetectorError,
+    HalfSize,
+    OnnxDetector,
+    best_first,
+    detect_in,
+    detector_named,
+    shrunk,
+)
+from limo_hog.follow.region import Region
+from limo_sim.arena import Arena
+from limo_sim.scenario import Scenario
+
+
+@dataclass
+class Spy:
+    """Notes what it is shown and finds one box."""
+
+    shown: list[tuple[int, ...]] = field(default_factory=list)
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        self.shown.append(image.shape)
+        return Detections(np.array([[10, 20, 64, 128]], np.int32), np.array([1.0]))
+
+
+@pytest.fixture(scope="module")
+def frame() -> NDArray[np.uint8]:
+    """Somebody 3 m ahead."""
+    return Arena(Scenario.load("standing"), 0).frame().image
+
+
+def test_our_hog_and_opencvs_find_the_same_person(frame: NDArray[np.uint8]) -> None:
+    ours, theirs = PeopleDetector().detect(frame), Cv2Detector().detect(frame)
+    assert len(ours) == 1
+    assert ours.boxes.tolist() == theirs.boxes.tolist()
+
+
+def test_a_region_is_searched_alone_and_its_boxes_are_in_the_whole_image() -> None:
+    spy = Spy()
+    found = detect_in(spy, np.zeros((480, 640, 3), np.uint8), Region(96, 32, 208, 192, 150.0))
+    assert spy.shown == [(192, 208, 3)]
+    assert found.boxes.tolist() == [[106, 52, 64, 128]]
+
+
+def test_large_people_are_searched_in_a_smaller_picture() -> None:
+    spy = Spy()
+    found = detect_in(spy, np.zeros((480, 640, 3), np.uint8), Region(0, 0, 400, 400, 320.0))
+    assert spy.shown == [(200, 200, 3)]
+    assert found.boxes.tolist() == [[20, 40, 128, 256]]
+
+
+def test_a_region_around_a_person_finds_what_the_whole_image_does(frame: NDArray[np.uint8]) -> None:
+    detector = PeopleDetector()
+    whole = detector.detect(frame).boxes[0]
+    x, y, w, h = (int(value) for value in whole)
+    region = Region(x - 48, max(y - 32, 0), w + 96, h + 64, float(h))
+    part = detect_in(detector, frame, region).boxes[0]
+    assert np.abs(part - whole).max() <= 16
+
+
+def test_shrinking_is_opencvs_linear_resize() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (120, 90, 3), np.uint8)
+    ours, theirs = shrunk(image, 0.6).astype(int), cv2.resize(image, (54, 72)).astype(int)
+    assert np.abs(ours - theirs).max() <= 1
+
+
+def test_half_size_gives_boxes_of_the_whole_image() -> None:
+    spy = Spy()
+    found = HalfSize(spy).detect(np.zeros((481, 641, 3), np.uint8))
+    assert spy.shown == [(240, 320, 3)]
+    assert found.boxes.tolist() == [[20, 40, 128, 256]]
+
+
+def test_half_size_is_the_mean_of_four_pixels() -> None:
+    class Keep(Spy):
+        def detect(self, image: NDArray[np.uint8]) -> Detections:
+            self.image = image
+            return super().detect(image)
+
+    keep = Keep()
+    HalfSize(keep).detect(np.arange(4, dtype=np.uint8).reshape(2, 2, 1).repeat(3, axis=2))
+    assert keep.image.tolist() == [[[2, 2, 2]]]
+
+
+def test_the_surest_comes_first() -> None:
+    found = best_first(np.array([[0, 0, 1, 2], [3, 3, 1, 2]]), np.array([0.1, 0.9]))
+    assert found.scores.tolist() == [0.9, 0.1]
+    assert found.boxes[0].tolist() == [3, 3, 1, 2]
+
+
+def test_a_network_from_a_file_finds_dark_cells(tmp_path: Path) -> None:
+    path = tmp_path / "dark.onnx"
+    path.write_bytes(dark_cells())
+    image = np.full((480, 640, 3), 255, np.uint8)
+    image[160:192, 320:352] = 0
+    found = detector_named(f"onnx:{path}").detect(image)
+    assert found.boxes.tolist() == [[320, 144, 32, 64]]
+    assert found.scores[0] > 0
+
+
+def test_a_network_sees_a_large_image_whole(tmp_path: Path) -> None:
+    path = tmp_path / "dark.onnx"
+    path.write_bytes(dark_cells())
+    image = np.full((960, 1280, 3), 255, np.uint8)
+    image[320:384, 640:704] = 0
+    assert OnnxDetector(path).detect(image).boxes.tolist() == [[640, 288, 64, 128]]
+
+
+def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(b"not a network")
+    image = np.zeros((480, 640, 3), np.uint8)
+    with pytest.raises(DetectorError, match="cannot read this as an ONNX network"):
+        detector_named(f"onnx:{broken}").detect(image)
+    with pytest.raises(DetectorError, match="no such file"):
+        detector_named("onnx:absent.onnx").detect(image)
+    with pytest.raises(DetectorError, match="want one of hog, hog-half, cv2, onnx:FILE"):
+        detector_named("yolo")

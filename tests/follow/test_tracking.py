@@ -1,0 +1,201 @@
+"""The tracking controller finds, follows, holds, coasts, loses and finds again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.follow.views import NOBODY, World, scan_of
+
+from limo_hog.detector import Detections
+from limo_hog.follow import Decision, Mode, Odometry, TrackingController
+from limo_hog.follow.people import pose_at
+from limo_hog.follow.tracking import TrackingState
+
+CONTROLLER = TrackingController()
+
+
+def run(world: World, seconds: float, state: TrackingState | None = None, **seen: bool) -> Decision[TrackingState]:
+    """Let the controller drive the world's robot."""
+    decision = None
+    state = state or CONTROLLER.start()
+    for _ in range(round(seconds / world.period)):
+        decision = CONTROLLER.step(world.observe(**seen), state)
+        state = decision.state
+        world.drive(decision.twist)
+    assert decision is not None
+    return decision
+
+
+def test_it_searches_by_turning_and_does_not_drive() -> None:
+    decision = run(World(person=(-3.0, 0.0)), 1.0)
+    assert decision.mode is Mode.SEARCH
+    assert decision.twist.linear == 0
+    assert abs(decision.twist.angular) == CONTROLLER.search_rate
+
+
+def test_it_faces_somebody_new_at_once_and_drives_only_when_sure() -> None:
+    world = World(person=(3.0, 1.0))
+    first = run(world, 0.1)
+    assert first.twist.angular > 0.3
+    assert first.twist.linear == 0
+    assert "not sure" in first.reason
+    assert run(world, 3.0, first.state).twist.linear > 0.2
+
+
+def test_it_holds_its_distance_to_somebody_who_stands() -> None:
+    world = World()
+    decision = run(world, 12.0)
+    assert decision.mode is Mode.HOLD
+    assert world.distance - 0.084 == pytest.approx(1.5, abs=0.1)
+
+
+def test_it_follows_without_lag_somebody_who_walks_around_it() -> None:
+    world = World(person=(2.0, -1.0), velocity=(0.0, 0.4))
+    run(world, 6.0)
+    # A proportional controller of the same gain lags by rate / gain: 0.2 / 2.5 rad here.
+    assert abs(world.bearing) < 0.03
+
+
+def test_it_backs_away_from_somebody_who_comes_near() -> None:
+    world = World()
+    state = run(world, 12.0).state
+    world.velocity = (-0.3, 0.0)
+    decision = run(world, 2.0, state)
+    assert decision.twist.linear < -0.1
+    assert world.distance > 1.3
+
+
+def test_it_coasts_over_missing_frames_and_says_where_it_looks() -> None:
+    world = World(person=(3.0, -0.5), velocity=(0.0, 0.3))
+    state = run(world, 4.0).state
+    decision = run(world, 0.5, state, visible=False)
+    assert decision.mode is Mode.FOLLOW
+    assert abs(world.bearing) < 0.06
+    assert decision.target is None
+
+
+def test_somebody_gone_is_lost_and_searched_for_the_way_they_went() -> None:
+    world = World(person=(3.0, -1.0), velocity=(0.0, 0.4))
+    state = run(world, 4.0).state
+    decision = run(world, 1.5, state, visible=False)
+    assert decision.mode is Mode.LOST
+    assert decision.twist.linear == 0
+    decision = run(world, 2.0, decision.state, visible=False)
+    assert decision.reason == "looking all around for the person"
+    assert decision.twist.angular > 0
+
+
+def test_legs_in_the_scan_keep_somebody_too_near_for_the_camera() -> None:
+    world = World(person=(1.6, 0.0))
+    state = run(world, 4.0).state
+    for _ in range(30):
+        world.velocity = (-0.25, 0.0)
+        legs = scan_of([(world.distance, 0.08), (world.distance, -0.08)], world.time)
+        view = replace(world.observe(visible=False), scan=legs)
+        decision = CONTROLLER.step(view, state)
+        state = decision.state
+        world.drive(decision.twist)
+    assert decision.mode is not Mode.LOST
+    assert decision.twist.linear < 0
+
+
+def test_weak_boxes_of_a_pillar_are_never_driven_to() -> None:
+    world = World(person=(2.5, 0.0))
+    state = CONTROLLER.start()
+    for frame in range(200):
+        decision = CONTROLLER.step(world.observe(visible=frame % 2 == 0, score=0.6), state)
+        state = decision.state
+        world.drive(decision.twist)
+        assert decision.twist.linear == 0
+
+
+def test_it_stays_with_the_person_it_began_with() -> None:
+    world = World()
+    state = run(world, 5.0).state
+    mine = state.followed
+    for _ in range(20):
+        x, y = world.person
+        other = World(person=(x + 0.5, y - 0.8), robot=world.robot, time=world.time)
+        view, second = world.observe(), other.observe(score=5.0).detections
+        assert len(second) == 1
+        together = Detections(
+            np.concatenate([second.boxes, view.detections.boxes]),
+            np.concatenate([second.scores, view.detections.scores]),
+        )
+        decision = CONTROLLER.step(replace(view, detections=together), state)
+        state = decision.state
+        world.time += 0.1
+        assert state.followed == mine
+        assert decision.target == 1
+
+
+def test_it_asks_for_the_part_of_the_image_where_the_person_will_be() -> None:
+    world = World(person=(3.0, -0.5), velocity=(0.0, 0.3))
+    decision = run(world, 4.05)
+    region = decision.region
+    assert region is not None
+    assert region.width * region.height < 0.5 * 640 * 480
+    view = world.observe()
+    x, y, w, h = view.detections.boxes[0]
+    assert region.x <= x
+    assert x + w <= region.x + region.width
+    assert region.y <= max(y, 0)
+    assert y + h <= region.y + region.height + 8
+
+
+def test_every_few_frames_it_looks_at_the_whole_image() -> None:
+    world = World()
+    state = run(world, 3.0).state
+    whole = 0
+    for _ in range(CONTROLLER.full_every * 3):
+        decision = run(world, 0.1, state)
+        state = decision.state
+        whole += decision.region is None
+    assert whole == 3
+
+
+def test_a_late_frame_is_put_where_the_robot_was_when_it_was_taken() -> None:
+    turning = tuple(Odometry(0.1 * k, yaw=0.1 * k, angular=1.0) for k in range(11))
+    assert pose_at(turning, 0.55).yaw == pytest.approx(0.55)
+    assert pose_at(turning, 1.2).yaw == pytest.approx(1.2)
+    assert pose_at((), 3.0) == Odometry(3.0)
+
+
+def test_a_late_frame_does_not_make_it_swing() -> None:
+    # Frames 0.4 s late: the robot must not turn on for what it has turned already.
+    world = World(person=(3.0, 1.5))
+    state = CONTROLLER.start()
+    views, overshoot = [], 0.0
+    for _ in range(60):
+        now = Odometry(world.time, *world.robot)
+        views.append(world.observe())
+        late = replace(views[max(0, len(views) - 5)], odometry=now, scan=None)
+        decision = CONTROLLER.step(late, state)
+        state = decision.state
+        world.drive(decision.twist)
+        overshoot = min(overshoot, world.bearing)
+    assert abs(world.bearing) < 0.03
+    assert overshoot > -0.12
+
+
+def test_it_goes_around_a_pillar_between() -> None:
+    world = World(person=(4.0, 0.0))
+    state = run(world, 2.5).state
+    pillar = (world.robot[0] + 1.2, 0.05)
+    here = (pillar[0] - world.robot[0], pillar[1])
+    view = replace(
+        world.observe(), scan=scan_of([here, (here[0], here[1] + 0.1), (here[0], here[1] - 0.1)], world.time)
+    )
+    decision = CONTROLLER.step(view, state)
+    assert decision.reason == "going around something"
+    assert abs(decision.twist.angular) > 0.3
+
+
+def test_nothing_depends_on_anything_but_what_is_handed_in() -> None:
+    one, two = World(person=(2.5, 0.4)), World(person=(2.5, 0.4))
+    assert run(one, 3.0).twist == run(two, 3.0).twist
+    assert not math.isnan(one.bearing)
+    assert CONTROLLER.step(replace(one.observe(), detections=NOBODY), CONTROLLER.start()).target is None

@@ -13,12 +13,30 @@ def part_of(path: Path) -> Path:
 
 
 @contextmanager
+def about(path: Path) -> Iterator[None]:
+    """Let an error that names the unfinished file, or none, name the file the user knows."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None or str(error.filename) == str(part_of(path)):
+            error.filename = str(path)
+        raise
+
+
+@contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give a name to write to, and rename it to `path` when all went well; else nothing is left behind."""
+    """Give a name to write to, and rename it to `path` when all went well; else nothing is left behind.
+
+    Folders are made as needed.
+    """
     part = part_of(path)
+    with about(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
     try:
         yield part
         part.replace(path)
-    except BaseException:
+    except BaseException as error:
         part.unlink(missing_ok=True)
+        if isinstance(error, OSError) and str(error.filename) == str(part):
+            error.filename = str(path)
         raise

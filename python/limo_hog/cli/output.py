@@ -6,7 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-from limo_hog.atomic import whole_file
+from limo_hog.atomic import about, whole_file
 from limo_hog.exceptions import LimoHogError
 
 #: The file name that stands for standard output.
@@ -23,7 +23,7 @@ def write_json(target: str, value: object) -> None:
     if target == STDOUT:
         sys.stdout.write(text)
         return
-    with whole_file(Path(target)) as part:
+    with whole_file(Path(target)) as part, about(Path(target)):
         part.write_text(text)
 
 

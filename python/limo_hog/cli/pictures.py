@@ -104,7 +104,8 @@ class Run:
 
     def summary(self, seconds: float) -> str:
         """Say what came of it in one line."""
-        words = [f"{self.pictures} pictures, {self.people} people in {self.peopled} of them"]
+        pictures = "picture" if self.pictures == 1 else "pictures"
+        words = [f"{self.pictures} {pictures}, {self.people} people in {self.peopled} of them"]
         if self.pictures:
             words.append(f"{self._ms / self.pictures:.1f} ms each, {self.pictures / seconds:.4g} a second")
         if self.known:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from limo_hog.atomic import part_of
+from limo_hog.atomic import about, part_of
 from limo_hog.cli.output import STDOUT
 from limo_hog.exceptions import LimoHogError
 
@@ -40,14 +40,18 @@ def json_lines(target: str | None, resume: bool) -> Iterator[Results]:
     path = Path(target)
     part = part_of(path)
     done = _take_up(path, part) if resume else {}
-    with part.open("ab" if resume else "wb", buffering=0) as file:
+    with about(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        opened = part.open("ab" if resume else "wb", buffering=0)
+    with opened as file:
         whole = file.tell()
 
         def write(result: dict[str, Any]) -> None:
             nonlocal whole
             data = json.dumps(result).encode() + b"\n"
-            while data:
-                data = data[file.write(data) :]
+            with about(path):
+                while data:
+                    data = data[file.write(data) :]
             whole = file.tell()
 
         try:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.atomic import whole_file
+from limo_hog.atomic import about, whole_file
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 
@@ -34,8 +34,7 @@ def write_image(path: Path, image: NDArray[np.uint8]) -> None:
     ok, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     if not ok:
         raise WriteError(f"{path}: OpenCV cannot encode {image.shape} {image.dtype} as {path.suffix}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as part:
+    with whole_file(path) as part, about(path):
         part.write_bytes(data.tobytes())
 
 
@@ -53,7 +52,6 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[[NDArray[np.uint8]
     """
     with needed(by="writing H.264 video", what="PyAV", install="'limo-hog[video]'"):
         import av
-    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as part, av.open(part, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         stream.pix_fmt = "yuv420p"

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from limo_hog.atomic import whole_file
+from limo_hog.atomic import about, whole_file
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
@@ -99,7 +99,6 @@ def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
     The file has its name only when it is whole.
     """
     _with_vision()
-    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as part, part.open("wb") as file:
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="limo-hog")
@@ -112,7 +111,8 @@ def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
                 schema = writer.register_schema(name, "ros2msg", definition.encode())
                 channels[topic] = writer.register_channel(topic, "cdr", schema)
             nanoseconds = round(time * 1e9)
-            writer.add_message(channels[topic], nanoseconds, serialize(message), nanoseconds)
+            with about(path):
+                writer.add_message(channels[topic], nanoseconds, serialize(message), nanoseconds)
 
         yield write
         writer.finish()  # type: ignore[no-untyped-call]

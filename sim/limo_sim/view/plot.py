@@ -60,7 +60,6 @@ def plot(episode: Episode, path: Path) -> None:
         axes.set_xlim(0, episode.seconds)
     for axes in (error, distance):
         axes.set_xticklabels([])
-    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as part:
         figure.savefig(part)
 

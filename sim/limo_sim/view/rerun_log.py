@@ -25,7 +25,6 @@ _GREEN, _RED = (60, 200, 80), (235, 60, 60)
 @contextmanager
 def logged(path: Path) -> Iterator[Callable[[Moment], None]]:
     """Give a function that logs a moment: camera with boxes, depth, map and series."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as part:
         log = rr.RecordingStream("limo-hog")
         log.save(part)

@@ -154,10 +154,14 @@ class OnnxDetector:
     threshold: float = 0.25
     overlap: float = 0.45
 
+    def __post_init__(self) -> None:
+        # A wrong file is told before the robot starts, not frame by frame.
+        _ = self._network
+
     def detect(self, image: Image) -> Detections:
         """Find people, best first."""
-        with needed(by="an ONNX detector", what="OpenCV", install="'limo-hog[cv]'"):
-            import cv2
+        import cv2
+
         shrink = self.size / max(image.shape[:2])
         fitted = cv2.resize(image, (0, 0), fx=shrink, fy=shrink)
         square = np.full((self.size, self.size, 3), 114, np.uint8)
@@ -180,7 +184,8 @@ class OnnxDetector:
 
     @cached_property
     def _network(self) -> cv2.dnn.Net:
-        import cv2
+        with needed(by="an ONNX detector", what="OpenCV", install="'limo-hog[cv]'"):
+            import cv2
 
         if not self.path.is_file():
             raise DetectorError(f"{self.path}: no such file; --detector onnx:FILE wants an ONNX network")

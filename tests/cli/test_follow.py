@@ -1,0 +1,98 @@
+"""`limo-hog follow` and `limo-hog score`, as a user types them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from limo_hog.cli.main import main
+
+KEYS = [
+    "scenario",
+    "controller",
+    "detector",
+    "seed",
+    "seconds",
+    "frames",
+    "first_detection_s",
+    "in_view",
+    "detected",
+    "best_box_wrong",
+    "longest_gap_s",
+    "pixel_error_mean",
+    "pixel_error_p95",
+    "distance_min_m",
+    "distance_mean_m",
+    "distance_rms_error_m",
+    "zone_intimate",
+    "zone_personal",
+    "zone_social",
+    "zone_public",
+    "contacts_person",
+    "contacts_wall",
+    "mean_abs_domega",
+    "path_m",
+    "detect_ms_p50",
+    "detect_ms_p95",
+    "render_ms_p50",
+    "real_time_factor",
+]
+
+
+def test_the_score_card_on_standard_output_has_every_figure_of_the_contract(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["follow", "--scenario", "followable", "--seconds", "1", "--json", "-"]) == 0
+    card = json.loads(capsys.readouterr().out)
+    assert set(KEYS) <= set(card)
+    assert card["controller"] == "tracking"
+    assert card["seconds"] == 1.0
+    assert 0 <= card["in_view"] <= 1
+
+
+def test_without_json_a_person_reads_the_card(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["follow", "--scenario", "empty", "--seconds", "0.5", "--controller", "approach"]) == 0
+    out = capsys.readouterr().out
+    assert "empty · approach · hog · seed 0" in out
+    assert "nobody seen" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--scenario", "moon"], "unknown scenario moon"),
+        (["--detector", "yolo"], "want one of hog, hog-half, cv2, onnx:FILE"),
+        (["--detector", "onnx:absent.onnx"], "absent.onnx: no such file"),
+        (["--controller", "approach", "--target", "1"], "holds no distance"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["follow", "--seconds", "0.2", *arguments]) == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize("arguments", [["--seconds", "0"], ["--seed", "-1"], ["--controller", "x"], ["--target", "9"]])
+def test_wrong_arguments_are_refused(arguments: list[str]) -> None:
+    assert main(["follow", *arguments]) == 2
+
+
+def test_score_compares_controllers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, picture = tmp_path / "score.json", tmp_path / "score.png"
+    command = ["score", "--scenario", "empty", "followable", "--controller", "proxemic", "tracking", "--seeds", "2"]
+    assert main([*command, "--seconds", "0.3", "--workers", "2", "--json", str(out), "--plot", str(picture)]) == 0
+    result = json.loads(out.read_text())
+    assert [(run["scenario"], run["controller"], run["seed"]) for run in result["runs"]] == [
+        (scenario, controller, seed)
+        for scenario in ("empty", "followable")
+        for controller in ("proxemic", "tracking")
+        for seed in (0, 1)
+    ]
+    assert result["summary"][2]["measures"]["in_view"]["mean"] == 1.0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert "followable" in capsys.readouterr().out

@@ -1,0 +1,98 @@
+"""Runs in the arena: closed loop, the same for the same seed, and safe when the detector is not."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.follow import ProxemicController, TrackingController, controller_named
+from limo_hog.follow.decision import Mode
+from limo_sim.episode import Episode, run_episode
+from limo_sim.scenario import Scenario
+from limo_sim.score import score
+
+WALL_CLOCK = {"detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor"}
+
+
+class Failing:
+    """Works, fails for a second, works again."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+        self.works = PeopleDetector()
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        self.calls += 1
+        if 30 <= self.calls < 40:
+            raise RuntimeError("the GPU fell off the bus")
+        return self.works.detect(image)
+
+
+def run(scenario: str, seconds: float, controller: Any = None, detector: Any = None, seed: int = 0) -> Episode:
+    return run_episode(
+        Scenario.load(scenario), controller or TrackingController(), detector or PeopleDetector(), seconds, seed
+    )
+
+
+def test_the_same_seed_gives_the_same_score_but_for_the_wall_clock() -> None:
+    one, two = (score(run("followable", 3.0)).to_json() for _ in range(2))
+    for name in WALL_CLOCK:
+        assert one.pop(name) is not None
+        two.pop(name)
+    assert one == two
+
+
+def test_the_tracking_controller_closes_in_on_somebody_who_stands() -> None:
+    result = score(run("standing", 9.0))
+    assert result.in_view == 1.0
+    assert result.detected == 1.0
+    assert result.contacts_person == 0
+    assert result.modes["hold"] > 0.1
+
+
+@pytest.mark.parametrize("name", ["approach", "proxemic"])
+def test_the_workshops_controllers_follow_behind_the_safety_layer(name: str) -> None:
+    result = score(run("standing", 5.0, controller_named(name)))
+    assert result.in_view == 1.0
+    assert result.path_m > 0.5
+    assert result.contacts_person == 0
+
+
+def test_nobody_is_approached_nearer_than_the_safety_layer_allows() -> None:
+    class Blind:
+        """Sees somebody straight ahead whatever there is."""
+
+        def detect(self, image: NDArray[np.uint8]) -> Detections:
+            del image
+            return Detections(np.array([[288, 150, 64, 128]], np.int32), np.array([2.0]))
+
+    scenario = Scenario.load("standing")
+    near = dataclasses.replace(scenario.people[0], route=((2.0, 0.0, 0.0),))
+    episode = run_episode(
+        dataclasses.replace(scenario, people=(near,)), ProxemicController(target_distance=0.3), Blind(), 15.0, 0
+    )
+    result = score(episode)
+    assert result.clearance_min_m is not None
+    assert 0.45 <= result.clearance_min_m < 0.7
+    assert result.modes["blocked"] > 0.1
+
+
+def test_a_detector_that_raises_stops_the_robot_until_it_works_again() -> None:
+    episode = run("standing", 6.0, detector=Failing())
+    failed = [step for step in episode.steps if "GPU fell off" in step.reason]
+    assert len(failed) == 10
+    assert all(step.mode is Mode.BLOCKED and step.twist.linear == step.twist.angular == 0 for step in failed)
+    after = [step for step in episode.steps if step.time > failed[-1].time]
+    assert after[-1].mode is Mode.FOLLOW
+
+
+def test_nobody_is_found_where_nobody_is() -> None:
+    result = score(run("empty", 4.0))
+    assert result.in_view is None
+    assert result.path_m < 0.05
+    assert result.modes["search"] == 1.0

@@ -148,6 +148,21 @@ def test_resuming_does_only_what_is_left(pictures: Path, tmp_path: Path) -> None
     assert sorted(p.name for p in tmp_path.iterdir()) == ["film.mp4", "in", "out.json"]
 
 
+def test_copies_that_are_there_are_not_made_again(pictures: Path, tmp_path: Path) -> None:
+    film, out = tmp_path / "film.mp4", tmp_path / "out"
+    _film(film)
+    arguments = ["detect", str(pictures), str(film), "--out", str(out), "--resume"]
+    assert main(arguments) == 0
+    made = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
+    assert len(made) == 4
+    gone = next(path for path in made if path.name == "b.png")
+    gone.unlink()
+    assert main(arguments) == 0
+    again = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
+    assert again.keys() == made.keys()
+    assert [path for path in made if made[path] != again[path]] == [gone]
+
+
 def test_resuming_what_was_not_kept_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["detect", "a.png", "--resume"]) == 2
     assert "--json FILE or --out DIR" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import signal
 import socket
@@ -13,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import aiohttp
 import av
 import cv2
 import numpy as np
@@ -161,6 +163,33 @@ def test_ctrl_c_leaves_whole_files(tmp_path: Path) -> None:
         images = sum(connection.msgcount for connection in reader.connections if connection.topic.endswith("/image"))
         assert frames > 0
         assert abs(frames - images) <= 1
+
+
+async def _text(page: Any) -> str:
+    message = await page.receive(timeout=30)
+    return str(message.data) if message.type is aiohttp.WSMsgType.TEXT else ""
+
+
+def test_ctrl_c_ends_a_run_that_is_paused_on_its_page() -> None:
+    command = [str(LIMO_HOG), "follow", "--seconds", "3600", "--view", "0"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    url = process.stderr.readline().split()[-1]
+
+    async def pause() -> None:
+        async with aiohttp.ClientSession() as session, session.ws_connect(url + "live") as page:
+            await page.send_str('{"do": "pause"}')
+            told = ""
+            while '"paused": true' not in told:
+                told = await _text(page)
+            process.send_signal(signal.SIGINT)
+            # The page is told that it is over.
+            while '"ended"' not in told:
+                told = await _text(page)
+
+    asyncio.run(pause())
+    assert process.communicate(timeout=30)[1] == "limo-hog: stopped\n"
+    assert process.returncode == 130
 
 
 def test_a_log_for_the_rerun_viewer_is_one(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from limo_hog.exceptions import LimoHogError
 COMMANDS = {
     "follow": "watch a robot find and follow a walking person in the arena, and score it",
     "run": "run an ordinary ROS 2 Python node against the arena, without ROS",
+    "workshop": "learn it: a template node, a checker, and model solutions",
     "detect": "find people in photographs, folders and videos",
     "score": "compare controllers over scenarios and seeds, on all cores",
     "replay": "let detector and follower look at a recording",

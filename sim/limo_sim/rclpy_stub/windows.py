@@ -104,6 +104,9 @@ def _watched(base: Any, world: World) -> Any:
             return getattr(self._descriptor, name)
 
         def detectMultiScale(self, img: Any, *args: Any, **kwargs: Any) -> Any:  # noqa: N802 — OpenCV's name
+            looked_at = f"{getattr(img, 'dtype', type(img).__name__)} {np.shape(img)}"
+            if looked_at not in world.asked:
+                world.asked.append(looked_at)
             began = time.perf_counter()
             rects, weights = self._descriptor.detectMultiScale(img, *args, **kwargs)
             ms = 1e3 * (time.perf_counter() - began)

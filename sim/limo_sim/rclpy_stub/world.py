@@ -69,6 +69,15 @@ class Command:
     twist: Twist
 
 
+@dataclass(frozen=True, slots=True)
+class Callback:
+    """When a callback began, how long it slept [s of the arena's time], and how long it worked [s of the wall's]."""
+
+    time: float
+    slept: float
+    worked: float
+
+
 class World:
     """One run: the arena, who listens, and the log that the score is made of.
 
@@ -78,6 +87,10 @@ class World:
         Every Twist on /cmd_vel.
     found
         What the script's detector found since the last camera frame.
+    asked
+        What the detector was asked to look at in the run, as "uint8 (480, 640, 3)", each once.
+    callbacks
+        How long each callback took.
     fault
         What went wrong first in the script, even if the script hid it.
     """
@@ -107,7 +120,8 @@ class World:
         self.shown: dict[str, int] = {}
         self.fault: BaseException | None = None
         self.detector_used = False
-        self.busy_ms: list[float] = []
+        self.callbacks: list[Callback] = []
+        self.asked: list[str] = []
         self._outlet = Outlet(self.arena)
         self._steps: list[Step] = []
         self._frame: Frame | None = None
@@ -152,7 +166,7 @@ class World:
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Call back into the script, and remember how that went wrong."""
-        began = time.perf_counter()
+        began, since = time.perf_counter(), self.time
         try:
             function(*arguments)
         except (RunOver, SystemExit):
@@ -161,7 +175,7 @@ class World:
             self.fault = self.fault or error
             raise
         finally:
-            self.busy_ms.append(1e3 * (time.perf_counter() - began))
+            self.callbacks.append(Callback(since, self.time - since, time.perf_counter() - began))
 
     def show(self, window: str, picture: NDArray[np.uint8]) -> None:
         """Keep the newest picture of a window."""

@@ -1,0 +1,125 @@
+"""The scenes a student's node is tried in, and what it did in each frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.detector import Detections
+from limo_hog.follow.twist import Twist
+from limo_sim.episode import Moment
+from limo_sim.rclpy_stub.script import Outcome, run_script
+from limo_sim.rclpy_stub.world import Found, World
+from limo_sim.scenario import Person, Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """An arena for a second or so: what is there, in words, and ROS arguments for the node."""
+
+    name: str
+    words: str
+    scenario: Scenario
+    seconds: float = 1.0
+    arguments: tuple[str, ...] = ()
+
+
+def _standing(*places: tuple[float, float]) -> Scenario:
+    return Scenario(name="workshop check", people=tuple(Person(route=((x, y, 3600.0),), facing=0.0) for x, y in places))
+
+
+LEFT = Scene("left", "somebody stands on the left", _standing((2.1, 0.6)))
+RIGHT = Scene("right", "somebody stands on the right", _standing((2.1, -0.6)))
+AHEAD = Scene("ahead", "somebody stands straight ahead", _standing((2.2, 0.0)))
+NOBODY = Scene("nobody", "nobody is there", _standing())
+#: Two people, of whom OpenCV's detector lists the less sure one first.
+TWO = Scene("two", "two people stand there", _standing((2.2, 0.7), (3.4, -1.0)), 0.6)
+NEAR = Scene("near", "somebody is nearer than wanted", _standing((2.0, 0.0)), 1.0, ("-p", "target_distance:=2.5"))
+FAR = Scene("far", "somebody is further than wanted", _standing((3.2, 0.0)), 1.0, ("-p", "target_distance:=1.5"))
+
+FOLLOWER_SCENES = (LEFT, RIGHT, AHEAD, NOBODY, TWO)
+PROXEMIC_SCENES = (LEFT, RIGHT, NOBODY, TWO, NEAR, FAR)
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """One camera frame, and what the node made of it before the next.
+
+    Attributes
+    ----------
+    time
+        When the node got it [s].
+    image
+        The camera's.
+    found
+        Boxes in the camera's pixels.
+    raw
+        What the detector said, in pixels of the image it was given; None where it was not asked.
+    commands
+        What was published on /cmd_vel.
+    windows
+        What was shown, by window.
+    said
+        What was logged.
+    """
+
+    time: float
+    image: NDArray[np.uint8]
+    found: Detections
+    raw: Found | None
+    commands: tuple[Twist, ...]
+    windows: dict[str, NDArray[np.uint8]]
+    said: tuple[str, ...]
+
+
+@dataclass
+class Take:
+    """A node in one scene."""
+
+    scene: Scene
+    looks: list[Look] = field(default_factory=list)
+    outcome: Outcome | None = None
+
+
+def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
+    """Run a node in a scene and note what it does with each frame."""
+    take = Take(scene)
+    worlds: list[World] = []
+    said: list[str] = []
+    commanded = 0
+
+    def watch(moment: Moment) -> None:
+        nonlocal commanded
+        world = worlds[0]
+        commands = tuple(command.twist for command in world.commands[commanded:])
+        if moment.frame is None:
+            return
+        commanded = len(world.commands)
+        raw = world.found[-1] if world.found else None
+        take.looks.append(
+            Look(
+                moment.step.time,
+                moment.frame.image,
+                moment.step.detections,
+                raw,
+                commands,
+                dict(moment.windows),
+                tuple(said),
+            )
+        )
+        said.clear()
+
+    take.outcome = run_script(
+        script,
+        scene.scenario,
+        scene.seconds,
+        arguments=("--ros-args", *scene.arguments),
+        log=lambda _time, _level, _name, message: said.append(message),
+        watch=watch,
+        patience=patience,
+        made=worlds.append,
+    )
+    return take

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from limo_hog import _core
 from limo_hog.arguments import pixels
+from limo_hog.suppression import soften, suppress
 
 #: The person inside a window: x + .1 w, y + .07 h, .8 w, .8 h. The rest is the margin it was trained with.
 _PERSON_IN_WINDOW = (0.1, 0.07, 0.8, 0.8)
@@ -73,6 +74,12 @@ class PeopleDetector:
         How much each level is smaller than the one before.
     group_threshold
         Similar hits must be more than this to make a detection; 0 returns every hit.
+    nms
+        How one box is made of many hits: "group", OpenCV's grouping; "iou", the best of those that overlap; "soft",
+        as that, but others are doubted, not dropped, so that somebody half hidden by somebody else may stay.
+    overlap
+        For "iou", the intersection over union beyond which two hits are one person; for "soft", the one at which
+        doubt is strong.
     """
 
     model: Literal["default", "daimler"] = "default"
@@ -81,6 +88,8 @@ class PeopleDetector:
     padding: tuple[int, int] = (4, 4)
     scale: float = 1.05
     group_threshold: int = 2
+    nms: Literal["group", "iou", "soft"] = "group"
+    overlap: float = 0.3
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
         """People in `image`, best first.
@@ -101,9 +110,15 @@ class PeopleDetector:
             self.win_stride,
             self.padding,
             self.scale,
-            self.group_threshold,
+            self.group_threshold if self.nms == "group" else 0,
             False,
         )
+        if self.nms == "iou":
+            kept = suppress(boxes, scores, self.overlap)
+            return Detections(boxes[kept], scores[kept])
+        if self.nms == "soft":
+            kept, scores = soften(boxes, scores, self.overlap**2, self.threshold)
+            return Detections(boxes[kept], scores)
         best_first = np.argsort(-scores, kind="stable")
         return Detections(boxes[best_first], scores[best_first])
 

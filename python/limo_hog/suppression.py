@@ -52,8 +52,8 @@ def soften(
     waiting = np.flatnonzero(above >= 0)
     kept: list[int] = []
     left: list[float] = []
-    # Less than a hundredth of the best is nobody.
-    least = 0.01 * float(above.max(initial=0.0))
+    # Less than a twentieth of the best is nobody.
+    least = 0.05 * float(above.max(initial=0.0))
     while waiting.size:
         first = int(np.argmax(above[waiting]))
         best = int(waiting[first])

@@ -128,5 +128,15 @@ def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) ->
         detector_named(f"onnx:{broken}")
     with pytest.raises(DetectorError, match="no such file"):
         detector_named("onnx:absent.onnx")
-    with pytest.raises(DetectorError, match="want one of hog, hog-half, cv2, onnx:FILE"):
+    with pytest.raises(DetectorError, match="want one of hog, hog-half, hog-iou, hog-soft, cv2, onnx:FILE"):
         detector_named("yolo")
+
+
+def test_one_person_is_one_box_by_each_way_to_suppress(frame: NDArray[np.uint8]) -> None:
+    every_hit = PeopleDetector(group_threshold=0).detect(frame)
+    assert len(every_hit) > 5
+    for name in ("hog", "hog-iou", "hog-soft"):
+        found = detector_named(name).detect(frame)
+        assert len(found) == 1
+        assert found.scores[0] > 1
+    assert detector_named("hog-iou").detect(frame).scores[0] == every_hit.scores[0]

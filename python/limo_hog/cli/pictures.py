@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import TypeVar
@@ -77,8 +77,10 @@ class Run:
 
     def __init__(self, args: argparse.Namespace, results: Results, bar: Progress) -> None:
         self._args, self._results, self._bar = args, results, bar
-        detector = PeopleDetector(threshold=args.threshold, group_threshold=2 if args.nms is None else 0)
-        self._search = Search(detector, args.min_height, args.max_height, args.nms)
+        detector = PeopleDetector(threshold=args.threshold)
+        if args.nms is not None:
+            detector = replace(detector, nms="iou", overlap=args.nms)
+        self._search = Search(detector, args.min_height, args.max_height)
         self._copies: dict[Source, Path] = {}
         self._workers = 1
         self._task = bar.add_task("looking", total=0)

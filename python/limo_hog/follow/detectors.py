@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ Image = NDArray[np.uint8]
 #: Height a followed person's window is shrunk to before the search [px]; HOG's smallest is 128.
 _EXPECTED = 160.0
 #: Names `detector_named` knows; `onnx:FILE` is the fourth kind.
-NAMES = ("hog", "hog-half", "cv2")
+NAMES = ("hog", "hog-half", "hog-iou", "hog-soft", "cv2")
 
 
 class DetectorError(LimoHogError):
@@ -41,7 +41,7 @@ class Detector(Protocol):
 
 
 def detector_named(name: str) -> Detector:
-    """Return the detector `hog`, `hog-half`, `cv2` or `onnx:FILE`.
+    """Return a detector: one of `NAMES`, or `onnx:FILE`.
 
     Raises
     ------
@@ -56,7 +56,10 @@ def detector_named(name: str) -> Detector:
         raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}, onnx:FILE")
     from limo_hog.detector import PeopleDetector
 
-    return HalfSize(PeopleDetector()) if name == "hog-half" else PeopleDetector()
+    if name == "hog-half":
+        return HalfSize(PeopleDetector())
+    kinds: dict[str, Literal["group", "iou", "soft"]] = {"hog-iou": "iou", "hog-soft": "soft"}
+    return PeopleDetector(nms=kinds.get(name, "group"))
 
 
 def detect_in(detector: Detector, image: Image, region: Region | None) -> Detections:

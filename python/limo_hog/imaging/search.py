@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections, PeopleDetector
 from limo_hog.extras import needed
-from limo_hog.suppression import suppress
 
 with needed(by="enlarging pictures", what="OpenCV", install="'limo-hog[cv]'"):
     import cv2
@@ -32,15 +31,11 @@ class Search:
         window. None leaves pictures as they are: 96.
     max_height
         Height of the tallest person to report [px]; None reports all.
-    nms
-        Of boxes whose intersection over union is more than this only the best is kept; for a detector that does not
-        group (`group_threshold` 0). None keeps all.
     """
 
     detector: PeopleDetector = field(default_factory=PeopleDetector)
     min_height: float | None = None
     max_height: float | None = None
-    nms: float | None = None
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
         """Find people, best first, in pixels of the image as it came.
@@ -58,8 +53,6 @@ class Search:
         keep = np.arange(len(scores))
         if self.max_height is not None:
             keep = keep[_SHARE * boxes[:, 3] <= self.max_height]
-        if self.nms is not None:
-            keep = keep[suppress(boxes[keep], scores[keep], self.nms)]
         return Detections(boxes[keep], scores[keep])
 
 

@@ -192,6 +192,8 @@ def _print(facts: dict[str, Any], rows: list[Row]) -> None:
     rival = f"OpenCV {facts['opencv']}" if facts["opencv_has_hog"] else "nothing"
     console.print(f"[bold]limo-hog {facts['limo_hog']} ({facts['backend']}) against {rival}[/]")
     console.print(f"{facts['cpu']}, {facts['cores']} cores, Python {facts['python']}")
+    if (facts["load"] or 0) > 0.5 * facts["cores"]:
+        console.print(f"[yellow]The machine is busy (load {facts['load']}): do not trust these times.[/]")
     if not facts["opencv_has_hog"]:
         console.print(
             "No OpenCV with HOGDescriptor here: pip install 'opencv-python-headless<5' to compare.", soft_wrap=True

@@ -12,7 +12,7 @@ import limo_hog
 from limo_hog import _core
 
 
-def environment() -> dict[str, str | int | bool | list[str] | None]:
+def environment() -> dict[str, str | int | float | bool | list[str] | None]:
     """Describe machine and libraries; plain values, for a table or JSON."""
     opencv, has_hog = _opencv()
     return {
@@ -21,6 +21,7 @@ def environment() -> dict[str, str | int | bool | list[str] | None]:
         "cpu_features": [name for name in _core.available_backends() if name != "scalar"],
         "cpu": _cpu(),
         "cores": cores(),
+        "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
         "threads": limo_hog.get_num_threads(),
         "opencv": opencv,
         "opencv_has_hog": has_hog,

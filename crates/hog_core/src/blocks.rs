@@ -2,24 +2,44 @@
 
 use crate::gradient::Gradient;
 use crate::params::{HogSpec, Size};
+use crate::simd::{MulAdd, Work, run};
 
 /// What a block's pixels add to its cells: Gaussian times bilinear share, precomputed.
 ///
 /// Pixels that reach one cell come first, then those of two, then those of four; each group column by column.
 /// Single precision sums depend on that order, and descriptors are to equal OpenCV's to the last bit.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct BlockWeights {
     one: Vec<Pixel<1>>,
     two: Vec<Pixel<2>>,
     four: Vec<Pixel<4>>,
+    /// The same pixels in the same order, for blocks of up to 4 and up to 16 cells.
+    abreast_4: Vec<Abreast<4>>,
+    abreast_16: Vec<Abreast<16>>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Pixel<const CELLS: usize> {
     column: usize,
     row: usize,
-    /// Where each cell's histogram begins in the block, and the weight of the pixel in it.
+    /// The cells that the pixel reaches, and its weight in each.
     cells: [(usize, f32); CELLS],
+}
+
+/// A pixel with its weight in every cell of the block: zero in those it does not reach.
+#[derive(Debug, Clone, Copy)]
+struct Abreast<const LANES: usize> {
+    column: usize,
+    row: usize,
+    weights: [f32; LANES],
+}
+
+impl<const CELLS: usize> Pixel<CELLS> {
+    fn abreast<const LANES: usize>(&self) -> Abreast<LANES> {
+        let mut weights = [0.0; LANES];
+        self.cells.iter().for_each(|&(cell, weight)| weights[cell] = weight);
+        Abreast { column: self.column, row: self.row, weights }
+    }
 }
 
 /// Up to two cells (index and share) that a pixel reaches along one axis.
@@ -40,12 +60,12 @@ fn cells_along(pixel: usize, cell: usize, cells: usize) -> Vec<(usize, f32)> {
 
 impl BlockWeights {
     /// The weights of a block of `block` pixels in cells of `cell` pixels under a Gaussian of `sigma` pixels.
-    pub fn new(block: Size, cell: Size, nbins: usize, sigma: f32) -> Self {
+    pub fn new(block: Size, cell: Size, sigma: f32) -> Self {
         let cells = Size::new(block.width / cell.width, block.height / cell.height);
         let scale = 1.0 / ((sigma * sigma) * 2.0);
         // Centred on (width / 2, height / 2), not on the middle pixel: the models were trained that way.
         let squared = |index: usize, side: usize| (index as f32 - side as f32 * 0.5).powi(2);
-        let mut weights = Self { one: Vec::new(), two: Vec::new(), four: Vec::new() };
+        let mut weights = Self::default();
         for column in 0..block.width {
             let across = cells_along(column, cell.width, cells.width);
             for row in 0..block.height {
@@ -53,7 +73,7 @@ impl BlockWeights {
                 let exponent = -(squared(row, block.height) + squared(column, block.width)) * scale;
                 let gauss = f64::from(exponent).exp() as f32;
                 let reached = down.iter().flat_map(|&(cy, sy)| {
-                    across.iter().map(move |&(cx, sx)| ((cx * cells.height + cy) * nbins, gauss * (sx * sy)))
+                    across.iter().map(move |&(cx, sx)| (cx * cells.height + cy, gauss * (sx * sy)))
                 });
                 let reached: Vec<_> = reached.collect();
                 match *reached.as_slice() {
@@ -64,24 +84,48 @@ impl BlockWeights {
                 }
             }
         }
+        match cells.width * cells.height {
+            0..=4 => weights.abreast_4 = weights.abreast(),
+            5..=16 => weights.abreast_16 = weights.abreast(),
+            _ => {}
+        }
         weights
+    }
+
+    fn abreast<const LANES: usize>(&self) -> Vec<Abreast<LANES>> {
+        let one = self.one.iter().map(Pixel::abreast);
+        one.chain(self.two.iter().map(Pixel::abreast)).chain(self.four.iter().map(Pixel::abreast)).collect()
     }
 }
 
-/// The normalised histograms of the block whose first pixel is (`x`, `y`) of `gradient`, into `block`
-/// (`spec.block_len` elements: cells column by column, bins within).
-pub fn block_histogram(gradient: &Gradient, x: usize, y: usize, spec: &HogSpec, block: &mut [f32]) {
+/// The normalised histograms of the blocks that begin at the pixels `firsts` (indices into `gradient`), one block after
+/// the other into `out` (`spec.block_len` elements each: cells column by column, bins within).
+pub fn block_histograms(gradient: &Gradient, firsts: &[usize], spec: &HogSpec, out: &mut [f32]) {
+    let weights = &spec.weights;
+    if !weights.abreast_4.is_empty() {
+        run(CellsAbreast { gradient, firsts, spec, pixels: &weights.abreast_4, out });
+    } else if !weights.abreast_16.is_empty() {
+        run(CellsAbreast { gradient, firsts, spec, pixels: &weights.abreast_16, out });
+    } else {
+        for (&first, block) in firsts.iter().zip(out.chunks_exact_mut(spec.block_len)) {
+            block_histogram(gradient, first, spec, block);
+        }
+    }
+}
+
+/// The plain form for one block, of any number of cells: what the faster form equals to the last bit.
+fn block_histogram(gradient: &Gradient, first: usize, spec: &HogSpec, block: &mut [f32]) {
     block.fill(0.0);
-    let first = y * gradient.width + x;
-    add_votes(gradient, first, &spec.weights.one, block);
-    add_votes(gradient, first, &spec.weights.two, block);
-    add_votes(gradient, first, &spec.weights.four, block);
+    add_votes(gradient, first, spec.nbins, &spec.weights.one, block);
+    add_votes(gradient, first, spec.nbins, &spec.weights.two, block);
+    add_votes(gradient, first, spec.nbins, &spec.weights.four, block);
     normalise(block, spec.l2_hys_threshold);
 }
 
 fn add_votes<const CELLS: usize>(
     gradient: &Gradient,
     first: usize,
+    nbins: usize,
     pixels: &[Pixel<CELLS>],
     block: &mut [f32],
 ) {
@@ -90,6 +134,7 @@ fn add_votes<const CELLS: usize>(
         let [g0, g1] = gradient.shares[at];
         let [b0, b1] = gradient.bins[at].map(usize::from);
         for (cell, weight) in pixel.cells {
+            let cell = cell * nbins;
             // Both sums start from the old values: with a single bin the second share replaces the first.
             let sums = (block[cell + b0] + g0 * weight, block[cell + b1] + g1 * weight);
             block[cell + b0] = sums.0;
@@ -98,7 +143,57 @@ fn add_votes<const CELLS: usize>(
     }
 }
 
+/// Blocks whose sums are made in turns, so that none waits for its own last store.
+const TOGETHER: usize = 4;
+
+/// Blocks of up to `LANES` cells, each cell in its lane: a pixel votes in all of them at once, with weight zero in
+/// those it does not reach, which leaves their sums as they are.
+struct CellsAbreast<'a, const LANES: usize> {
+    gradient: &'a Gradient,
+    firsts: &'a [usize],
+    spec: &'a HogSpec,
+    pixels: &'a [Abreast<LANES>],
+    out: &'a mut [f32],
+}
+
+impl<const LANES: usize> Work for CellsAbreast<'_, LANES> {
+    #[inline(always)]
+    fn run<M: MulAdd>(self) {
+        let Self { gradient, firsts, spec, pixels, out } = self;
+        let mut sums = [[[0.0f32; LANES]; 256]; TOGETHER];
+        for (firsts, out) in firsts.chunks(TOGETHER).zip(out.chunks_mut(TOGETHER * spec.block_len)) {
+            // Places without a block repeat the last.
+            let firsts: [usize; TOGETHER] = std::array::from_fn(|block| firsts[block.min(firsts.len() - 1)]);
+            sums.iter_mut().for_each(|sums| sums[..spec.nbins].fill([0.0; LANES]));
+            for &Abreast { column, row, weights } in pixels {
+                let offset = row * gradient.width + column;
+                for (sums, first) in sums.iter_mut().zip(firsts) {
+                    let [g0, g1] = gradient.shares[first + offset];
+                    let [b0, b1] = gradient.bins[first + offset].map(usize::from);
+                    // As above: both sums start from the old values.
+                    let (mut sum0, mut sum1) = (sums[b0], sums[b1]);
+                    for lane in 0..LANES {
+                        sum0[lane] += g0 * weights[lane];
+                        sum1[lane] += g1 * weights[lane];
+                    }
+                    sums[b0] = sum0;
+                    sums[b1] = sum1;
+                }
+            }
+            for (block, sums) in out.chunks_exact_mut(spec.block_len).zip(&sums) {
+                for (cell, histogram) in block.chunks_exact_mut(spec.nbins).enumerate() {
+                    for (value, sums) in histogram.iter_mut().zip(sums) {
+                        *value = sums[cell];
+                    }
+                }
+                normalise(block, spec.l2_hys_threshold);
+            }
+        }
+    }
+}
+
 /// L2-Hys: scale to unit length, clip at `threshold`, scale again. A block without gradient stays zero.
+#[inline(always)]
 fn normalise(block: &mut [f32], threshold: f32) {
     let scale = 1.0 / (sum_of_squares(block).sqrt() + block.len() as f32 * 0.1);
     for value in block.iter_mut() {
@@ -111,6 +206,7 @@ fn normalise(block: &mut [f32], threshold: f32) {
 }
 
 /// The sum of squares in four lanes, then the rest one by one.
+#[inline(always)]
 fn sum_of_squares(block: &[f32]) -> f32 {
     let (vectors, tail) = block.as_chunks::<4>();
     let mut lanes = [0.0f32; 4];
@@ -126,13 +222,48 @@ fn sum_of_squares(block: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::params::HogParams;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn cells_abreast_give_the_sums_of_the_plain_form(
+            nbins in 1..=20usize,
+            cells in (1..=4usize, 1..=4usize),
+            cell in (2..=6usize, 2..=6usize),
+            votes in prop::collection::vec((0.0..100f32, 0.0..100f32, 0..255u8), 40 * 25),
+            firsts in prop::collection::vec(0..20usize, 1..20),
+        ) {
+            let block = ((cells.0 * cell.0) as i64, (cells.1 * cell.1) as i64);
+            let spec = HogSpec::new(&HogParams {
+                win_size: block,
+                block_size: block,
+                cell_size: (cell.0 as i64, cell.1 as i64),
+                nbins: nbins as i64,
+                ..HogParams::default()
+            }).unwrap();
+            let bins = |bin: u8| [bin % nbins as u8, (bin + 1) % nbins as u8];
+            let gradient = Gradient {
+                width: 40,
+                shares: votes.iter().map(|&(a, b, _)| [a, b]).collect(),
+                bins: votes.iter().map(|&(_, _, bin)| bins(bin)).collect(),
+            };
+            let mut together = vec![f32::NAN; firsts.len() * spec.block_len];
+            block_histograms(&gradient, &firsts, &spec, &mut together);
+            for (&first, found) in firsts.iter().zip(together.chunks_exact(spec.block_len)) {
+                let mut alone = vec![f32::NAN; spec.block_len];
+                block_histogram(&gradient, first, &spec, &mut alone);
+                prop_assert_eq!(&alone, found);
+            }
+        }
+    }
 
     #[test]
     fn a_block_of_two_by_two_cells_shares_its_pixels_in_nine_zones() {
         // 1 2 1     corners reach one cell, edges two, the middle four
         // 2 4 2
         // 1 2 1     (zones of 4, 8 and 4 pixels)
-        let weights = BlockWeights::new(Size::new(16, 16), Size::new(8, 8), 9, 4.0);
+        let weights = BlockWeights::new(Size::new(16, 16), Size::new(8, 8), 4.0);
         assert_eq!((weights.one.len(), weights.two.len(), weights.four.len()), (4 * 16, 4 * 32, 64));
     }
 

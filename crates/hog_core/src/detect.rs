@@ -61,6 +61,25 @@ pub struct Hit {
     pub weight: f64,
 }
 
+impl Hit {
+    fn new(grid: &Grid, (x, y): (usize, usize), weight: f64) -> Self {
+        let (x, y) = grid.to_image(x, y);
+        Self { x, y, weight }
+    }
+}
+
+/// The fast path at work on one image.
+#[derive(Clone, Copy)]
+struct Fast<'a> {
+    plan: &'a simd::Plan,
+    planes: &'a simd::Planes,
+    /// Windows scored closer than this to the threshold are scored again by the exact sums, as OpenCV orders them.
+    doubt: f64,
+}
+
+/// A path whose scores may be further off than this only finds the hits: the exact sums weigh them.
+const NOISE_MAX: f64 = 1e-4;
+
 impl Hog {
     /// A detector of this geometry; `coefficients` of the SVM, if any, must fit it.
     pub fn new(params: &HogParams, coefficients: Option<&[f32]>) -> Result<Self> {
@@ -126,10 +145,13 @@ impl Hog {
         let Some(locations) = locations else {
             return Ok(reference::descriptors(image, &grid, &self.spec));
         };
+        let places: Vec<_> = locations.iter().map(|&at| grid.to_padded(at, &self.spec)).collect();
+        let inside: Vec<_> = places.iter().flatten().copied().collect();
+        let mut windows = reference::Windows::new(image, &grid, &inside, &self.spec);
         let mut out = Vec::with_capacity(elements);
-        for &location in locations {
-            match grid.to_padded(location, &self.spec) {
-                Some(at) => out.extend(reference::window_descriptor(image, &grid, at, &self.spec)),
+        for place in places {
+            match place {
+                Some(at) => out.extend_from_slice(windows.descriptor(at)),
                 None => out.resize(out.len() + self.spec.descriptor_len(), 0.0),
             }
         }
@@ -148,17 +170,13 @@ impl Hog {
         let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
-            let hits = |planes: Option<&simd::Planes>| {
-                self.hits(image, planes, size_of(image), &grid, search.hit_threshold, svm)
-            };
-            return self.with_planes(image, hits);
+            let hits =
+                |fast: Option<Fast>| self.hits(image, fast, size_of(image), &grid, search.hit_threshold, svm);
+            return self.with_fast(image, false, hits);
         };
-        let inside =
-            locations.iter().filter_map(|&location| Some((location, grid.to_padded(location, &self.spec)?)));
-        let scored = inside.map(|((x, y), at)| {
-            let weight = reference::window_score(image, &grid, at, &self.spec, svm);
-            Hit { x, y, weight }
-        });
+        let inside: Vec<_> = locations.iter().filter_map(|&at| grid.to_padded(at, &self.spec)).collect();
+        let mut windows = reference::Windows::new(image, &grid, &inside, &self.spec);
+        let scored = inside.iter().map(|&at| Hit::new(&grid, at, windows.score(at, svm)));
         Ok(scored.filter(|hit| hit.weight >= search.hit_threshold).collect())
     }
 
@@ -178,10 +196,11 @@ impl Hog {
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
         let levels = levels(size_of(image), scale, &self.spec);
         let mut candidates = Vec::new();
-        self.with_planes(image, |planes| {
-            let of_level = |level: &Level| {
-                self.level_candidates(image, planes, level, &steps, search.hit_threshold, svm)
-            };
+        // Mean-shift truncates to whole pixels: there the last bit of a weight may tell.
+        let exact_weights = matches!(grouping, Grouping::MeanShift(_));
+        self.with_fast(image, exact_weights, |fast| {
+            let of_level =
+                |level: &Level| self.level_candidates(image, fast, level, &steps, search.hit_threshold, svm);
             for found in in_order(&levels, threads, of_level) {
                 candidates.append(&mut found?);
             }
@@ -201,28 +220,27 @@ impl Hog {
         Steps::new(search.win_stride, search.padding, default_stride, &self.spec)
     }
 
-    /// Runs `work` with the image's planes if there is a fast path.
-    fn with_planes<R>(&self, image: ImageView, work: impl FnOnce(Option<&simd::Planes>) -> R) -> R {
-        if self.fast.is_none() {
-            return work(None);
-        }
+    /// Runs `work` with the fast path, if there is one.
+    fn with_fast<R>(&self, image: ImageView, exact_weights: bool, work: impl FnOnce(Option<Fast>) -> R) -> R {
+        let Some(plan) = &self.fast else { return work(None) };
+        let doubt = if exact_weights || plan.noise() > NOISE_MAX { f64::INFINITY } else { plan.noise() };
         PLANES.with(|planes| {
             planes.fill(image);
-            work(Some(planes))
+            work(Some(Fast { plan, planes, doubt }))
         })
     }
 
     fn level_candidates(
         &self,
         image: ImageView,
-        planes: Option<&simd::Planes>,
+        fast: Option<Fast>,
         level: &Level,
         steps: &Steps,
         hit_threshold: f64,
         svm: &Svm,
     ) -> Result<Vec<Candidate>> {
         let grid = steps.grid(level.size, &self.spec);
-        let hits = self.hits(image, planes, level.size, &grid, hit_threshold, svm)?;
+        let hits = self.hits(image, fast, level.size, &grid, hit_threshold, svm)?;
         let candidate = |hit: &Hit| Candidate {
             rect: to_image(hit.x, hit.y, level.scale, &self.spec),
             weight: hit.weight,
@@ -235,17 +253,13 @@ impl Hog {
     fn hits(
         &self,
         image: ImageView,
-        planes: Option<&simd::Planes>,
+        fast: Option<Fast>,
         size: Size,
         grid: &Grid,
         hit_threshold: f64,
         svm: &Svm,
     ) -> Result<Vec<Hit>> {
-        let hit = |(x, y): (usize, usize), weight: f64| {
-            let (x, y) = grid.to_image(x, y);
-            Hit { x, y, weight }
-        };
-        if let (Some(planes), Some(plan)) = (planes, &self.fast)
+        if let Some(Fast { plan, planes, doubt }) = fast
             && simd::serves(grid)
         {
             return SCRATCH.with(|scratch| {
@@ -253,10 +267,9 @@ impl Hog {
                 let mut level = None;
                 let mut hits = Vec::new();
                 for &(x, y, score) in &scratch.found {
-                    let weight = if (score - hit_threshold).abs() > plan.noise() {
+                    let weight = if (score - hit_threshold).abs() > doubt {
                         score
                     } else {
-                        // Too close to call: the exact sums decide, as OpenCV orders them.
                         let level = match &mut level {
                             Some(level) => level,
                             none => none.insert(Shrunk::new(image, size)?),
@@ -264,7 +277,7 @@ impl Hog {
                         reference::window_score(level.view()?, grid, (x, y), &self.spec, svm)
                     };
                     if weight >= hit_threshold {
-                        hits.push(hit((x, y), weight));
+                        hits.push(Hit::new(grid, (x, y), weight));
                     }
                 }
                 Ok(hits)
@@ -277,7 +290,7 @@ impl Hog {
             (i * grid.stride.width, j * grid.stride.height)
         };
         let found = scores.into_iter().enumerate().filter(|&(_, weight)| weight >= hit_threshold);
-        Ok(found.map(|(index, weight)| hit(place(index), weight)).collect())
+        Ok(found.map(|(index, weight)| Hit::new(grid, place(index), weight)).collect())
     }
 }
 

@@ -2,9 +2,11 @@
 //!
 //! The scalar form, equal to OpenCV 4.14's `computeGradient` to the last bit.
 
+use std::ops::Range;
+
 use crate::image::{ImageView, reflect_101};
 use crate::params::{HogSpec, Size};
-use crate::simd::polar;
+use crate::simd::{MulAdd, Work, polar, run};
 
 /// A part of the padded image, in padded coordinates: image pixel (x, y) is at (x + left, y + top).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,14 +48,6 @@ const POLAR_RUN: usize = 1024;
 /// ... and a run shorter than this (two vectors) with a differently rounded last step.
 const POLAR_VECTOR_MIN: usize = 16;
 
-/// Buffers of one row, kept between rows.
-struct RowBuffers {
-    dx: Vec<f32>,
-    dy: Vec<f32>,
-    magnitude: Vec<f32>,
-    angle: Vec<f32>,
-}
-
 /// The gradient of `region` of the padded image, as if the whole padded image had been computed.
 pub fn gradient(image: ImageView, padding: Padding, region: Region, spec: &HogSpec) -> Gradient {
     let mut out = Gradient::default();
@@ -63,35 +57,45 @@ pub fn gradient(image: ImageView, padding: Padding, region: Region, spec: &HogSp
 
 /// [`gradient`] into memory that is used again.
 pub fn gradient_into(image: ImageView, padding: Padding, region: Region, spec: &HogSpec, out: &mut Gradient) {
-    let lut = gamma_table(spec.gamma_correction);
-    let columns: Vec<usize> = (0..region.width + 2)
-        .map(|i| reflect_101((region.x + i) as i64 - 1 - padding.left, image.width()) * image.channels())
-        .collect();
-    let row_at = |y: i64| image.row(reflect_101(y - padding.top, image.height()));
-    let mut row = RowBuffers {
-        dx: vec![0.0; region.width],
-        dy: vec![0.0; region.width],
-        magnitude: vec![0.0; region.width],
-        angle: vec![0.0; region.width],
-    };
-    let binning = Binning::new(spec);
     out.width = region.width;
-    out.shares.clear();
-    out.bins.clear();
-    out.shares.reserve(region.width * region.height);
-    out.bins.reserve(region.width * region.height);
-    for y in region.y as i64..(region.y + region.height) as i64 {
-        let rows = [row_at(y - 1), row_at(y), row_at(y + 1)];
-        if image.channels() == 1 {
-            derive_gray(&lut, &columns, rows, &mut row);
-        } else {
-            derive_colour(&lut, &columns, rows, region.x, padding.size.width, &mut row);
-        }
-        polar_row(region.x, padding.size.width, &mut row);
-        for (&magnitude, &angle) in row.magnitude.iter().zip(&row.angle) {
-            let (shares, bins) = binning.vote(magnitude, angle);
-            out.shares.push(shares);
-            out.bins.push(bins);
+    out.shares = vec![[0.0; 2]; region.width * region.height];
+    out.bins = vec![[0; 2]; region.width * region.height];
+    if region.width > 0 && region.height > 0 {
+        run(Rows { image, padding, region, spec, out });
+    }
+}
+
+struct Rows<'a> {
+    image: ImageView<'a>,
+    padding: Padding,
+    region: Region,
+    spec: &'a HogSpec,
+    out: &'a mut Gradient,
+}
+
+impl Work for Rows<'_> {
+    #[inline(always)]
+    fn run<M: MulAdd>(self) {
+        let Self { image, padding, region, spec, out } = self;
+        let source = Source::new(image, padding, region, spec);
+        let mut buffer = [(); 4].map(|()| vec![0.0f32; region.width]);
+        let [dx, dy, magnitude, angle] = &mut buffer;
+        let mut rows = [(); 3].map(|()| vec![0.0; (region.width + 2) * image.channels()]);
+        source.fill(0, &mut rows[0]);
+        source.fill(1, &mut rows[1]);
+        let out = out.shares.chunks_exact_mut(region.width).zip(out.bins.chunks_exact_mut(region.width));
+        for (y, (shares, bins)) in out.enumerate() {
+            source.fill(y + 2, &mut rows[(y + 2) % 3]);
+            let neighbours = [y, y + 1, y + 2].map(|row| rows[row % 3].as_slice());
+            if image.channels() == 1 {
+                derive_gray(neighbours, dx, dy);
+            } else {
+                let first_of_tail = (padding.size.width / 4 * 4).saturating_sub(region.x).min(region.width);
+                derive_colour::<false>(neighbours, 0..first_of_tail, dx, dy);
+                derive_colour::<true>(neighbours, first_of_tail..region.width, dx, dy);
+            }
+            polar_row::<M>(region.x, padding.size.width, [dx, dy], [magnitude, angle]);
+            vote(spec, magnitude, angle, shares, bins);
         }
     }
 }
@@ -101,85 +105,122 @@ pub(crate) fn gamma_table(gamma_correction: bool) -> [f32; 256] {
     std::array::from_fn(|value| if gamma_correction { (value as f32).sqrt() } else { value as f32 })
 }
 
-fn derive_gray(lut: &[f32; 256], columns: &[usize], [above, here, below]: [&[u8]; 3], row: &mut RowBuffers) {
-    for (i, (dx, dy)) in row.dx.iter_mut().zip(&mut row.dy).enumerate() {
-        *dx = lut[here[columns[i + 2]] as usize] - lut[here[columns[i]] as usize];
-        *dy = lut[below[columns[i + 1]] as usize] - lut[above[columns[i + 1]] as usize];
+/// Rows of the padded image with gamma applied, one column and row wider than the region on every side.
+struct Source<'a> {
+    image: ImageView<'a>,
+    gamma: [f32; 256],
+    /// Where in an image row each column reads.
+    columns: Vec<usize>,
+    /// Image row, before mirroring, of the row above the region.
+    first: i64,
+}
+
+impl<'a> Source<'a> {
+    fn new(image: ImageView<'a>, padding: Padding, region: Region, spec: &HogSpec) -> Self {
+        let left = region.x as i64 - 1 - padding.left;
+        let column = |i: usize| reflect_101(left + i as i64, image.width()) * image.channels();
+        Self {
+            image,
+            gamma: gamma_table(spec.gamma_correction),
+            columns: (0..region.width + 2).map(column).collect(),
+            first: region.y as i64 - 1 - padding.top,
+        }
+    }
+
+    /// Writes the channels of row `y`, one after the other.
+    #[inline(always)]
+    fn fill(&self, y: usize, out: &mut [f32]) {
+        let row = self.image.row(reflect_101(self.first + y as i64, self.image.height()));
+        for (c, plane) in out.chunks_exact_mut(self.columns.len()).enumerate() {
+            for (value, &column) in plane.iter_mut().zip(&self.columns) {
+                *value = self.gamma[row[column + c] as usize];
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn derive_gray([above, here, below]: [&[f32]; 3], dx: &mut [f32], dy: &mut [f32]) {
+    let horizontal = here.iter().zip(&here[2..]);
+    let vertical = above[1..].iter().zip(&below[1..]);
+    for ((dx, dy), ((left, right), (up, down))) in dx.iter_mut().zip(dy).zip(horizontal.zip(vertical)) {
+        (*dx, *dy) = (right - left, down - up);
     }
 }
 
 /// Takes the channel with the largest squared magnitude (two products and a sum, no fused step). Among equals the
 /// lowest channel wins, but in the last `padded_width % 4` columns the highest.
-fn derive_colour(
-    lut: &[f32; 256],
-    columns: &[usize],
-    [above, here, below]: [&[u8]; 3],
-    first_column: usize,
-    padded_width: usize,
-    row: &mut RowBuffers,
+#[inline(always)]
+fn derive_colour<const HIGHEST_WINS: bool>(
+    [above, here, below]: [&[f32]; 3],
+    columns: Range<usize>,
+    dx: &mut [f32],
+    dy: &mut [f32],
 ) {
-    let tail = padded_width / 4 * 4;
-    for (i, (dx, dy)) in row.dx.iter_mut().zip(&mut row.dy).enumerate() {
-        let [left, mid, right] = [columns[i], columns[i + 1], columns[i + 2]];
+    let plane = here.len() / 3;
+    let (first, len) = (columns.start, columns.len());
+    let (dx, dy) = (&mut dx[columns.clone()], &mut dy[columns]);
+    let channels = [0, 1, 2].map(|c| {
+        let at = c * plane + first;
+        [&here[at..][..len], &here[at + 2..][..len], &above[at + 1..][..len], &below[at + 1..][..len]]
+    });
+    for i in 0..len {
         let of_channel = |c: usize| {
-            let dx = lut[here[right + c] as usize] - lut[here[left + c] as usize];
-            let dy = lut[below[mid + c] as usize] - lut[above[mid + c] as usize];
+            let [left, right, up, down] = channels[c];
+            let (dx, dy) = (right[i] - left[i], down[i] - up[i]);
             (dx * dx + dy * dy, dx, dy)
         };
-        let highest_wins = first_column + i >= tail;
         let mut best = of_channel(0);
         for candidate in [of_channel(1), of_channel(2)] {
-            if candidate.0 > best.0 || (highest_wins && candidate.0 == best.0) {
+            if candidate.0 > best.0 || (HIGHEST_WINS && candidate.0 == best.0) {
                 best = candidate;
             }
         }
-        (*dx, *dy) = (best.1, best.2);
+        (dx[i], dy[i]) = (best.1, best.2);
     }
 }
 
 /// Magnitude and angle of a row, run by run as the whole padded row would be split.
-fn polar_row(first_column: usize, padded_width: usize, row: &mut RowBuffers) {
-    let end = first_column + row.dx.len();
+#[inline(always)]
+fn polar_row<M: MulAdd>(
+    first_column: usize,
+    padded_width: usize,
+    [dx, dy]: [&[f32]; 2],
+    [magnitude, angle]: [&mut [f32]; 2],
+) {
+    let end = first_column + dx.len();
     let mut x = first_column;
     while x < end {
         let run_start = x / POLAR_RUN * POLAR_RUN;
         let run_end = (run_start + POLAR_RUN).min(padded_width);
         let part = x - first_column..run_end.min(end) - first_column;
-        polar(
-            &row.dx[part.clone()],
-            &row.dy[part.clone()],
+        polar::<M>(
+            &dx[part.clone()],
+            &dy[part.clone()],
             run_end - run_start >= POLAR_VECTOR_MIN,
-            &mut row.magnitude[part.clone()],
-            &mut row.angle[part],
+            &mut magnitude[part.clone()],
+            &mut angle[part],
         );
         x = run_end;
     }
 }
 
-/// Splits a gradient between the two bins whose centres are nearest.
-struct Binning {
-    bins_per_radian: f32,
-    nbins: i32,
-}
-
-impl Binning {
-    fn new(spec: &HogSpec) -> Self {
-        let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
-        Self { bins_per_radian: (spec.nbins as f64 / range) as f32, nbins: spec.nbins as i32 }
-    }
-
-    #[inline]
-    fn vote(&self, magnitude: f32, angle: f32) -> ([f32; 2], [u8; 2]) {
-        let position = self.bins_per_radian * angle - 0.5;
+/// Splits each gradient between the two bins whose centres are nearest.
+#[inline(always)]
+fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], shares: &mut [[f32; 2]], bins: &mut [[u8; 2]]) {
+    let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
+    let bins_per_radian = (spec.nbins as f64 / range) as f32;
+    let nbins = spec.nbins as i32;
+    let votes = shares.iter_mut().zip(bins);
+    for ((magnitude, angle), (shares, bins)) in magnitude.iter().zip(angle).zip(votes) {
+        let position = bins_per_radian * angle - 0.5;
         let floor = position.floor();
         let share = position - floor;
-        let mut first = floor as i32;
-        if first < 0 {
-            first += self.nbins;
-        } else if first >= self.nbins {
-            first -= self.nbins;
-        }
-        let second = if first + 1 < self.nbins { first + 1 } else { 0 };
-        ([magnitude * (1.0 - share), magnitude * share], [first as u8, second as u8])
+        let floor = floor as i32;
+        let turn = if floor < 0 { nbins } else { 0 } - if floor >= nbins { nbins } else { 0 };
+        let first = floor + turn;
+        let second = if first + 1 < nbins { first + 1 } else { 0 };
+        *shares = [magnitude * (1.0 - share), magnitude * share];
+        *bins = [first as u8, second as u8];
     }
 }

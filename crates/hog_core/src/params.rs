@@ -168,7 +168,7 @@ impl HogSpec {
             nlevels: params.nlevels.min(i64::from(i32::MAX)) as usize,
             signed_gradient: params.signed_gradient,
             sigma,
-            weights: BlockWeights::new(block, cell, nbins, sigma),
+            weights: BlockWeights::new(block, cell, sigma),
         })
     }
 

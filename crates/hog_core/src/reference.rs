@@ -4,11 +4,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::blocks::block_histogram;
+use crate::blocks::block_histograms;
 use crate::gradient::{Gradient, Region, gradient};
 use crate::grid::Grid;
 use crate::image::ImageView;
-use crate::params::HogSpec;
+use crate::params::{HogSpec, Size};
 use crate::svm::Svm;
 
 /// Block histograms of an image, row of blocks by row of blocks, each computed once and dropped when no window
@@ -48,21 +48,24 @@ impl<'a> BlockRows<'a> {
             rows.entry(y).or_insert_with(|| {
                 let mut row = spare.pop().unwrap_or_default();
                 row.resize(columns.len() * spec.block_len, 0.0);
-                for (&x, block) in columns.iter().zip(row.chunks_exact_mut(spec.block_len)) {
-                    block_histogram(gradient, x, y, spec, block);
-                }
+                let firsts: Vec<usize> = columns.iter().map(|x| y * gradient.width + x).collect();
+                block_histograms(gradient, &firsts, spec, &mut row);
                 row
             });
         }
     }
 
-    /// Block `index` (in descriptor order: column by column) of window `i` of the row of windows at padded row `y`.
-    fn block(&self, y: usize, i: usize, index: usize) -> &[f32] {
-        let (bx, by) = (index / self.spec.blocks.height, index % self.spec.blocks.height);
-        let at = self.places[i * self.spec.blocks.width + bx] * self.spec.block_len;
-        self.rows
-            .get(&(y + by * self.spec.stride.height))
-            .map_or(&[], |row| &row[at..at + self.spec.block_len])
+    /// The rows of blocks of the windows at padded row `y`.
+    fn rows(&self, y: usize) -> Vec<&[f32]> {
+        let row = |by| self.rows.get(&(y + by * self.spec.stride.height)).map_or(&[][..], Vec::as_slice);
+        (0..self.spec.blocks.height).map(row).collect()
+    }
+
+    /// The blocks of window `i` of `rows`, in descriptor order: column by column.
+    fn window<'r>(&self, rows: &'r [&[f32]], i: usize) -> impl Iterator<Item = &'r [f32]> {
+        let len = self.spec.block_len;
+        let places = &self.places[i * self.spec.blocks.width..][..self.spec.blocks.width];
+        places.iter().flat_map(move |place| rows.iter().map(move |row| &row[place * len..][..len]))
     }
 }
 
@@ -76,10 +79,9 @@ pub fn descriptors(image: ImageView, grid: &Grid, spec: &HogSpec) -> Vec<f32> {
     for j in 0..grid.windows.height {
         let y = j * grid.stride.height;
         blocks.advance(y);
+        let rows = blocks.rows(y);
         for i in 0..grid.windows.width {
-            for index in 0..spec.blocks.width * spec.blocks.height {
-                out.extend_from_slice(blocks.block(y, i, index));
-            }
+            blocks.window(&rows, i).for_each(|block| out.extend_from_slice(block));
         }
     }
     out
@@ -95,27 +97,58 @@ pub fn scores(image: ImageView, grid: &Grid, spec: &HogSpec, svm: &Svm) -> Vec<f
     for j in 0..grid.windows.height {
         let y = j * grid.stride.height;
         blocks.advance(y);
-        scores.extend(
-            (0..grid.windows.width).map(|i| svm.score(spec.block_len, |index| blocks.block(y, i, index))),
-        );
+        let rows = blocks.rows(y);
+        scores.extend((0..grid.windows.width).map(|i| svm.score(blocks.window(&rows, i))));
     }
     scores
 }
 
-/// The descriptor of the one window at padded (`x`, `y`), without computing the rest of the image.
-pub fn window_descriptor(image: ImageView, grid: &Grid, (x, y): (usize, usize), spec: &HogSpec) -> Vec<f32> {
-    let region = Region { x, y, width: spec.win.width, height: spec.win.height };
-    let gradient = gradient(image, grid.padding(), region, spec);
-    let mut descriptor = vec![0.0; spec.descriptor_len()];
-    for (index, block) in descriptor.chunks_exact_mut(spec.block_len).enumerate() {
-        let (bx, by) = (index / spec.blocks.height, index % spec.blocks.height);
-        block_histogram(&gradient, bx * spec.stride.width, by * spec.stride.height, spec, block);
+/// Some windows of an image, for which the gradient is computed no further than they reach.
+pub struct Windows<'a> {
+    spec: &'a HogSpec,
+    region: Region,
+    gradient: Gradient,
+    /// First pixel of each block, and its histograms, in descriptor order.
+    firsts: Vec<usize>,
+    descriptor: Vec<f32>,
+}
+
+impl<'a> Windows<'a> {
+    /// Prepares the windows that begin at `places` of the padded image.
+    pub fn new(image: ImageView, grid: &Grid, places: &[(usize, usize)], spec: &'a HogSpec) -> Self {
+        let along = |of: fn(&(usize, usize)) -> usize, win: usize| {
+            let first = places.iter().map(of).min().unwrap_or(0);
+            (first, places.iter().map(of).max().map_or(0, |last| last + win - first))
+        };
+        let (x, width) = along(|place| place.0, spec.win.width);
+        let (y, height) = along(|place| place.1, spec.win.height);
+        let region = Region { x, y, width, height };
+        let gradient = gradient(image, grid.padding(), region, spec);
+        let descriptor = vec![0.0; spec.descriptor_len()];
+        Self { spec, region, gradient, firsts: Vec::new(), descriptor }
     }
-    descriptor
+
+    /// The descriptor of the window at padded (`x`, `y`), one of those prepared.
+    pub fn descriptor(&mut self, (x, y): (usize, usize)) -> &[f32] {
+        let Size { width, height } = self.spec.stride;
+        let (x, y) = (x - self.region.x, y - self.region.y);
+        self.firsts.clear();
+        for bx in 0..self.spec.blocks.width {
+            let first = |by| (y + by * height) * self.gradient.width + x + bx * width;
+            self.firsts.extend((0..self.spec.blocks.height).map(first));
+        }
+        block_histograms(&self.gradient, &self.firsts, self.spec, &mut self.descriptor);
+        &self.descriptor
+    }
+
+    /// The score of the window at padded (`x`, `y`), one of those prepared.
+    pub fn score(&mut self, at: (usize, usize), svm: &Svm) -> f64 {
+        let len = self.spec.block_len;
+        svm.score(self.descriptor(at).chunks_exact(len))
+    }
 }
 
 /// The score of the one window at padded (`x`, `y`).
 pub fn window_score(image: ImageView, grid: &Grid, at: (usize, usize), spec: &HogSpec, svm: &Svm) -> f64 {
-    let descriptor = window_descriptor(image, grid, at, spec);
-    svm.score(spec.block_len, |index| &descriptor[index * spec.block_len..][..spec.block_len])
+    Windows::new(image, grid, &[at], spec).score(at, svm)
 }

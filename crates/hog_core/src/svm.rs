@@ -32,11 +32,14 @@ impl Svm {
         self.bias
     }
 
-    /// The score of the window whose blocks `block_of` gives, each by its place in the descriptor.
-    pub fn score<'a>(&self, block_len: usize, block_of: impl Fn(usize) -> &'a [f32]) -> f64 {
+    /// The score of the window with these blocks, in descriptor order.
+    pub fn score<'a>(&self, blocks: impl Iterator<Item = &'a [f32]>) -> f64 {
+        let mut rest = self.weights.as_slice();
         let mut score = f64::from(self.bias);
-        for (index, weights) in self.weights.chunks_exact(block_len.max(1)).enumerate() {
-            score = add_block(score, weights, block_of(index));
+        for block in blocks {
+            let (weights, others) = rest.split_at(block.len());
+            score = add_block(score, weights, block);
+            rest = others;
         }
         score
     }

@@ -6,6 +6,7 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod backend;
+mod exact;
 mod lane;
 mod level;
 mod plan;
@@ -15,6 +16,7 @@ mod score;
 mod strip;
 
 pub use backend::Backend;
+pub(crate) use exact::{MulAdd, Work, run};
 pub(crate) use level::{Scratch, detect, serves};
 pub(crate) use plan::Plan;
 pub(crate) use polar::polar;

@@ -2,29 +2,7 @@
 //!
 //! OpenCV fuses multiply and add where the CPU can, and rounds twice where it cannot; so does this.
 
-/// a·b + c, with one rounding or two.
-trait MulAdd {
-    fn mul_add(a: f32, b: f32, c: f32) -> f32;
-}
-
-#[allow(dead_code, reason = "which of the two is used depends on the architecture")]
-struct Fused;
-#[allow(dead_code, reason = "which of the two is used depends on the architecture")]
-struct Separate;
-
-impl MulAdd for Fused {
-    #[inline(always)]
-    fn mul_add(a: f32, b: f32, c: f32) -> f32 {
-        a.mul_add(b, c)
-    }
-}
-
-impl MulAdd for Separate {
-    #[inline(always)]
-    fn mul_add(a: f32, b: f32, c: f32) -> f32 {
-        a * b + c
-    }
-}
+use super::exact::MulAdd;
 
 /// Degrees of the odd polynomial that stands for the arctangent on 0..=1.
 const DEGREES: f32 = (180.0 / std::f64::consts::PI) as f32;
@@ -37,30 +15,14 @@ const RADIANS: f32 = (std::f64::consts::PI / 180.0) as f32;
 /// `magnitude` and `angle` [0, 2π] of (`dx`, `dy`); all four of one length.
 ///
 /// `vector_rule` tells how angles beyond 45° are rounded: as OpenCV's vector code does, or as its scalar code does.
-pub(crate) fn polar(dx: &[f32], dy: &[f32], vector_rule: bool, magnitude: &mut [f32], angle: &mut [f32]) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-            // SAFETY: both instruction sets were found on this CPU.
-            unsafe { polar_fma(dx, dy, vector_rule, magnitude, angle) }
-        } else {
-            polar_row::<Separate>(dx, dy, vector_rule, magnitude, angle);
-        }
-    }
-    #[cfg(target_arch = "aarch64")]
-    polar_row::<Fused>(dx, dy, vector_rule, magnitude, angle);
-    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-    polar_row::<Separate>(dx, dy, vector_rule, magnitude, angle);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn polar_fma(dx: &[f32], dy: &[f32], vector_rule: bool, magnitude: &mut [f32], angle: &mut [f32]) {
-    polar_row::<Fused>(dx, dy, vector_rule, magnitude, angle);
-}
-
 #[inline(always)]
-fn polar_row<M: MulAdd>(dx: &[f32], dy: &[f32], vector_rule: bool, magnitude: &mut [f32], angle: &mut [f32]) {
+pub(crate) fn polar<M: MulAdd>(
+    dx: &[f32],
+    dy: &[f32],
+    vector_rule: bool,
+    magnitude: &mut [f32],
+    angle: &mut [f32],
+) {
     let gradients = dx.iter().zip(dy);
     let polar = magnitude.iter_mut().zip(angle);
     if vector_rule {
@@ -93,6 +55,7 @@ fn polar_of<M: MulAdd, const VECTOR_RULE: bool>(dx: f32, dy: f32) -> (f32, f32) 
 
 #[cfg(test)]
 mod tests {
+    use super::super::exact::{Fused, Separate};
     use super::*;
 
     #[test]
@@ -102,7 +65,7 @@ mod tests {
         let dy: Vec<f32> = turn.iter().map(|a| (7.0 * a.sin()) as f32).collect();
         for vector_rule in [true, false] {
             let (mut magnitude, mut angle) = (vec![0.0; 720], vec![0.0; 720]);
-            polar(&dx, &dy, vector_rule, &mut magnitude, &mut angle);
+            polar::<Fused>(&dx, &dy, vector_rule, &mut magnitude, &mut angle);
             for (i, &expected) in turn.iter().enumerate() {
                 let off = (f64::from(angle[i]) - expected).abs();
                 let off = off.min(2.0 * std::f64::consts::PI - off);
@@ -115,7 +78,7 @@ mod tests {
     #[test]
     fn no_gradient_has_angle_and_magnitude_zero() {
         let (mut magnitude, mut angle) = ([9.0], [9.0]);
-        polar(&[0.0], &[0.0], true, &mut magnitude, &mut angle);
+        polar::<Separate>(&[0.0], &[0.0], true, &mut magnitude, &mut angle);
         assert_eq!((magnitude, angle), ([0.0], [0.0]));
     }
 }

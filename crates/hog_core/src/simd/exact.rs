@@ -1,0 +1,53 @@
+//! The exact pipeline's loops, left to the compiler to vectorise, for the vectors this CPU has.
+
+/// a·b + c with one rounding or two: OpenCV fuses where the CPU can, and so must whoever wants its bits.
+pub(crate) trait MulAdd {
+    fn mul_add(a: f32, b: f32, c: f32) -> f32;
+}
+
+#[allow(dead_code, reason = "which of the two is used depends on the architecture")]
+pub(crate) struct Fused;
+#[allow(dead_code, reason = "which of the two is used depends on the architecture")]
+pub(crate) struct Separate;
+
+impl MulAdd for Fused {
+    #[inline(always)]
+    fn mul_add(a: f32, b: f32, c: f32) -> f32 {
+        a.mul_add(b, c)
+    }
+}
+
+impl MulAdd for Separate {
+    #[inline(always)]
+    fn mul_add(a: f32, b: f32, c: f32) -> f32 {
+        a * b + c
+    }
+}
+
+/// A loop to be compiled for several instruction sets; `run` must be `#[inline(always)]`.
+pub(crate) trait Work {
+    fn run<M: MulAdd>(self);
+}
+
+/// Runs `work` as compiled for this CPU.
+pub(crate) fn run(work: impl Work) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: both instruction sets were found on this CPU.
+            unsafe { run_avx2(work) }
+        } else {
+            work.run::<Separate>();
+        }
+    }
+    #[cfg(target_arch = "aarch64")]
+    work.run::<Fused>();
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+    work.run::<Separate>();
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn run_avx2(work: impl Work) {
+    work.run::<Fused>();
+}

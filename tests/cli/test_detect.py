@@ -96,6 +96,41 @@ def test_a_video_gives_a_line_a_frame_and_an_annotated_copy(tmp_path: Path, caps
         assert len(list(container.decode(stream))) == 4
 
 
+def test_ctrl_c_is_the_end_of_a_camera(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Camera:
+        """Shows a picture seven times, until its user has seen enough."""
+
+        def __init__(self, _: int) -> None:
+            self.left = 7
+
+        def isOpened(self) -> bool:
+            return True
+
+        def get(self, _: int) -> float:
+            return 0.0
+
+        def grab(self) -> bool:
+            self.left -= 1
+            if self.left < 0:
+                raise KeyboardInterrupt
+            return True
+
+        def retrieve(self) -> tuple[bool, np.ndarray[Any, Any]]:
+            return True, PICTURE
+
+        def release(self) -> None:
+            pass
+
+    monkeypatch.setattr(cv2, "VideoCapture", Camera)
+    out = tmp_path / "out"
+    assert main(["detect", "0", "--json", "-", "--out", str(out)]) == 0
+    results = _lines(capsys.readouterr().out)
+    with av.open(out / "0.mp4") as container:
+        assert len(list(container.decode(video=0))) == len(results) > 0
+
+
 def test_a_small_person_is_found_by_enlarging(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "small.png"
     write_image(path, np.asarray(cv2.resize(PICTURE, None, fx=0.4, fy=0.4, interpolation=cv2.INTER_AREA), np.uint8))

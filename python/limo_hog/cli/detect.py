@@ -37,7 +37,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="instead of grouping hits as OpenCV does, keep the best of those that overlap more than this (0..1)",
     )
     parser.add_argument("--person-box", action="store_true", help="boxes tight around the person, without margin")
-    parser.add_argument("--threads", type=threads, default=0, metavar="N", help="0: all cores (0)")
+    parser.add_argument(
+        "--threads", type=threads, default=0, metavar="N", help="how many cores to keep busy; 0: all (0)"
+    )
     parser.add_argument("--every", type=count, default=1, metavar="N", help="every Nth frame of a video (1)")
     parser.add_argument("--resume", action="store_true", help="go on where an earlier run with --json or --out stopped")
 

@@ -177,12 +177,17 @@ class Run:
             def work(job: tuple[int, Image]) -> tuple[Found, Image | None]:
                 return self._find(source, *job)
 
-            for found, picture in in_order(work, frames(), self._workers):
-                if write and picture is not None:
-                    write(picture)
-                if found.frame not in done:
-                    self._keep(found)
-                self._bar.advance(self._task)
+            try:
+                for found, picture in in_order(work, frames(), self._workers):
+                    if write and picture is not None:
+                        write(picture)
+                    if found.frame not in done:
+                        self._keep(found)
+                    self._bar.advance(self._task)
+            except KeyboardInterrupt:
+                # A camera has no other end: what was seen until now is whole.
+                if source.kind is not Kind.CAMERA:
+                    raise
 
     def _find(self, source: Source, frame: int, image: Image) -> tuple[Found, Image | None]:
         start = time.perf_counter()

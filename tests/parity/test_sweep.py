@@ -25,6 +25,11 @@ QUICK_SEEDS, ALL_SEEDS, CHUNK = 200, 2400, 50
 #: About the most values and windows of one `compute` call: larger strides are taken where it would be more.
 ELEMENTS_MAX, WINDOWS_MAX = 2_000_000, 1_500
 
+PEOPLE_MODELS = {
+    3780: limo_hog.HOGDescriptor_getDefaultPeopleDetector(),
+    1980: limo_hog.HOGDescriptor_getDaimlerPeopleDetector(),
+}
+
 Image = NDArray[np.uint8]
 Pair = tuple[int, int]
 
@@ -138,8 +143,8 @@ def some_combination(seed: int) -> Combination:
     while max(size, ELEMENTS_MAX // WINDOWS_MAX) * windows[0] * windows[1] / (step[0] * step[1]) > ELEMENTS_MAX:
         win_stride = step = (step[0] * 2 + 1, step[1] * 2)
     svm = rng.normal(0.0, 1.0, size + int(rng.integers(0, 2))).astype(np.float32)
-    if size == 3780 and rng.random() < 0.8:
-        svm = limo_hog.HOGDescriptor_getDefaultPeopleDetector()
+    if size in PEOPLE_MODELS and rng.random() < 0.8:
+        svm = PEOPLE_MODELS[size]
     return Combination(
         seed=seed,
         geometry=geometry,

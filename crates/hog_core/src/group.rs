@@ -77,8 +77,16 @@ fn partition(rects: &[Rect], eps: f64) -> (Vec<usize>, usize) {
         }
         node
     }
-    for i in 0..rects.len() {
-        for j in 0..i {
+    let mut by_x: Vec<usize> = (0..rects.len()).collect();
+    by_x.sort_unstable_by_key(|&i| rects[i].x);
+    for (place, &i) in by_x.iter().enumerate() {
+        let size = i64::from(rects[i].width) + i64::from(rects[i].height);
+        // No rectangle further to the right than this can be similar.
+        let reach = if eps >= 0.0 { eps * size as f64 * 0.5 } else { f64::INFINITY };
+        for &j in &by_x[place + 1..] {
+            if (i64::from(rects[j].x) - i64::from(rects[i].x)) as f64 > reach {
+                break;
+            }
             if similar(&rects[i], &rects[j], eps) {
                 let (a, b) = (root(&mut parent, i), root(&mut parent, j));
                 parent[a.max(b)] = a.min(b);
@@ -239,6 +247,7 @@ fn mode_rect([x, y, log_scale]: Place, win: (i32, i32)) -> Rect {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn rect(x: i32, y: i32, width: i32, height: i32) -> Rect {
         Rect { x, y, width, height }
@@ -255,6 +264,33 @@ mod tests {
     fn classes_are_connected_through_their_members() {
         let chain: Vec<Rect> = (0..20).map(|i| rect(i * 2, 0, 10, 20)).collect();
         assert_eq!(partition(&chain, 0.2), (vec![0; 20], 1));
+    }
+
+    proptest! {
+        #[test]
+        fn classes_are_those_of_all_pairs(
+            sides in prop::collection::vec((-60..60i32, -60..60i32, -3..40i32, -3..40i32), 0..60),
+            eps in -0.5..1.0f64,
+        ) {
+            let rects: Vec<Rect> = sides.iter().map(|&(x, y, w, h)| rect(x, y, w, h)).collect();
+            let mut classes: Vec<usize> = (0..rects.len()).collect();
+            for i in 0..rects.len() {
+                for j in 0..i {
+                    if similar(&rects[i], &rects[j], eps) {
+                        let (kept, gone) = (classes[i].min(classes[j]), classes[i].max(classes[j]));
+                        classes.iter_mut().filter(|class| **class == gone).for_each(|class| *class = kept);
+                    }
+                }
+            }
+            let mut numbers: Vec<usize> = Vec::new();
+            let renumbered: Vec<usize> = classes.iter().map(|class| {
+                numbers.iter().position(|number| number == class).unwrap_or_else(|| {
+                    numbers.push(*class);
+                    numbers.len() - 1
+                })
+            }).collect();
+            prop_assert_eq!(partition(&rects, eps), (renumbered, numbers.len()));
+        }
     }
 
     #[test]

@@ -67,6 +67,7 @@ class Piece:
     scanned: tuple[Disc | Rectangle, ...]
 
 
+_STONE: Colour = (176, 172, 164)
 _WOOD: Colour = (150, 108, 72)
 _STEEL: Colour = (92, 94, 98)
 _ORANGE: Colour = (214, 92, 34)
@@ -75,18 +76,28 @@ _LEGS = ((-0.14, -0.13), (-0.14, 0.13), (0.14, -0.13), (0.14, 0.13))
 
 KINDS: dict[str, Piece] = {
     "pillar": Piece(
-        solids=(Frustum(0, 0, 0.0, 1.1, 0.15, 0.15, (176, 172, 164)),),
+        solids=(Frustum(0, 0, 0.0, 1.1, 0.15, 0.15, _STONE),),
         footprint=Disc(0, 0, 0.15),
         scanned=(Disc(0, 0, 0.15),),
     ),
     "cone": Piece(
         solids=(
-            Box(0, 0, 0.15, 0.15, 0.0, 0.03, (48, 48, 50)),
-            Frustum(0, 0, 0.03, 0.55, 0.11, 0.024, _ORANGE),
-            Frustum(0, 0, 0.22, 0.32, 0.0805, 0.064, _WHITE),
+            Box(0, 0, 0.2, 0.2, 0.0, 0.03, (48, 48, 50)),
+            Frustum(0, 0, 0.03, 0.75, 0.18, 0.03, _ORANGE),
+            Frustum(0, 0, 0.30, 0.44, 0.126, 0.097, _WHITE),
         ),
-        footprint=Disc(0, 0, 0.15),
-        scanned=(Disc(0, 0, 0.0967),),
+        footprint=Rectangle(0, 0, 0.2, 0.2),
+        scanned=(Disc(0, 0, 0.163),),
+    ),
+    # more like a person to HOG than the others: head, neck and trunk
+    "bollard": Piece(
+        solids=(
+            Frustum(0, 0, 0.0, 0.70, 0.13, 0.13, _STONE),
+            Frustum(0, 0, 0.70, 0.78, 0.05, 0.05, _STONE),
+            Frustum(0, 0, 0.78, 0.92, 0.07, 0.06, _STONE),
+        ),
+        footprint=Disc(0, 0, 0.13),
+        scanned=(Disc(0, 0, 0.13),),
     ),
     "coat_rack": Piece(
         solids=(

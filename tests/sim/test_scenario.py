@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 
 import pytest
@@ -120,3 +121,24 @@ def test_scenarios_made_up_from_seeds_are_valid_and_differ() -> None:
     assert len({scenario.camera for scenario in made}) == 30
     assert {len(scenario.people) for scenario in made} == {1, 2}
     assert made[7] == Scenario.load("random:7")
+
+
+def test_the_page_about_the_arena_tells_the_truth(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "simulator.md").read_text(encoding="utf-8")
+    [example] = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    scenario = Scenario.load(written(tmp_path, example))
+    assert scenario.camera.drop_probability == 0.3
+    for name in Scenario.names():
+        assert f"| `{name}` |" in page
+    known = {"people[]": Person, "furniture[]": Furniture} | {
+        field.name: type(getattr(scenario, field.name)) for field in dataclasses.fields(scenario)
+    }
+    told = set()
+    for keys in re.findall(r"^\| `(\S+\..*?)` \|", page, re.MULTILINE):
+        table, names = keys.split(".")
+        told |= {(table, name) for name in names.replace("`", "").split(", ")}
+    for table, kind in known.items():
+        if dataclasses.is_dataclass(kind):
+            assert {name for owner, name in told if owner == table} == {
+                field.name for field in dataclasses.fields(kind)
+            }

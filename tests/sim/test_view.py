@@ -88,12 +88,12 @@ def test_the_page_is_served_on_loopback_alone() -> None:
                 socket.create_connection((own, port), timeout=2)
 
 
-def test_another_sites_page_may_not_steer() -> None:
+@pytest.mark.parametrize("host", [None, "elsewhere.example"])
+def test_another_sites_page_may_not_steer(host: str | None) -> None:
+    headers = {"Origin": "http://elsewhere.example"} | ({"Host": host} if host else {})
+
     async def ask(view: View) -> int:
-        async with (
-            aiohttp.ClientSession() as session,
-            session.get(view.url + "live", headers={"Origin": "http://elsewhere.example"}) as answer,
-        ):
+        async with aiohttp.ClientSession() as session, session.get(view.url + "live", headers=headers) as answer:
             return answer.status
 
     with View(WORKSHOP) as view:

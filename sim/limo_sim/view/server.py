@@ -80,7 +80,10 @@ class View:
         self.pace = pace or Pace()
         self._newest: Moment | None = None
         self._pictured: Moment | None = None
-        self._history: deque[list[float | None]] = deque(maxlen=_REMEMBERED)
+        self._rows: deque[list[float | None]] = deque(maxlen=_REMEMBERED)
+        self._written = 0
+        # Time and pose of the last control periods: a scan is as old as it is.
+        self._poses: deque[tuple[float, float, float, float]] = deque(maxlen=32)
         self._ended: Mapping[str, Any] | None = None
         self._clients: set[web.WebSocketResponse] = set()
         self._loop = asyncio.new_event_loop()
@@ -97,10 +100,12 @@ class View:
         """Show a moment, and return when the run may go on."""
         if moment.frame is not None:
             self._pictured = moment
-        self._newest = moment
         now, (x, y, _) = reading(moment.step), moment.step.truth.robot
         people = [(p.x, p.y) for p in moment.step.truth.people if p is not None]
-        self._history.append([*asdict(now).values(), x, y, *(people[0] if people else (None, None))])
+        self._rows.append([*asdict(now).values(), x, y, *(people[0] if people else (None, None))])
+        self._poses.append((moment.step.time, *moment.step.truth.robot))
+        self._written += 1
+        self._newest = moment
         self.pace.wait(moment.step.time)
 
     def end(self, card: Mapping[str, Any]) -> None:
@@ -161,9 +166,10 @@ class View:
         await asyncio.gather(*map(dismiss, list(self._clients)))
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
-        # Another site's page, open in the same browser, may not steer.
-        origin = request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != request.host:
+        # Another site's page, open in the same browser, may not steer; nor may one whose name leads here.
+        origin = urlsplit(request.headers.get("Origin", f"//{request.host}"))
+        names = {LOOPBACK, "localhost"} if self._host == LOOPBACK else {origin.hostname}
+        if origin.netloc != request.host or origin.hostname not in names:
             raise web.HTTPForbidden(text="this page is not for other sites")
         client = web.WebSocketResponse(heartbeat=20, compress=False)
         await client.prepare(request)
@@ -192,19 +198,21 @@ class View:
             ],
             "zones": list(ZONE_ENDS.values()),
             "parameters": self._controller.parameters if self._controller else {},
-            "history": list(self._history),
         }
 
     async def _show(self, client: web.WebSocketResponse) -> None:
         """Send a page what is new, as fast as it takes it and no faster than `PERIOD`."""
         shown: tuple[Any, ...] = ()
-        pictured = None
+        pictured, told = None, 0
         while not client.closed:
             newest, frame = self._newest, self._pictured
             now = (newest, self.pace.paused, self.pace.speed)
             if newest is not None and now != shown:
                 shown = now
-                await client.send_str(json.dumps(self._state(newest)))
+                written = self._written
+                rows = list(self._rows)[-(written - told) :] if written > told else []
+                told = written
+                await client.send_str(json.dumps({"state": self._state(newest), "rows": rows}))
                 if frame is not None and frame is not pictured:
                     pictured = frame
                     for picture in await self._loop.run_in_executor(None, self._pictures, frame):
@@ -214,19 +222,17 @@ class View:
     def _state(self, moment: Moment) -> dict[str, Any]:
         step = moment.step
         return {
-            "state": {
-                **asdict(reading(step)),
-                "mode": step.mode.value,
-                "reason": step.reason,
-                "robot": step.truth.robot,
-                "people": [(p.x, p.y) for p in step.truth.people if p is not None],
-                "scan": _hits(moment.scan, step.truth.robot),
-                "detect_ms": step.detect_ms or None,
-                "boxes": len(step.detections),
-                "contacts": asdict(step.truth.contacts),
-                "paused": self.pace.paused,
-                "speed": self.pace.speed,
-            }
+            **asdict(reading(step)),
+            "mode": step.mode.value,
+            "reason": step.reason,
+            "robot": step.truth.robot,
+            "people": [(p.x, p.y) for p in step.truth.people if p is not None],
+            "scan": _hits(moment.scan, list(self._poses)),
+            "detect_ms": step.detect_ms or None,
+            "boxes": len(step.detections),
+            "contacts": asdict(step.truth.contacts),
+            "paused": self.pace.paused,
+            "speed": self.pace.speed,
         }
 
     def _pictures(self, moment: Moment) -> list[bytes]:
@@ -273,11 +279,12 @@ def _page(name: str, kind: str) -> Any:
     return answer
 
 
-def _hits(scan: Scan | None, robot: tuple[float, float, float]) -> list[list[float]]:
-    """Return every second lidar hit in the arena's frame [m], to the centimetre."""
+def _hits(scan: Scan | None, poses: list[tuple[float, float, float, float]]) -> list[list[float]]:
+    """Return every second lidar hit in the arena's frame [m], to the centimetre, by the pose at the scan's time."""
     if scan is None:
         return []
-    x, y, yaw = robot
+    times, *pose = np.array(poses).T
+    x, y, yaw = (float(np.interp(scan.stamp, times, values)) for values in (*pose[:2], np.unwrap(pose[2])))
     ranges: NDArray[np.float64] = scan.ranges.astype(np.float64)
     angles = yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
     hit = np.isfinite(ranges)

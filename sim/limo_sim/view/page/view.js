@@ -26,30 +26,24 @@ function connect() {
 }
 
 function read(message) {
-  if (message.history) welcome(message);
-  if (message.state) state(message.state);
+  if (message.scenario !== undefined) welcome(message);
+  if (message.state) state(message.state, message.rows);
   if (message.complaint) $("complaint").textContent = message.complaint;
   if (message.ended) end(message.ended);
 }
 
 function welcome(message) {
   scene = message;
-  history = message.history;
+  history = [];
   ended = false;
   notice("");
   $("scenario").textContent = scene.scenario;
   parameters(scene.parameters);
 }
 
-function state(next) {
+function state(next, rows) {
   now = next;
-  const last = history.length ? history[history.length - 1][TIME] : -1;
-  if (now.time > last) {
-    const person = now.people[0] || [null, null];
-    const row = [now.time, now.error_px, now.distance_m, now.linear_m_s, now.angular_rad_s];
-    history.push([...row, now.robot[0], now.robot[1], ...person]);
-    if (history.length > KEPT) history.splice(0, history.length - KEPT);
-  }
+  history = history.concat(rows).slice(-KEPT);
   $("clock").textContent = `${now.time.toFixed(1)} s`;
   $("mode").textContent = now.mode;
   $("mode").className = `chip ${now.mode}`;

@@ -83,9 +83,16 @@ const NOISE_MAX: f64 = 1e-4;
 impl Hog {
     /// A detector of this geometry; `coefficients` of the SVM, if any, must fit it.
     pub fn new(params: &HogParams, coefficients: Option<&[f32]>) -> Result<Self> {
+        Self::with_backend(params, coefficients, Backend::current()?)
+    }
+
+    /// [`new`](Self::new) with a backend other than the one in force; this CPU must have it.
+    pub fn with_backend(params: &HogParams, coefficients: Option<&[f32]>, backend: Backend) -> Result<Self> {
+        if !backend.is_available() {
+            return Err(HogError::Backend(format!("this machine has no {}", backend.name())));
+        }
         let spec = HogSpec::new(params)?;
         let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
-        let backend = Backend::current()?;
         let fast = svm.as_ref().and_then(|svm| simd::Plan::new(&spec, svm, backend));
         Ok(Self { spec, svm, fast, backend })
     }

@@ -34,6 +34,7 @@ impl Lane for Avx2 {
     const COARSE_VECTORS: usize = 1;
     type F = __m256;
     type I = __m256i;
+    type Sum = __m256i;
     type M = __m256;
     type Masked = __m256;
 
@@ -217,6 +218,10 @@ impl Lane for Avx2 {
     #[inline(always)]
     fn splat_word(self, word: u32) -> __m256i {
         isa!(_mm256_set1_epi32(word.cast_signed()))
+    }
+    #[inline(always)]
+    fn no_sum(self) -> __m256i {
+        isa!(_mm256_setzero_si256())
     }
     #[inline(always)]
     fn begin_block(self, _total: __m256i) -> __m256i {

@@ -34,6 +34,7 @@ impl Lane for Avx512 {
     const COARSE_VECTORS: usize = 2;
     type F = __m512;
     type I = __m512i;
+    type Sum = __m512i;
     type M = __mmask16;
     type Masked = (__m512, __mmask16);
 
@@ -231,6 +232,10 @@ impl Lane for Avx512 {
     #[inline(always)]
     fn splat_word(self, word: u32) -> __m512i {
         isa!(_mm512_set1_epi32(word.cast_signed()))
+    }
+    #[inline(always)]
+    fn no_sum(self) -> __m512i {
+        isa!(_mm512_setzero_si512())
     }
     #[inline(always)]
     fn begin_block(self, total: __m512i) -> __m512i {

@@ -16,6 +16,8 @@ pub(super) trait Lane: Copy {
     type F: Copy;
     /// 32-bit words.
     type I: Copy;
+    /// Totals of the first look at the SVM.
+    type Sum: Copy;
     /// One truth value per lane.
     type M: Copy;
     /// A vector of which only some lanes count; the others stand for 0.
@@ -25,7 +27,7 @@ pub(super) trait Lane: Copy {
     /// ... and the source pixels they may lie apart.
     const REACH: usize;
 
-    /// Vectors of windows that the first look takes at a time.
+    /// Vectors of windows that the first look takes at a time; 0: there is none, all windows are summed exactly.
     const COARSE_VECTORS: usize;
 
     fn splat(self, x: f32) -> Self::F;
@@ -104,14 +106,16 @@ pub(super) trait Lane: Copy {
     /// `from` points at `LANES` readable words.
     unsafe fn load_words(self, from: *const u32) -> Self::I;
     fn splat_word(self, word: u32) -> Self::I;
+    /// Totals of nothing.
+    fn no_sum(self) -> Self::Sum;
     /// What a block's sum of `dot_bytes` begins with, if it is to be added to `total`.
-    fn begin_block(self, total: Self::I) -> Self::I;
+    fn begin_block(self, total: Self::Sum) -> Self::Sum;
     /// sum + the products of the four unsigned bytes with the four signed weights of each word.
-    fn dot_bytes(self, sum: Self::I, bytes: Self::I, weights: Self::I) -> Self::I;
+    fn dot_bytes(self, sum: Self::Sum, bytes: Self::I, weights: Self::I) -> Self::Sum;
     /// The total with a block's sum, counted `multiple` times.
-    fn end_block(self, total: Self::I, sum: Self::I, multiple: i32) -> Self::I;
-    /// One bit per lane: whether the word is at least `least`.
-    fn at_least(self, words: Self::I, least: i32) -> u32;
+    fn end_block(self, total: Self::Sum, sum: Self::Sum, multiple: i32) -> Self::Sum;
+    /// One bit per lane: whether the total is at least `least`.
+    fn at_least(self, total: Self::Sum, least: i32) -> u32;
 
     /// Mixes neighbouring pixels of a row (`source`, each byte flipped by 0x80) as `columns` tells: Σ weight·pixel −
     /// 2¹⁵, for every output pixel (rounded up to a whole group).

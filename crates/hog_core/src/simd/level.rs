@@ -7,6 +7,7 @@ use crate::params::Size;
 use super::backend::Backend;
 use super::lane::Lane;
 use super::plan::{Plan, WORDS};
+use super::portable::Portable;
 use super::rows::{LevelImage, Planes, Shrink};
 use super::score::{Windows, score};
 use super::strip::{BLOCK, Job, strip};
@@ -119,7 +120,9 @@ pub(crate) fn detect(
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
         Backend::Avx2 => unsafe { avx2(task, scratch) },
-        _ => {}
+        #[cfg(target_arch = "aarch64")]
+        Backend::Neon => neon(task, scratch),
+        _ => level(Portable, Portable, task, scratch),
     }
     scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
 }
@@ -138,6 +141,13 @@ fn avx2(task: Task, scratch: &mut Scratch) {
     use super::avx2::Avx2;
     // SAFETY: this function's features are the token's.
     let l = unsafe { Avx2::new() };
+    level(l, l, task, scratch);
+}
+
+#[cfg(target_arch = "aarch64")]
+fn neon(task: Task, scratch: &mut Scratch) {
+    // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
+    let l = unsafe { super::neon::Neon::new() };
     level(l, l, task, scratch);
 }
 

@@ -9,8 +9,11 @@ mod backend;
 mod exact;
 mod lane;
 mod level;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod plan;
 mod polar;
+mod portable;
 mod rows;
 mod score;
 mod strip;

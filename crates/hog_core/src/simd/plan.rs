@@ -67,9 +67,6 @@ pub(super) struct Coarse {
 impl Plan {
     /// The plan of `spec` and `svm`, if the kernels can serve them.
     pub(crate) fn new(spec: &HogSpec, svm: &Svm, backend: Backend) -> Option<Self> {
-        if matches!(backend, Backend::Scalar | Backend::Neon) {
-            return None; // these two have no kernels yet: the reference serves them
-        }
         let eight = Size::new(8, 8);
         let served = spec.block == Size::new(16, 16)
             && spec.cell == eight
@@ -102,7 +99,7 @@ impl Plan {
             across,
             weights: svm.weights().to_vec(),
             bias: f64::from(svm.bias()),
-            coarse: Coarse::new(svm.weights(), spec.blocks, backend == Backend::Avx512),
+            coarse: Coarse::new(svm.weights(), spec.blocks, backend != Backend::Avx2),
             noise: 4e-7 * norms,
         })
     }

@@ -36,11 +36,11 @@ pub(super) unsafe fn score<L: Lane>(
     let plan = windows.plan;
     let groups = windows.width.div_ceil(L::LANES);
     masks.clear();
-    masks.resize(groups * windows.height, 0);
+    masks.resize(groups * windows.height, u32::MAX);
     let least = (threshold - plan.bias - plan.noise - plan.coarse.bound) / plan.coarse.unit;
     let least = least.floor().clamp(f64::from(i32::MIN), f64::from(i32::MAX)) as i32;
     let mut top = 0;
-    while top < windows.height {
+    while L::COARSE_VECTORS > 0 && top < windows.height {
         let rows = (windows.height - top).min(ROWS);
         let mut group = 0;
         while group < groups {
@@ -111,7 +111,7 @@ unsafe fn coarse<L: Lane, const V: usize>(
     groups: usize,
     masks: &mut [u32],
 ) {
-    let mut totals = [[l.splat_word(0); V]; ROWS];
+    let mut totals = [[l.no_sum(); V]; ROWS];
     let height = windows.plan.blocks.height;
     for y in 0..rows + height - 1 {
         // Row y of blocks takes part in window rows from..to, as their block row y - window row.
@@ -146,7 +146,7 @@ unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>
     windows: &Windows,
     bytes: *const u32,
     y: usize,
-    totals: &mut [[L::I; V]; ROWS],
+    totals: &mut [[L::Sum; V]; ROWS],
 ) {
     let size = windows.plan.blocks;
     let coarse = &windows.plan.coarse;

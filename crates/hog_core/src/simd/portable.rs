@@ -1,0 +1,261 @@
+//! Four lanes in plain Rust, which the compiler turns into what the architecture has for certain (SSE2 on x86-64).
+
+use super::lane::Lane;
+use super::rows::Columns;
+
+/// No instruction set beyond the architecture's baseline.
+#[derive(Clone, Copy)]
+pub(super) struct Portable;
+
+/// Four numbers, aligned as a vector.
+#[derive(Clone, Copy)]
+#[repr(align(16))]
+pub(super) struct Four<T>([T; 4]);
+
+/// `expression` of every lane `i`.
+macro_rules! lanes {
+    ($i:ident => $expression:expr) => {
+        Four([
+            {
+                const $i: usize = 0;
+                $expression
+            },
+            {
+                const $i: usize = 1;
+                $expression
+            },
+            {
+                const $i: usize = 2;
+                $expression
+            },
+            {
+                const $i: usize = 3;
+                $expression
+            },
+        ])
+    };
+}
+
+impl Lane for Portable {
+    const LANES: usize = 4;
+    const WIDE: bool = false;
+    const GROUP: usize = 8;
+    const REACH: usize = 256;
+    const COARSE_VECTORS: usize = 0;
+    type F = Four<f32>;
+    type I = Four<u32>;
+    type Sum = ();
+    type M = Four<bool>;
+    type Masked = Four<f32>;
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> Four<f32> {
+        Four([x; 4])
+    }
+    #[inline(always)]
+    unsafe fn load(self, from: *const f32) -> Four<f32> {
+        // SAFETY: the caller's promise.
+        Four(unsafe { from.cast::<[f32; 4]>().read_unaligned() })
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32, x: Four<f32>) {
+        // SAFETY: the caller's promise.
+        unsafe { to.cast::<[f32; 4]>().write_unaligned(x.0) };
+    }
+    #[inline(always)]
+    fn add(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        lanes!(I => a.0[I] + b.0[I])
+    }
+    #[inline(always)]
+    fn sub(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        lanes!(I => a.0[I] - b.0[I])
+    }
+    #[inline(always)]
+    fn mul(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        lanes!(I => a.0[I] * b.0[I])
+    }
+    #[inline(always)]
+    fn min(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        lanes!(I => if a.0[I] < b.0[I] { a.0[I] } else { b.0[I] })
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Four<f32>, b: Four<f32>, c: Four<f32>) -> Four<f32> {
+        lanes!(I => a.0[I] * b.0[I] + c.0[I])
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, a: Four<f32>, b: Four<f32>, c: Four<f32>) -> Four<f32> {
+        lanes!(I => c.0[I] - a.0[I] * b.0[I])
+    }
+    #[inline(always)]
+    fn abs(self, x: Four<f32>) -> Four<f32> {
+        lanes!(I => x.0[I].abs())
+    }
+    #[inline(always)]
+    fn min_abs(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        self.min(self.abs(a), self.abs(b))
+    }
+    #[inline(always)]
+    fn max_abs(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        let (a, b) = (self.abs(a), self.abs(b));
+        lanes!(I => if a.0[I] > b.0[I] { a.0[I] } else { b.0[I] })
+    }
+    #[inline(always)]
+    fn floor(self, x: Four<f32>) -> Four<f32> {
+        lanes!(I => whole(x.0[I]) as f32)
+    }
+    #[inline(always)]
+    fn round(self, x: Four<f32>) -> Four<f32> {
+        lanes!(I => whole(x.0[I] + 0.5) as f32)
+    }
+    #[inline(always)]
+    fn sqrt(self, x: Four<f32>) -> Four<f32> {
+        lanes!(I => x.0[I].sqrt())
+    }
+    #[inline(always)]
+    fn gamma(self, x: Four<f32>) -> Four<f32> {
+        self.sqrt(x)
+    }
+    #[inline(always)]
+    fn root(self, x: Four<f32>) -> Four<f32> {
+        self.sqrt(x)
+    }
+    #[inline(always)]
+    fn ratio(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        lanes!(I => a.0[I] / if b.0[I] > 1e-20 { b.0[I] } else { 1e-20 })
+    }
+    #[inline(always)]
+    fn div(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        lanes!(I => a.0[I] / b.0[I])
+    }
+    #[inline(always)]
+    fn less(self, a: Four<f32>, b: Four<f32>) -> Four<bool> {
+        lanes!(I => a.0[I] < b.0[I])
+    }
+    #[inline(always)]
+    fn negate_where(self, mask: Four<bool>, x: Four<f32>) -> Four<f32> {
+        lanes!(I => if mask.0[I] { -x.0[I] } else { x.0[I] })
+    }
+    #[inline(always)]
+    fn zero_where(self, mask: Four<bool>, x: Four<f32>) -> Four<f32> {
+        lanes!(I => if mask.0[I] { 0.0 } else { x.0[I] })
+    }
+    #[inline(always)]
+    fn select(self, mask: Four<bool>, yes: Four<f32>, no: Four<f32>) -> Four<f32> {
+        lanes!(I => if mask.0[I] { yes.0[I] } else { no.0[I] })
+    }
+    #[inline(always)]
+    fn flip_by_signs(self, x: Four<f32>, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        const SIGN: u32 = 1 << 31;
+        lanes!(I => f32::from_bits(x.0[I].to_bits() ^ ((a.0[I].to_bits() ^ b.0[I].to_bits()) & SIGN)))
+    }
+    #[inline(always)]
+    fn keep(self, x: Four<f32>, key: Four<f32>, wanted: f32) -> Four<f32> {
+        lanes!(I => if key.0[I] == wanted { x.0[I] } else { 0.0 })
+    }
+    #[inline(always)]
+    fn keep_either(self, one: (Four<f32>, Four<f32>, f32), other: (Four<f32>, Four<f32>, f32)) -> Four<f32> {
+        let (one, other) = (self.keep(one.0, one.1, one.2), self.keep(other.0, other.1, other.2));
+        lanes!(I => f32::from_bits(one.0[I].to_bits() | other.0[I].to_bits()))
+    }
+    #[inline(always)]
+    fn mul_add_masked(self, x: Four<f32>, weight: Four<f32>, sum: Four<f32>) -> Four<f32> {
+        self.mul_add(x, weight, sum)
+    }
+    #[inline(always)]
+    fn weigh(self, x: Four<f32>, _product: Four<f32>, weight: Four<f32>, sum: Four<f32>) -> Four<f32> {
+        self.mul_add(x, weight, sum)
+    }
+    #[inline(always)]
+    fn shift_in(self, x: Four<f32>, next: f32) -> Four<f32> {
+        Four([x.0[1], x.0[2], x.0[3], next])
+    }
+    #[inline(always)]
+    fn shift_up(self, x: Four<f32>, before: f32) -> Four<f32> {
+        Four([before, x.0[0], x.0[1], x.0[2]])
+    }
+    #[inline(always)]
+    fn first(self, x: Four<f32>) -> f32 {
+        x.0[0]
+    }
+    #[inline(always)]
+    unsafe fn low_words(self, from: *const u8) -> Four<u32> {
+        // SAFETY: the caller's promise.
+        let words = unsafe { from.cast::<[[u8; 8]; 4]>().read_unaligned() };
+        lanes!(I => u64::from_le_bytes(words[I]) as u32)
+    }
+    #[inline(always)]
+    unsafe fn high_words(self, from: *const u8) -> Four<u32> {
+        // SAFETY: the caller's promise.
+        let words = unsafe { from.cast::<[[u8; 8]; 4]>().read_unaligned() };
+        lanes!(I => (u64::from_le_bytes(words[I]) >> 32) as u32)
+    }
+    #[inline(always)]
+    fn byte<const K: u32>(self, words: Four<u32>) -> Four<f32> {
+        lanes!(I => (words.0[I] >> (8 * K) & 0xff).cast_signed() as f32)
+    }
+    #[inline(always)]
+    unsafe fn store_bytes(self, to: *mut u32, x: [Four<f32>; 4]) {
+        let byte = |x: f32, k: u32| whole(x + 0.5).cast_unsigned() << (8 * k);
+        let words =
+            lanes!(I => byte(x[0].0[I], 0) | byte(x[1].0[I], 1) | byte(x[2].0[I], 2) | byte(x[3].0[I], 3));
+        // SAFETY: the caller's promise.
+        unsafe { to.cast::<[u32; 4]>().write_unaligned(words.0) };
+    }
+    #[inline(always)]
+    unsafe fn load_words(self, from: *const u32) -> Four<u32> {
+        // SAFETY: the caller's promise.
+        Four(unsafe { from.cast::<[u32; 4]>().read_unaligned() })
+    }
+    #[inline(always)]
+    fn splat_word(self, word: u32) -> Four<u32> {
+        Four([word; 4])
+    }
+    #[inline(always)]
+    fn no_sum(self) {}
+    #[inline(always)]
+    fn begin_block(self, (): ()) {}
+    #[inline(always)]
+    fn dot_bytes(self, (): (), _: Four<u32>, _: Four<u32>) {}
+    #[inline(always)]
+    fn end_block(self, (): (), (): (), _: i32) {}
+    #[inline(always)]
+    fn at_least(self, (): (), _: i32) -> u32 {
+        u32::MAX
+    }
+
+    #[inline(always)]
+    unsafe fn mix_columns(self, source: *const u8, columns: &Columns, to: *mut i16) {
+        let groups = columns.base.iter().zip(columns.index.as_chunks::<16>().0);
+        for (group, ((&base, index), weight)) in groups.zip(columns.weight.as_chunks::<16>().0).enumerate() {
+            for i in 0..8 {
+                // SAFETY: every tap lies in the source, and `to` has room for all groups: the caller's promise.
+                unsafe {
+                    let pixel = |k: usize| {
+                        i16::from((*source.add(base as usize + usize::from(index[k]))).cast_signed())
+                    };
+                    let mixed = |k: usize| pixel(k) * i16::from(weight[k]);
+                    to.add(8 * group + i).write(mixed(2 * i) + mixed(2 * i + 1));
+                }
+            }
+        }
+    }
+    #[inline(always)]
+    unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize) {
+        let (a, b) = (256 - i32::from(weight), i32::from(weight));
+        for i in 0..len {
+            // SAFETY: the caller's promise.
+            unsafe {
+                let sum = i32::from(*upper.add(i)) * a + i32::from(*lower.add(i)) * b;
+                to.add(i).write(((sum + (1 << 23) + (1 << 15)) >> 16) as u8);
+            }
+        }
+    }
+}
+
+/// The whole part of a number of 0..=255.5.
+#[inline(always)]
+fn whole(x: f32) -> i32 {
+    debug_assert!((0.0..256.0).contains(&x));
+    // SAFETY: the number fits.
+    unsafe { x.to_int_unchecked() }
+}

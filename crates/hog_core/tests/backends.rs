@@ -1,4 +1,5 @@
 //! Every backend that this CPU has against the reference.
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Search, model};
 use proptest::prelude::*;

@@ -126,6 +126,8 @@ impl Columns {
 pub(super) struct Shrink {
     columns: Columns,
     mixed: [Vec<i16>; 2],
+    /// Which pixels stand left and right of a row, from the inside out.
+    mirrored: Vec<[usize; 2]>,
 }
 
 /// The planes of one level, each row mirrored outwards by the padding and one pixel more.
@@ -174,8 +176,16 @@ impl LevelImage {
             } else {
                 self.shrink(l, source, channel, size, shrink);
             }
-            for y in 0..size.height {
-                self.mirror(channel, y, size.width, pad);
+        }
+        shrink.mirrored.clear();
+        let width = size.width;
+        let reflect = |i: usize| [reflect_101(-1 - i as i64, width), reflect_101((width + i) as i64, width)];
+        shrink.mirrored.extend((0..=pad).map(reflect));
+        for row in self.data.chunks_exact_mut(self.stride) {
+            let row = &mut row[self.left - pad - 1..][..width + 2 * (pad + 1)];
+            for (i, &[before, after]) in shrink.mirrored.iter().enumerate() {
+                row[pad - i] = row[pad + 1 + before];
+                row[pad + 1 + width + i] = row[pad + 1 + after];
             }
         }
     }
@@ -186,7 +196,7 @@ impl LevelImage {
 
     #[inline(always)]
     fn shrink<L: Lane>(&mut self, l: L, source: &Planes, channel: usize, size: Size, shrink: &mut Shrink) {
-        let Shrink { columns, mixed: [upper, lower] } = shrink;
+        let Shrink { columns, mixed: [upper, lower], .. } = shrink;
         let room = size.width.next_multiple_of(STEP);
         upper.resize(room, 0);
         lower.resize(room, 0);
@@ -208,15 +218,6 @@ impl LevelImage {
             let to = self.row(channel, y, room).as_mut_ptr();
             // SAFETY: both rows and the level's row hold `room` elements.
             unsafe { l.mix_rows(upper.as_ptr(), lower.as_ptr(), tap.weight as i16, to, room) };
-        }
-    }
-
-    /// Fills `pad` + 1 pixels on both sides of a row.
-    fn mirror(&mut self, channel: usize, y: usize, width: usize, pad: usize) {
-        let start = channel * self.plane + y * self.stride + self.left;
-        for i in 0..=pad {
-            self.data[start - 1 - i] = self.data[start + reflect_101(-1 - i as i64, width)];
-            self.data[start + width + i] = self.data[start + reflect_101((width + i) as i64, width)];
         }
     }
 }

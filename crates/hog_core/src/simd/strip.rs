@@ -43,13 +43,13 @@ pub(super) struct Job<'a> {
 /// A gradient's two votes. Of two neighbouring bins one is even and one is odd, so each vote is kept by parity and a
 /// bin has to look at one of them only. Bins 8 and 0 are neighbours too: there the odd vote belongs to the other one.
 #[derive(Clone, Copy)]
-struct Votes<F> {
-    even: F,
-    odd: F,
+pub(super) struct Votes<F> {
+    pub even: F,
+    pub odd: F,
     /// Half the even bin.
-    even_key: F,
+    pub even_key: F,
     /// Half of the odd bin plus one; 0 stands for bin 8, 5 for bin 0.
-    odd_key: F,
+    pub odd_key: F,
 }
 
 /// Computes the blocks of the strip of cells that begins at lane `first`.
@@ -91,7 +91,7 @@ pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, 
 
 /// The pixels of padded row `y` of every channel.
 #[inline(always)]
-unsafe fn fill<L: Lane, const CHANNELS: usize>(
+pub(super) unsafe fn fill<L: Lane, const CHANNELS: usize>(
     l: L,
     job: &Job,
     first: usize,
@@ -141,7 +141,7 @@ unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL 
 
 /// The votes of pixel (`phase`, `y`) of every cell.
 #[inline(always)]
-fn vote<L: Lane, const CHANNELS: usize>(
+pub(super) fn vote<L: Lane, const CHANNELS: usize>(
     l: L,
     rows: &[[[L::F; CELL + 2]; CHANNELS]; CELL + 2],
     phase: usize,
@@ -209,7 +209,7 @@ const ARC: [f32; 4] = {
 
 /// Sums the votes of all bins, as many at a time as there are registers for.
 #[inline(always)]
-fn spread_all<L: Lane>(
+pub(super) fn spread_all<L: Lane>(
     l: L,
     weights: &[[f32; 3]; CELL],
     votes: &[Votes<L::F>; CELL],
@@ -294,7 +294,7 @@ fn of_bin<L: Lane>(l: L, votes: &Votes<L::F>, bin: usize) -> L::Masked {
 
 /// Sums across the columns of each block's two cells, normalises (L2-Hys) and stores the blocks of one row.
 #[inline(always)]
-unsafe fn finish<L: Lane>(
+pub(super) unsafe fn finish<L: Lane>(
     l: L,
     job: &mut Job,
     sums: &[[L::F; CELL]; 2 * BINS],

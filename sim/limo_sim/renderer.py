@@ -38,9 +38,9 @@ U8 = NDArray[np.uint8]
 Seen = tuple[float, tuple[int, int, int, int] | None]
 """Visible share of a silhouette, and its box [px]."""
 
-_SHADOW = 0.35
-_BANK_MARGIN = 64
-_LEVELS = 128
+_SHADOW = 0.35  # how much darker the floor is right under somebody
+_BANK_MARGIN = 64  # the noise patterns are so much larger than a frame, which takes a window of them
+_LEVELS = 128  # of brightness, from black to the full colour
 _COARSE = 64  # a silhouette that the image's edge cuts is measured on about so many rows
 
 _COLUMNS = ((np.arange(WIDTH) - CENTRE_X) / FOCAL_PX).astype(np.float32)
@@ -101,13 +101,13 @@ class Renderer:
         for index, (person, pose) in enumerate(zip(scenario.people, people, strict=True)):
             if pose is None:
                 continue
-            self._cast_shadow(image, depth, camera, (pose.x, pose.y), 0.25 * person.height)
+            self._shade_floor(image, depth, camera, (pose.x, pose.y), 0.25 * person.height)
             if shape := outline(body(person, pose), camera):
                 outlines[index] = shape
                 order.append((math.hypot(pose.x - camera.x, pose.y - camera.y), index))
         for piece in scenario.furniture:
             order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), piece))
-            self._cast_shadow(image, depth, camera, (piece.x, piece.y), 0.25)
+            self._shade_floor(image, depth, camera, (piece.x, piece.y), 0.25)
         canvases: list[tuple[int, Canvas]] = []
         for _, thing in sorted(order, key=lambda entry: -entry[0]):
             if isinstance(thing, Furniture):
@@ -170,7 +170,7 @@ class Renderer:
                 cast_frustum(canvas, solid, camera, seen_sun, part)
         _blend(image, depth, canvas, palette)
 
-    def _cast_shadow(self, image: U8, depth: F32, camera: CameraPose, at: tuple[float, float], radius: float) -> None:
+    def _shade_floor(self, image: U8, depth: F32, camera: CameraPose, at: tuple[float, float], radius: float) -> None:
         """Darken the floor softly around something that stands on it."""
         [[across, _, ahead]] = camera.to_camera(np.array([[*at, 0.0]])).tolist()
         window = _window(upright_bounds(across, ahead, radius, 0.0, 0.0))

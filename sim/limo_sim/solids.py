@@ -25,8 +25,8 @@ Window = tuple[int, int, int, int]
 
 NEAR = 0.08
 """Nothing nearer than this is drawn [m]."""
-_UPRIGHT = 0.2
-TONES = 2.0
+_UPRIGHT = 0.2  # a capsule whose axis leans less than this [sine] is cast as if it lay in the image plane
+TONES = 4.0
 """Brightness stays below this, so that a solid's number and its brightness fit in one value."""
 
 
@@ -89,7 +89,7 @@ class Canvas:
         return (slice(r0, r1), slice(c0, c1)) if c0 < c1 and r0 < r1 else None
 
     def put(self, at: tuple[slice, slice], depth: F32, cover: F32, tone: F32) -> None:
-        """Draw one solid where it is nearest; its depth is NaN, or its cover not above 0, where it is not."""
+        """Draw one solid where it is nearest; its depth is NaN where it is not."""
         wins = depth < self.depth[at]
         np.copyto(self.depth[at], depth, where=wins)
         np.copyto(self.tone[at], tone, where=wins)

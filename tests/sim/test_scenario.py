@@ -90,7 +90,7 @@ def test_bad_data_is_refused_with_file_key_and_range(tmp_path: Path, text: str, 
 def test_a_missing_file_and_an_unknown_name_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"nowhere\.toml: cannot be read"):
         Scenario.load(tmp_path / "nowhere.toml")
-    with pytest.raises(ScenarioError, match="unknown scenario wrokshop: want one of .*workshop, "):
+    with pytest.raises(ScenarioError, match=r"unknown scenario wrokshop: want one of .*workshop, "):
         Scenario.load("wrokshop")
     with pytest.raises(ScenarioError, match="unknown scenario wrokshop:3"):
         Scenario.load("wrokshop:3")

@@ -36,6 +36,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="who finds people: ours, ours on the half image, OpenCV's, or a network (%(default)s)",
     )
     parser.add_argument("--json", metavar="FILE", help="write the score card as JSON; - is standard output")
+    parser.add_argument(
+        "--ros2", action="store_true", help="follow on a ROS 2 robot, or `limo-hog arena --ros2`, in place of the arena"
+    )
     add_watching(parser)
 
 
@@ -58,6 +61,10 @@ def seed(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Run one episode and show how it went."""
+    if args.ros2:
+        from limo_hog.cli.drive import drive
+
+        return drive(args)
     with needed(by="limo-hog follow", what="the simulator", install="limo-sim"):
         from limo_sim.episode import run_episode
         from limo_sim.scenario import Scenario

@@ -20,6 +20,8 @@ COMMANDS = {
     "follow": "watch a robot find and follow a walking person in the arena, and score it",
     "run": "run an ordinary ROS 2 Python node against the arena, without ROS",
     "workshop": "learn it: a template node, a checker, and model solutions",
+    "arena": "the arena alone, in real time, for ROS 2 nodes to drive",
+    "topic": "look at ROS 2 topics, as `ros2 topic` does",
     "detect": "find people in photographs, folders and videos",
     "score": "compare controllers over scenarios and seeds, on all cores",
     "replay": "let detector and follower look at a recording",

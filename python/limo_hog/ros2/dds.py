@@ -1,0 +1,234 @@
+"""Topics over DDS, as ROS 2 Humble and Jazzy name, type and encode them; loopback alone unless told otherwise.
+
+ROS_DOMAIN_ID chooses the domain. CYCLONEDDS_URI, where it is set, replaces the loopback configuration.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from rosbags.interfaces import Nodetype
+
+from limo_hog.exceptions import LimoHogError
+from limo_hog.extras import needed
+from limo_hog.ros2.messages import MessageError, deserialize, serialize, typestore
+
+with needed(by="ROS 2 over the network", what="Cyclone DDS", install="'limo-hog[ros2]'"):
+    from cyclonedds import builtin
+    from cyclonedds.core import InstanceState as Instance
+    from cyclonedds.core import Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
+    from cyclonedds.domain import Domain, DomainParticipant
+    from cyclonedds.idl import make_idl_struct, types
+    from cyclonedds.internal import InvalidSample
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+    from cyclonedds.util import duration
+
+#: Discovery by unicast to this machine's own ports: loopback has no multicast.
+_LOOPBACK = """
+<CycloneDDS><Domain id="any">
+  <General>
+    <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
+    <AllowMulticast>false</AllowMulticast>
+    <MaxMessageSize>65500B</MaxMessageSize>
+  </General>
+  <Discovery>
+    <ParticipantIndex>auto</ParticipantIndex>
+    <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
+    <Peers><Peer address="127.0.0.1"/></Peers>
+  </Discovery>
+</Domain></CycloneDDS>
+"""
+
+#: ROS 2's prefix of topics in DDS.
+_PREFIX = "rt"
+
+
+class BusError(LimoHogError):
+    """DDS cannot be used as asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoints:
+    """A topic as others offer it: its ROS type, and how many publish and subscribe."""
+
+    type_name: str
+    publishers: int
+    subscriptions: int
+
+
+@cache
+def dds_type(type_name: str) -> Any:
+    """Return the DDS type of a ROS message; its bytes are rosbags'.
+
+    Its samples hold a ROS message in `message`; None in place of one that could not be read.
+    """
+    package, _, name = type_name.split("/")
+    fields = {field: _dds_field(desc) for field, desc in typestore().fielddefs[type_name][1]}
+    made: Any = make_idl_struct(f"{name}_", f"{package}.msg.dds_.{name}_", fields)
+
+    def hold(self: Any, message: Any) -> None:
+        self.message = message
+
+    def write(self: Any, *_: Any, **__: Any) -> bytes:
+        return serialize(self.message)
+
+    def read(data: bytes, *_: Any, **__: Any) -> Any:
+        try:
+            return made(deserialize(bytes(data), type_name))
+        except MessageError:
+            # A foreign writer's mistake must not end the reader; it is counted where it is taken.
+            return made(None)
+
+    made.__init__ = hold
+    made.serialize = write
+    made.deserialize = staticmethod(read)
+    # Of a sample that only says that its writer has gone, nothing is read.
+    made.deserialize_key = staticmethod(lambda *_, **__: made(None))
+    return made
+
+
+def _dds_field(desc: Any) -> Any:
+    kind, of = desc
+    if kind == Nodetype.NAME:
+        return dds_type(of)
+    if kind == Nodetype.BASE:
+        base = of[0]
+        if base in ("uint8", "char", "byte", "octet"):
+            # As idlc does it: with uint8 the type information crashes readers of Cyclone DDS 0.10.
+            return types.byte
+        return {"bool": bool, "string": str}.get(base) or getattr(types, base)
+    item, length = of
+    generic: Any = types
+    return generic.array[_dds_field(item), length] if kind == Nodetype.ARRAY else generic.sequence[_dds_field(item)]
+
+
+def _qos(type_name: str, depth: int) -> Qos:
+    return Qos(
+        Policy.Reliability.Reliable(duration(milliseconds=100)),
+        Policy.Durability.Volatile,
+        Policy.History.KeepLast(depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+        # ROS 2 Jazzy and later tell each other the type's hash in this way.
+        Policy.Userdata(f"typehash={typestore().hash_rihs01(type_name)};".encode()),
+    )
+
+
+class Publisher:
+    """Sends messages of one topic."""
+
+    def __init__(self, participant: Any, topic: str, type_name: str, depth: int) -> None:
+        self._type = dds_type(type_name)
+        qos = _qos(type_name, depth)
+        self._writer = DataWriter(participant, Topic(participant, _PREFIX + topic, self._type), qos=qos)
+
+    @property
+    def has_readers(self) -> bool:
+        """Whether anybody listens."""
+        return bool(self._writer.get_matched_subscriptions())
+
+    def publish(self, message: Any) -> None:
+        """Send a message."""
+        self._writer.write(self._type(message))
+
+
+class Subscription:
+    """Receives messages of one topic.
+
+    Attributes
+    ----------
+    dropped
+        How many samples were no message of the topic's type.
+    """
+
+    def __init__(self, participant: Any, topic: str, type_name: str, depth: int) -> None:
+        qos = _qos(type_name, depth)
+        self._depth = depth
+        self.dropped = 0
+        self.reader = DataReader(participant, Topic(participant, _PREFIX + topic, dds_type(type_name)), qos=qos)
+
+    def take(self) -> list[Any]:
+        """Return the messages that have come since, oldest first."""
+        samples = self.reader.take(N=max(self._depth, 1))
+        messages = [sample.message for sample in samples if not isinstance(sample, InvalidSample)]
+        good = [message for message in messages if message is not None]
+        self.dropped += len(messages) - len(good)
+        return good
+
+
+class Bus:
+    """A participant of the ROS 2 network.
+
+    Raises
+    ------
+    BusError
+        If ROS_DOMAIN_ID is no domain, or DDS does not start.
+    """
+
+    def __init__(self) -> None:
+        text = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+        if not text.isdecimal() or int(text) > 232:
+            raise BusError(f"ROS_DOMAIN_ID is {text!r}; wanted is a number from 0 to 232")
+        self.domain = int(text)
+        self._domain = None if os.environ.get("CYCLONEDDS_URI") else _domain(self.domain)
+        try:
+            self._participant = DomainParticipant(self.domain)
+        except Exception as error:
+            raise BusError(f"DDS does not start in domain {self.domain}: {error}") from error
+        self._wakers = WaitSet(self._participant)
+        self._watched: list[ReadCondition] = []
+
+    def publisher(self, topic: str, type_name: str, depth: int = 10) -> Publisher:
+        """Begin to publish."""
+        return Publisher(self._participant, topic, type_name, depth)
+
+    def subscription(self, topic: str, type_name: str, depth: int = 10) -> Subscription:
+        """Begin to listen; `wait` wakes up for it."""
+        subscription = Subscription(self._participant, topic, type_name, depth)
+        condition = ReadCondition(subscription.reader, ViewState.Any | SampleState.NotRead | Instance.Any)
+        self._wakers.attach(condition)
+        self._watched.append(condition)
+        return subscription
+
+    def wait(self, seconds: float) -> None:
+        """Return when a subscription has something, or after so long."""
+        self._wakers.wait(duration(microseconds=max(int(seconds * 1e6), 1)))
+
+    def topics(
+        self, seconds: float = 1.5, enough: Callable[[dict[str, Endpoints]], bool] | None = None
+    ) -> dict[str, Endpoints]:
+        """Return what is offered, by topic, after looking around for so long, or when `enough` is found."""
+        readers = [
+            builtin.BuiltinDataReader(self._participant, kind)
+            for kind in (builtin.BuiltinTopicDcpsPublication, builtin.BuiltinTopicDcpsSubscription)
+        ]
+        until = time.monotonic() + seconds
+        while True:
+            found = self._endpoints(readers)
+            if time.monotonic() > until or (enough is not None and enough(found)):
+                return found
+            time.sleep(0.05)
+
+    def _endpoints(self, readers: list[Any]) -> dict[str, Endpoints]:
+        counts: dict[str, tuple[str, list[int]]] = {}
+        for index, reader in enumerate(readers):
+            for sample in reader.read(1000):
+                alive = sample.sample_info.instance_state == Instance.Alive
+                if not alive or not sample.topic_name.startswith(f"{_PREFIX}/"):
+                    continue
+                kind = sample.type_name.replace("::", "/").replace("/dds_/", "/").removesuffix("_")
+                known = counts.setdefault(sample.topic_name.removeprefix(_PREFIX), (kind, [0, 0]))
+                known[1][index] += 1
+        return {name: Endpoints(kind, *numbers) for name, (kind, numbers) in sorted(counts.items())}
+
+
+@cache
+def _domain(number: int) -> Any:
+    # One configuration a domain and process: the second would be an error.
+    return Domain(number, _LOOPBACK)

@@ -1,0 +1,243 @@
+"""Topics over DDS: bytes, loss and latency on loopback, the tools that look, and the follower that drives."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
+
+from cyclonedds import builtin
+from cyclonedds.idl import make_idl_struct, types
+from cyclonedds.qos import Policy
+
+from limo_hog.cli.main import main
+from limo_hog.cli.topic import as_yaml
+from limo_hog.follow.observation import Scan
+from limo_hog.follow.twist import Twist
+from limo_hog.ros2 import dds, follower, messages, names
+
+TWIST = "geometry_msgs/msg/Twist"
+
+
+@pytest.fixture(autouse=True)
+def own_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests that run at once must not hear each other."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(100 + worker))
+    monkeypatch.delenv("CYCLONEDDS_URI", raising=False)
+
+
+@contextmanager
+def publishing(topic: str, message: Any, hertz: float = 10.0) -> Iterator[dds.Publisher]:
+    """Publish a message again and again from a thread."""
+    publisher = dds.Bus().publisher(topic, message.__msgtype__)
+    over = threading.Event()
+
+    def work() -> None:
+        at = time.monotonic()
+        while not over.is_set():
+            publisher.publish(message)
+            at += 1 / hertz
+            time.sleep(max(at - time.monotonic(), 0))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield publisher
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_the_bytes_are_those_that_cyclone_dds_makes_itself() -> None:
+    vector: Any = make_idl_struct("V", "V", dict.fromkeys("xyz", types.float64))
+    plain: Any = make_idl_struct("T", "T", {"linear": vector, "angular": vector})
+    ours = dds.dds_type(TWIST)(messages.twist(Twist(0.2, -0.7))).serialize()
+    assert ours == plain(linear=vector(x=0.2, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=-0.7)).serialize(
+        use_version_2=False
+    )
+
+
+def test_sequences_and_strings_have_the_bytes_that_cyclone_dds_makes_itself() -> None:
+    generic: Any = types
+    time_: Any = make_idl_struct("Tm", "Tm", {"sec": types.int32, "nanosec": types.uint32})
+    header: Any = make_idl_struct("H", "H", {"stamp": time_, "frame_id": str})
+    floats = dict.fromkeys(("a", "b", "c", "d", "e", "f", "g"), types.float32)
+    scan_type: Any = make_idl_struct(
+        "S", "S", {"h": header, **floats, "r": generic.sequence[types.float32], "i": generic.sequence[types.float32]}
+    )
+    message = messages.laser_scan(Scan(1.25, np.array([1.0, 2.5, np.inf], np.float32), -2.0, 2.0, 0.12, 8.0))
+    theirs = scan_type(
+        h=header(stamp=time_(sec=1, nanosec=250_000_000), frame_id="laser_link"),
+        a=-2.0,
+        b=2.0,
+        c=2.0,
+        d=0.0,
+        e=0.125,
+        f=0.12,
+        g=8.0,
+        r=[1.0, 2.5, float("inf")],
+        i=[],
+    )
+    assert messages.serialize(message) == theirs.serialize(use_version_2=False)
+
+
+def test_names_types_and_hashes_are_what_ros_2_looks_for() -> None:
+    bus = dds.Bus()
+    with publishing(names.COMMAND, messages.twist(Twist())):
+        bus.topics(5.0, enough=lambda found: names.COMMAND in found)
+        reader = builtin.BuiltinDataReader(bus._participant, builtin.BuiltinTopicDcpsPublication)
+        ends = {sample.topic_name: sample for sample in reader.read(100)}
+    end = ends["rt/cmd_vel"]
+    assert end.type_name == "geometry_msgs::msg::dds_::Twist_"
+    assert end.qos[Policy.Reliability].max_blocking_time == 100_000_000
+    assert bytes(end.qos[Policy.Userdata].data).startswith(b"typehash=RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a")
+
+
+RECEIVER = """
+import sys, time
+import numpy as np
+from limo_hog.ros2 import dds, messages, names
+bus = dds.Bus()
+images = bus.subscription(names.IMAGE, names.TYPES[names.IMAGE], depth=50)
+print("ready", flush=True)
+late, stamps = [], []
+until = time.monotonic() + float(sys.argv[1])
+while time.monotonic() < until:
+    bus.wait(0.5)
+    for message in images.take():
+        late.append(time.time() - messages.to_seconds(message.header.stamp))
+        stamps.append(int(message.data[0]))
+print(len(late), np.percentile(late, 95), stamps[:1], np.unique(np.diff(stamps) % 256).tolist())
+"""
+
+
+def exchange(seconds: float, hertz: float) -> tuple[int, int, float]:
+    """Send images to another process; returns how many were sent and came, and the 95 % latency [s]."""
+    receiver = subprocess.Popen(
+        [sys.executable, "-c", RECEIVER, str(seconds + 2)], stdout=subprocess.PIPE, text=True, env=dict(os.environ)
+    )
+    assert receiver.stdout is not None
+    assert receiver.stdout.readline() == "ready\n"
+    publisher = dds.Bus().publisher(names.IMAGE, names.TYPES[names.IMAGE])
+    while not publisher.has_readers:
+        time.sleep(0.01)
+    pixels = np.zeros((480, 640, 3), np.uint8)
+    count = int(seconds * hertz)
+    began = time.monotonic()
+    for number in range(count):
+        pixels[0, 0, 0] = number % 256
+        publisher.publish(messages.image(time.time(), pixels))
+        time.sleep(max(began + (number + 1) / hertz - time.monotonic(), 0))
+    out = receiver.communicate(timeout=30)[0].split()
+    return count, int(out[0]), float(out[1])
+
+
+def test_images_reach_another_process_and_none_is_lost() -> None:
+    sent, came, late = exchange(3.0, 20.0)
+    assert came == sent
+    assert late < 0.1
+
+
+@pytest.mark.slow
+def test_a_minute_of_images_at_10_hz_comes_whole_and_within_10_ms() -> None:
+    sent, came, late = exchange(60.0, 10.0)
+    assert came == sent == 600
+    assert late <= 0.010
+
+
+def test_what_is_no_message_is_dropped_and_counted() -> None:
+    bus = dds.Bus()
+    subscription = bus.subscription(names.IMAGE, names.TYPES[names.IMAGE])
+    publisher = dds.Bus().publisher(names.IMAGE, names.TYPES[names.IMAGE])
+    sample = publisher._type(None)
+    # Cyclone DDS itself refuses bytes of the wrong shape; a text that is not UTF-8 comes through.
+    foreign = messages.serialize(messages.image(0.0, np.zeros((4, 4), np.uint8))).replace(b"depth_link", 10 * b"\xff")
+    publisher._type.serialize = lambda *_, **__: foreign
+    try:
+        until = time.monotonic() + 10
+        while subscription.dropped == 0 and time.monotonic() < until:
+            publisher._writer.write(sample)
+            bus.wait(0.1)
+            assert subscription.take() == []
+    finally:
+        dds.dds_type.cache_clear()
+    assert subscription.dropped >= 1
+
+
+def test_topic_list_info_and_echo_print_as_ros2_topic_does(capsys: pytest.CaptureFixture[str]) -> None:
+    with publishing(names.COMMAND, messages.twist(Twist(0.2, 0.0))):
+        assert main(["topic", "list", "-t"]) == 0
+        assert "/cmd_vel [geometry_msgs/msg/Twist]\n" in capsys.readouterr().out
+        assert main(["topic", "info", "/cmd_vel"]) == 0
+        assert capsys.readouterr().out == "Type: geometry_msgs/msg/Twist\nPublisher count: 1\nSubscription count: 0\n"
+        assert main(["topic", "echo", "--once", "/cmd_vel"]) == 0
+    assert capsys.readouterr().out == (
+        "linear:\n  x: 0.2\n  y: 0.0\n  z: 0.0\nangular:\n  x: 0.0\n  y: 0.0\n  z: 0.0\n---\n"
+    )
+
+
+def test_topic_hz_measures_the_rate(capsys: pytest.CaptureFixture[str]) -> None:
+    with publishing(names.COMMAND, messages.twist(Twist()), hertz=10.0):
+        assert main(["topic", "hz", "/cmd_vel", "--seconds", "5"]) == 0
+    rate = float(capsys.readouterr().out.split("average rate: ")[-1].split()[0])
+    assert rate == pytest.approx(10.0, abs=0.2)
+
+
+def test_a_topic_that_is_not_there_is_an_error_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["topic", "echo", "/nothing"]) == 1
+    assert "topic /nothing is not there in ROS domain" in capsys.readouterr().err
+
+
+def test_yaml_is_what_ros_prints_for_numbers_that_are_none_and_long_sequences() -> None:
+    text = as_yaml(messages.laser_scan(Scan(0.0, np.array([np.inf, np.nan] + 200 * [1.0]), -2.0, 2.0, 0.12, 8.0)))
+    assert "ranges:\n- .inf\n- .nan\n- 1.0\n" in text
+    assert text.count("\n- ") == 129
+    assert "- '...'\nintensities: []\n" in text
+    assert "z: 1.0e-05\n" in as_yaml(messages.twist(Twist(0.0, 1e-5)))
+
+
+@pytest.mark.parametrize("domain", ["x", "-1", "400"])
+def test_a_domain_that_is_none_is_refused(
+    domain: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+    assert main(["topic", "list"]) == 1
+    assert f"ROS_DOMAIN_ID is {domain!r}" in capsys.readouterr().err
+
+
+def test_a_follower_without_a_robot_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(follower, "SILENT_AFTER", 0.3)
+    assert main(["follow", "--ros2", "--seconds", "5"]) == 1
+    assert "nobody publishes /limo_camera/image" in capsys.readouterr().err
+
+
+def test_two_processes_close_the_loop(capsys: pytest.CaptureFixture[str]) -> None:
+    command = [sys.executable, "-m", "limo_hog.cli.main"]
+    arena = subprocess.Popen(
+        [*command, "arena", "--ros2", "--scenario", "followable", "--seconds", "30"],
+        stderr=subprocess.DEVNULL,
+        env=dict(os.environ),
+    )
+    bus = dds.Bus()
+    bus.topics(20.0, enough=lambda found: names.IMAGE in found)
+    odometry = bus.subscription(names.ODOMETRY, names.TYPES[names.ODOMETRY], depth=1)
+    assert main(["follow", "--ros2", "--seconds", "6", "--json", "-"]) == 0
+    assert '"found": 0' not in capsys.readouterr().out
+    bus.wait(1.0)
+    last = [messages.to_odometry(message) for message in odometry.take()]
+    arena.terminate()
+    arena.wait(10)
+    assert np.hypot(last[-1].x, last[-1].y) > 0.1

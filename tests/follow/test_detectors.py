@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -20,7 +19,6 @@ from limo_hog.follow.detectors import (
     best_first,
     detect_in,
     detector_named,
-    shrunk,
 )
 from limo_hog.follow.region import Region
 from limo_sim.arena import Arena
@@ -71,12 +69,6 @@ def test_a_region_around_a_person_finds_what_the_whole_image_does(frame: NDArray
     region = Region(x - 48, max(y - 32, 0), w + 96, h + 64, float(h))
     part = detect_in(detector, frame, region).boxes[0]
     assert np.abs(part - whole).max() <= 16
-
-
-def test_shrinking_is_opencvs_linear_resize() -> None:
-    image = np.random.default_rng(0).integers(0, 256, (120, 90, 3), np.uint8)
-    ours, theirs = shrunk(image, 0.6).astype(int), cv2.resize(image, (54, 72)).astype(int)
-    assert np.abs(ours - theirs).max() <= 1
 
 
 def test_half_size_gives_boxes_of_the_whole_image() -> None:

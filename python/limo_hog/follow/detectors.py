@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 Image = NDArray[np.uint8]
 
-#: Height a followed person's window is shrunk to before the search [px]; HOG's smallest is 128.
-_EXPECTED = 160.0
+#: Followed people whose window is at least so high are searched for at half the size [px]; HOG's least is 128.
+_LARGE = 280
 #: Names `detector_named` knows; `onnx:FILE` is the fourth kind.
 NAMES = ("hog", "hog-half", "hog-iou", "hog-soft", "cv2")
 
@@ -66,29 +66,12 @@ def detect_in(detector: Detector, image: Image, region: Region | None) -> Detect
     """Search a region of an image, or all of it where `region` is None; boxes are in the whole image."""
     if region is None:
         return detector.detect(image)
-    part = image[region.y : region.y + region.height, region.x : region.x + region.width]
-    # Large people are searched at a size where HOG's finest levels, the dearest, are not far below theirs.
-    shrink = min(1.0, _EXPECTED / region.window_height)
-    found = detector.detect(shrunk(part, shrink) if shrink < 1 else np.ascontiguousarray(part))
-    boxes = np.rint(found.boxes / shrink).astype(np.int32)
-    return Detections(boxes + np.array([region.x, region.y, 0, 0], np.int32), found.scores)
-
-
-def shrunk(image: Image, factor: float) -> Image:
-    """Return a uint8 (H, W, C) image at `factor` times its size, linear between pixel centres."""
-    down, down_share = _between(image.shape[0], round(factor * image.shape[0]))
-    right, right_share = _between(image.shape[1], round(factor * image.shape[1]))
-    upper, lower = image[down].astype(np.float32), image[down + 1].astype(np.float32)
-    lines = upper + down_share[:, None, None] * (lower - upper)
-    pixels = lines[:, right] + right_share[:, None] * (lines[:, right + 1] - lines[:, right])
-    return np.rint(pixels).astype(np.uint8)
-
-
-def _between(old: int, new: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Place `new` pixels among `old` ones: each one's left neighbour, and the share of the right one."""
-    place = np.clip((np.arange(new) + 0.5) * old / new - 0.5, 0, old - 1)
-    low = np.minimum(place.astype(np.intp), old - 2)
-    return low, (place - low).astype(np.float32)
+    rows, columns = slice(region.y, region.y + region.height), slice(region.x, region.x + region.width)
+    if region.window_height >= _LARGE:
+        # The finest levels cost most, and could only hold people half as tall.
+        detector = HalfSize(detector)
+    found = detector.detect(np.ascontiguousarray(image[rows, columns]))
+    return Detections(found.boxes + np.array([region.x, region.y, 0, 0], np.int32), found.scores)
 
 
 def best_first(boxes: NDArray[Any], scores: NDArray[Any]) -> Detections:

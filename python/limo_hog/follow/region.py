@@ -31,7 +31,7 @@ class Region:
 
 
 #: The region is so many expected windows wide and high: room for steps, for the gait, and for HOG's margin.
-_WIDTHS, _HEIGHTS = 2.4, 1.3
+_WIDTHS, _HEIGHTS = 2.0, 1.25
 #: Sides are multiples of this [px], so that few different sizes occur.
 _GRID = 16
 

@@ -151,7 +151,7 @@ class TrackingController:
     chase: float = 2.0
     forget: float = 8.0
     search_rate: float = 0.7
-    full_every: int = 10
+    full_every: int = 15
     back_off: float = 0.15
     margin: Margin = field(default_factory=lambda: Margin(0.6, 0.25))
     body: Body = LIMO
@@ -317,7 +317,7 @@ class TrackingController:
 
     def _region(self, person: Person, state: TrackingState, observation: Observation) -> Region | None:
         """Where the person should be in the next frame."""
-        if state.since_full + 1 >= self.full_every or not person.confirmed:
+        if state.since_full + 1 >= self.full_every or not self._worth(person):
             return None
         stamp = observation.stamp + state.period
         pose = pose_at(state.poses, stamp)

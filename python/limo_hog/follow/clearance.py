@@ -75,7 +75,9 @@ def room_behind(points: Points, margin: Margin, body: Body) -> float:
     return room_ahead(-points, margin, body)
 
 
-def free_heading(points: Points, wanted: float, last: float, reach: float, margin: Margin, body: Body) -> float | None:
+def free_heading(
+    points: Points, wanted: float, leaning: float, reach: float, margin: Margin, body: Body
+) -> float | None:
     """Return the direction nearest to `wanted` in which the robot can drive at least `reach` [rad, m].
 
     None where no direction has so much room.
@@ -84,13 +86,13 @@ def free_heading(points: Points, wanted: float, last: float, reach: float, margi
     ----------
     points
         What is around, without who is driven to.
-    wanted, last
-        The straight direction, and what the answer was the last time less `wanted` then: of two ways around
-        something, the one begun is kept.
+    wanted, leaning
+        The straight direction, and the detour from it that is liked best [rad]: of two ways around something, the
+        one already begun, or the one on which somebody walks away.
     reach
         How much room is enough.
     """
-    for turn in sorted(_DETOURS, key=lambda turn: abs(turn) + 0.5 * abs(turn - last)):
+    for turn in sorted(_DETOURS, key=lambda turn: abs(turn) + 0.5 * abs(turn - leaning)):
         cos, sin = math.cos(wanted + turn), math.sin(wanted + turn)
         if room_ahead(points @ np.array([[cos, -sin], [sin, cos]]), margin, body) >= reach:
             return wanted + turn

@@ -158,8 +158,8 @@ def should_be_seen(person: Person, pose: Odometry, observation: Observation) -> 
     middle = observation.height / 2 + person.centre / max(distance, 0.3)
     if window < SMALLEST_WINDOW:
         return False
-    # Near by, the head and the room HOG wants above it are out of the image.
-    if middle < 0.48 * window or observation.height - middle < 0.48 * window:
+    # Near by, the head and the room HOG wants above it are out of the image; who is not known yet gets no such credit.
+    if person.confirmed and not 0.48 * window <= middle <= observation.height - 0.48 * window:
         return False
     if not (observation.region or Region(0, 0, observation.width, observation.height, window)).holds(column):
         return False

@@ -36,6 +36,8 @@ _PERSONS_OWN = 0.45
 _HIDES = 0.12
 #: Slower than this a person's direction does not change [rad/s].
 _STEADY = 0.05
+#: How much the side somebody walks to is preferred in going around something [s].
+_LEAN = 2.0
 #: How far ahead the way must be free [m].
 _LOOK_AHEAD = 1.2
 #: Boxes nearer than this, and so much more for each second, may be a person who was lost [m, m/s].
@@ -120,6 +122,8 @@ class TrackingController:
         Somebody not confirmed after so many frames, and trusted less than `hint`, is given up.
     coast
         How long to drive by the prediction alone [s].
+    blind
+        How long legs in the scan alone are followed [s].
     chase
         How long to face where an unseen person should be before searching all around [s].
     forget
@@ -139,7 +143,7 @@ class TrackingController:
     target_distance: float = 1.5
     linear_gain: float = 0.8
     angular_gain: float = 2.5
-    max_linear: float = 0.5
+    max_linear: float = 0.7
     max_angular: float = 1.5
     near_enough: float = 0.08
     straight_enough: float = 0.02
@@ -148,6 +152,7 @@ class TrackingController:
     hint: float = 0.4
     doubt: int = 30
     coast: float = 0.8
+    blind: float = 4.0
     chase: float = 2.0
     forget: float = 8.0
     search_rate: float = 0.7
@@ -229,8 +234,10 @@ class TrackingController:
     ) -> tuple[Person, TrackingState]:
         """Bring the followed person up to the newest scan, if their legs are in it."""
         scan = observation.scan
-        # Legs that the camera should see a person on, and does not, are a chair's.
-        if scan is None or not person.confirmed or person.misses > _MISSES or scan.stamp <= person.felt:
+        if scan is None or not person.confirmed or scan.stamp <= person.felt:
+            return person, state
+        # Legs that the camera should see a person on, and does not, are a chair's; so may be all after a while.
+        if person.misses > _MISSES or unseen > self.blind:
             return person, state
         track = felt(person.track, scan, pose_at(state.poses, scan.stamp), self.body, self.noise)
         if track is None:
@@ -279,8 +286,11 @@ class TrackingController:
         here = distance * np.array([math.cos(bearing), math.sin(bearing)])
         around = around[np.hypot(*(around - here).T) > _PERSONS_OWN]
         if distance - self.body.camera_x > self.target_distance - self.near_enough:
+            leaning = state.detour or _LEAN * aim.bearing_rate
             reach = min(distance - 2 * _PERSONS_OWN, _LOOK_AHEAD)
-            heading = free_heading(around, bearing, state.detour, reach, self.margin, self.body)
+            heading = free_heading(around, bearing, leaning, reach, self.margin, self.body)
+            if heading is None:
+                heading = free_heading(around, bearing, leaning, reach / 2, self.margin, self.body)
             aim = replace(aim, heading=heading)
         across = np.abs(around @ [-math.sin(bearing), math.cos(bearing)])
         along = around @ [math.cos(bearing), math.sin(bearing)]
@@ -293,7 +303,7 @@ class TrackingController:
         angular = min(max(angular, -self.max_angular), self.max_angular)
         error = aim.distance - self.body.camera_x - self.target_distance
         # Sideways the robot would only lose sight: turn first, then drive.
-        linear = (self.linear_gain * error + aim.range_rate) * max(math.cos(2 * heading), 0.0)
+        linear = (self.linear_gain * error + aim.range_rate) * max(math.cos(heading), 0.0) ** 2
         linear = min(max(linear, -self.max_linear), self.max_linear)
         if lost > self.coast:
             return Twist(0.0, angular), Mode.LOST, "turning where the person went"

@@ -31,7 +31,7 @@ with needed(by="ROS 2 over the network", what="Cyclone DDS", install="'limo-hog[
     from cyclonedds.util import duration
 
 #: Discovery by unicast to this machine's own ports: loopback has no multicast.
-_LOOPBACK = """
+LOOPBACK = """
 <CycloneDDS><Domain id="any">
   <General>
     <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
@@ -231,4 +231,4 @@ class Bus:
 @cache
 def _domain(number: int) -> Any:
     # One configuration a domain and process: the second would be an error.
-    return Domain(number, _LOOPBACK)
+    return Domain(number, LOOPBACK)

@@ -76,7 +76,8 @@ class Renderer:
         -------
         uint8 (480, 640, 3) BGR; float32 (480, 640) depth [m]; per person how much of them is seen, and where.
         """
-        image, depth, seen = self._draw(camera, people)
+        image = self._backdrop.copy()
+        depth, seen = self._draw(image, camera, people)
         row, column = noise.integers(_BANK_MARGIN, size=2)
         window = np.s_[row : row + HEIGHT, column : column + WIDTH]
         cv2.add(image, self._brighter[window], dst=image)
@@ -91,23 +92,26 @@ class Renderer:
 
     def look(self, camera: CameraPose, people: Sequence[Pose | None]) -> list[Seen]:
         """How much of each person a frame would show, and where; no frame is exposed."""
-        return self._draw(camera, people)[2]
+        return self._draw(None, camera, people)[1]
 
-    def _draw(self, camera: CameraPose, people: Sequence[Pose | None]) -> tuple[U8, F32, list[Seen]]:
+    def _draw(self, image: U8 | None, camera: CameraPose, people: Sequence[Pose | None]) -> tuple[F32, list[Seen]]:
+        """Depth and what is seen of people; the colours go into `image`, if there is one."""
         scenario, sun = self._scenario, self._sun.seen_from(camera)
-        image, depth = self._room(camera)
+        depth = self._draw_room(image, camera)
         outlines: dict[int, Outline] = {}
         order: list[tuple[float, int | Furniture]] = []
         for index, (person, pose) in enumerate(zip(scenario.people, people, strict=True)):
             if pose is None:
                 continue
-            self._shade_floor(image, depth, camera, (pose.x, pose.y), 0.25 * person.height)
+            if image is not None:
+                self._shade_floor(image, depth, camera, (pose.x, pose.y), 0.25 * person.height)
             if shape := outline(body(person, pose), camera):
                 outlines[index] = shape
                 order.append((math.hypot(pose.x - camera.x, pose.y - camera.y), index))
         for piece in scenario.furniture:
             order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), piece))
-            self._shade_floor(image, depth, camera, (piece.x, piece.y), 0.25)
+            if image is not None:
+                self._shade_floor(image, depth, camera, (piece.x, piece.y), 0.25)
         canvases: list[tuple[int, Canvas]] = []
         for _, thing in sorted(order, key=lambda entry: -entry[0]):
             if isinstance(thing, Furniture):
@@ -120,18 +124,27 @@ class Renderer:
         seen: list[Seen] = [(0.0, None)] * len(people)
         for index, canvas in canvases:
             seen[index] = _measure(canvas, depth, outlines[index], sun)
-        return image, depth, seen
+        return depth, seen
 
-    def _room(self, camera: CameraPose) -> tuple[U8, F32]:
-        """Sky, floor and walls."""
-        image = self._backdrop.copy()
+    def _draw_room(self, image: U8 | None, camera: CameraPose) -> F32:
+        """Sky, floor and walls; the image has its sky and floor already."""
         look = math.cos(camera.yaw), math.sin(camera.yaw)
         ahead_x, ahead_y = look[0] + look[1] * _COLUMNS, look[1] - look[0] * _COLUMNS
         with np.errstate(divide="ignore"):
             to_x = (np.copysign(np.float32(ROOM_HALF), ahead_x) - camera.x) / ahead_x
             to_y = (np.copysign(np.float32(ROOM_HALF), ahead_y) - camera.y) / ahead_y
         wall = np.minimum(to_x, to_y).astype(np.float32)
-        faces = np.where(to_x < to_y, np.where(ahead_x > 0, 0, 1), np.where(ahead_y > 0, 2, 3))
+        if image is not None:
+            self._paint_walls(image, wall, np.where(to_x < to_y, 2 * (ahead_x < 0), 1 + 2 * (ahead_y < 0)))
+        depth: F32 = np.minimum(_FLOOR_DEPTH, wall)
+        top = CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) / wall
+        above = math.ceil(float(top.max()))
+        if above > 0:
+            depth[:above][np.arange(above, dtype=np.float32)[:, None] < top] = np.inf
+        return depth
+
+    def _paint_walls(self, image: U8, wall: F32, faces: NDArray[np.int64]) -> None:
+        """Paint walls whose depth and number are known for every column."""
         edges = [0, *(np.flatnonzero(np.diff(faces)) + 1).tolist(), WIDTH]
         for start, stop in pairwise(edges):
             z = wall[[start, stop - 1]]
@@ -148,14 +161,8 @@ class Renderer:
             quad = np.clip(np.rint(np.array(corners) * 16), -(2**20), 2**20).astype(np.int32)
             grey = self._wall_greys[int(faces[start])]
             cv2.fillConvexPoly(image, quad, (grey, grey, grey), cv2.LINE_AA, shift=4)
-        depth = np.minimum(_FLOOR_DEPTH, wall)
-        top = CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) / wall
-        above = math.ceil(float(top.max()))
-        if above > 0:
-            depth[:above][np.arange(above, dtype=np.float32)[:, None] < top] = np.inf
-        return image, depth
 
-    def _draw_furniture(self, image: U8, depth: F32, camera: CameraPose, piece: Furniture) -> None:
+    def _draw_furniture(self, image: U8 | None, depth: F32, camera: CameraPose, piece: Furniture) -> None:
         solids, palette, (radius, height) = self._models[piece]
         [[x, _, z]] = camera.to_camera(np.array([[piece.x, piece.y, 0.0]])).tolist()
         window = _window(upright_bounds(x, z, radius, 0.0, height))
@@ -197,10 +204,10 @@ class Renderer:
         return np.ascontiguousarray(np.broadcast_to(rows[:, None, None], (HEIGHT, WIDTH, 3)))
 
     def _make_wall_greys(self) -> list[float]:
-        """Brightness of the walls at +x, -x, +y, -y by how they face the sun."""
+        """Brightness of the walls at +x, +y, -x, -y by how they face the sun."""
         x, y, _ = self._sun.towards
         wall = 255 * self._scenario.light.wall
-        return [min(wall * (0.895 + 0.095 * facing), 255.0) for facing in (-x, x, -y, y)]
+        return [min(wall * (0.895 + 0.095 * facing), 255.0) for facing in (-x, -y, x, y)]
 
 
 def _model(piece: Furniture) -> tuple[list[Frustum | Box], U8, tuple[float, float]]:
@@ -244,16 +251,17 @@ def _window(bounds: Bounds | None) -> Window | None:
     return (left, top, right, bottom) if left < right and top < bottom else None
 
 
-def _blend(image: U8, depth: F32, canvas: Canvas, palette: U8) -> None:
+def _blend(image: U8 | None, depth: F32, canvas: Canvas, palette: U8) -> None:
     """Lay an object over the picture wherever it is nearer than what is there."""
     left, top, right, bottom = canvas.window
     there = depth[top:bottom, left:right]
     nearer = canvas.depth < there
-    alpha = np.minimum(canvas.cover, 1.0)
-    alpha *= nearer
-    colour = palette.take((canvas.tone * _LEVELS).astype(np.int32), axis=0, mode="clip")
-    patch = image[top:bottom, left:right]
-    cv2.blendLinear(colour, patch.copy(), alpha, 1.0 - alpha, dst=patch)
+    if image is not None:
+        alpha = np.minimum(canvas.cover, 1.0)
+        alpha *= nearer
+        colour = palette.take((canvas.tone * _LEVELS).astype(np.int32), axis=0, mode="clip")
+        patch = image[top:bottom, left:right]
+        cv2.blendLinear(colour, patch.copy(), alpha, 1.0 - alpha, dst=patch)
     nearer &= canvas.inside
     np.copyto(there, canvas.depth, where=nearer)
 

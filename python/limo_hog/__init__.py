@@ -16,6 +16,7 @@ from limo_hog.exceptions import (
     ParameterError,
     ParameterTypeError,
 )
+from limo_hog.extras import MissingExtraError
 from limo_hog.hog import (
     HOGDESCRIPTOR_DEFAULT_NLEVELS,
     HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL,
@@ -30,6 +31,8 @@ from limo_hog.hog import (
     HOGDescriptor_L2Hys,
     groupRectangles,
 )
+from limo_hog.opencv import install_into_cv2
+from limo_hog.visualize import visualize
 
 __version__ = "0.1.0"
 
@@ -53,11 +56,14 @@ __all__ = [
     "ImageError",
     "ImageTypeError",
     "LimoHogError",
+    "MissingExtraError",
     "ModelFormatError",
     "ParameterError",
     "ParameterTypeError",
     "PeopleDetector",
     "get_num_threads",
     "groupRectangles",
+    "install_into_cv2",
     "set_num_threads",
+    "visualize",
 ]

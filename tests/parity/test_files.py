@@ -1,0 +1,189 @@
+"""Model files go both ways between limo-hog and OpenCV, coefficient for coefficient."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import limo_hog
+from limo_hog import HOGDescriptor, ModelFormatError
+
+ATTRIBUTES = [
+    *("winSize", "blockSize", "blockStride", "cellSize", "nbins", "derivAperture", "histogramNormType"),
+    *("L2HysThreshold", "gammaCorrection", "nlevels", "signedGradient"),
+]
+SUFFIXES = [".xml", ".yml", ".yaml", ".json", ".xml.gz", ".yml.gz", ".json.gz", ".model", ""]
+
+
+def some_model(seed: int) -> tuple[tuple[Any, ...], np.ndarray[Any, Any]]:
+    """Constructor arguments, and coefficients from the tiniest to the infinite."""
+    rng = np.random.default_rng(seed)
+    threshold, sigma = float(rng.random()), float(rng.choice([-1.0, 2.0, rng.random()]))
+    geometry = ((16, 24), (8, 8), (8, 8), (8, 8), 9, 1, sigma, 0, threshold, bool(seed % 2), 13, bool(seed % 3))
+    size = HOGDescriptor(*geometry).getDescriptorSize()
+    svm = (rng.normal(size=size + 1) * 10.0 ** rng.integers(-40, 35, size + 1)).astype(np.float32)
+    svm[:10] = [0, -0.0, 1, -1, 1e10, 3e9, 2**31, np.nan, np.inf, -np.inf]
+    return geometry, svm
+
+
+def pair_of_detectors(seed: int) -> tuple[Any, Any]:
+    geometry, svm = some_model(seed)
+    both: tuple[Any, Any] = HOGDescriptor(*geometry), cv2.HOGDescriptor(*geometry)
+    for hog in both:
+        if seed % 5:
+            hog.setSVMDetector(svm)
+    return both
+
+
+def assert_same_detector(ours: Any, theirs: Any) -> None:
+    for name in ATTRIBUTES:
+        assert getattr(ours, name) == getattr(theirs, name), name
+    assert ours.getWinSigma() == theirs.getWinSigma()
+    np.testing.assert_array_equal(ours.svmDetector, theirs.svmDetector)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_what_opencv_saves_is_loaded_whole(tmp_path: Path, suffix: str) -> None:
+    for seed in range(10):
+        _, theirs = pair_of_detectors(seed)
+        path = tmp_path / f"model{seed}{suffix}"
+        theirs.save(str(path))
+        assert_same_detector(HOGDescriptor(path), theirs)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_what_is_saved_opencv_loads_whole(tmp_path: Path, suffix: str) -> None:
+    for seed in range(10):
+        ours, _ = pair_of_detectors(seed)
+        path = tmp_path / f"model{seed}{suffix}"
+        ours.save(path)
+        theirs = cv2.HOGDescriptor()
+        assert theirs.load(str(path))
+        assert_same_detector(ours, theirs)
+
+
+@pytest.mark.parametrize("suffix", [".xml", ".yml", ".json", ".xml.gz"])
+@pytest.mark.parametrize("stem", ["model", "9lives", "a b.c", "-", "é"])
+def test_files_are_opencvs_own_to_the_byte(tmp_path: Path, suffix: str, stem: str) -> None:
+    ours, theirs = pair_of_detectors(1)
+    path = tmp_path / f"{stem}{suffix}"
+    texts = []
+    for hog in (ours, theirs):
+        hog.save(str(path))
+        data = path.read_bytes()
+        texts.append(gzip.decompress(data) if suffix.endswith("gz") else data)
+        path.unlink()
+    assert texts[0] == texts[1]
+
+
+def test_the_people_models_survive_every_format(tmp_path: Path) -> None:
+    hog = HOGDescriptor()
+    hog.setSVMDetector(hog.getDefaultPeopleDetector())
+    for suffix in SUFFIXES:
+        hog.save(tmp_path / f"people{suffix}")
+        loaded = HOGDescriptor(tmp_path / f"people{suffix}")
+        np.testing.assert_array_equal(loaded.svmDetector, hog.getDefaultPeopleDetector())
+
+
+def test_an_object_is_found_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "two.yml"
+    first, second = HOGDescriptor(), HOGDescriptor((48, 96), (16, 16), (8, 8), (8, 8), 9)
+    first.save(path, "first")
+    whole = path.read_text()
+    second.save(path, "second")
+    path.write_text(whole + path.read_text().split("---\n")[1])
+    hog = HOGDescriptor(path)
+    assert hog.winSize == (64, 128)
+    assert hog.load(path, "second") and hog.winSize == (48, 96)
+    with pytest.raises(ModelFormatError, match=r"third.*first, second"):
+        hog.load(path, "third")
+
+
+def test_a_file_written_by_hand_may_use_yamls_other_forms(tmp_path: Path) -> None:
+    path = tmp_path / "hand.yml"
+    lines = ["winSize:", "   - 16", "   - 16", "blockSize: [8, 8]   # pixels", "blockStride: [", "  8,", "  8 ]"]
+    path.write_text(
+        "%YAML:1.0\r\n---\r\nmine:\r\n   " + "\r\n   ".join([*lines, "cellSize: [8,8]", "nbins: 9", "nlevels: 3"])
+    )
+    hog = HOGDescriptor(path)
+    assert (hog.winSize, hog.blockSize, hog.blockStride, hog.nlevels) == ((16, 16), (8, 8), (8, 8), 3)
+
+
+def test_missing_values_count_as_zero_and_a_missing_detector_keeps_the_old_as_in_opencv(tmp_path: Path) -> None:
+    path = tmp_path / "bare.yml"
+    path.write_text(
+        "%YAML:1.0\n---\nbare:\n   winSize: [ 64, 128 ]\n   blockSize: [ 16, 16 ]\n   blockStride: [ 8, 8 ]\n"
+        "   cellSize: [ 8, 8 ]\n   nbins: 18\n   nlevels: 4\n"
+    )
+    hogs: tuple[Any, Any] = HOGDescriptor(), cv2.HOGDescriptor()
+    for hog in hogs:
+        hog.setSVMDetector(limo_hog.HOGDescriptor_getDefaultPeopleDetector())
+        assert hog.load(str(path))
+        assert not hog.checkDetectorSize()
+    assert_same_detector(*hogs)
+    assert (hogs[0].L2HysThreshold, hogs[0].derivAperture, hogs[0].winSigma) == (0.0, 0, 0.0)
+    with pytest.raises(limo_hog.DetectorSizeError, match=r"3781 coefficients.*7560"):
+        hogs[0].detect(np.zeros((128, 64), np.uint8))
+    assert len(hogs[0].compute(np.zeros((128, 64), np.uint8))) == 7560
+
+
+GOOD = (
+    "%YAML:1.0\n---\nh:\n   winSize: [ 16, 16 ]\n   blockSize: [ 8, 8 ]\n   blockStride: [ 8, 8 ]\n"
+    "   cellSize: [ 8, 8 ]\n   nbins: 9\n   nlevels: 4\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "told"),
+    [
+        ("", ModelFormatError, "starts with"),
+        ("PK\x03\x04", ModelFormatError, "PK"),
+        ("%YAML:1.0\n---\n", ModelFormatError, "no object"),
+        (GOOD.replace("winSize", "windowSize"), ModelFormatError, "winSize is missing"),
+        (GOOD.replace("cellSize: [ 8, 8 ]", "cellSize: [ 8 ]"), ModelFormatError, "cellSize"),
+        (GOOD.replace("nbins: 9", "nbins: nine"), ModelFormatError, "nine"),
+        (GOOD.replace("nbins: 9", "nbins: .Inf"), ModelFormatError, "nbins"),
+        (GOOD.replace("nbins: 9", "nbins: 0"), limo_hog.GeometryError, "nbins is 0"),
+        (GOOD.replace("nlevels: 4", "nlevels: 0"), limo_hog.GeometryError, "nlevels is 0"),
+        (GOOD + "   SVMDetector: [ 1., 2. ]\n", limo_hog.DetectorSizeError, "2 coefficients"),
+        ('<?xml version="1.0"?>\n<opencv_storage><a>', ModelFormatError, "damaged|holds no"),
+        ('<?xml version="1.0"?>\n<html></html>', ModelFormatError, "opencv_storage"),
+        ('{"a": {"winSize": [16, 16', ModelFormatError, "holds no"),
+        ("[1, 2]", ModelFormatError, "starts with"),
+    ],
+)
+def test_a_file_that_is_no_model_is_refused_and_changes_nothing(
+    tmp_path: Path, text: str, error: type[Exception], told: str
+) -> None:
+    path = tmp_path / "bad"
+    path.write_text(text)
+    hog = HOGDescriptor()
+    hog.setSVMDetector(hog.getDefaultPeopleDetector())
+    before = HOGDescriptor(*hog._geometry)
+    before.setSVMDetector(hog.svmDetector)
+    with pytest.raises(error, match=told):
+        hog.load(path)
+    assert hog == before
+
+
+def test_a_truncated_gzip_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "model.xml.gz"
+    HOGDescriptor().save(path)
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(ModelFormatError, match=r"model\.xml\.gz"):
+        HOGDescriptor(path)
+
+
+def test_files_that_cannot_be_read_or_written_raise_instead_of_passing_silently(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="missing"):
+        HOGDescriptor(tmp_path / "missing.yml")
+    with pytest.raises(FileNotFoundError, match="no directory"):
+        HOGDescriptor().save(tmp_path / "nowhere" / "model.yml")
+    with pytest.raises(limo_hog.ParameterError, match="a b"):
+        HOGDescriptor().save(tmp_path / "model.yml", "a b")
+    assert list(tmp_path.iterdir()) == []

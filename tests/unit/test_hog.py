@@ -1,0 +1,202 @@
+"""What HOGDescriptor offers beyond OpenCV's, and what it says to wrong arguments."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import limo_hog
+from limo_hog import HOGDescriptor, groupRectangles, visualize
+
+GEOMETRY = ((48, 96), (16, 16), (8, 8), (8, 8), 9)
+
+
+def people() -> Any:
+    hog = HOGDescriptor()
+    hog.setSVMDetector(hog.getDefaultPeopleDetector())
+    return hog
+
+
+def noise(*shape: int) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    return np.random.default_rng(1).integers(0, 256, shape, dtype=np.uint8)
+
+
+@pytest.mark.parametrize(
+    "again", [copy.copy, copy.deepcopy, lambda hog: pickle.loads(pickle.dumps(hog))], ids=["copy", "deepcopy", "pickle"]
+)
+@pytest.mark.parametrize("hog", [HOGDescriptor(), HOGDescriptor(*GEOMETRY, 1, 3.5, 0, 0.3, True, 7, True), people()])
+def test_a_copy_is_equal_and_finds_the_same(hog: HOGDescriptor, again: Any) -> None:
+    twin = again(hog)
+    assert twin == hog and hash(twin) == hash(hog) and repr(twin) == repr(hog)
+    np.testing.assert_array_equal(twin.compute(noise(140, 80)), hog.compute(noise(140, 80)))
+    twin.setSVMDetector(np.ones(hog.getDescriptorSize()))
+    assert twin != hog
+
+
+def test_a_subclass_can_be_made_used_and_pickled() -> None:
+    hog = _Named(*GEOMETRY)
+    assert isinstance(pickle.loads(pickle.dumps(hog)), _Named)
+
+
+class _Named(HOGDescriptor):
+    pass
+
+
+def test_equality_looks_at_geometry_and_detector() -> None:
+    assert HOGDescriptor(*GEOMETRY) == HOGDescriptor(*GEOMETRY)
+    assert HOGDescriptor(*GEOMETRY) != HOGDescriptor(*GEOMETRY, _gammaCorrection=True)
+    assert people() != HOGDescriptor()
+    assert HOGDescriptor() != "HOGDescriptor"
+
+
+def test_the_repr_tells_geometry_and_detector() -> None:
+    assert "winSize=(64, 128)" in repr(people()) and "3781 coefficients" in repr(people())
+    assert "no detector" in repr(HOGDescriptor())
+
+
+def test_attributes_are_read_only_and_the_detector_is_a_copy() -> None:
+    hog: Any = people()
+    for name in ("winSize", "nbins", "svmDetector", "anything"):
+        with pytest.raises(AttributeError):
+            setattr(hog, name, 1)
+    hog.svmDetector[:] = 0
+    np.testing.assert_array_equal(hog.svmDetector, hog.getDefaultPeopleDetector())
+
+
+def test_none_stands_for_every_default() -> None:
+    assert HOGDescriptor(*GEOMETRY, None, None, None, None, None, None, None) == HOGDescriptor(*GEOMETRY)
+    image = noise(200, 120)
+    for one, other in zip(
+        people().detectMultiScale(image, None, None, None, None, None),
+        people().detectMultiScale(image),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_final_threshold_is_the_old_name_of_group_threshold() -> None:
+    image = noise(200, 120)
+    for new, old in zip(
+        people().detectMultiScale(image, -3, groupThreshold=0),
+        people().detectMultiScale(image, -3, finalThreshold=0),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(new, old)
+
+
+@pytest.mark.parametrize("shape", [(3780,), (3781,), (3781, 1), (1, 3781)])
+@pytest.mark.parametrize("kind", [list, np.float64, np.float16, np.int8])
+def test_coefficients_come_as_any_row_of_numbers(shape: tuple[int, ...], kind: Any) -> None:
+    values: Any = np.arange(np.prod(shape)).reshape(shape) % 100
+    hog = HOGDescriptor()
+    hog.setSVMDetector(values.tolist() if kind is list else values.astype(kind))
+    np.testing.assert_array_equal(hog.svmDetector, values.ravel().astype(np.float32))
+    hog.setSVMDetector(None)
+    assert hog.svmDetector == ()
+
+
+def test_a_detector_of_the_wrong_length_leaves_the_old_one_in_force() -> None:
+    hog = people()
+    with pytest.raises(limo_hog.DetectorSizeError, match=r"1764 coefficients.*3780 or 3781"):
+        hog.setSVMDetector(np.ones(1764))
+    assert hog == people()
+
+
+#: Without its types, so that they can be wrong.
+untyped: Any = limo_hog
+
+WRONG: list[tuple[Any, type[Exception], str]] = [
+    (lambda: untyped.HOGDescriptor((64, 128)), TypeError, "_blockSize, _blockStride, _cellSize, _nbins"),
+    (lambda: untyped.HOGDescriptor((64.0, 128), *GEOMETRY[1:]), TypeError, "_winSize is"),
+    (lambda: untyped.HOGDescriptor((64, 128, 3), *GEOMETRY[1:]), TypeError, "_winSize is"),
+    (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 9.5), TypeError, "_nbins is 9.5"),
+    (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 0).getDescriptorSize(), ValueError, "nbins is 0"),
+    (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 300).getDescriptorSize(), ValueError, "nbins is 300"),
+    (lambda: untyped.HOGDescriptor((2**40, 8), *GEOMETRY[1:]), ValueError, "_winSize is"),
+    (lambda: people().detect(noise(200, 100), "1"), TypeError, "hitThreshold is '1'"),
+    (lambda: people().detectMultiScale(noise(200, 100), scale="1"), TypeError, "scale is '1'"),
+    (lambda: people().detect(noise(200, 100), 0, (8,)), TypeError, r"winStride is \(8,\)"),
+    (lambda: people().detect(noise(200, 100), 0, (0, 8)), ValueError, r"winStride is \(0, 8\)"),
+    (lambda: people().detect(noise(200, 100), 0, (-8, 8)), ValueError, r"winStride is \(-8, 8\)"),
+    (lambda: people().compute(noise(200, 100), locations=[(0.5, 1)]), TypeError, "locations has shape"),
+    (lambda: people().compute(noise(200, 100), locations=[[(0, 1)]]), TypeError, r"shape \(1, 1, 2\)"),
+    (lambda: people().compute(noise(200, 100), locations=[(0, 1), (2,)]), TypeError, "locations has shape"),
+    (lambda: people().setSVMDetector(["a"]), TypeError, "real numbers"),
+    (lambda: people().setSVMDetector(np.zeros((1890, 2))), TypeError, r"\(1890, 2\)"),
+    (lambda: people().setSVMDetector([[1.0], [1.0, 2.0]]), TypeError, "ragged"),
+    (lambda: untyped.groupRectangles([[0, 0, 1]], 1), TypeError, r"rectList has shape \(1, 3\)"),
+    (lambda: untyped.groupRectangles([[0.5, 0, 1, 1]], 1), TypeError, "float64"),
+    (lambda: untyped.groupRectangles([[0, 0, 1, 1]], 1.5), TypeError, "groupThreshold is 1.5"),
+    (lambda: untyped.groupRectangles([[0, 0, 1, 2**40]], 1), ValueError, "beyond"),
+    (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(36)), ValueError, "there are 36 values"),
+    (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(3780), zoom=0), ValueError, "zoom is 0"),
+]
+
+
+@pytest.mark.parametrize(("call", "kind", "told"), WRONG)
+def test_a_wrong_argument_is_named_with_what_came(call: Any, kind: type[Exception], told: str) -> None:
+    with pytest.raises(limo_hog.HogError, match=told) as caught:
+        call()
+    assert isinstance(caught.value, kind)
+
+
+def test_regions_are_searched_each_as_an_image_of_its_own() -> None:
+    image, hog = noise(400, 300), people()
+    regions = [(20, 30, 120, 200), (-50, -50, 200, 250), (280, 390, 100, 100), (1000, 0, 10, 10)]
+    boxes, scores = hog.detectROI(image, regions, -9.0, groupThreshold=0)
+    expected = []
+    for x, y, width, height in ((20, 30, 120, 200), (0, 0, 150, 200), (280, 390, 20, 10)):
+        found, weights = hog.detectMultiScale(image[y : y + height, x : x + width], -9.0, groupThreshold=0)
+        expected += [(*(box + np.array([x, y, 0, 0])), weight) for box, weight in zip(found, weights, strict=True)]
+    assert len(expected) > 0
+    np.testing.assert_array_equal(np.column_stack([boxes, scores]), expected)
+    assert hog.detectROI(image, [], -9.0) == ((), ())
+
+
+def test_arrays_given_to_compute_gradient_are_filled() -> None:
+    image, hog = noise(20, 30), HOGDescriptor()
+    grad, bins = np.zeros((20, 30, 2), np.float32), np.zeros((20, 30, 2), np.uint8)
+    found = hog.computeGradient(image, grad, bins)
+    assert found[0] is grad and found[1] is bins
+    np.testing.assert_array_equal(grad, hog.computeGradient(image, np.zeros(3, np.float32))[0])
+    assert hog.computeGradient(image, None, None, (-30, 0)) == ((), ())
+
+
+def test_a_picture_shows_vertical_strokes_where_the_window_has_a_vertical_edge() -> None:
+    window = np.zeros((128, 64), np.uint8)
+    window[:, 36:] = 255
+    hog = HOGDescriptor()
+    picture = visualize(hog, hog.compute(window), zoom=4).astype(int)
+    assert picture.shape == (512, 256, 3)
+    cell = picture[256:288, 128:160].sum(2)
+    assert cell[:, 12:20].sum() > 10 * max(cell[:8, :8].sum(), cell[12:20, 24:].sum())
+    assert picture[:, :96].sum() == 0
+
+
+def test_a_picture_of_a_detector_tells_for_from_against() -> None:
+    hog = HOGDescriptor()
+    for sign, strong, weak in ((1, 2, 0), (-1, 0, 2)):
+        picture = visualize(hog, np.full(3781, float(sign))).astype(int)
+        assert picture[..., strong].sum() > picture[..., weak].sum()
+    assert visualize(hog, np.zeros(3780)).sum() == 0
+
+
+def test_opencv_4_keeps_its_own_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    import cv2
+
+    kept = cv2.HOGDescriptor
+    monkeypatch.delattr(cv2, "groupRectangles")
+    assert limo_hog.install_into_cv2() == ["groupRectangles"]
+    assert cv2.HOGDescriptor is kept and cv2.groupRectangles is groupRectangles
+    monkeypatch.undo()
+
+
+def test_without_opencv_there_is_nothing_to_install_into(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    with pytest.raises(limo_hog.MissingExtraError, match=r"pip install limo-hog\[cv\]"):
+        limo_hog.install_into_cv2()

@@ -93,7 +93,7 @@ KINDS: dict[str, Piece] = {
     "bollard": Piece(
         solids=(
             Frustum(0, 0, 0.0, 0.70, 0.13, 0.13, _STONE),
-            Frustum(0, 0, 0.70, 0.78, 0.05, 0.05, _STONE),
+            Frustum(0, 0, 0.70, 0.82, 0.05, 0.05, _STONE),
             Frustum(0, 0, 0.78, 0.92, 0.07, 0.06, _STONE),
         ),
         footprint=Disc(0, 0, 0.13),

@@ -1,4 +1,4 @@
-"""A peer that is not ours, Cyclone DDS's C library with types from idlc, understands us and we it."""
+"""Peers that are not ours, Cyclone DDS's C library and Fast DDS, understand us and we them."""
 
 from __future__ import annotations
 
@@ -19,43 +19,64 @@ from limo_hog.ros2 import dds, messages, names
 
 HERE = Path(__file__).parent / "peer"
 
+#: How a peer is built from ros.idl, beside it, and which Debian packages that takes.
+BUILDS = {
+    "cyclone": (
+        "cyclonedds-tools, cyclonedds-dev and gcc",
+        ["idlc", "ros.idl"],
+        ["cc", "-O1", str(HERE / "peer.c"), "ros.c", "-I.", "-lddsc", "-o", "peer"],
+    ),
+    "fast": (
+        "fastddsgen, libfastrtps-dev and g++",
+        ["fastddsgen", "-replace", "ros.idl"],
+        [
+            *("c++", "-O1", "-std=c++17", str(HERE / "peer.cpp"), "ros.cxx", "rosPubSubTypes.cxx", "-I."),
+            *("-lfastrtps", "-lfastcdr", "-o", "peer"),
+        ],
+    ),
+}
 
-@pytest.fixture(scope="module")
-def peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the peer."""
-    if shutil.which("idlc") is None or shutil.which("cc") is None:
-        pytest.skip("needs Debian's cyclonedds-tools, cyclonedds-dev and a C compiler")
-    folder = tmp_path_factory.mktemp("peer")
-    subprocess.run(["idlc", str(HERE / "ros.idl")], cwd=folder, check=True)
-    source = [str(HERE / "peer.c"), "ros.c", "-I.", "-lddsc", "-o", "peer"]
-    subprocess.run(["cc", "-O1", *source], cwd=folder, check=True)
+
+def built(kind: str, folder: Path) -> Path:
+    """Build a peer."""
+    packages, generate, compile_ = BUILDS[kind]
+    if shutil.which(generate[0]) is None or shutil.which(compile_[0]) is None:
+        pytest.skip(f"needs Debian's {packages}")
+    shutil.copy(HERE / "ros.idl", folder)
+    for command in (generate, compile_):
+        subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
     return folder / "peer"
 
 
-def test_a_c_peer_receives_images_and_twists_and_its_twists_arrive(peer: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", "121")
-    environment = {**os.environ, "CYCLONEDDS_URI": dds.LOOPBACK}
+@pytest.mark.parametrize("kind", ["cyclone", pytest.param("fast", marks=pytest.mark.slow)])
+def test_a_peer_receives_every_image_and_twist_and_its_twists_arrive(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    peer = built(kind, tmp_path)
+    domain = str(121 + list(BUILDS).index(kind))
+    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
     bus = dds.Bus()
     commands = bus.subscription(names.COMMAND, names.TYPES[names.COMMAND])
     images = bus.publisher(names.IMAGE, names.TYPES[names.IMAGE])
     heard = bus.publisher("/heard", names.TYPES[names.COMMAND])
-    other = subprocess.Popen([str(peer), "121", "250"], stdout=subprocess.PIPE, text=True, env=environment)
+    environment = {**os.environ, "CYCLONEDDS_URI": dds.LOOPBACK}
+    other = subprocess.Popen([str(peer), domain, "300"], stdout=subprocess.PIPE, text=True, env=environment)
     assert other.stdout is not None
     assert other.stdout.readline() == "ready\n"
     until = time.monotonic() + 5
     while not (images.has_readers and heard.has_readers) and time.monotonic() < until:
         time.sleep(0.01)
     pixels = np.random.default_rng(0).integers(0, 255, (480, 640, 3)).astype(np.uint8)
-    for number in range(60):
-        images.publish(messages.image(number / 30, pixels))
+    for number in range(30):
+        images.publish(messages.image(number / 15, pixels))
         heard.publish(messages.twist(Twist(0.0, 0.125)))
-        time.sleep(1 / 30)
-    said = json.loads(other.communicate(timeout=60)[0])
+        time.sleep(1 / 15)
+    said = json.loads(other.communicate(timeout=60)[0].splitlines()[-1])
     assert said == {
-        "images": 60,
+        "images": 30,
         "encoding": "bgr8",
         "pixel_sum": int(pixels.sum()),
-        "twists": 60,
+        "twists": 30,
         "angular": 0.125,
     }
     got = [messages.to_twist(message) for message in commands.take()]

@@ -232,7 +232,7 @@ impl Hog {
         let Some(plan) = &self.fast else { return work(None) };
         let doubt = if exact_weights || plan.noise() > NOISE_MAX { f64::INFINITY } else { plan.noise() };
         PLANES.with(|planes| {
-            planes.fill(image);
+            simd::split(self.backend, planes, image);
             work(Some(Fast { plan, planes, doubt }))
         })
     }

@@ -127,4 +127,17 @@ pub(super) trait Lane: Copy {
     /// # Safety
     /// Rows hold `len` rounded up to 64 elements.
     unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize);
+
+    /// Splits `len` interleaved pixels of three channels, flipping every byte by 0x80.
+    /// # Safety
+    /// `from` has 3 · `len` bytes, each of `to` has `len`.
+    #[inline(always)]
+    unsafe fn split(self, from: *const u8, to: [*mut u8; 3], len: usize) {
+        for i in 0..len {
+            for (channel, to) in to.iter().enumerate() {
+                // SAFETY: the caller's promise.
+                unsafe { to.add(i).write(*from.add(3 * i + channel) ^ 0x80) };
+            }
+        }
+    }
 }

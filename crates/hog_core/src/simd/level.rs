@@ -1,7 +1,7 @@
 //! One level, from planes to hits: lattices, strips, scores, and the choice of instruction set.
 
 use crate::grid::Grid;
-use crate::image::reflect_101;
+use crate::image::{ImageView, reflect_101};
 use crate::params::Size;
 
 use super::backend::Backend;
@@ -22,7 +22,6 @@ pub(crate) struct Scratch {
     bytes: Lines,
     edge: Vec<[f32; BLOCK]>,
     masks: Vec<u32>,
-    sums: Vec<f32>,
     /// Windows found: padded x, padded y, score.
     pub(crate) found: Vec<(usize, usize, f64)>,
 }
@@ -127,6 +126,26 @@ pub(crate) fn detect(
     scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
 }
 
+/// Fills `planes` with the pixels of `image`.
+pub(crate) fn split(backend: Backend, planes: &mut Planes, image: ImageView) {
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available; who has AVX-512 has AVX2.
+        Backend::Avx512 | Backend::Avx2 => unsafe { avx2_split(planes, image) },
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: as in `neon`.
+        Backend::Neon => planes.fill(unsafe { super::neon::Neon::new() }, image),
+        _ => planes.fill(Portable, image),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2_split(planes: &mut Planes, image: ImageView) {
+    // SAFETY: this function's features are the token's.
+    planes.fill(unsafe { super::avx2::Avx2::new() }, image);
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
 fn avx512(task: Task, scratch: &mut Scratch) {
@@ -151,7 +170,7 @@ fn neon(task: Task, scratch: &mut Scratch) {
     level(l, l, task, scratch);
 }
 
-/// `tail` serves a level's last strip where that is at most half a vector of `l`.
+/// `tail` serves what is narrow: single windows, and a level's last strip if that is at most half a vector of `l`.
 #[inline(always)]
 fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) {
     scratch.image.fill(l, task.source, task.size, task.grid.pad.width, &mut scratch.shrink);
@@ -178,7 +197,7 @@ fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usi
     }
     let (cells_x, cells_y) = (width + plan.blocks.width, height + plan.blocks.height);
     let lanes = cells_x.next_multiple_of(32) + 32 + plan.blocks.width.next_multiple_of(16);
-    let Scratch { image, rows, blocks, bytes, edge, masks, sums, found, .. } = scratch;
+    let Scratch { image, rows, blocks, bytes, edge, masks, found, .. } = scratch;
     let blocks: *mut f32 = blocks.reserve((cells_y - 1) * BLOCK * lanes + 64).cast();
     let bytes = bytes.reserve((cells_y - 1) * WORDS * lanes + 64);
     rows.clear();
@@ -209,7 +228,7 @@ fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usi
     let before = found.len();
     let windows = Windows { plan, blocks, bytes, lanes, width, height };
     // SAFETY: the strips have filled the blocks of all windows; `lanes` is as wide as wanted.
-    unsafe { score(l, &windows, threshold, masks, sums, found) };
+    unsafe { score(l, tail, &windows, threshold, masks, found) };
     let mut kept = before;
     for index in before..found.len() {
         let (x, y, score) = found[index];

@@ -20,7 +20,7 @@ mod strip;
 
 pub use backend::Backend;
 pub(crate) use exact::{MulAdd, Work, run};
-pub(crate) use level::{Scratch, detect, serves};
+pub(crate) use level::{Scratch, detect, serves, split};
 pub(crate) use plan::Plan;
 pub(crate) use polar::polar;
 pub(crate) use rows::Planes;

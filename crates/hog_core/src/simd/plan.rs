@@ -8,6 +8,8 @@ use super::backend::Backend;
 use super::level;
 use super::strip::BLOCK;
 
+/// The blocks of a window's row are padded to a multiple of this, the most lanes that sum one window.
+pub(super) const ACROSS: usize = 8;
 /// Words of a block's bytes.
 pub(super) const WORDS: usize = BLOCK / 4;
 
@@ -40,7 +42,7 @@ pub(crate) struct Plan {
     pub(super) down: [[f32; 3]; 8],
     /// The same across, not doubled.
     pub(super) across: [[f32; 3]; 8],
-    /// One weight per descriptor element.
+    /// `[block row][element][block column]`, padded with zeros to [`ACROSS`] columns.
     pub(super) weights: Vec<f32>,
     pub(super) bias: f64,
     pub(super) coarse: Coarse,
@@ -97,7 +99,7 @@ impl Plan {
             blocks: spec.blocks,
             down: across.map(|row| row.map(|weight| 2.0 * weight)),
             across,
-            weights: svm.weights().to_vec(),
+            weights: by_rows(svm.weights(), spec.blocks),
             bias: f64::from(svm.bias()),
             coarse: Coarse::new(svm.weights(), spec.blocks, backend != Backend::Avx2),
             noise: 4e-7 * norms,
@@ -114,6 +116,19 @@ impl Plan {
 
 fn norm(values: &[f32]) -> f64 {
     values.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The weights, column by column of blocks, as `[block row][element][block column]`.
+fn by_rows(weights: &[f32], blocks: Size) -> Vec<f32> {
+    let padded = blocks.width.next_multiple_of(ACROSS);
+    let mut rows = vec![0.0; blocks.height * BLOCK * padded];
+    for (index, block) in weights.as_chunks::<BLOCK>().0.iter().enumerate() {
+        let (x, y) = (index / blocks.height, index % blocks.height);
+        for (i, &weight) in block.iter().enumerate() {
+            rows[(y * BLOCK + i) * padded + x] = weight;
+        }
+    }
+    rows
 }
 
 /// A block's weights along one axis: a Gaussian around 8 times a linear share.

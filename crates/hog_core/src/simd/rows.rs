@@ -23,7 +23,8 @@ pub(crate) struct Planes {
 
 impl Planes {
     /// Takes over the pixels of `image`.
-    pub(crate) fn fill(&mut self, image: ImageView) {
+    #[inline(always)]
+    pub(super) fn fill<L: Lane>(&mut self, l: L, image: ImageView) {
         let (width, height, channels) = (image.width(), image.height(), image.channels());
         let plane = width * height;
         self.size = Some(Size::new(width, height));
@@ -36,13 +37,11 @@ impl Planes {
                     *to = from ^ 0x80;
                 }
             } else {
-                let (b, rest) = self.data.split_at_mut(plane);
-                let (g, r) = rest.split_at_mut(plane);
-                let at = y * width..(y + 1) * width;
-                let to = b[at.clone()].iter_mut().zip(&mut g[at.clone()]).zip(&mut r[at]);
-                for (((b, g), r), from) in to.zip(row.as_chunks::<3>().0) {
-                    [*b, *g, *r] = from.map(|v| v ^ 0x80);
-                }
+                let (first, rest) = self.data.split_at_mut(plane);
+                let (second, third) = rest.split_at_mut(plane);
+                let to = [first, second, third].map(|plane| plane[y * width..][..width].as_mut_ptr());
+                // SAFETY: a row of the image and of each plane has `width` pixels.
+                unsafe { l.split(row.as_ptr(), to, width) };
             }
         }
     }

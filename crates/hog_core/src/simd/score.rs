@@ -3,7 +3,7 @@
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
 use super::lane::Lane;
-use super::plan::{Plan, WORDS};
+use super::plan::{ACROSS, Plan, WORDS};
 use super::strip::BLOCK;
 
 /// Rows of windows that the first look takes at a time.
@@ -23,16 +23,18 @@ pub(super) struct Windows<'a> {
 
 /// Calls `found(x, y, score)` for every window whose score may be at least `threshold`, row by row; lets others through too.
 ///
+/// `narrow` has at most [`ACROSS`] lanes.
+///
 /// # Safety
 /// `blocks` and `bytes` hold the blocks of all windows, and `lanes` is at least `width` rounded up to 32 plus the
 /// blocks of a window along x plus 16.
 #[inline(always)]
-pub(super) unsafe fn score<L: Lane>(
+pub(super) unsafe fn score<L: Lane, T: Lane>(
     l: L,
+    narrow: T,
     windows: &Windows,
     threshold: f64,
     masks: &mut Vec<u32>,
-    sums: &mut Vec<f32>,
     found: &mut Vec<(usize, usize, f64)>,
 ) {
     let plan = windows.plan;
@@ -66,38 +68,43 @@ pub(super) unsafe fn score<L: Lane>(
         if mask == 0 {
             continue;
         }
-        // SAFETY: as above.
-        unsafe { exact(l, windows, x, y, sums) };
         while mask != 0 {
-            let lane = mask.trailing_zeros() as usize;
+            let x = x + mask.trailing_zeros() as usize;
             mask &= mask - 1;
-            let of_blocks = sums[lane..].iter().step_by(L::LANES);
-            let score = of_blocks.fold(plan.bias, |score, &sum| score + f64::from(sum));
-            found.push((x + lane, y, score));
+            // SAFETY: as above.
+            found.push((x, y, unsafe { exact(narrow, windows, x, y) }));
         }
     }
 }
 
-/// The sums of every block of the windows at `x`.. of row `y`: `[block][lane]`.
+/// The score of one window. Lanes are the blocks of a row, so that one window costs no more than it must.
 #[inline(always)]
-unsafe fn exact<L: Lane>(l: L, windows: &Windows, x: usize, y: usize, sums: &mut Vec<f32>) {
-    let size = windows.plan.blocks;
-    sums.resize(size.width * size.height * L::LANES, 0.0);
-    let weights = windows.plan.weights.as_chunks::<BLOCK>().0;
-    for (index, (weights, sum)) in weights.iter().zip(sums.chunks_exact_mut(L::LANES)).enumerate() {
-        let (block_x, block_y) = (index / size.height, index % size.height);
-        let mut parts = [l.splat(0.0); 4];
-        for (i, &weight) in weights.iter().enumerate() {
-            // SAFETY: promised by the caller of `score`.
-            let value = unsafe {
-                l.load(windows.blocks.add(((y + block_y) * BLOCK + i) * windows.lanes + x + block_x))
-            };
-            parts[i % 4] = l.mul_add(value, l.splat(weight), parts[i % 4]);
+unsafe fn exact<L: Lane>(l: L, windows: &Windows, x: usize, y: usize) -> f64 {
+    let plan = windows.plan;
+    let padded = plan.blocks.width.next_multiple_of(ACROSS);
+    let mut score = plan.bias;
+    for (block_y, weights) in plan.weights.chunks_exact(BLOCK * padded).enumerate() {
+        // SAFETY: promised by the caller of `score`; lanes beyond the window's have the weight 0.
+        let blocks = unsafe { windows.blocks.add((y + block_y) * BLOCK * windows.lanes + x) };
+        for part in (0..plan.blocks.width).step_by(L::LANES) {
+            let mut sums = [l.splat(0.0); 4];
+            for (i, weights) in weights.chunks_exact(padded).enumerate() {
+                // SAFETY: as above; `padded` is a multiple of LANES.
+                let (value, weight) = unsafe {
+                    (l.load(blocks.add(i * windows.lanes + part)), l.load(weights.as_ptr().add(part)))
+                };
+                sums[i % 4] = l.mul_add(value, weight, sums[i % 4]);
+            }
+            let total = l.add(l.add(sums[0], sums[1]), l.add(sums[2], sums[3]));
+            let mut of_blocks = [0.0f32; ACROSS];
+            // SAFETY: LANES is at most ACROSS.
+            unsafe { l.store(of_blocks.as_mut_ptr(), total) };
+            for sum in &of_blocks[..L::LANES] {
+                score += f64::from(*sum);
+            }
         }
-        let total = l.add(l.add(parts[0], parts[1]), l.add(parts[2], parts[3]));
-        // SAFETY: `sum` has LANES elements.
-        unsafe { l.store(sum.as_mut_ptr(), total) };
     }
+    score
 }
 
 /// The first look at `rows` rows of `V` vectors of windows.

@@ -232,8 +232,8 @@ def test_shadow_falls_on_the_floor_beneath() -> None:
     assert shaded[470, 320, 0] == lit[470, 320, 0]
 
 
-def test_the_gait_sheet_shows_a_person_from_four_sides(tmp_path: Path) -> None:
-    """Draws 4 directions × 6 phases for people to look at: contact-sheet.png in the test's folder."""
+def test_the_gait_sheet_shows_a_person_from_four_sides() -> None:
+    """Draws 4 directions × 6 phases for people to look at: out/gait.png."""
     rows = []
     for yaw in (0.0, math.pi / 2, math.pi, math.pi / 4):
         tiles = [
@@ -242,7 +242,9 @@ def test_the_gait_sheet_shows_a_person_from_four_sides(tmp_path: Path) -> None:
         ]
         rows.append(np.hstack(tiles))
     sheet = np.vstack(rows)
-    cv2.imwrite(str(tmp_path / "contact-sheet.png"), sheet)
+    out = Path(__file__).parents[2] / "out"
+    out.mkdir(exist_ok=True)
+    cv2.imwrite(str(out / "gait.png"), sheet)
     assert sheet.shape == (1200, 960, 3)
     blue = sheet[..., 0].astype(int) - sheet[..., 2]
     shirts = [(blue[300 * r : 300 * r + 300, 160 * c : 160 * c + 160] > 30).sum() for r in range(4) for c in range(6)]

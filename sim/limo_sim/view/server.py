@@ -217,7 +217,8 @@ class View:
                     pictured = frame
                     for picture in await self._loop.run_in_executor(None, self._pictures, frame):
                         await client.send_bytes(picture)
-            await asyncio.sleep(PERIOD)
+            # A run that hurries has no time to lose on pictures nobody can follow.
+            await asyncio.sleep(PERIOD if self.pace.speed else 2 * PERIOD)
 
     def _state(self, moment: Moment) -> dict[str, Any]:
         step = moment.step

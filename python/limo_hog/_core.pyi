@@ -1,20 +1,35 @@
-"""The compiled detector. Use `limo_hog.HOGDescriptor` or `limo_hog.PeopleDetector`; this is what they call."""
+"""The compiled detector. Use `limo_hog.HOGDescriptor` or `limo_hog.PeopleDetector`; this is what they call.
+
+The method is that of Dalal and Triggs, "Histograms of Oriented Gradients for Human Detection" (CVPR 2005), with the
+roundings and the order of sums of OpenCV 4.14, so that its trained models mean the same here.
+
+Sizes, strides, paddings and places are (x, y) [px]. Images are uint8, (H, W), (H, W, 1) or (H, W, 3), in any memory
+layout and order of colours; pixels outside the array are mirrored ones (reflect-101). Calls release the GIL.
+"""
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
 
+__all__ = [
+    "Hog",
+    "available_backends",
+    "backend",
+    "daimler_people_detector",
+    "default_people_detector",
+    "get_num_threads",
+    "group_rectangles",
+    "set_num_threads",
+]
+
 _Pair: TypeAlias = tuple[int, int]
 
+@final
 class Hog:
-    """A geometry with or without an SVM: immutable, shareable between threads; calls release the GIL.
-
-    Sizes, strides and paddings are (x, y) [px]; the stride (0, 0) stands for a method's default. Images are uint8,
-    (H, W), (H, W, 1) or (H, W, 3). Raises the `HogError` family of `limo_hog.exceptions`.
-    """
+    """A geometry with or without an SVM: immutable, so that threads may share it."""
 
     def __new__(
         cls,
@@ -29,15 +44,96 @@ class Hog:
         nlevels: int,
         signed_gradient: bool,
         detector: NDArray[np.float32] | None,
-    ) -> Self: ...
+    ) -> Self:
+        """Check a geometry and take the coefficients of a linear SVM for it.
+
+        Parameters
+        ----------
+        win_size, block_size, block_stride, cell_size
+            1 to 32768 [px]. A block is a whole number of cells, a window one block and a whole number of strides.
+        nbins
+            Orientation bins of a cell, 1 to 256.
+        win_sigma
+            Gaussian of a block's pixels [px], centred on (block width, block height) / 2; where it is not positive,
+            (block width + block height) / 8.
+        l2_hys_threshold
+            Where block histograms of unit length are clipped before they are scaled to unit length again (L2-Hys).
+        gamma_correction
+            Take the gradient of the square root of the pixels.
+        nlevels
+            Most levels of a pyramid, at least 1.
+        signed_gradient
+            Bins over 2π instead of π.
+        detector
+            float32 (n,): one weight per element of a descriptor, and perhaps a bias after them; None for none.
+
+        Raises
+        ------
+        GeometryError
+            The sizes do not fit together, or a number is out of its range.
+        DetectorSizeError
+            There are other than `descriptor_len` or one more coefficients.
+        BackendError
+            The environment asks for an instruction set that is unknown or that this CPU lacks.
+        """
+
     @property
-    def descriptor_len(self) -> int: ...
+    def descriptor_len(self) -> int:
+        """Elements of one window's descriptor: bins × cells of a block × blocks of a window."""
+
     def gradient(
         self, image: NDArray[np.uint8], padding: tuple[int, int, int, int]
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]: ...
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """Magnitude of each pixel's gradient, shared linearly between the two bins whose centres are nearest.
+
+        Central differences without the factor ½, of the colour channel with the largest magnitude. Angles are those
+        of OpenCV's polynomial, within 0.02° of the arctangent; bin i is centred on (i + ½) / nbins of the range.
+
+        Parameters
+        ----------
+        padding
+            Columns and rows to add (or, if negative, to drop): left, top, right, bottom [px].
+
+        Returns
+        -------
+        shares, bins
+            float32 (H', W', 2) and uint8 (H', W', 2).
+
+        Raises
+        ------
+        ImageError, ParameterError
+            The image is none of those above; no pixel is left, or far too many.
+        """
+
     def compute(
         self, image: NDArray[np.uint8], win_stride: _Pair, padding: _Pair, locations: Sequence[_Pair] | None
-    ) -> NDArray[np.float32]: ...
+    ) -> NDArray[np.float32]:
+        """Descriptors of windows, one after the other.
+
+        A block's histograms are sums of `gradient`'s shares, weighted by the Gaussian and linearly between the
+        centres of the cells, then normalised: v / (‖v‖ + 0.1 n), clipped, v / (‖v‖ + 0.001), n being its elements.
+
+        Parameters
+        ----------
+        win_stride
+            Distance of neighbouring windows [px]; (0, 0) stands for the cell size.
+        padding
+            Mirrored border [px], rounded up to (p + g - 1) & -g, g being gcd(window stride, block stride).
+        locations
+            Top left corners of the windows, in image pixels; None for the whole grid, row by row.
+
+        Returns
+        -------
+        descriptors
+            float32 (windows × `descriptor_len`,): blocks column by column, in them cells column by column, in them
+            the bins. Zeros for a location whose window leaves the padded image.
+
+        Raises
+        ------
+        ImageError, ParameterError
+            The image is none of those above; a stride is not positive, the padding or the result too large.
+        """
+
     def detect(
         self,
         image: NDArray[np.uint8],
@@ -45,7 +141,25 @@ class Hog:
         win_stride: _Pair,
         padding: _Pair,
         locations: Sequence[_Pair] | None,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]: ...
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Windows whose score, bias + weights · descriptor, is at least `hit_threshold`.
+
+        Parameters
+        ----------
+        win_stride, padding, locations
+            As of `compute`; locations whose window leaves the padded image are passed over.
+
+        Returns
+        -------
+        places, scores
+            int32 (n, 2) top left corners in image pixels and float64 (n,), in the order of the windows.
+
+        Raises
+        ------
+        ImageError, ParameterError
+            As `compute`.
+        """
+
     def detect_multi_scale(
         self,
         image: NDArray[np.uint8],
@@ -55,14 +169,71 @@ class Hog:
         scale: float,
         group_threshold: float,
         mean_shift: bool,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]: ...
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Hits on all levels of a pyramid, grouped, and clipped to the image.
+
+        Level i is the image shrunk by scaleⁱ with OpenCV's INTER_LINEAR_EXACT, as long as the window fits.
+
+        Parameters
+        ----------
+        win_stride
+            As of `compute`, in pixels of each level; (0, 0) stands for the block stride.
+        padding
+            As of `compute`, in pixels of each level.
+        scale
+            1 or less, and what is no number, leaves the image's own size alone.
+        group_threshold
+            Truncated to an integer: similar rectangles must be more than this; below 1 every hit is returned. With
+            `mean_shift`: the least density of a mode.
+        mean_shift
+            Group by the modes of the hits' density over place and scale (Dalal's thesis, 2006, chapter 5).
+
+        Returns
+        -------
+        boxes, scores
+            int32 (n, 4) x, y, width, height [px] and float64 (n,): a group's best score or a mode's density. In the
+            order of levels and windows, whatever the number of threads.
+
+        Raises
+        ------
+        ImageError, ParameterError
+            As `compute`.
+        """
 
 def group_rectangles(
     rects: Sequence[Sequence[int]], threshold: int, eps: float
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]: ...
-def default_people_detector() -> NDArray[np.float32]: ...
-def daimler_people_detector() -> NDArray[np.float32]: ...
-def set_num_threads(count: int) -> None: ...
-def get_num_threads() -> int: ...
-def backend() -> str: ...
-def available_backends() -> list[str]: ...
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Mean rectangles of the connected components of similarity, as `cv2.groupRectangles`.
+
+    Two rectangles are similar where each edge lies within eps · (smaller width + smaller height) / 2.
+
+    Parameters
+    ----------
+    rects
+        n times x, y, width, height [px], each of 32 bits.
+    threshold
+        A component must have more members; below 1 the rectangles are returned as they came.
+
+    Returns
+    -------
+    rects, counts
+        int32 (m, 4) and int32 (m,) numbers of members.
+    """
+
+def default_people_detector() -> NDArray[np.float32]:
+    """float32 (3781,): OpenCV's people detector for windows of 64 × 128, bias last."""
+
+def daimler_people_detector() -> NDArray[np.float32]:
+    """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
+
+def set_num_threads(count: int) -> None:
+    """Let pyramids be searched by this many threads; 0 for one per core."""
+
+def get_num_threads() -> int:
+    """How many threads search a pyramid."""
+
+def backend() -> str:
+    """Instruction set that new detectors use."""
+
+def available_backends() -> list[str]:
+    """Instruction sets that this CPU has kernels for."""

@@ -1,0 +1,28 @@
+"""docs/ros2.md lists what is offered, and no more."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from limo_hog.ros2 import names
+from limo_sim.rclpy_stub.context import Context
+from limo_sim.rclpy_stub.front import _offered
+from limo_sim.rclpy_stub.world import World
+from limo_sim.scenario import Scenario
+
+TEXT = (Path(__file__).parents[2] / "docs" / "ros2.md").read_text(encoding="utf-8")
+
+
+def test_every_module_and_name_that_is_offered_is_listed() -> None:
+    world = World(Scenario(name="empty"), 0, 1.0, script=Path("node.py"), log=lambda *_: None)
+    listed = set(re.findall(r"`([A-Za-z_.]+)`", TEXT))
+    for module, content in _offered(Context(world)).items():
+        if content:
+            assert module in listed, module
+        if not module.endswith(("_msgs.msg", "builtin_interfaces.msg", "rclpy.qos")):
+            assert set(content) <= listed, (module, set(content) - listed)
+
+
+def test_every_topic_is_listed() -> None:
+    assert [topic for topic in names.TYPES if f"`{topic}`" not in TEXT] == []

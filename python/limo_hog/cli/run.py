@@ -36,6 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--seconds", type=seconds, default=60.0, metavar="S", help="simulated time (60)")
     parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
     parser.add_argument("--json", metavar="FILE", help="write the score card as JSON; - is standard output")
+    parser.add_argument("--real", action="store_true", help="with this computer's own rclpy: in real time, no score")
     add_watching(parser)
     parser.add_argument(
         "--ros-args",
@@ -48,6 +49,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Run the node and show how it went."""
+    if args.real:
+        from limo_hog.cli.real import run_real
+
+        return run_real(args)
     with needed(by="limo-hog run", what="the simulator", install="limo-sim"):
         from limo_sim.scenario import Scenario
     with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):

@@ -8,14 +8,17 @@ import sys
 import time
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from limo_hog.cli.main import main
 from limo_hog.ros2 import names
+from limo_sim.episode import Moment
 from limo_sim.rclpy_stub.script import run_script, score_of
 from limo_sim.rclpy_stub.world import StubError
 from limo_sim.scenario import Person
+from limo_sim.view.server import View
 
 from .conftest import NOBODY, STANDING, Run, node
 
@@ -48,7 +51,8 @@ def test_a_node_that_drives_moves_the_robot(run: Run) -> None:
 
 
 def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
-    outcome = run(node(FOLLOW), STANDING, 3.0)
+    moments: list[Moment] = []
+    outcome = run(node(FOLLOW), STANDING, 3.0, watch=moments.append)
     card = score_of(outcome)
     assert outcome.failure == ""
     assert card.first_detection_s == 0.0
@@ -57,7 +61,23 @@ def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
     person = outcome.episode.steps[-1].truth.people[0]
     assert person is not None
     assert abs(person.bearing) < 0.05
-    assert outcome.world.shown["camera"] == 30
+    shown = [moment for moment in moments if moment.frame is not None]
+    assert len(shown) == 30
+    for moment in shown:
+        assert moment.frame is not None
+        np.testing.assert_array_equal(moment.windows["camera"], moment.frame.image)
+
+
+def test_a_nodes_windows_are_on_the_live_page_under_their_names(run: Run) -> None:
+    moments: list[Moment] = []
+    run(node(FOLLOW), STANDING, 0.2, watch=moments.append)
+    with View(STANDING) as view:
+        window = view._pictures(moments[-1])[-1]
+    name, _, jpeg = window[1:].partition(b"\n")
+    assert (window[:1], name) == (b"w", b"camera")
+    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    assert picture.shape == (480, 640, 3)
 
 
 def test_the_same_node_gives_the_same_run(run: Run) -> None:
@@ -249,7 +269,6 @@ def test_polling_and_spinning_with_a_timeout_let_time_pass(run: Run) -> None:
 
 
 def test_a_run_leaves_python_as_it_was(run: Run) -> None:
-    cv2 = pytest.importorskip("cv2")
     before = (time.sleep, cv2.imshow, getattr(cv2, "HOGDescriptor", None), list(sys.path), list(sys.argv))
     run(node(FOLLOW), seconds=0.2)
     after = (time.sleep, cv2.imshow, getattr(cv2, "HOGDescriptor", None), list(sys.path), list(sys.argv))

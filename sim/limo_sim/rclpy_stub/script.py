@@ -121,7 +121,7 @@ def run_script(
 def score_of(outcome: Outcome) -> ScoreCard:
     """Measure a run; what hangs on detections is None where the script's detector is not one that can be watched."""
     card = score(outcome.episode)
-    if outcome.world.detector_used:
+    if outcome.world.asked:
         return card
     return replace(
         card,

@@ -14,21 +14,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-import limo_hog
 from limo_hog.detector import Detections
+from limo_hog.opencv import install_into_cv2
 from limo_sim.rclpy_stub.world import Found, World
 
 _MISSING = object()
-_HOG_NAMES = [name for name in limo_hog.__all__ if name.startswith(("HOGDescriptor", "HOGDESCRIPTOR", "groupRect"))]
 
 
 @contextmanager
 def watched_cv2(world: World) -> Iterator[None]:
     """Put windows that need no display and a detector that is watched into cv2, for one run."""
     # OpenCV 5 has no HOG: for this run, ours takes its place.
-    missing = {name: getattr(limo_hog, name) for name in _HOG_NAMES if not hasattr(cv2, name)}
-    descriptor = getattr(cv2, "HOGDescriptor", limo_hog.HOGDescriptor)
-    replacements = {**missing, **_windows(world), "HOGDescriptor": _watched(descriptor, world)}
+    installed = install_into_cv2()
+    replacements = {**_windows(world), "HOGDescriptor": _watched(cv2.HOGDescriptor, world)}
     before = {name: getattr(cv2, name, _MISSING) for name in replacements}
     for name, value in replacements.items():
         setattr(cv2, name, value)
@@ -40,6 +38,8 @@ def watched_cv2(world: World) -> Iterator[None]:
                 delattr(cv2, name)
             else:
                 setattr(cv2, name, value)
+        for name in installed:
+            delattr(cv2, name)
 
 
 def _windows(world: World) -> dict[str, Callable[..., Any]]:

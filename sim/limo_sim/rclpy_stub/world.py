@@ -117,9 +117,7 @@ class World:
         self.commands: list[Command] = []
         self.found: list[Found] = []
         self.windows: dict[str, NDArray[np.uint8]] = {}
-        self.shown: dict[str, int] = {}
         self.fault: BaseException | None = None
-        self.detector_used = False
         self.callbacks: list[Callback] = []
         self.asked: list[str] = []
         self._outlet = Outlet(self.arena)
@@ -180,11 +178,9 @@ class World:
     def show(self, window: str, picture: NDArray[np.uint8]) -> None:
         """Keep the newest picture of a window."""
         self.windows[window] = picture
-        self.shown[window] = self.shown.get(window, 0) + 1
 
     def note(self, found: Found) -> None:
         """Take what the script's detector found."""
-        self.detector_used = True
         self.found.append(found)
 
     def publish(self, topic: str, message: Message) -> None:
@@ -202,14 +198,14 @@ class World:
             if reader.topic == topic:
                 reader.offer(copy.deepcopy(message))
 
-    def episode(self, seconds: float | None = None) -> Episode:
+    def episode(self) -> Episode:
         """Return the log."""
         return Episode(
             scenario=self.arena.scenario,
             controller=self.script.name,
-            detector="hog" if self.detector_used else "the node's own",
+            detector="hog" if self.asked else "the node's own",
             seed=self.arena.seed,
-            seconds=self.time if seconds is None else seconds,
+            seconds=self.time,
             steps=tuple(self._steps),
             contacts=self.arena.contacts,
             wall_seconds=time.perf_counter() - self._began,

@@ -17,12 +17,11 @@ from limo_hog.exceptions import (
     ParameterTypeError,
 )
 from limo_hog.extras import MissingExtraError
-from limo_hog.hog import (
+from limo_hog.functions import (
     HOGDESCRIPTOR_DEFAULT_NLEVELS,
     HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL,
     HOGDESCRIPTOR_DESCR_FORMAT_ROW_BY_ROW,
     HOGDESCRIPTOR_L2HYS,
-    HOGDescriptor,
     HOGDescriptor_DEFAULT_NLEVELS,
     HOGDescriptor_DESCR_FORMAT_COL_BY_COL,
     HOGDescriptor_DESCR_FORMAT_ROW_BY_ROW,
@@ -31,6 +30,7 @@ from limo_hog.hog import (
     HOGDescriptor_L2Hys,
     groupRectangles,
 )
+from limo_hog.hog import HOGDescriptor
 from limo_hog.opencv import install_into_cv2
 from limo_hog.visualize import visualize
 

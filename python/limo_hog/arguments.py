@@ -15,6 +15,8 @@ from limo_hog.exceptions import ImageError, ImageTypeError, ParameterError, Para
 Pair = Sequence[int] | NDArray[np.integer[Any]]
 #: Many of them: (n, 2) integers.
 Pairs = Sequence[Pair] | NDArray[np.integer[Any]]
+#: OpenCV's way to say "nothing": an empty tuple where an array would stand.
+Nothing = tuple[()]
 
 _INT_MAX = 2**31 - 1
 

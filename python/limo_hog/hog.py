@@ -14,22 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limo_hog import _core, model_files
-from limo_hog.arguments import Pair, Pairs, coefficients, integer, pair, pixels, places, real, rectangles
+from limo_hog.arguments import Nothing, Pair, Pairs, coefficients, integer, pair, pixels, places, real, rectangles
 from limo_hog.exceptions import ParameterTypeError
-from limo_hog.geometry import Geometry
+from limo_hog.geometry import Attributes, Geometry
 
-#: OpenCV's way to say "nothing": an empty tuple where an array would stand.
-Nothing = tuple[()]
 #: Rectangles or places and their weights.
 Found = tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]
 
-HOGDescriptor_L2Hys = HOGDESCRIPTOR_L2HYS = 0
-HOGDescriptor_DEFAULT_NLEVELS = HOGDESCRIPTOR_DEFAULT_NLEVELS = 64
-HOGDescriptor_DESCR_FORMAT_COL_BY_COL = HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL = 0
-HOGDescriptor_DESCR_FORMAT_ROW_BY_ROW = HOGDESCRIPTOR_DESCR_FORMAT_ROW_BY_ROW = 1
 
-
-class HOGDescriptor:
+class HOGDescriptor(Attributes):
     """Histograms of oriented gradients, and a linear SVM that finds people by them.
 
     `HOGDescriptor()` has the geometry of OpenCV's default people detector, gamma correction on. With arguments the
@@ -38,7 +31,7 @@ class HOGDescriptor:
     first use: what does not fit raises `GeometryError`.
     """
 
-    __slots__ = ("_armed", "_bare", "_geometry", "_svm")
+    __slots__ = ("_armed", "_bare", "_svm")
 
     def __init__(
         self,
@@ -95,66 +88,6 @@ class HOGDescriptor:
         # The compiled detector without and with its SVM, each made when first needed.
         self._bare: _core.Hog | None = None
         self._armed: _core.Hog | None = None
-
-    @property
-    def winSize(self) -> tuple[int, int]:
-        """Detection window (width, height) [px]."""
-        return self._geometry.winSize
-
-    @property
-    def blockSize(self) -> tuple[int, int]:
-        """Block (width, height) [px]."""
-        return self._geometry.blockSize
-
-    @property
-    def blockStride(self) -> tuple[int, int]:
-        """Distance of neighbouring blocks (x, y) [px]."""
-        return self._geometry.blockStride
-
-    @property
-    def cellSize(self) -> tuple[int, int]:
-        """Cell (width, height) [px]."""
-        return self._geometry.cellSize
-
-    @property
-    def nbins(self) -> int:
-        """Orientation bins of a cell."""
-        return self._geometry.nbins
-
-    @property
-    def derivAperture(self) -> int:
-        """Kept and saved, never used, as in OpenCV."""
-        return self._geometry.derivAperture
-
-    @property
-    def winSigma(self) -> float:
-        """Gaussian window of a block [px]; -1 stands for the default, see `getWinSigma`."""
-        return self._geometry.winSigma
-
-    @property
-    def histogramNormType(self) -> int:
-        """Kept and saved, never used, as in OpenCV: L2-Hys is the only one."""
-        return self._geometry.histogramNormType
-
-    @property
-    def L2HysThreshold(self) -> float:
-        """Clipping value of the block normalisation."""
-        return self._geometry.L2HysThreshold
-
-    @property
-    def gammaCorrection(self) -> bool:
-        """Whether the gradient is taken of the square root of the pixels."""
-        return self._geometry.gammaCorrection
-
-    @property
-    def nlevels(self) -> int:
-        """Most levels of a pyramid."""
-        return self._geometry.nlevels
-
-    @property
-    def signedGradient(self) -> bool:
-        """Whether the bins cover 2π instead of π."""
-        return self._geometry.signedGradient
 
     @property
     def svmDetector(self) -> NDArray[np.float32] | Nothing:
@@ -396,7 +329,8 @@ class HOGDescriptor:
                 found, scores = self.detectMultiScale(region, hitThreshold, **options)
                 boxes.append(np.reshape(np.asarray(found, np.int32), (-1, 4)) + np.array([left, top, 0, 0], np.int32))
                 weights.append(np.asarray(scores, np.float64))
-        return (np.concatenate(boxes), np.concatenate(weights)) if len(boxes) > 1 else ((), ())
+        all_boxes = np.concatenate(boxes)
+        return (all_boxes, np.concatenate(weights)) if len(all_boxes) else ((), ())
 
     def save(self, filename: str | os.PathLike[str], objname: str = "") -> None:
         """Write geometry and detector to a file that OpenCV reads, too.
@@ -412,6 +346,8 @@ class HOGDescriptor:
         ------
         OSError
             The file cannot be written.
+        ParameterError
+            The object's name is not a letter or `_`, then letters, digits, `-` and `_`.
         """
         model_files.save(Path(filename), self._geometry, self._svm, objname)
 
@@ -504,40 +440,3 @@ def _filled(target: Any, result: Any) -> Any:
         target[...] = result
         return target
     return result
-
-
-def HOGDescriptor_getDefaultPeopleDetector() -> NDArray[np.float32]:
-    """float32 (3781,): OpenCV's people detector for the default geometry, bias last."""
-    return _core.default_people_detector()
-
-
-def HOGDescriptor_getDaimlerPeopleDetector() -> NDArray[np.float32]:
-    """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
-    return _core.daimler_people_detector()
-
-
-def groupRectangles(
-    rectList: Sequence[Sequence[int]] | NDArray[np.integer[Any]],
-    groupThreshold: SupportsIndex | None,
-    eps: SupportsFloat | None = 0.2,
-) -> tuple[NDArray[np.int32], NDArray[np.int32]] | tuple[Nothing, Nothing]:
-    """Mean rectangles of groups of similar ones.
-
-    Parameters
-    ----------
-    rectList
-        (n, 4) integers: x, y, width, height [px].
-    groupThreshold
-        A group must have more members than this to be kept; 0 or less returns all rectangles.
-    eps
-        How far apart edges of similar rectangles may lie, relative to their size.
-
-    Returns
-    -------
-    rectList, weights
-        int32 (m, 4) rectangles and int32 (m,) numbers of members; `((), ())` when none are left.
-    """
-    found, counts = _core.group_rectangles(
-        rectangles("rectList", rectList), integer("groupThreshold", groupThreshold, 0), real("eps", eps, 0.2)
-    )
-    return (found, counts) if len(found) else ((), ())

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from limo_hog import hog
+from limo_hog import functions
 from limo_hog.extras import needed
+from limo_hog.hog import HOGDescriptor
 
-#: All that left OpenCV with the HOG detector.
-CV2_NAMES = (
-    "HOGDescriptor",
+#: The functions and constants that left OpenCV with the HOG detector.
+_FUNCTIONS = (
     "HOGDescriptor_L2Hys",
     "HOGDescriptor_DEFAULT_NLEVELS",
     "HOGDescriptor_DESCR_FORMAT_COL_BY_COL",
@@ -37,7 +37,8 @@ def install_into_cv2() -> list[str]:
     """
     with needed(by="limo_hog.install_into_cv2", what="OpenCV", install="limo-hog[cv]"):
         import cv2
-    missing = [name for name in CV2_NAMES if not hasattr(cv2, name)]
+    names = {"HOGDescriptor": HOGDescriptor} | {name: getattr(functions, name) for name in _FUNCTIONS}
+    missing = [name for name in names if not hasattr(cv2, name)]
     for name in missing:
-        setattr(cv2, name, getattr(hog, name))
+        setattr(cv2, name, names[name])
     return missing

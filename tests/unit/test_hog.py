@@ -156,6 +156,7 @@ def test_regions_are_searched_each_as_an_image_of_its_own() -> None:
     assert len(expected) > 0
     np.testing.assert_array_equal(np.column_stack([boxes, scores]), expected)
     assert hog.detectROI(image, [], -9.0) == ((), ())
+    assert hog.detectROI(image, regions, 9.0) == ((), ())
 
 
 def test_arrays_given_to_compute_gradient_are_filled() -> None:

@@ -261,9 +261,9 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
         depth += half_pixel
         pixels = FOCAL_PX / depth
         cover = 0.5 * pixels * discriminant / (a * radii)
-        height = MOUNT_HEIGHT - down * depth
-        cover = np.minimum(cover, (solid.z1 - height) * pixels + 0.5)
-        np.minimum(cover, (height - solid.z0) * pixels + 0.5, out=cover)
+        below_top, above_foot = FOCAL_PX * down + 0.5, 0.5 - FOCAL_PX * down
+        cover = np.minimum(cover, (solid.z1 - MOUNT_HEIGHT) * pixels + below_top)
+        np.minimum(cover, (MOUNT_HEIGHT - solid.z0) * pixels + above_foot, out=cover)
         depth = np.where((cover > 0) & (depth > NEAR), depth, np.float32(np.nan))
     x, _, z = sun.towards
     tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -76,6 +77,8 @@ def test_unseen_people_come_to_a_stop_and_grow_uncertain() -> None:
     assert np.linalg.eigvalsh(much_later.covariance).min() > 0
 
 
-def test_an_earlier_stamp_changes_nothing() -> None:
-    track = found(5.0, 0.0, 3.0, HERE, NOISE)
-    assert predicted(track, 4.0, NOISE) is track
+def test_at_an_earlier_stamp_the_person_is_where_they_came_from() -> None:
+    track = replace(found(5.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.0, 0.5]))
+    before = predicted(track, 4.0, NOISE)
+    assert before.mean == pytest.approx([3.0, 0.5, 0.0, 0.5])
+    assert before.stamp == 4.0

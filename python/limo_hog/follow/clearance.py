@@ -52,7 +52,7 @@ def depth_points(depth: NDArray[np.float32], focal_px: float, reach: float, body
 class Margin:
     """The ground kept free around the robot's outline: an ellipse so far ahead (or behind) and beside [m]."""
 
-    ahead: float = 0.55
+    ahead: float = 0.6
     beside: float = 0.2
 
 

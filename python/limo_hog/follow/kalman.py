@@ -79,10 +79,11 @@ def found(stamp: float, bearing: float, distance: float, pose: Odometry, noise: 
 
 
 def predicted(track: Track, stamp: float, noise: Noise) -> Track:
-    """Let the person walk on until `stamp`; an earlier stamp changes nothing."""
+    """Let the person walk on until `stamp`; to an earlier one they walk back, and nothing grows more certain."""
     dt = stamp - track.stamp
     if dt <= 0:
-        return track
+        x, y, vx, vy = track.mean
+        return Track(stamp, np.array([x + dt * vx, y + dt * vy, vx, vy]), track.covariance)
     eye = np.eye(2)
     kept = math.exp(-dt / noise.persistence)
     move = np.eye(4)

@@ -7,11 +7,12 @@ where a person is. It cannot tell a person from a chair, so it may carry on a tr
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from limo_hog.follow.body import Body
-from limo_hog.follow.clearance import scan_points, to_odometry
+from limo_hog.follow.clearance import Points, scan_points, to_odometry
 from limo_hog.follow.kalman import Noise, Track, bearing_range, innovation, predicted, updated
 from limo_hog.follow.observation import Odometry, Scan
 
@@ -25,28 +26,28 @@ _REACH = 2.2
 _SPREAD = 0.1
 
 
-def felt(track: Track, scan: Scan, pose: Odometry, body: Body, noise: Noise) -> Track | None:
-    """Return the track brought up to the scan and corrected by the legs in it; None where there are none.
+@dataclass(frozen=True, slots=True)
+class Returns:
+    """What a scan has hit, float64 (N, 2) [m] in the odometry frame, and where the robot was."""
 
-    Parameters
-    ----------
-    track
-        Somebody, where they were at most at `scan.stamp`.
-    scan
-        A lidar scan.
-    pose
-        Where the robot was when the scan was taken.
-    body
-        Where the lidar sits.
-    noise
-        How people walk.
-    """
-    track = predicted(track, scan.stamp, noise)
+    stamp: float
+    points: Points
+    pose: Odometry
+
+
+def returns_of(scan: Scan, pose: Odometry, body: Body) -> Returns:
+    """Take a scan into the odometry frame; `pose` is where the robot was when it was taken."""
+    return Returns(scan.stamp, to_odometry(scan_points(scan, body), pose), pose)
+
+
+def felt(track: Track, returns: Returns, noise: Noise) -> Track | None:
+    """Return the track brought up to a scan and corrected by the legs in it; None where there are none."""
+    track = predicted(track, returns.stamp, noise)
+    pose = returns.pose
     distance = bearing_range(track, pose)[1]
     if distance > _REACH:
         return None
-    points = to_odometry(scan_points(scan, body), pose)
-    legs = points[np.hypot(*(points - track.mean[:2]).T) < _STRIDE]
+    legs = returns.points[np.hypot(*(returns.points - track.mean[:2]).T) < _STRIDE]
     if len(legs) < 2 or np.hypot(*np.ptp(legs, axis=0)) > _WIDEST:
         return None
     dx, dy = legs.mean(axis=0) - (pose.x, pose.y)

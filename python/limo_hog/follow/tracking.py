@@ -11,7 +11,7 @@ from limo_hog.follow.body import LIMO, Body
 from limo_hog.follow.clearance import Margin, free_heading, scan_points
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.kalman import Noise, bearing_range, predicted, rates
-from limo_hog.follow.legs import felt
+from limo_hog.follow.legs import Returns, felt, returns_of
 from limo_hog.follow.observation import Observation, Odometry
 from limo_hog.follow.people import (
     SMALLEST_WINDOW,
@@ -46,6 +46,10 @@ _SAME_PERSON, _HASTE = 0.5, 1.0
 _MISSES = 3
 #: How far back the robot's poses are remembered: older frames are not waited for [s].
 _POSES_FOR = 2.0
+#: How long scans are: more than a camera frame may be late [s].
+_SCANS_FOR = 1.0
+#: A scan may be so much older than the frame it is used with [s].
+_SCAN_PERIOD = 0.13
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +64,8 @@ class TrackingState:
         Number of the person who is followed; None while nobody is.
     next_number
         Number of the next new person.
-    poses
-        Where the robot was lately, oldest first.
+    poses, scans
+        Where the robot was and what the lidar hit lately, oldest first.
     stamp, period
         Stamp of the last frame and the time between the last two [s].
     since_full
@@ -78,6 +82,7 @@ class TrackingState:
     followed: int | None = None
     next_number: int = 1
     poses: tuple[Odometry, ...] = ()
+    scans: tuple[Returns, ...] = ()
     stamp: float | None = None
     period: float = 0.1
     since_full: int = 0
@@ -158,7 +163,7 @@ class TrackingController:
     search_rate: float = 0.7
     full_every: int = 15
     back_off: float = 0.15
-    margin: Margin = field(default_factory=lambda: Margin(0.6, 0.25))
+    margin: Margin = field(default_factory=lambda: Margin(0.65, 0.25))
     body: Body = LIMO
 
     def start(self) -> TrackingState:
@@ -174,7 +179,7 @@ class TrackingController:
         if person is None:
             return self._search(state)
         unseen = observation.stamp - person.seen
-        person, state = self._feel(person, state, observation, unseen)
+        person, state = self._feel(person, state, unseen)
         aim = self._aim(person, state, observation)
         motion = aim.bearing_rate if abs(aim.bearing_rate) > _STEADY else aim.bearing
         state = replace(state, turn=math.copysign(1.0, motion))
@@ -199,10 +204,14 @@ class TrackingController:
     def _remember(self, observation: Observation, state: TrackingState) -> TrackingState:
         poses = state.poses
         if observation.odometry is not None:
-            young = (pose for pose in poses if observation.odometry.stamp - pose.stamp < _POSES_FOR)
-            poses = (*young, observation.odometry)
+            recent = (pose for pose in poses if observation.odometry.stamp - pose.stamp < _POSES_FOR)
+            poses = (*recent, observation.odometry)
+        scans, scan = state.scans, observation.scan
+        if scan is not None and (not scans or scan.stamp > scans[-1].stamp):
+            young = tuple(one for one in scans if scan.stamp - one.stamp < _SCANS_FOR)
+            scans = (*young, returns_of(scan, pose_at(poses, scan.stamp), self.body))
         period = state.period if state.stamp is None else observation.stamp - state.stamp
-        return replace(state, poses=poses, stamp=observation.stamp, period=min(max(period, 0.02), 0.5))
+        return replace(state, poses=poses, scans=scans, stamp=observation.stamp, period=min(max(period, 0.02), 0.5))
 
     def _track(self, observation: Observation, state: TrackingState) -> tuple[TrackingState, dict[int, int]]:
         """Pair boxes with people; returns the new state and each found person's box, number -> index."""
@@ -229,22 +238,20 @@ class TrackingController:
                 number += 1
         return replace(state, people=tuple(people), next_number=number), boxes
 
-    def _feel(
-        self, person: Person, state: TrackingState, observation: Observation, unseen: float
-    ) -> tuple[Person, TrackingState]:
+    def _feel(self, person: Person, state: TrackingState, unseen: float) -> tuple[Person, TrackingState]:
         """Bring the followed person up to the newest scan, if their legs are in it."""
-        scan = observation.scan
-        if scan is None or not person.confirmed or scan.stamp <= person.felt:
-            return person, state
         # Legs that the camera should see a person on, and does not, are a chair's; so may be all after a while.
-        if person.misses > _MISSES or unseen > self.blind:
+        if not person.confirmed or person.misses > _MISSES or unseen > self.blind:
             return person, state
-        track = felt(person.track, scan, pose_at(state.poses, scan.stamp), self.body, self.noise)
-        if track is None:
-            return person, state
-        now = replace(person, track=track, felt=scan.stamp)
-        # What the camera follows stays at the camera's time, which may be earlier, as long as it does.
-        kept = replace(person, felt=scan.stamp) if unseen == 0 else now
+        now = person
+        for returns in state.scans:
+            # What is unseen was brought here by earlier scans; each may tell only once.
+            told = -math.inf if unseen == 0 else person.felt
+            if returns.stamp > max(told, now.track.stamp - _SCAN_PERIOD):
+                track = felt(now.track, returns, self.noise)
+                now = now if track is None else replace(now, track=track, felt=returns.stamp)
+        # Who is seen stays in the state at the camera's time, which may be well before the scans'.
+        kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = tuple(kept if one.number == person.number else one for one in state.people)
         return now, replace(state, people=people)
 

@@ -196,6 +196,11 @@ def is_new(seen: Measurement, people: Sequence[Person], pose: Odometry) -> bool:
 
 def seen_again(person: Person, seen: Measurement, pose: Odometry, noise: Noise, gate: float) -> Person:
     """Correct a person by the box that is theirs; a box beyond `gate` says that they changed their ways."""
+    window, centre = person.window, person.centre
+    if seen.range is not None:
+        # Learnt from what is not believed too: it may have been wrong from the beginning.
+        window += _SIZE_STEP * (seen.height * seen.range - window)
+        centre += _SIZE_STEP * (seen.centre * seen.range - centre)
     seen = believed(person, seen)
     if seen.range is not None and person.track.stamp - max(person.seen, person.felt) > _STALE:
         # What they did before is no guide to how they walk now.
@@ -205,10 +210,6 @@ def seen_again(person: Person, seen: Measurement, pose: Odometry, noise: Noise, 
         loose = person.track.covariance + np.diag([_SAME_PERSON**2, _SAME_PERSON**2, 1.0, 1.0])
         person = replace(person, track=replace(person.track, covariance=loose))
         fit = innovation(person.track, seen.bearing, seen.range, pose, noise)
-    window, centre = person.window, person.centre
-    if seen.range is not None:
-        window += _SIZE_STEP * (seen.height * seen.range - window)
-        centre += _SIZE_STEP * (seen.centre * seen.range - centre)
     return replace(
         judged(person, min(seen.score / _SURE, 1.0)),
         track=updated(person.track, fit),

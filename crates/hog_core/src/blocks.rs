@@ -160,7 +160,13 @@ impl<const LANES: usize> Work for CellsAbreast<'_, LANES> {
     #[inline(always)]
     fn run<M: MulAdd>(self) {
         let Self { gradient, firsts, spec, pixels, out } = self;
-        let mut sums = [[[0.0f32; LANES]; 256]; TOGETHER];
+        // Every byte is a bin's index.
+        #[expect(
+            clippy::useless_vec,
+            reason = "memory comes zeroed from the heap; an array would be copied there"
+        )]
+        let mut sums = vec![[[0.0f32; LANES]; 256]; TOGETHER];
+        let Some(sums) = sums.first_chunk_mut::<TOGETHER>() else { return };
         for (firsts, out) in firsts.chunks(TOGETHER).zip(out.chunks_mut(TOGETHER * spec.block_len)) {
             // Places without a block repeat the last.
             let firsts: [usize; TOGETHER] = std::array::from_fn(|block| firsts[block.min(firsts.len() - 1)]);
@@ -180,7 +186,7 @@ impl<const LANES: usize> Work for CellsAbreast<'_, LANES> {
                     sums[b1] = sum1;
                 }
             }
-            for (block, sums) in out.chunks_exact_mut(spec.block_len).zip(&sums) {
+            for (block, sums) in out.chunks_exact_mut(spec.block_len).zip(&*sums) {
                 for (cell, histogram) in block.chunks_exact_mut(spec.nbins).enumerate() {
                     for (value, sums) in histogram.iter_mut().zip(sums) {
                         *value = sums[cell];

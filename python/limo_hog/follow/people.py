@@ -32,6 +32,10 @@ _MISFIT = 0.35
 _STALE = 1.0
 #: A box with this score [SVM margin] is beyond doubt; pillars and cones rarely reach it.
 _SURE = 1.0
+#: Nearer than this HOG misses people too often to be held against them [m].
+_NEAR = 1.7
+#: What any box counts at least for somebody already taken for a person.
+_KNOWN = 0.6
 #: Trust from which somebody is taken for a person, and below which not any more.
 _TRUSTED, _DOUBTED = 0.7, 0.3
 #: Boxes nearer than this to a person are never somebody else [m].
@@ -158,8 +162,10 @@ def should_be_seen(person: Person, pose: Odometry, observation: Observation) -> 
     middle = observation.height / 2 + person.centre / max(distance, 0.3)
     if window < SMALLEST_WINDOW:
         return False
-    # Near by, the head and the room HOG wants above it are out of the image; who is not known yet gets no such credit.
-    if person.confirmed and not 0.48 * window <= middle <= observation.height - 0.48 * window:
+    # Near by, the head and the room HOG wants above it are out of the image, and boxes shrink to parts of the body;
+    # who is not known yet gets no such credit.
+    cut_off = not 0.48 * window <= middle <= observation.height - 0.48 * window
+    if person.confirmed and (cut_off or distance < _NEAR):
         return False
     if not (observation.region or Region(0, 0, observation.width, observation.height, window)).holds(column):
         return False
@@ -210,8 +216,10 @@ def seen_again(person: Person, seen: Measurement, pose: Odometry, noise: Noise, 
         loose = person.track.covariance + np.diag([_SAME_PERSON**2, _SAME_PERSON**2, 1.0, 1.0])
         person = replace(person, track=replace(person.track, covariance=loose))
         fit = innovation(person.track, seen.bearing, seen.range, pose, noise)
+    # Near by HOG is never sure, of a person known to be one either.
+    evidence = max(min(seen.score / _SURE, 1.0), _KNOWN if person.confirmed else 0.0)
     return replace(
-        judged(person, min(seen.score / _SURE, 1.0)),
+        judged(person, evidence),
         track=updated(person.track, fit),
         seen=person.track.stamp,
         window=window,

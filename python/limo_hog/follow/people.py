@@ -117,7 +117,7 @@ def measure(observation: Observation, body: Body) -> list[Measurement]:
 def associate(
     people: tuple[Person, ...], measurements: list[Measurement], pose: Odometry, noise: Noise, gate: float
 ) -> dict[int, int]:
-    """Pair people with boxes, the best fit first; a fit further off than `gate` (chi-squared) is none.
+    """Pair people with boxes, the confirmed and then the best fit first; beyond `gate` (chi-squared) is no fit.
 
     Returns index of the person -> index of the measurement. Every track must be at the frame's stamp.
     """
@@ -128,9 +128,9 @@ def associate(
             fit = innovation(person.track, seen.bearing, seen.range, pose, noise).distance2
             # A person who changed direction sharply is still who they were; a pillar does not.
             if fit <= gate or (person.confirmed and apart(person, seen, pose) < _SAME_PERSON):
-                fits.append((fit, who, which))
+                fits.append((not person.confirmed, fit, who, which))
     pairs: dict[int, int] = {}
-    for _, who, which in sorted(fits):
+    for _, _, who, which in sorted(fits):
         if who not in pairs and which not in pairs.values():
             pairs[who] = which
     return pairs

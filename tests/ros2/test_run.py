@@ -129,6 +129,11 @@ def test_a_bad_callback_ends_in_its_own_traceback_and_a_robot_that_stands(
     assert outcome.world.arena.odometry().linear == 0.0
 
 
+def test_ctrl_c_in_a_callback_ends_the_run_even_if_the_script_catches_it(run: Run) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        run(node("raise KeyboardInterrupt"))
+
+
 def test_a_fault_that_the_script_hides_is_found_all_the_same(run: Run) -> None:
     hidden = node("1 / 0").replace("except KeyboardInterrupt", "except Exception")
     assert "ZeroDivisionError" in run(hidden).failure

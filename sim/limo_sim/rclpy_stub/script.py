@@ -107,6 +107,9 @@ def run_script(
             world.fault = world.fault or error
         finally:
             sys.argv, sys.path[:] = argv, path
+    if isinstance(world.fault, KeyboardInterrupt):
+        # Ctrl-C in a callback is the user's, even if the script makes a good end of it.
+        raise world.fault
     if world.fault is not None:
         failed_at = world.time
         world.seconds = failed_at + _AFTERMATH

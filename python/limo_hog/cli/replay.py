@@ -55,7 +55,8 @@ class Timed:
 def run(args: argparse.Namespace) -> int:
     """Replay a recording and show the figures."""
     from limo_hog.ros2.bag import read_bag
-    from limo_hog.ros2.replay import IMAGE_TOPIC, Replayed, replay
+    from limo_hog.ros2.names import IMAGE
+    from limo_hog.ros2.replay import Replayed, replay
 
     detector = Timed(detector_named(args.detector))
     controller = controller_named(args.controller)
@@ -75,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
             labels = [f"{score:.1f}" for score in frame.found.scores]
             return annotate(frame.image, frame.found.boxes, labels, frame.target, f"{frame.stamp:.1f} s")
 
-        for frame in replay(read_bag(args.file), controller, detector, args.image or IMAGE_TOPIC):
+        for frame in replay(read_bag(args.file), controller, detector, args.image or IMAGE):
             frames.append(_compared(frame))
             if write is not None:
                 write(draw(frame))

@@ -19,10 +19,9 @@ from limo_hog.follow.safety import Guard, GuardState
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import DETECTIONS, Record, to_detections
+from limo_hog.ros2.names import IMAGE
 
 S = TypeVar("S")
-
-IMAGE_TOPIC = "/limo_camera/image"
 
 
 class ReplayError(LimoHogError):
@@ -67,7 +66,7 @@ class _Senses:
 
 
 def replay(
-    records: Iterable[Record], controller: Controller[S], detector: Detector, image_topic: str = IMAGE_TOPIC
+    records: Iterable[Record], controller: Controller[S], detector: Detector, image_topic: str = IMAGE
 ) -> Iterator[Replayed]:
     """Let a follower look at a recording; what it decides moves nothing.
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import bag_writer, detections_message
+from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
 from limo_sim.camera import FOCAL_PX
 from limo_sim.episode import Moment
 
-IMAGE, DEPTH, CAMERA_INFO = "/limo_camera/image", "/limo_camera/depth/image_raw", "/limo_camera/camera_info"
-SCAN, ODOMETRY, COMMAND, DETECTIONS = "/scan", "/odom", "/cmd_vel", "/limo_camera/detections"
+DETECTIONS = "/limo_camera/detections"
 
 
 @contextmanager

@@ -89,8 +89,8 @@ class HalfSize:
     def detect(self, image: Image) -> Detections:
         """Find people in every second pixel, each the mean of four; boxes are in the whole image."""
         height, width = image.shape[0] // 2 * 2, image.shape[1] // 2 * 2
-        quarters = image[:height, :width].reshape(height // 2, 2, width // 2, 2, -1).astype(np.uint16)
-        half = ((quarters.sum(axis=(1, 3)) + 2) // 4).astype(np.uint8)
+        rows = image[0:height:2].astype(np.uint16) + image[1:height:2]
+        half = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
         found = self.detector.detect(half)
         return Detections(found.boxes * 2, found.scores)
 

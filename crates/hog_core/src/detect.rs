@@ -131,15 +131,15 @@ impl Hog {
         Ok((gradient(image, Padding { left, top, size }, region, &self.spec), size))
     }
 
-    /// The descriptors of the windows at `locations` (all windows if none are given), one after the other.
+    /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).
     ///
-    /// A location whose window leaves the padded image has a descriptor of zeros. The stride (0, 0) is the cell size.
-    pub fn compute(
+    /// The stride (0, 0) is the cell size.
+    pub fn compute_len(
         &self,
         image: ImageView,
         search: &Search,
         locations: Option<&[(i64, i64)]>,
-    ) -> Result<Vec<f32>> {
+    ) -> Result<usize> {
         let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
         let count = locations.map_or(grid.len(), <[_]>::len);
         let elements = count.saturating_mul(self.spec.descriptor_len());
@@ -149,20 +149,34 @@ impl Hog {
                 self.spec.descriptor_len()
             )));
         }
+        Ok(elements)
+    }
+
+    /// Writes the descriptors whose elements [`Hog::compute_len`] counts, one after the other, into `out`.
+    ///
+    /// A location whose window leaves the padded image has a descriptor of zeros.
+    pub fn compute(
+        &self,
+        image: ImageView,
+        search: &Search,
+        locations: Option<&[(i64, i64)]>,
+        out: &mut [f32],
+    ) -> Result<()> {
+        let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
         let Some(locations) = locations else {
-            return Ok(reference::descriptors(image, &grid, &self.spec));
+            reference::descriptors(image, &grid, &self.spec, out);
+            return Ok(());
         };
         let places: Vec<_> = locations.iter().map(|&at| grid.to_padded(at, &self.spec)).collect();
         let inside: Vec<_> = places.iter().flatten().copied().collect();
         let mut windows = reference::Windows::new(image, &grid, &inside, &self.spec);
-        let mut out = Vec::with_capacity(elements);
-        for place in places {
+        for (place, out) in places.into_iter().zip(out.chunks_exact_mut(self.spec.descriptor_len().max(1))) {
             match place {
-                Some(at) => out.extend_from_slice(windows.descriptor(at)),
-                None => out.resize(out.len() + self.spec.descriptor_len(), 0.0),
+                Some(at) => out.copy_from_slice(windows.descriptor(at)),
+                None => out.fill(0.0),
             }
         }
-        Ok(out)
+        Ok(())
     }
 
     /// The windows that are hits, of those at `locations` (of all, if none are given), in their order.

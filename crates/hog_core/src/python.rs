@@ -150,9 +150,18 @@ impl Hog {
         padding: Pair,
         locations: Option<Vec<Pair>>,
     ) -> PyResult<Array1<'py, f32>> {
+        let py = image.py();
+        let raise = |error| raised(py, &error);
         let search = Search { hit_threshold: 0.0, win_stride, padding };
-        let found = self.on(&image, |hog, view| hog.compute(view, &search, locations.as_deref()))?;
-        Ok(PyArray1::from_vec(image.py(), found))
+        let pixels = Pixels::new(py, &image)?;
+        let (view, locations) = (pixels.view().map_err(raise)?, locations.as_deref());
+        let len = self.inner.compute_len(view, &search, locations).map_err(raise)?;
+        // In memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
+        let descriptors = PyArray1::zeros(py, len, false);
+        let mut out = descriptors.readwrite();
+        let out = out.as_slice_mut()?;
+        py.detach(|| self.inner.compute(view, &search, locations, out)).map_err(raise)?;
+        Ok(descriptors)
     }
 
     fn detect<'py>(

@@ -70,21 +70,21 @@ impl<'a> BlockRows<'a> {
 }
 
 /// The descriptors of all windows, one after the other.
-pub fn descriptors(image: ImageView, grid: &Grid, spec: &HogSpec) -> Vec<f32> {
-    let mut out = Vec::with_capacity(grid.len() * spec.descriptor_len());
+pub fn descriptors(image: ImageView, grid: &Grid, spec: &HogSpec, out: &mut [f32]) {
     if spec.descriptor_len() == 0 || grid.is_empty() {
-        return out;
+        return;
     }
     let mut blocks = BlockRows::new(image, grid, spec);
-    for j in 0..grid.windows.height {
+    let row_len = grid.windows.width * spec.descriptor_len();
+    for (j, out) in out.chunks_exact_mut(row_len).enumerate() {
         let y = j * grid.stride.height;
         blocks.advance(y);
         let rows = blocks.rows(y);
-        for i in 0..grid.windows.width {
-            blocks.window(&rows, i).for_each(|block| out.extend_from_slice(block));
+        let found = (0..grid.windows.width).flat_map(|i| blocks.window(&rows, i));
+        for (out, block) in out.chunks_exact_mut(spec.block_len).zip(found) {
+            out.copy_from_slice(block);
         }
     }
-    out
 }
 
 /// The scores of all windows, row by row.

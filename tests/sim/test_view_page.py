@@ -22,14 +22,14 @@ from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable
 
 PICTURES = Path(__file__).parents[2] / "out" / "view"
-SECONDS = 12.0
+SECONDS = 90.0  # at twice real time: longer than the browser takes to start and look
 SCENARIO = Scenario.load("workshop")
 
 
 @pytest.fixture
 def running() -> Iterator[tuple[View, Tunable[Any]]]:
     controller = Tunable(controller_named("tracking", None))
-    with View(SCENARIO, controller, pace=Pace(0)) as view:
+    with View(SCENARIO, controller, pace=Pace(2)) as view:
 
         def episode() -> None:
             # A coarse search: this is about the page.
@@ -109,6 +109,7 @@ async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
     await tab.value(set_field % "-1")
     await tab.until("document.querySelector('#complaint').textContent.includes('want a number from 0 on')")
     assert controller.parameters["target_distance"] == 2.5
+    view.pace.set_speed(0)
     await tab.value("document.querySelector('#pause').click()")
 
 

@@ -42,7 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add `score`."""
     parser = subparsers.add_parser(
         "score",
-        description="Play every scenario with every controller and several seeds, and compare: mean and 95 %% "
+        description="Play every scenario with every controller and several seeds, and compare: mean and 95 % "
         "interval of the score cards' figures.",
     )
     parser.add_argument("--scenario", nargs="+", metavar="NAME|FILE.toml", help="only these (all that come along)")

@@ -4,7 +4,7 @@ use crate::blocks::BlockWeights;
 use crate::error::{HogError, Result};
 
 /// Width and height [px] (or a stride or padding along x and y).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Size {
     /// Along x.
     pub width: usize,

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::lane::Lane;
-use super::rows::Columns;
+use super::rows::{Columns, Rows};
 
 /// Proof that the CPU has AVX2 and FMA.
 #[derive(Clone, Copy)]
@@ -244,42 +244,40 @@ impl Lane for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn mix_columns(self, source: *const u8, columns: &Columns, to: *mut i16) {
+    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns) {
+        // Two groups at a time, one in each half of a vector.
         isa!({
-            for (pair, base) in columns.base.as_chunks::<2>().0.iter().enumerate() {
-                let index = _mm256_loadu_si256(columns.index.as_ptr().add(32 * pair).cast());
-                let weight = _mm256_loadu_si256(columns.weight.as_ptr().add(32 * pair).cast());
-                let (a, b) = (source.add(base[0] as usize), source.add(base[1] as usize));
-                let near = _mm256_loadu2_m128i(b.cast(), a.cast());
-                let mut pixels = _mm256_shuffle_epi8(near, index);
-                if columns.span > 16 {
-                    // The shuffle looks at the low four bits of an index, and gives 0 where its top bit is set.
-                    let far = _mm256_loadu2_m128i(b.add(16).cast(), a.add(16).cast());
-                    let beyond = _mm256_cmpgt_epi8(index, _mm256_set1_epi8(15));
-                    pixels = _mm256_blendv_epi8(pixels, _mm256_shuffle_epi8(far, index), beyond);
-                }
-                _mm256_storeu_si256(to.add(16 * pair).cast(), _mm256_maddubs_epi16(weight, pixels));
-            }
-        });
-    }
-    #[inline(always)]
-    unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize) {
-        isa!({
-            let weights = _mm256_set1_epi32(i32::from(weight) << 16 | i32::from(256 - weight));
+            let (index, weights) = (columns.index.as_ptr(), columns.weight.as_ptr());
+            let (base, parts, one_vector) = (columns.base.as_ptr(), columns.parts, columns.span <= 16);
+            let shares = _mm256_set1_epi32(i32::from(weight) << 16 | i32::from(256 - weight));
             let bias = _mm256_set1_epi32((1 << 23) + (1 << 15)); // undoes −2¹⁵ of both rows, rounds half up
-            for at in (0..len).step_by(32) {
-                let mut halves = [_mm256_setzero_si256(); 2];
-                for (half, mixed) in halves.iter_mut().enumerate() {
-                    let a = _mm256_loadu_si256(upper.add(at + 16 * half).cast());
-                    let b = _mm256_loadu_si256(lower.add(at + 16 * half).cast());
-                    let low = _mm256_madd_epi16(_mm256_unpacklo_epi16(a, b), weights);
-                    let high = _mm256_madd_epi16(_mm256_unpackhi_epi16(a, b), weights);
+            for pair in 0..columns.base.len() / (2 * parts) {
+                let mut above = [_mm256_setzero_si256(); C];
+                let mut below = [_mm256_setzero_si256(); C];
+                for part in 2 * pair * parts..(2 * pair + 1) * parts {
+                    let other = part + parts;
+                    let index =
+                        _mm256_loadu2_m128i(index.add(16 * other).cast(), index.add(16 * part).cast());
+                    let weight =
+                        _mm256_loadu2_m128i(weights.add(16 * other).cast(), weights.add(16 * part).cast());
+                    let at = [*base.add(part) as usize, *base.add(other) as usize];
+                    for (c, rows) in rows.iter().enumerate() {
+                        let upper = pairs(rows.upper, at, index, weight, one_vector);
+                        let lower = pairs(rows.lower, at, index, weight, one_vector);
+                        above[c] = _mm256_add_epi16(above[c], upper);
+                        below[c] = _mm256_add_epi16(below[c], lower);
+                    }
+                }
+                for (c, rows) in rows.iter().enumerate() {
+                    let low = _mm256_madd_epi16(_mm256_unpacklo_epi16(above[c], below[c]), shares);
+                    let high = _mm256_madd_epi16(_mm256_unpackhi_epi16(above[c], below[c]), shares);
                     let low = _mm256_srli_epi32::<16>(_mm256_add_epi32(low, bias));
                     let high = _mm256_srli_epi32::<16>(_mm256_add_epi32(high, bias));
-                    *mixed = _mm256_packus_epi32(low, high);
+                    let words = _mm256_packus_epi32(low, high);
+                    let (first, second) =
+                        (_mm256_castsi256_si128(words), _mm256_extracti128_si256::<1>(words));
+                    _mm_storeu_si128(rows.to.add(16 * pair).cast(), _mm_packus_epi16(first, second));
                 }
-                let bytes = _mm256_packus_epi16(halves[0], halves[1]);
-                _mm256_storeu_si256(to.add(at).cast(), _mm256_permute4x64_epi64::<0xd8>(bytes));
             }
         });
     }
@@ -325,5 +323,27 @@ unsafe fn eight_words(from: *const u8) -> (__m256, __m256) {
         let a = _mm256_loadu2_m128i(from.add(32).cast(), from.cast());
         let b = _mm256_loadu2_m128i(from.add(48).cast(), from.add(16).cast());
         (_mm256_castsi256_ps(a), _mm256_castsi256_ps(b))
+    })
+}
+
+/// 8 pairs of neighbours from each of two places, brought together by shuffles, then weighed and added.
+#[inline(always)]
+unsafe fn pairs(
+    row: *const u8,
+    at: [usize; 2],
+    index: __m256i,
+    weight: __m256i,
+    one_vector: bool,
+) -> __m256i {
+    isa!({
+        let (a, b) = (row.add(at[0]), row.add(at[1]));
+        let mut pixels = _mm256_shuffle_epi8(_mm256_loadu2_m128i(b.cast(), a.cast()), index);
+        if !one_vector {
+            // The shuffle looks at the low four bits of an index.
+            let far = _mm256_loadu2_m128i(b.add(16).cast(), a.add(16).cast());
+            let beyond = _mm256_cmpgt_epi8(index, _mm256_set1_epi8(15));
+            pixels = _mm256_blendv_epi8(pixels, _mm256_shuffle_epi8(far, index), beyond);
+        }
+        _mm256_maddubs_epi16(weight, pixels)
     })
 }

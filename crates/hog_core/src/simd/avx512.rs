@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::lane::Lane;
-use super::rows::Columns;
+use super::rows::{Columns, Rows};
 
 /// Proof that the CPU has AVX-512 F, BW, VL, DQ, VBMI and VNNI.
 #[derive(Clone, Copy)]
@@ -255,44 +255,60 @@ impl Lane for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn mix_columns(self, source: *const u8, columns: &Columns, to: *mut i16) {
-        // One shuffle brings 32 pairs of neighbours together, one instruction weighs and adds them.
+    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns) {
         isa!({
-            let one_vector = columns.span <= 64;
-            for (group, &base) in columns.base.iter().enumerate() {
-                let index = _mm512_loadu_si512(columns.index.as_ptr().add(64 * group).cast());
-                let weight = _mm512_loadu_si512(columns.weight.as_ptr().add(64 * group).cast());
-                let from = source.add(base as usize);
-                let low = _mm512_loadu_si512(from.cast());
-                let pixels = if one_vector {
-                    _mm512_permutexvar_epi8(index, low)
-                } else {
-                    _mm512_permutex2var_epi8(low, index, _mm512_loadu_si512(from.add(64).cast()))
-                };
-                _mm512_storeu_si512(to.add(32 * group).cast(), _mm512_maddubs_epi16(weight, pixels));
-            }
-        });
-    }
-    #[inline(always)]
-    unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize) {
-        isa!({
-            let weights = _mm512_set1_epi32(i32::from(weight) << 16 | i32::from(256 - weight));
+            let (index, weights) = (columns.index.as_ptr(), columns.weight.as_ptr());
+            let (base, parts, one_vector) = (columns.base.as_ptr(), columns.parts, columns.span <= 64);
+            let shares = _mm512_set1_epi32(i32::from(weight) << 16 | i32::from(256 - weight));
             let bias = _mm512_set1_epi32((1 << 23) + (1 << 15)); // undoes −2¹⁵ of both rows, rounds half up
-            let order = _mm512_set_epi64(7, 5, 3, 1, 6, 4, 2, 0);
-            for at in (0..len).step_by(64) {
-                let mut halves = [_mm512_setzero_si512(); 2];
-                for (half, mixed) in halves.iter_mut().enumerate() {
-                    let a = _mm512_loadu_si512(upper.add(at + 32 * half).cast());
-                    let b = _mm512_loadu_si512(lower.add(at + 32 * half).cast());
-                    let low = _mm512_madd_epi16(_mm512_unpacklo_epi16(a, b), weights);
-                    let high = _mm512_madd_epi16(_mm512_unpackhi_epi16(a, b), weights);
-                    let low = _mm512_srli_epi32::<16>(_mm512_add_epi32(low, bias));
-                    let high = _mm512_srli_epi32::<16>(_mm512_add_epi32(high, bias));
-                    *mixed = _mm512_packus_epi32(low, high);
+            let third_bytes = _mm512_loadu_si512(THIRD_BYTES.as_ptr().cast());
+            for group in 0..columns.base.len() / parts {
+                let mut above = [_mm512_setzero_si512(); C];
+                let mut below = [_mm512_setzero_si512(); C];
+                for part in group * parts..(group + 1) * parts {
+                    let index = _mm512_loadu_si512(index.add(64 * part).cast());
+                    let weight = _mm512_loadu_si512(weights.add(64 * part).cast());
+                    let at = *base.add(part) as usize;
+                    for (c, rows) in rows.iter().enumerate() {
+                        let upper = pairs(rows.upper.add(at), index, weight, one_vector);
+                        let lower = pairs(rows.lower.add(at), index, weight, one_vector);
+                        above[c] = _mm512_add_epi16(above[c], upper);
+                        below[c] = _mm512_add_epi16(below[c], lower);
+                    }
                 }
-                let bytes = _mm512_packus_epi16(halves[0], halves[1]);
-                _mm512_storeu_si512(to.add(at).cast(), _mm512_permutexvar_epi64(order, bytes));
+                for (c, rows) in rows.iter().enumerate() {
+                    let low = _mm512_dpwssd_epi32(bias, _mm512_unpacklo_epi16(above[c], below[c]), shares);
+                    let high = _mm512_dpwssd_epi32(bias, _mm512_unpackhi_epi16(above[c], below[c]), shares);
+                    let bytes = _mm512_permutex2var_epi8(low, third_bytes, high);
+                    _mm256_storeu_si256(rows.to.add(32 * group).cast(), _mm512_castsi512_si256(bytes));
+                }
             }
         });
     }
 }
+
+/// 32 pairs of neighbours brought together by one shuffle, then weighed and added.
+#[inline(always)]
+unsafe fn pairs(from: *const u8, index: __m512i, weight: __m512i, one_vector: bool) -> __m512i {
+    isa!({
+        let low = _mm512_loadu_si512(from.cast());
+        let pixels = if one_vector {
+            _mm512_permutexvar_epi8(index, low)
+        } else {
+            _mm512_permutex2var_epi8(low, index, _mm512_loadu_si512(from.add(64).cast()))
+        };
+        _mm512_maddubs_epi16(weight, pixels)
+    })
+}
+
+/// Where `mix` finds its pixels: the third bytes of words that lie as `unpacklo` and `unpackhi` leave them.
+const THIRD_BYTES: [u8; 64] = {
+    let mut index = [0; 64];
+    let mut i = 0;
+    while i < 32 {
+        let word = i / 8 * 4 + i % 4 + if i % 8 < 4 { 0 } else { 16 };
+        index[i] = (4 * word + 2) as u8;
+        i += 1;
+    }
+    index
+};

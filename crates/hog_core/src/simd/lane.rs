@@ -1,6 +1,6 @@
 //! The vector a kernel is written for: one trait, an implementation per instruction set.
 
-use super::rows::Columns;
+use super::rows::{Columns, Rows};
 
 /// The operations of one instruction set on vectors of [`LANES`](Self::LANES) single precision numbers.
 ///
@@ -22,9 +22,9 @@ pub(super) trait Lane: Copy {
     type M: Copy;
     /// A vector of which only some lanes count; the others stand for 0.
     type Masked: Copy;
-    /// Output pixels that `mix_columns` makes at a time ...
+    /// Output pixels that `mix` makes at a time ...
     const GROUP: usize;
-    /// ... and the source pixels they may lie apart.
+    /// ... and the source pixels that a part of them may span.
     const REACH: usize;
 
     /// Vectors of windows that the first look takes at a time; 0: there is none, all windows are summed exactly.
@@ -117,16 +117,12 @@ pub(super) trait Lane: Copy {
     /// One bit per lane: whether the total is at least `least`.
     fn at_least(self, total: Self::Sum, least: i32) -> u32;
 
-    /// Mixes neighbouring pixels of a row (`source`, each byte flipped by 0x80) as `columns` tells: Σ weight·pixel −
-    /// 2¹⁵, for every output pixel (rounded up to a whole group).
+    /// One row of a level in `C` channels: neighbouring pixels of two rows (each byte flipped by 0x80) mixed as
+    /// `columns` tells, then (upper·(256 − weight) + lower·weight) / 2¹⁶, rounded half up.
     /// # Safety
-    /// The taps of `columns` and [`rows::SLACK`](super::rows::SLACK) bytes after them are readable in `source`; `to`
+    /// The taps of `columns` and [`rows::SLACK`](super::rows::SLACK) bytes after them are readable in all rows; `to`
     /// has room for all groups.
-    unsafe fn mix_columns(self, source: *const u8, columns: &Columns, to: *mut i16);
-    /// (upper·(256 − weight) + lower·weight) / 2¹⁶, rounded half up, of rows made by `mix_columns`.
-    /// # Safety
-    /// Rows hold `len` rounded up to 64 elements.
-    unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize);
+    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns);
 
     /// Splits `len` interleaved pixels of three channels, flipping every byte by 0x80.
     /// # Safety

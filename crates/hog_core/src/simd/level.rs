@@ -1,23 +1,22 @@
 //! One level, from planes to hits: lattices, strips, scores, and the choice of instruction set.
 
 use crate::grid::Grid;
-use crate::image::{ImageView, reflect_101};
+use crate::image::ImageView;
 use crate::params::Size;
 
 use super::backend::Backend;
 use super::lane::Lane;
 use super::plan::{Plan, WORDS};
 use super::portable::Portable;
-use super::rows::{LevelImage, Planes, Shrink};
+use super::rows::{Band, Planes};
 use super::score::{Windows, score};
-use super::strip::{BLOCK, Job, strip};
+use super::strip::{BLOCK, CARRY, CELL, Job, strip};
 
 /// Scratch memory of one level, used again from level to level and call to call.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    image: LevelImage,
-    shrink: Shrink,
-    rows: Vec<usize>,
+    band: Band,
+    carry: Lines,
     blocks: Lines,
     bytes: Lines,
     edge: Vec<[f32; BLOCK]>,
@@ -44,6 +43,9 @@ impl Lines {
         self.0.as_mut_ptr().cast()
     }
 }
+
+/// Bytes of pixels that the strips work on at a time: a part of the second-level cache.
+const BAND: usize = 384 << 10;
 
 /// What to look at.
 #[derive(Clone, Copy)]
@@ -173,7 +175,7 @@ fn neon(task: Task, scratch: &mut Scratch) {
 /// `tail` serves what is narrow: single windows, and a level's last strip if that is at most half a vector of `l`.
 #[inline(always)]
 fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) {
-    scratch.image.fill(l, task.source, task.size, task.grid.pad.width, &mut scratch.shrink);
+    scratch.band.begin(task.source, task.size, task.grid.pad.width, L::GROUP, L::REACH);
     let Task { grid, .. } = task;
     // Windows whose distance is no multiple of 8 lie on several lattices of blocks.
     let lattices = |stride: usize| if stride.is_multiple_of(8) { 0..1 } else { 0..2 };
@@ -186,7 +188,7 @@ fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) {
 
 #[inline(always)]
 fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usize), scratch: &mut Scratch) {
-    let Task { plan, source, size, grid, threshold } = task;
+    let Task { plan, source, grid, threshold, .. } = task;
     let along = |padded: usize, blocks: usize, origin: usize| {
         (padded - origin).checked_sub(8 * (blocks + 1)).map_or(0, |room| room / 8 + 1)
     };
@@ -197,33 +199,38 @@ fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usi
     }
     let (cells_x, cells_y) = (width + plan.blocks.width, height + plan.blocks.height);
     let lanes = cells_x.next_multiple_of(32) + 32 + plan.blocks.width.next_multiple_of(16);
-    let Scratch { image, rows, blocks, bytes, edge, masks, found, .. } = scratch;
+    let Scratch { band, carry, blocks, bytes, edge, masks, found } = scratch;
     let blocks: *mut f32 = blocks.reserve((cells_y - 1) * BLOCK * lanes + 64).cast();
     let bytes = bytes.reserve((cells_y - 1) * WORDS * lanes + 64);
-    rows.clear();
-    rows.extend((0..8 * cells_y + 2).map(|y| {
-        let y = (top + y) as i64 - 1 - grid.pad.height as i64;
-        reflect_101(y, size.height) * image.stride
-    }));
+    let carry: *mut f32 = carry.reserve(cells_x.div_ceil(L::LANES) * CARRY * L::LANES).cast();
     edge.clear();
     edge.resize(cells_y, [0.0; BLOCK]);
-    let mut origin = [image.pixels().as_ptr(); 3];
-    for (channel, origin) in origin.iter_mut().enumerate().take(source.channels()) {
-        let at = channel * image.plane + image.left + left - grid.pad.width;
-        *origin = image.pixels()[at..].as_ptr();
-    }
-    let mut job = Job { plan, origin, rows, cells_y, blocks, bytes, lanes, edge };
-    // From right to left: a strip adds to the last blocks of the strip left of it.
-    let rest = cells_x % L::LANES;
-    let mut end = cells_x - rest;
-    if rest > T::LANES {
-        strip_of(l, &mut job, end, source.channels());
-    } else if rest > 0 {
-        strip_of(tail, &mut job, end, source.channels());
-    }
-    while end > 0 {
-        end -= L::LANES;
-        strip_of(l, &mut job, end, source.channels());
+    let at_once = (BAND / (CELL * band.stride)).max(1);
+    for begin in (0..cells_y).step_by(at_once) {
+        let cells = begin..(begin + at_once).min(cells_y);
+        let above = (top + CELL * begin) as i64 - 1 - grid.pad.height as i64;
+        match source.channels() {
+            1 => band.fill::<L, 1>(l, source, above, CELL * cells.len() + 2),
+            _ => band.fill::<L, 3>(l, source, above, CELL * cells.len() + 2),
+        }
+        let mut origin = [band.pixels().as_ptr(); 3];
+        for (channel, origin) in origin.iter_mut().enumerate().take(source.channels()) {
+            *origin = band.pixels()[channel * band.plane + band.left + left - grid.pad.width..].as_ptr();
+        }
+        let stride = band.stride;
+        let mut job = Job { plan, origin, stride, cells, carry, blocks, bytes, lanes, edge };
+        // From right to left: a strip adds to the last blocks of the strip left of it.
+        let rest = cells_x % L::LANES;
+        let mut end = cells_x - rest;
+        if rest > T::LANES {
+            strip_of(l, &mut job, end, source.channels());
+        } else if rest > 0 {
+            strip_of(tail, &mut job, end, source.channels());
+        }
+        while end > 0 {
+            end -= L::LANES;
+            strip_of(l, &mut job, end, source.channels());
+        }
     }
     let before = found.len();
     let windows = Windows { plan, blocks, bytes, lanes, width, height };

@@ -3,7 +3,7 @@
 use std::arch::aarch64::*;
 
 use super::lane::Lane;
-use super::rows::Columns;
+use super::rows::{Columns, Rows};
 
 /// Proof that the CPU has NEON.
 #[derive(Clone, Copy)]
@@ -263,37 +263,31 @@ impl Lane for Neon {
     }
 
     #[inline(always)]
-    unsafe fn mix_columns(self, source: *const u8, columns: &Columns, to: *mut i16) {
-        // A table look-up brings 8 pairs of neighbours together; products of a weight (up to 255) and a signed pixel
-        // fit 16 bits, and so does the sum of a pair.
-        isa!({
-            for (group, &base) in columns.base.iter().enumerate() {
-                let from = source.add(base as usize);
-                let index = vld1q_u8(columns.index.as_ptr().add(16 * group));
-                let weight = vld1q_u8(columns.weight.as_ptr().add(16 * group));
-                let near = uint8x16x2_t(vld1q_u8(from), vld1q_u8(from.add(16)));
-                let pixels = vreinterpretq_s8_u8(vqtbl2q_u8(near, index));
-                let low = vmulq_s16(
-                    vmovl_s8(vget_low_s8(pixels)),
-                    vreinterpretq_s16_u16(vmovl_u8(vget_low_u8(weight))),
-                );
-                let high = vmulq_s16(vmovl_high_s8(pixels), vreinterpretq_s16_u16(vmovl_high_u8(weight)));
-                vst1q_s16(to.add(8 * group), vpaddq_s16(low, high));
-            }
-        });
-    }
-    #[inline(always)]
-    unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize) {
+    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns) {
         isa!({
             let bias = vdupq_n_s32((1 << 23) + (1 << 15)); // undoes −2¹⁵ of both rows, rounds half up
-            let (a, b) = (256 - weight, weight);
-            for at in (0..len).step_by(8) {
-                let (u, v) = (vld1q_s16(upper.add(at)), vld1q_s16(lower.add(at)));
-                let low = vmlal_n_s16(vmlal_n_s16(bias, vget_low_s16(u), a), vget_low_s16(v), b);
-                let high = vmlal_high_n_s16(vmlal_high_n_s16(bias, u, a), v, b);
-                let low = vshrn_n_u32::<16>(vreinterpretq_u32_s32(low));
-                let high = vshrn_n_u32::<16>(vreinterpretq_u32_s32(high));
-                vst1_u8(to.add(at), vmovn_u16(vcombine_u16(low, high)));
+            let parts = columns.parts;
+            for group in 0..columns.base.len() / parts {
+                let mut above = [vdupq_n_s16(0); C];
+                let mut below = [vdupq_n_s16(0); C];
+                for part in group * parts..(group + 1) * parts {
+                    let index = vld1q_u8(columns.index.as_ptr().add(16 * part));
+                    let weight = vld1q_u8(columns.weight.as_ptr().add(16 * part));
+                    let at = *columns.base.get_unchecked(part) as usize;
+                    for (c, rows) in rows.iter().enumerate() {
+                        above[c] = vaddq_s16(above[c], pairs(rows.upper.add(at), index, weight));
+                        below[c] = vaddq_s16(below[c], pairs(rows.lower.add(at), index, weight));
+                    }
+                }
+                for (c, rows) in rows.iter().enumerate() {
+                    let (u, v) = (above[c], below[c]);
+                    let low = vmlal_n_s16(bias, vget_low_s16(u), 256 - weight);
+                    let low = vmlal_n_s16(low, vget_low_s16(v), weight);
+                    let high = vmlal_high_n_s16(vmlal_high_n_s16(bias, u, 256 - weight), v, weight);
+                    let low = vshrn_n_u32::<16>(vreinterpretq_u32_s32(low));
+                    let high = vshrn_n_u32::<16>(vreinterpretq_u32_s32(high));
+                    vst1_u8(rows.to.add(8 * group), vmovn_u16(vcombine_u16(low, high)));
+                }
             }
         });
     }
@@ -312,4 +306,18 @@ impl Lane for Neon {
             super::portable::Portable.split(from.add(3 * whole), to.map(|to| to.add(whole)), len - whole);
         });
     }
+}
+
+/// 8 pairs of neighbours brought together by a table look-up, then weighed and added: products of a weight (up to 255)
+/// and a signed pixel fit 16 bits, and so does the sum of a pair.
+#[inline(always)]
+unsafe fn pairs(from: *const u8, index: uint8x16_t, weight: uint8x16_t) -> int16x8_t {
+    isa!({
+        let near = uint8x16x2_t(vld1q_u8(from), vld1q_u8(from.add(16)));
+        let pixels = vreinterpretq_s8_u8(vqtbl2q_u8(near, index));
+        let low =
+            vmulq_s16(vmovl_s8(vget_low_s8(pixels)), vreinterpretq_s16_u16(vmovl_u8(vget_low_u8(weight))));
+        let high = vmulq_s16(vmovl_high_s8(pixels), vreinterpretq_s16_u16(vmovl_high_u8(weight)));
+        vpaddq_s16(low, high)
+    })
 }

@@ -1,7 +1,7 @@
 //! Four lanes in plain Rust, which the compiler turns into what the architecture has for certain (SSE2 on x86-64).
 
 use super::lane::Lane;
-use super::rows::Columns;
+use super::rows::{Columns, Rows};
 
 /// No instruction set beyond the architecture's baseline.
 #[derive(Clone, Copy)]
@@ -40,7 +40,7 @@ impl Lane for Portable {
     const LANES: usize = 4;
     const WIDE: bool = false;
     const GROUP: usize = 8;
-    const REACH: usize = 256;
+    const REACH: usize = 16;
     const COARSE_VECTORS: usize = 0;
     type F = Four<f32>;
     type I = Four<u32>;
@@ -224,29 +224,30 @@ impl Lane for Portable {
     }
 
     #[inline(always)]
-    unsafe fn mix_columns(self, source: *const u8, columns: &Columns, to: *mut i16) {
-        let groups = columns.base.iter().zip(columns.index.as_chunks::<16>().0);
-        for (group, ((&base, index), weight)) in groups.zip(columns.weight.as_chunks::<16>().0).enumerate() {
-            for i in 0..8 {
-                // SAFETY: every tap lies in the source, and `to` has room for all groups: the caller's promise.
-                unsafe {
-                    let pixel = |k: usize| {
-                        i16::from((*source.add(base as usize + usize::from(index[k]))).cast_signed())
-                    };
-                    let mixed = |k: usize| pixel(k) * i16::from(weight[k]);
-                    to.add(8 * group + i).write(mixed(2 * i) + mixed(2 * i + 1));
+    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns) {
+        let shares = [256 - weight.cast_unsigned(), weight.cast_unsigned()];
+        let pairs = columns.index.as_chunks::<16>().0.iter().zip(columns.weight.as_chunks::<16>().0);
+        for (part, ((index, weight), &base)) in pairs.zip(&columns.base).enumerate() {
+            for rows in &rows {
+                // SAFETY: a part spans REACH pixels, and SLACK bytes behind a row are readable: the caller's promise.
+                let [upper, lower] = [rows.upper, rows.lower].map(|row| unsafe {
+                    row.add(base as usize).cast::<[u8; Self::REACH]>().read_unaligned()
+                });
+                let mut mixed = [0; Self::REACH];
+                for ((mixed, upper), lower) in mixed.iter_mut().zip(upper).zip(lower) {
+                    *mixed = u16::from(upper ^ 0x80) * shares[0] + u16::from(lower ^ 0x80) * shares[1];
                 }
-            }
-        }
-    }
-    #[inline(always)]
-    unsafe fn mix_rows(self, upper: *const i16, lower: *const i16, weight: i16, to: *mut u8, len: usize) {
-        let (a, b) = (256 - i32::from(weight), i32::from(weight));
-        for i in 0..len {
-            // SAFETY: the caller's promise.
-            unsafe {
-                let sum = i32::from(*upper.add(i)) * a + i32::from(*lower.add(i)) * b;
-                to.add(i).write(((sum + (1 << 23) + (1 << 15)) >> 16) as u8);
+                for i in 0..8 {
+                    if weight[2 * i] == 0 {
+                        continue; // this pixel is another part's
+                    }
+                    let share = |k: usize| {
+                        u32::from(mixed[usize::from(index[k]) % Self::REACH]) * u32::from(weight[k])
+                    };
+                    let sum = share(2 * i) + share(2 * i + 1) + (1 << 15);
+                    // SAFETY: `to` has room for all groups: the caller's promise.
+                    unsafe { rows.to.add(part / columns.parts * 8 + i).write((sum >> 16) as u8) };
+                }
             }
         }
     }

@@ -17,7 +17,7 @@ const OVERREAD: usize = 8 * 16 + 16;
 #[derive(Debug, Default)]
 pub(crate) struct Planes {
     data: Vec<u8>,
-    size: Option<Size>,
+    size: Size,
     channels: usize,
 }
 
@@ -27,7 +27,7 @@ impl Planes {
     pub(super) fn fill<L: Lane>(&mut self, l: L, image: ImageView) {
         let (width, height, channels) = (image.width(), image.height(), image.channels());
         let plane = width * height;
-        self.size = Some(Size::new(width, height));
+        self.size = Size::new(width, height);
         self.channels = channels;
         self.data.resize(plane * channels + SLACK, 0);
         for y in 0..height {
@@ -50,45 +50,58 @@ impl Planes {
         self.channels
     }
 
-    fn size(&self) -> Size {
-        self.size.unwrap_or(Size::new(0, 0))
-    }
-
     fn row(&self, channel: usize, y: usize) -> &[u8] {
-        let size = self.size();
-        &self.data[(channel * size.height + y) * size.width..]
+        &self.data[(channel * self.size.height + y) * self.size.width..]
     }
 }
 
 /// How a row is shrunk: for every output pixel two neighbours and their weights, in groups that one shuffle fills.
+///
+/// Where the pixels of a group lie further apart than a shuffle reaches, the group is a sum of several parts, each of
+/// which gives the output pixels of the others the weight 0.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
-    /// First source pixel of each group.
+    /// Parts of a group.
+    pub parts: usize,
+    /// First source pixel of each part.
     pub base: Vec<u32>,
-    /// Two offsets per output pixel, from its group's base.
+    /// Two offsets per output pixel, from its part's base.
     pub index: Vec<u8>,
     /// Two weights per output pixel, together 256.
     pub weight: Vec<u8>,
-    /// Most source pixels that a group spans.
+    /// Most source pixels that a part spans.
     pub span: usize,
     taps: Vec<Tap>,
 }
 
 impl Columns {
-    fn fill(&mut self, from: usize, to: usize, group: usize) {
+    /// Prepares to shrink rows of `from` pixels to `to`, in groups of `group` whose parts span at most `reach`.
+    fn fill(&mut self, from: usize, to: usize, group: usize, reach: usize) {
         self.taps.clear();
         self.taps.extend(taps(from, to));
-        let groups = to.div_ceil(STEP) * (STEP / group);
+        let spanned = |taps: &[Tap]| match taps {
+            [first, .., last] => last.second + 1 - first.first,
+            _ => 2,
+        };
+        self.parts = 1;
+        loop {
+            self.span = self.taps.chunks(group / self.parts).map(spanned).max().unwrap_or(0);
+            if self.span <= reach {
+                break;
+            }
+            self.parts *= 2;
+        }
+        let all = to.div_ceil(STEP) * (STEP / group) * self.parts;
         for list in [&mut self.index, &mut self.weight] {
             list.clear();
-            list.resize(2 * group * groups, 0);
+            list.resize(2 * group * all, 0);
         }
         self.base.clear();
-        self.base.resize(groups, 0);
-        self.span = 0;
-        for (g, taps) in self.taps.chunks(group).enumerate() {
+        self.base.resize(all, 0);
+        let size = group / self.parts;
+        for (part, taps) in self.taps.chunks(size).enumerate() {
             let base = taps.first().map_or(0, |tap| tap.first);
-            self.base[g] = base as u32;
+            self.base[part] = base as u32;
             for (i, tap) in taps.iter().enumerate() {
                 // A weight of 256 does not fit a byte: the one pixel then counts 255 times and once more.
                 let (first, second, weight) = match tap.weight {
@@ -96,127 +109,171 @@ impl Columns {
                     256 => (tap.second, tap.second, 1),
                     weight => (tap.first, tap.second, weight),
                 };
-                self.span = self.span.max(second - base + 1);
-                let at = 2 * (g * group + i);
+                let at = 2 * (part * group + part % self.parts * size + i);
                 self.index[at..at + 2].copy_from_slice(&[(first - base) as u8, (second - base) as u8]);
                 self.weight[at..at + 2].copy_from_slice(&[(256 - weight) as u8, weight as u8]);
             }
         }
     }
-
-    #[inline(always)]
-    fn mix<L: Lane>(&self, l: L, source: &[u8], to: &mut [i16]) {
-        if self.span <= L::REACH {
-            debug_assert!(to.len() >= L::GROUP * self.base.len());
-            // SAFETY: every tap lies in the row, behind which are SLACK bytes; `to` holds all groups.
-            unsafe { l.mix_columns(source.as_ptr(), self, to.as_mut_ptr()) }
-            return;
-        }
-        for (tap, to) in self.taps.iter().zip(to) {
-            let pixel = |at: usize| i32::from(source[at].cast_signed());
-            let weight = tap.weight as i32;
-            *to = (pixel(tap.first) * (256 - weight) + pixel(tap.second) * weight) as i16;
-        }
-    }
 }
 
-/// What shrinking needs between rows.
-#[derive(Debug, Default)]
-pub(super) struct Shrink {
-    columns: Columns,
-    mixed: [Vec<i16>; 2],
-    /// Which pixels stand left and right of a row, from the inside out.
-    mirrored: Vec<[usize; 2]>,
+/// Where a channel's row of a level comes from, and where it goes.
+#[derive(Clone, Copy)]
+pub(super) struct Rows {
+    pub upper: *const u8,
+    pub lower: *const u8,
+    pub to: *mut u8,
 }
 
-/// The planes of one level, each row mirrored outwards by the padding and one pixel more.
+/// Rows of one level, each mirrored outwards by the padding and one pixel more: as many at a time as stay in the
+/// second-level cache.
 #[derive(Debug, Default)]
-pub(super) struct LevelImage {
+pub(super) struct Band {
     data: Vec<u8>,
-    /// Bytes from row to row.
+    size: Size,
+    pad: usize,
+    /// Bytes from row to row; the channels of a row lie one after the other.
     pub stride: usize,
+    /// Bytes from channel to channel.
+    pub plane: usize,
     /// Bytes before the first pixel of a row.
     pub left: usize,
-    /// Bytes from plane to plane.
-    pub plane: usize,
+    columns: Columns,
+    /// Which two rows of the image make a row of the level; none if the level is the image.
+    down: Vec<Tap>,
 }
 
-impl LevelImage {
+impl Band {
     pub(super) fn pixels(&self) -> &[u8] {
         &self.data
     }
 
-    /// Makes the level of `size` pixels, with room for `pad` pixels of border.
-    #[inline(always)]
-    pub(super) fn fill<L: Lane>(
-        &mut self,
-        l: L,
-        source: &Planes,
-        size: Size,
-        pad: usize,
-        shrink: &mut Shrink,
-    ) {
-        self.left = (pad + 16).next_multiple_of(64);
-        self.stride = (self.left + size.width + pad + OVERREAD + STEP).next_multiple_of(64);
-        self.plane = self.stride * size.height;
-        self.data.resize(self.plane * source.channels, 0);
-        let same = size == source.size();
-        if !same {
-            shrink.columns.fill(source.size().width, size.width, L::GROUP);
+    /// Prepares for rows of the level of `size` pixels, with room for `pad` pixels of border.
+    pub(super) fn begin(&mut self, source: &Planes, size: Size, pad: usize, group: usize, reach: usize) {
+        self.size = size;
+        self.pad = pad;
+        self.left = (pad + 17).next_multiple_of(64);
+        self.plane = (self.left + size.width + pad + OVERREAD + STEP).next_multiple_of(64);
+        self.stride = self.plane * source.channels;
+        self.down.clear();
+        if size != source.size {
+            self.columns.fill(source.size.width, size.width, group, reach);
+            self.down.extend(taps(source.size.height, size.height));
         }
-        for channel in 0..source.channels {
-            if same {
-                for y in 0..size.height {
-                    let row = self.row(channel, y, size.width);
-                    for (to, from) in row.iter_mut().zip(source.row(channel, y)) {
+    }
+
+    /// Makes the rows `from..from + count` of the level, mirrored where there are none.
+    #[inline(always)]
+    pub(super) fn fill<L: Lane, const C: usize>(&mut self, l: L, source: &Planes, from: i64, count: usize) {
+        if self.data.len() < count * self.stride {
+            self.data.resize(count * self.stride, 0);
+        }
+        let Size { width, height } = self.size;
+        for (i, all) in self.data.chunks_exact_mut(self.stride).take(count).enumerate() {
+            let y = reflect_101(from + i as i64, height);
+            if let Some(tap) = self.down.get(y) {
+                let rows = std::array::from_fn(|channel| Rows {
+                    upper: source.row(channel, tap.first).as_ptr(),
+                    lower: source.row(channel, tap.second).as_ptr(),
+                    to: all[channel * self.plane + self.left..][..width.next_multiple_of(STEP)].as_mut_ptr(),
+                });
+                // SAFETY: every tap lies in its row, behind which are SLACK bytes; there is room for all groups.
+                unsafe { l.mix::<C>(rows, tap.weight as i16, &self.columns) };
+            } else {
+                for channel in 0..C {
+                    let to = &mut all[channel * self.plane + self.left..][..width];
+                    for (to, from) in to.iter_mut().zip(source.row(channel, y)) {
                         *to = from ^ 0x80;
                     }
                 }
-            } else {
-                self.shrink(l, source, channel, size, shrink);
             }
-        }
-        shrink.mirrored.clear();
-        let width = size.width;
-        let reflect = |i: usize| [reflect_101(-1 - i as i64, width), reflect_101((width + i) as i64, width)];
-        shrink.mirrored.extend((0..=pad).map(reflect));
-        for row in self.data.chunks_exact_mut(self.stride) {
-            let row = &mut row[self.left - pad - 1..][..width + 2 * (pad + 1)];
-            for (i, &[before, after]) in shrink.mirrored.iter().enumerate() {
-                row[pad - i] = row[pad + 1 + before];
-                row[pad + 1 + width + i] = row[pad + 1 + after];
+            for row in all.chunks_exact_mut(self.plane) {
+                mirror(row, self.left, width, self.pad + 1);
             }
         }
     }
+}
 
-    fn row(&mut self, channel: usize, y: usize, width: usize) -> &mut [u8] {
-        &mut self.data[channel * self.plane + y * self.stride + self.left..][..width]
+/// Continues the `width` pixels at `left` by `count` mirrored ones (or some more) on both sides.
+#[inline(always)]
+fn mirror(row: &mut [u8], left: usize, width: usize, count: usize) {
+    const AT_ONCE: usize = 16;
+    if width <= count.next_multiple_of(AT_ONCE) {
+        for i in 0..count {
+            row[left - 1 - i] = row[left + reflect_101(-1 - i as i64, width)];
+            row[left + width + i] = row[left + reflect_101((width + i) as i64, width)];
+        }
+        return;
     }
+    for i in (0..count).step_by(AT_ONCE) {
+        let (before, from) = row.split_at_mut(left);
+        let (inner, after) = from.split_at_mut(width);
+        let chunk = |at: usize| -> [u8; AT_ONCE] { std::array::from_fn(|k| inner[at + AT_ONCE - 1 - k]) };
+        before[left - i - AT_ONCE..][..AT_ONCE].copy_from_slice(&chunk(1 + i));
+        after[i..][..AT_ONCE].copy_from_slice(&chunk(width - 1 - i - AT_ONCE));
+    }
+}
 
-    #[inline(always)]
-    fn shrink<L: Lane>(&mut self, l: L, source: &Planes, channel: usize, size: Size, shrink: &mut Shrink) {
-        let Shrink { columns, mixed: [upper, lower], .. } = shrink;
-        let room = size.width.next_multiple_of(STEP);
-        upper.resize(room, 0);
-        lower.resize(room, 0);
-        let (mut upper_row, mut lower_row) = (usize::MAX, usize::MAX);
-        for (y, tap) in taps(source.size().height, size.height).enumerate() {
-            if upper_row != tap.first {
-                if lower_row == tap.first {
-                    std::mem::swap(upper, lower);
-                    lower_row = usize::MAX;
-                } else {
-                    columns.mix(l, source.row(channel, tap.first), upper);
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail")]
+mod tests {
+    use super::super::portable::Portable;
+    use super::*;
+    use crate::pyramid::resize;
+
+    /// Rows of a level, mirrored by `pad` pixels on all sides, against the reference's resize.
+    fn assert_rows<L: Lane, const C: usize>(l: L, from: Size, to: Size, pad: usize) {
+        let data: Vec<u8> = (0..from.width * from.height * C).map(|i| (i * i / 7 + 13 * i) as u8).collect();
+        let image = ImageView::new(&data, from.width, from.height, C, from.width * C).unwrap();
+        let wanted = resize(image, to).unwrap();
+        let mut planes = Planes::default();
+        planes.fill(l, image);
+        let mut band = Band::default();
+        band.begin(&planes, to, pad, L::GROUP, L::REACH);
+        let count = to.height + 2 * pad;
+        band.fill::<L, C>(l, &planes, -(pad as i64), count);
+        for y in 0..count {
+            let wanted_y = reflect_101(y as i64 - pad as i64, to.height);
+            for x in 0..to.width + 2 * pad {
+                let wanted_x = reflect_101(x as i64 - pad as i64, to.width);
+                for channel in 0..C {
+                    let found = band.pixels()[y * band.stride + channel * band.plane + band.left + x - pad];
+                    let wanted = wanted[(wanted_y * to.width + wanted_x) * C + channel];
+                    assert_eq!(found, wanted, "{from:?} to {to:?}, {C} channels, ({x}, {y})");
                 }
-                upper_row = tap.first;
             }
-            if lower_row != tap.second {
-                columns.mix(l, source.row(channel, tap.second), lower);
-                lower_row = tap.second;
-            }
-            let to = self.row(channel, y, room).as_mut_ptr();
-            // SAFETY: both rows and the level's row hold `room` elements.
-            unsafe { l.mix_rows(upper.as_ptr(), lower.as_ptr(), tap.weight as i16, to, room) };
         }
+    }
+
+    fn assert_levels<L: Lane>(l: L) {
+        for width in [1, 2, 31, 32, 33, 64, 100, 129, 1000, 3000] {
+            for shrunk in [1.0, 1.05, 1.9, 2.0, 3.7, 4.1, 8.3, 17.0, 40.0, 100.0] {
+                let from = Size::new(width, 9);
+                let to = Size::new((width as f64 / shrunk).ceil() as usize, 4);
+                assert_rows::<L, 1>(l, from, to, 9);
+                assert_rows::<L, 3>(l, from, to, 40);
+            }
+        }
+        assert_rows::<L, 3>(l, Size::new(70, 50), Size::new(70, 50), 3);
+    }
+
+    #[test]
+    fn rows_are_those_of_the_exact_resize_however_much_the_image_shrinks() {
+        assert_levels(Portable);
+        #[cfg(target_arch = "x86_64")]
+        {
+            use super::super::{avx2::Avx2, avx512::Avx512, backend::Backend};
+            if Backend::Avx2.is_available() {
+                // SAFETY: the CPU has it.
+                assert_levels(unsafe { Avx2::new() });
+            }
+            if Backend::Avx512.is_available() {
+                // SAFETY: the CPU has it.
+                assert_levels(unsafe { Avx512::new() });
+            }
+        }
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: every aarch64 CPU has it.
+        assert_levels(unsafe { super::super::neon::Neon::new() });
     }
 }

@@ -11,26 +11,30 @@
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
 use std::hint::black_box;
+use std::ops::Range;
 
 use super::lane::Lane;
 use super::plan::{Gamma, Plan};
 
 /// Pixels of a cell along one axis.
-const CELL: usize = 8;
+pub(super) const CELL: usize = 8;
 const BINS: usize = 9;
 /// Elements of a block: 2 × 2 cells.
 pub(super) const BLOCK: usize = 4 * BINS;
+/// Sums per lane that one row of cells leaves to the next.
+pub(super) const CARRY: usize = CELL * BINS * 2;
 
 /// What the strips of a level read and write.
 pub(super) struct Job<'a> {
     pub plan: &'a Plan,
-    /// The pixel at the lattice's origin, of each channel.
+    /// The pixel above the first cell's upper left one, of each channel.
     pub origin: [*const u8; 3],
-    /// For each padded row from one above the lattice's origin to one below its last cell: where it begins, relative
-    /// to the first row of the plane.
-    pub rows: &'a [usize],
-    /// Cells of the lattice along y.
-    pub cells_y: usize,
+    /// Bytes from one row of pixels to the next.
+    pub stride: usize,
+    /// Rows of cells to be added to the blocks; those above them have been.
+    pub cells: Range<usize>,
+    /// What the cells above give to the blocks they begin: [`CARRY`] numbers for each lane.
+    pub carry: *mut f32,
     /// Normalised blocks: `[block row][element][lane]`, and the same as bytes (1 stands for 255).
     pub blocks: *mut f32,
     pub bytes: *mut u32,
@@ -62,7 +66,11 @@ pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, 
     let zero = l.splat(0.0);
     // Two rows from the cell above, eight of the cell, each with one neighbour on both sides.
     let mut rows = [[[zero; CELL + 2]; CHANNELS]; CELL + 2];
-    let mut carry = [[[zero; 2]; BINS]; CELL];
+    // SAFETY: aligned room for the strip's lanes is the caller's promise; any bits are numbers.
+    let carry = unsafe { &mut *job.carry.add(CARRY * first).cast::<[[[L::F; 2]; BINS]; CELL]>() };
+    if job.cells.start == 0 {
+        *carry = [[[zero; 2]; BINS]; CELL];
+    }
     let mut sums = [[zero; CELL]; 2 * BINS];
     let mut votes = [Votes { even: zero, odd: zero, even_key: zero, odd_key: zero }; CELL];
     // SAFETY: promised by the caller.
@@ -70,10 +78,10 @@ pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, 
         fill(l, job, first, 0, &mut rows[0]);
         fill(l, job, first, 1, &mut rows[1]);
     }
-    for cell_y in 0..job.cells_y {
-        for (i, to) in rows[2..].iter_mut().enumerate() {
+    for (i, cell_y) in job.cells.clone().enumerate() {
+        for (y, to) in rows[2..].iter_mut().enumerate() {
             // SAFETY: promised by the caller.
-            unsafe { fill(l, job, first, CELL * cell_y + i + 2, to) };
+            unsafe { fill(l, job, first, CELL * i + y + 2, to) };
         }
         for phase in 0..CELL {
             for (y, votes) in votes.iter_mut().enumerate() {
@@ -89,7 +97,7 @@ pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, 
     }
 }
 
-/// The pixels of padded row `y` of every channel.
+/// The pixels of row `y` of the band, of every channel.
 #[inline(always)]
 pub(super) unsafe fn fill<L: Lane, const CHANNELS: usize>(
     l: L,
@@ -100,7 +108,7 @@ pub(super) unsafe fn fill<L: Lane, const CHANNELS: usize>(
 ) {
     for (channel, to) in to.iter_mut().enumerate() {
         // SAFETY: promised by the caller of `strip`.
-        unsafe { row(l, job.plan, job.origin[channel].add(job.rows[y] + CELL * first), to) };
+        unsafe { row(l, job.plan, job.origin[channel].add(y * job.stride + CELL * first), to) };
     }
 }
 

@@ -18,7 +18,9 @@ pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
 
 from cyclonedds import builtin
 from cyclonedds.idl import make_idl_struct, types
+from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy
+from cyclonedds.topic import Topic
 
 from limo_hog.cli.main import main
 from limo_hog.cli.topic import as_yaml
@@ -154,6 +156,35 @@ def test_a_minute_of_images_at_10_hz_comes_whole_and_within_10_ms() -> None:
     sent, came, late = exchange(60.0, 10.0)
     assert came == sent == 600
     assert late <= 0.010
+
+
+@pytest.mark.parametrize("publisher_first", [True, False])
+def test_a_driver_that_sends_with_best_effort_is_heard(publisher_first: bool) -> None:
+    listening, sending = dds.Bus(), dds.Bus()
+    qos = dds._qos(names.TYPES[names.SCAN], 10, reliable=False)
+    kind = dds.dds_type(names.TYPES[names.SCAN])
+
+    def subscribe() -> dds.Subscription:
+        return listening.subscription(names.SCAN, names.TYPES[names.SCAN])
+
+    def writer() -> Any:
+        return DataWriter(sending._participant, Topic(sending._participant, f"rt{names.SCAN}", kind), qos=qos)
+
+    if publisher_first:
+        driver = writer()
+        listening.topics(10.0, enough=lambda found: names.SCAN in found)
+        scans = subscribe()
+    else:
+        scans = subscribe()
+        driver = writer()
+    message = messages.laser_scan(Scan(1.0, np.ones(292, np.float32), -2.0, 2.0, 0.12, 8.0))
+    heard: list[Any] = []
+    until = time.monotonic() + 10
+    while not heard and time.monotonic() < until:
+        driver.write(kind(message))
+        listening.wait(0.1)
+        heard = scans.take()
+    assert len(heard[0].ranges) == 292
 
 
 def test_what_is_no_message_is_dropped_and_counted() -> None:

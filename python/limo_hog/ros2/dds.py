@@ -21,7 +21,7 @@ from limo_hog.ros2.messages import MessageError, deserialize, serialize, typesto
 with needed(by="ROS 2 over the network", what="Cyclone DDS", install="'limo-hog[ros2]'"):
     from cyclonedds import builtin
     from cyclonedds.core import InstanceState as Instance
-    from cyclonedds.core import Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
+    from cyclonedds.core import Listener, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
     from cyclonedds.domain import Domain, DomainParticipant
     from cyclonedds.idl import make_idl_struct, types
     from cyclonedds.internal import InvalidSample
@@ -110,9 +110,9 @@ def _dds_field(desc: Any) -> Any:
     return generic.array[_dds_field(item), length] if kind == Nodetype.ARRAY else generic.sequence[_dds_field(item)]
 
 
-def _qos(type_name: str, depth: int) -> Qos:
+def _qos(type_name: str, depth: int, *, reliable: bool = True) -> Qos:
     return Qos(
-        Policy.Reliability.Reliable(duration(milliseconds=100)),
+        Policy.Reliability.Reliable(duration(milliseconds=100)) if reliable else Policy.Reliability.BestEffort,
         Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
         Policy.DataRepresentation(use_cdrv0_representation=True),
@@ -139,8 +139,23 @@ class Publisher:
         self._writer.write(self._type(message))
 
 
+class _Mismatch(Listener):
+    """Notes that a publisher offers less than the reader asks for."""
+
+    def __init__(self) -> None:
+        self.seen = False
+        super().__init__()  # type: ignore[no-untyped-call]
+
+    def on_requested_incompatible_qos(self, reader: Any, status: Any) -> None:  # noqa: ARG002 — Listener's signature
+        """Note it; DDS calls from a thread of its own."""
+        self.seen = True
+
+
 class Subscription:
     """Receives messages of one topic.
+
+    Reliable, until a publisher turns up that is not, as the drivers of lidars and cameras: a reliable reader would
+    hear nothing of it.
 
     Attributes
     ----------
@@ -148,15 +163,27 @@ class Subscription:
         How many samples were no message of the topic's type.
     """
 
-    def __init__(self, participant: Any, topic: str, type_name: str, depth: int) -> None:
-        qos = _qos(type_name, depth)
-        self._depth = depth
+    def __init__(self, participant: Any, wakers: WaitSet, topic: str, type_name: str, depth: int) -> None:
+        self._participant, self._wakers, self._type_name, self._depth = participant, wakers, type_name, depth
+        self._topic = Topic(participant, _PREFIX + topic, dds_type(type_name))
+        self._mismatch = _Mismatch()
         self.dropped = 0
-        self.reader = DataReader(participant, Topic(participant, _PREFIX + topic, dds_type(type_name)), qos=qos)
+        self._open(reliable=True)
+
+    def _open(self, *, reliable: bool) -> None:
+        qos = _qos(self._type_name, self._depth, reliable=reliable)
+        listener = self._mismatch if reliable else None
+        self._reader = DataReader(self._participant, self._topic, qos=qos, listener=listener)
+        self._unread = ReadCondition(self._reader, ViewState.Any | SampleState.NotRead | Instance.Any)
+        self._wakers.attach(self._unread)
 
     def take(self) -> list[Any]:
         """Return the messages that have come since, oldest first."""
-        samples = self.reader.take(N=max(self._depth, 1))
+        if self._mismatch.seen:
+            self._mismatch.seen = False
+            self._wakers.detach(self._unread)
+            self._open(reliable=False)
+        samples = self._reader.take(N=max(self._depth, 1))
         messages = [sample.message for sample in samples if not isinstance(sample, InvalidSample)]
         good = [message for message in messages if message is not None]
         self.dropped += len(messages) - len(good)
@@ -183,7 +210,6 @@ class Bus:
         except Exception as error:
             raise BusError(f"DDS does not start in domain {self.domain}: {error}") from error
         self._wakers = WaitSet(self._participant)
-        self._watched: list[ReadCondition] = []
 
     def publisher(self, topic: str, type_name: str, depth: int = 10) -> Publisher:
         """Begin to publish."""
@@ -191,11 +217,7 @@ class Bus:
 
     def subscription(self, topic: str, type_name: str, depth: int = 10) -> Subscription:
         """Begin to listen; `wait` wakes up for it."""
-        subscription = Subscription(self._participant, topic, type_name, depth)
-        condition = ReadCondition(subscription.reader, ViewState.Any | SampleState.NotRead | Instance.Any)
-        self._wakers.attach(condition)
-        self._watched.append(condition)
-        return subscription
+        return Subscription(self._participant, self._wakers, topic, type_name, depth)
 
     def wait(self, seconds: float) -> None:
         """Return when a subscription has something, or after so long."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -27,6 +28,8 @@ from limo_hog.cli.topic import as_yaml
 from limo_hog.follow.observation import Scan
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import dds, follower, messages, names
+from limo_sim.arena import Arena
+from limo_sim.scenario import Scenario
 
 TWIST = "geometry_msgs/msg/Twist"
 
@@ -253,6 +256,33 @@ def test_a_follower_without_a_robot_says_so(
     monkeypatch.setattr(follower, "SILENT_AFTER", 0.3)
     assert main(["follow", "--ros2", "--seconds", "5"]) == 1
     assert "nobody publishes /limo_camera/image" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["compressed", "mono8", "rgb8"])
+def test_the_follower_reads_whatever_pictures_the_camera_sends(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    image = Arena(Scenario.load("standing"), 0).frame().image
+    message: Any
+    if kind == "compressed":
+        topic, message = names.IMAGE_COMPRESSED, messages.compressed_image(1.0, image)
+    else:
+        topic, message = names.IMAGE, messages.image(1.0, image[..., ::-1] if kind == "rgb8" else image[..., 1])
+        message.encoding = kind
+    with publishing(topic, message):
+        assert main(["follow", "--ros2", "--seconds", "1.5", "--json", "-"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["frames"] >= 5
+    assert report["found"] == report["frames"]
+
+
+def test_a_picture_of_a_kind_that_is_not_read_is_counted_and_the_robot_given_up(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(follower, "SILENT_AFTER", 1.0)
+    message = messages.compressed_image(1.0, np.zeros((8, 8, 3), np.uint8))
+    message.data = message.data[:20]
+    with publishing(names.IMAGE_COMPRESSED, message):
+        assert main(["follow", "--ros2", "--seconds", "5"]) == 1
+    assert "no picture for 1 s" in capsys.readouterr().err
 
 
 def test_two_processes_close_the_loop(capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,7 +21,7 @@ from limo_hog.follow.safety import Guard
 from limo_hog.follow.twist import Twist
 from limo_hog.imaging.drawing import annotate
 from limo_hog.ros2 import messages, names
-from limo_hog.ros2.dds import Bus
+from limo_hog.ros2.dds import Bus, Endpoints
 from limo_hog.ros2.messages import MessageError
 
 S = TypeVar("S")
@@ -63,13 +63,38 @@ class Report:
     modes: dict[str, int] = field(default_factory=dict)
 
 
-class Senses:
-    """The newest of every sensor."""
+def camera_topic(bus: Bus) -> str:
+    """Wait for a camera; returns its raw images' topic or, where there are none, its compressed ones'.
 
-    def __init__(self, bus: Bus) -> None:
+    Raises
+    ------
+    SilentRobotError
+        If no camera turns up within 10 s.
+    """
+
+    def offered(topic: str, found: dict[str, Endpoints]) -> bool:
+        return topic in found and found[topic].publishers > 0
+
+    def either(found: dict[str, Endpoints]) -> bool:
+        return offered(names.IMAGE, found) or offered(names.IMAGE_COMPRESSED, found)
+
+    if not either(bus.topics(SILENT_AFTER, enough=either)):
+        raise SilentRobotError(
+            f"nobody publishes {names.IMAGE} in ROS domain {bus.domain}: no camera in {SILENT_AFTER:g} s"
+        )
+    # Of a camera that offers both, either may be heard of first.
+    found = bus.topics(0.5, enough=lambda found: offered(names.IMAGE, found))
+    return names.IMAGE if offered(names.IMAGE, found) else names.IMAGE_COMPRESSED
+
+
+class Senses:
+    """The newest of every sensor; pictures come from the `camera` topic."""
+
+    def __init__(self, bus: Bus, camera: str) -> None:
+        self._camera = camera
         self._readers = {
             topic: bus.subscription(topic, names.TYPES[topic], depth=5)
-            for topic in (names.IMAGE, names.DEPTH, names.CAMERA_INFO, names.SCAN, names.ODOMETRY)
+            for topic in (camera, names.DEPTH, names.CAMERA_INFO, names.SCAN, names.ODOMETRY)
         }
         self._depths: deque[tuple[float, NDArray[np.float32]]] = deque(maxlen=10)
         self._broken = 0
@@ -88,7 +113,7 @@ class Senses:
             if math.isfinite(message.k[0]) and message.k[0] > 0:
                 self.focal_px = float(message.k[0])
         for message in self._readers[names.DEPTH].take():
-            depth = self._pixels(message)
+            depth = self._read(messages.pixels_of, message)
             if depth is not None and depth.ndim == 2:
                 metres = depth / 1000.0 if depth.dtype == np.uint16 else depth
                 self._depths.append((messages.to_seconds(message.header.stamp), metres.astype(np.float32, copy=False)))
@@ -97,11 +122,10 @@ class Senses:
         for message in self._readers[names.ODOMETRY].take():
             self.odometry = messages.to_odometry(message)
         # Old pictures are passed over: the robot acts on the newest.
-        for message in reversed(self._readers[names.IMAGE].take()):
-            picture = self._pixels(message)
-            if picture is not None and picture.dtype == np.uint8 and picture.ndim == 3 and picture.shape[2] == 3:
-                flipped = picture[..., ::-1] if message.encoding == "rgb8" else picture
-                return messages.to_seconds(message.header.stamp), np.ascontiguousarray(flipped)
+        for message in reversed(self._readers[self._camera].take()):
+            picture = self._picture(message)
+            if picture is not None:
+                return messages.to_seconds(message.header.stamp), picture
         return None
 
     def depth_at(self, stamp: float, shape: tuple[int, ...]) -> NDArray[np.float32] | None:
@@ -110,9 +134,23 @@ class Senses:
         gap, depth = min(fitting, key=lambda pair: pair[0], default=(math.inf, None))
         return depth if gap <= SLOP else None
 
-    def _pixels(self, message: Any) -> NDArray[Any] | None:
+    def _picture(self, message: Any) -> NDArray[np.uint8] | None:
+        if self._camera == names.IMAGE_COMPRESSED:
+            pixels, encoding = self._read(messages.decompressed, message), "bgr8"
+        else:
+            pixels, encoding = self._read(messages.pixels_of, message), message.encoding
+        if pixels is None:
+            return None
+        if pixels.dtype != np.uint8 or pixels.shape[2:] not in ((), (3,)):
+            self._broken += 1
+            return None
+        if pixels.ndim == 2:
+            return np.repeat(pixels[..., None], 3, axis=2)
+        return np.ascontiguousarray(pixels[..., ::-1] if encoding == "rgb8" else pixels)
+
+    def _read(self, read: Callable[[Any], NDArray[Any]], message: Any) -> NDArray[Any] | None:
         try:
-            return messages.pixels_of(message)
+            return read(message)
         except MessageError:
             self._broken += 1
             return None
@@ -130,9 +168,9 @@ def drive(
     Raises
     ------
     SilentRobotError
-        If no picture comes for 10 s.
+        If there is no camera, or no picture comes for 10 s.
     """
-    senses = Senses(bus)
+    senses = Senses(bus, camera_topic(bus))
     commands = bus.publisher(names.COMMAND, names.TYPES[names.COMMAND])
     annotated = bus.publisher(names.ANNOTATED, names.TYPES[names.ANNOTATED])
     guard = Guard(controller)

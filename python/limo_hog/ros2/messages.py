@@ -194,6 +194,23 @@ def compressed_image(stamp: float, pixels: NDArray[np.uint8], quality: int = 90)
     )
 
 
+def decompressed(message: Any) -> NDArray[np.uint8]:
+    """Return a CompressedImage's pixels, uint8 (H, W, 3) BGR or (H, W) gray; needs OpenCV.
+
+    Raises
+    ------
+    MessageError
+        The data are no picture.
+    """
+    with needed(by="a compressed image", what="OpenCV", install="'limo-hog[cv]'"):
+        import cv2
+    data = np.frombuffer(message.data, np.uint8)
+    pixels = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR) if data.size else None
+    if pixels is None:
+        raise MessageError(f"{data.size} bytes of {message.format!r} are no picture")
+    return pixels.astype(np.uint8, copy=False)
+
+
 def camera_info(stamp: float, width: int, height: int, focal_px: float) -> CameraInfo:
     """Return the calibration of an undistorted pinhole camera whose principal point is the image centre."""
     cx, cy = (width - 1) / 2, (height - 1) / 2

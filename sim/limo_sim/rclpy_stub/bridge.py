@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.ros2.messages import ENCODINGS, MessageError, pixels_of
+from limo_hog.ros2.messages import ENCODINGS, MessageError, decompressed, pixels_of
 from limo_sim.rclpy_stub.interfaces import Message, message_class
 
 
@@ -42,10 +42,10 @@ class CvBridge:
     def compressed_imgmsg_to_cv2(self, cmprs_img_msg: Any, desired_encoding: str = "passthrough") -> NDArray[Any]:
         """Return a CompressedImage's pixels, BGR."""
         _want(cmprs_img_msg, "sensor_msgs/msg/CompressedImage")
-        data = np.frombuffer(cmprs_img_msg.data, np.uint8)
-        pixels = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR) if data.size else None
-        if pixels is None:
-            raise CvBridgeError(f"{data.size} bytes of {cmprs_img_msg.format!r} are no picture")
+        try:
+            pixels = decompressed(cmprs_img_msg)
+        except MessageError as error:
+            raise CvBridgeError(str(error)) from error
         return _converted(pixels, "bgr8" if pixels.ndim == 3 else "mono8", desired_encoding)
 
     def cv2_to_imgmsg(self, cvim: Any, encoding: str = "passthrough", header: Any = None) -> Message:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
+from limo_hog.follow.clothes import clothes_in
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.detectors import Detector, detect_in
 from limo_hog.follow.observation import Observation, Odometry, Scan
@@ -205,5 +206,8 @@ def _decide(
         found, fault = NOTHING, f"the detector failed: {error}"
     detect_ms = 1e3 * (time.perf_counter() - began)
     height, width = frame.image.shape[:2]
-    observation = Observation(frame.stamp, width, height, FOCAL_PX, found, region, frame.depth, scan, odometry, fault)
+    clothes = clothes_in(frame.image, found.boxes)
+    observation = Observation(
+        frame.stamp, width, height, FOCAL_PX, found, region, frame.depth, scan, odometry, fault, clothes
+    )
     return guard.step(observation, state), observation, detect_ms

@@ -192,10 +192,18 @@ def on_person(box: NDArray[np.int32], truth: PersonTruth) -> bool:
 
 def _hits(step: Step) -> list[int]:
     """Whom each box is on, in the boxes' order; -1 nobody."""
-    return [
-        next((who for who, person in enumerate(_people(step.seen)) if person and on_person(box, person)), -1)
-        for box in step.detections.boxes
+    return [_hit(box, _people(step.seen)) for box in step.detections.boxes]
+
+
+def _hit(box: NDArray[np.int32], people: Sequence[PersonTruth | None]) -> int:
+    """Whom a box is on: of several, of those in view before those hidden, the one whose middle is nearest."""
+    middle = box[0] + box[2] / 2
+    ranks = [
+        (person.visible < IN_VIEW, abs(person.box[0] + person.box[2] / 2 - middle), who)
+        for who, person in enumerate(people)
+        if person and person.box and on_person(box, person)
     ]
+    return min(ranks)[2] if ranks else -1
 
 
 def _target(step: Step, hits: Sequence[int]) -> int | None:

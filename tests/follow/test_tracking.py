@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.views import NOBODY, World, scan_of
+from tests.follow.views import GREEN, NOBODY, RED, World, scan_of
 
 from limo_hog.detector import Detections
-from limo_hog.follow import Decision, Mode, Odometry, TrackingController
+from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingController
+from limo_hog.follow.clothes import clothes_in
 from limo_hog.follow.people import pose_at
 from limo_hog.follow.tracking import TrackingState
 
@@ -130,6 +131,59 @@ def test_it_stays_with_the_person_it_began_with() -> None:
         world.time += 0.1
         assert state.followed == mine
         assert decision.target == 1
+
+
+def seen_in(view: Observation, shirt: tuple[int, int, int]) -> Observation:
+    """The same view with a colour image, in which whoever is seen wears a shirt."""
+    image = np.full((480, 640, 3), shirt, np.uint8)
+    return replace(view, clothes=clothes_in(image, view.detections.boxes))
+
+
+def lost(world: World) -> TrackingState:
+    """Follow somebody in red, who goes out of sight to the right for 9 s."""
+    state = CONTROLLER.start()
+    for _ in range(130):
+        view = seen_in(world.observe(visible=world.time < 4.0), RED)
+        decision = CONTROLLER.step(view, state)
+        state = decision.state
+        world.time += world.period
+    assert decision.mode is Mode.LOST
+    assert decision.reason == "looking all around for the person"
+    return state
+
+
+def test_somebody_in_other_clothes_is_not_who_was_lost_until_long_after() -> None:
+    world = World()
+    state = lost(world)
+    parted = 4.0
+    while world.time < parted + CONTROLLER.faithful - 0.1:
+        decision = CONTROLLER.step(seen_in(world.observe(), GREEN), state)
+        state = decision.state
+        assert decision.target is None
+        assert "somebody else" in decision.reason
+        world.time += world.period
+    world.time += 0.5
+    decision = CONTROLLER.step(seen_in(world.observe(), GREEN), state)
+    assert decision.target == 0
+    assert decision.reason == "turning to somebody else: the person did not come back"
+    for _ in range(30):
+        world.time += world.period
+        decision = CONTROLLER.step(seen_in(world.observe(), GREEN), decision.state)
+    assert decision.reason == "following a person"
+
+
+def test_whoever_wears_what_the_lost_person_wore_is_followed_at_once() -> None:
+    world = World()
+    state = lost(world)
+    decision = CONTROLLER.step(seen_in(world.observe(), RED), state)
+    assert decision.target == 0
+    assert "facing somebody, not sure yet" in decision.reason
+
+
+def test_without_a_colour_image_anybody_will_do_at_once() -> None:
+    world = World()
+    state = lost(world)
+    assert CONTROLLER.step(world.observe(), state).target == 0
 
 
 def test_it_asks_for_the_part_of_the_image_where_the_person_will_be() -> None:

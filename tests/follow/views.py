@@ -13,6 +13,7 @@ from limo_hog.follow.observation import Observation, Odometry, Scan
 from limo_hog.follow.twist import Twist
 
 WIDTH, HEIGHT, FOCAL = 640, 480, 448.6
+RED, GREEN, BLUE = (40, 40, 170), (50, 140, 50), (130, 50, 35)
 NOBODY = Detections(np.empty((0, 4), np.int32), np.empty(0))
 
 
@@ -20,6 +21,18 @@ def boxes(*rows: tuple[int, int, int, int], scores: tuple[float, ...] | None = N
     """Detections at the given boxes, all equally sure unless `scores` says otherwise."""
     chosen = scores if scores is not None else (2.0,) * len(rows)
     return Detections(np.array(rows, np.int32).reshape(-1, 4), np.array(chosen, np.float64))
+
+
+def dressed(
+    box: tuple[int, int, int, int], shirt: tuple[int, int, int], trousers: tuple[int, int, int]
+) -> NDArray[np.uint8]:
+    """A grey image with somebody in a detection window, in BGR colours: a shirt above, trousers below."""
+    x, y, w, h = box
+    image = np.full((HEIGHT, WIDTH, 3), 180, np.uint8)
+    left, right = x + round(0.35 * w), x + round(0.65 * w)
+    image[y + round(0.25 * h) : y + round(0.49 * h), left:right] = shirt
+    image[y + round(0.49 * h) : y + round(0.85 * h), left:right] = trousers
+    return image
 
 
 def flat(depth: float) -> NDArray[np.float32]:

@@ -109,16 +109,25 @@ def rates(track: Track, pose: Odometry) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Innovation:
-    """What a measurement says beyond the prediction: difference, its covariance, the model's Jacobian."""
+    """What a measurement says beyond the prediction: difference, its covariance, the model's Jacobian.
+
+    `spread` are the variances of the measurement alone.
+    """
 
     difference: Array
     covariance: Array
     jacobian: Array
+    spread: Array
 
     @property
     def distance2(self) -> float:
         """Squared Mahalanobis distance: chi-squared with one degree of freedom for each measured number."""
         return float(self.difference @ np.linalg.solve(self.covariance, self.difference))
+
+    @property
+    def vagueness(self) -> float:
+        """How much more than the measurement the prediction leaves open: logarithm of the ratio of their volumes."""
+        return float(np.linalg.slogdet(self.covariance)[1] - np.log(self.spread).sum())
 
 
 def innovation(track: Track, bearing: float, distance: float | None, pose: Odometry, noise: Noise) -> Innovation:
@@ -128,11 +137,11 @@ def innovation(track: Track, bearing: float, distance: float | None, pose: Odome
     r2 = max(expected_range**2, 1e-6)
     r = math.sqrt(r2)
     jacobian = np.array([[-dy / r2, dx / r2, 0.0, 0.0], [dx / r, dy / r, 0.0, 0.0]])
-    spread = np.diag([noise.bearing**2, noise.range**2])
+    spread = np.array([noise.bearing**2, noise.range**2])
     difference = np.array([wrapped(bearing - expected_bearing), (distance or 0.0) - expected_range])
     if distance is None:
-        jacobian, spread, difference = jacobian[:1], spread[:1, :1], difference[:1]
-    return Innovation(difference, jacobian @ track.covariance @ jacobian.T + spread, jacobian)
+        jacobian, spread, difference = jacobian[:1], spread[:1], difference[:1]
+    return Innovation(difference, jacobian @ track.covariance @ jacobian.T + np.diag(spread), jacobian, spread)
 
 
 def updated(track: Track, seen: Innovation) -> Track:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
+from limo_hog.follow.clothes import Clothes
 from limo_hog.follow.region import Region
 
 
@@ -74,6 +75,8 @@ class Observation:
         The newest odometry; None without wheel encoders.
     fault
         Why the senses cannot be trusted this time, "" where they can; the robot then stands still.
+    clothes
+        float64 (N, 2, 3): what the person in each detection wears, by `clothes_in`; None without a colour image.
     """
 
     stamp: float
@@ -86,6 +89,7 @@ class Observation:
     scan: Scan | None = None
     odometry: Odometry | None = None
     fault: str = ""
+    clothes: Clothes | None = None
 
     @property
     def now(self) -> float:

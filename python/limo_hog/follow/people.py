@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.body import Body
+from limo_hog.follow.clothes import OTHER_CLOTHES, Clothes, learnt, unlikeness
 from limo_hog.follow.kalman import (
     Noise,
     Track,
@@ -38,10 +39,12 @@ _NEAR = 1.7
 _KNOWN = 0.6
 #: Trust from which somebody is taken for a person, and below which not any more.
 _TRUSTED, _DOUBTED = 0.7, 0.3
+#: A box is somebody else's where fit, vagueness and clothes together count more than this against somebody.
+_UNLIKELY = 24.0
 #: Boxes nearer than this to a person are never somebody else [m].
 _SAME_PERSON = 0.5
-#: How much one box counts in a person's size.
-_SIZE_STEP = 0.2
+#: How much one box counts in a person's size, and in what they wear.
+_SIZE_STEP, _CLOTHES_STEP = 0.2, 0.05
 #: Smaller windows than this HOG cannot find [px].
 SMALLEST_WINDOW = 128
 #: Distance assumed for somebody whose distance no sensor tells [m], and its standard deviation [m].
@@ -69,6 +72,8 @@ class Person:
         Frames in which they should have been found, and those since they were.
     window, centre
         Height of their detection window, and its middle below the image's, times their distance [px m].
+    clothes
+        What they wear, as far as seen; None while no camera tells.
     """
 
     number: int
@@ -81,6 +86,7 @@ class Person:
     age: int = 1
     misses: int = 0
     felt: float = -math.inf
+    clothes: Clothes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +94,7 @@ class Measurement:
     """One box as the robot sees it.
 
     Bearing [rad] and range [m] from the robot's centre, range None where unknown; height of the box and its middle
-    below the image's [px]; its score.
+    below the image's [px]; its score; and what is worn there, None where no camera tells.
     """
 
     bearing: float
@@ -96,51 +102,91 @@ class Measurement:
     height: int
     centre: float
     score: float
+    clothes: Clothes | None = None
 
 
 def measure(observation: Observation, body: Body) -> list[Measurement]:
     """Turn every box into a bearing and a range, the range from the depth image."""
     measurements = []
-    for box, score in observation.detections:
+    for index, (box, score) in enumerate(observation.detections):
+        worn = None if observation.clothes is None else observation.clothes[index]
+        if worn is not None and not np.isfinite(worn).all():
+            worn = None
         column, row = box_centre(box)
         slope = (observation.width / 2 - column) / observation.focal_px
         height, centre = int(box[3]), row - observation.height / 2
         depth = None if observation.depth is None else person_depth(observation.depth, box)
         if depth is None:
-            measurements.append(Measurement(math.atan(slope), None, height, centre, score))
+            measurements.append(Measurement(math.atan(slope), None, height, centre, score, worn))
             continue
         x, y = body.camera_x + depth, slope * depth
-        measurements.append(Measurement(math.atan2(y, x), math.hypot(x, y), height, centre, score))
+        measurements.append(Measurement(math.atan2(y, x), math.hypot(x, y), height, centre, score, worn))
     return measurements
 
 
 def associate(
     people: tuple[Person, ...], measurements: list[Measurement], pose: Odometry, noise: Noise, gate: float
 ) -> dict[int, int]:
-    """Pair people with boxes, the confirmed and then the best fit first; beyond `gate` (chi-squared) is no fit.
+    """Pair people with boxes, the confirmed and then the likeliest first; beyond `gate` (chi-squared) is no fit.
 
     Returns index of the person -> index of the measurement. Every track must be at the frame's stamp.
     """
     fits = []
     for who, person in enumerate(people):
         for which, seen in enumerate(measurements):
+            if is_beyond(person, seen, pose):
+                continue
+            unlike = strangeness(person, seen)
             seen = believed(person, seen)
-            fit = innovation(person.track, seen.bearing, seen.range, pose, noise).distance2
+            fit = innovation(person.track, seen.bearing, seen.range, pose, noise)
+            # Who may be anywhere fits anything: that counts against them, as other clothes do.
+            cost = fit.distance2 + fit.vagueness + unlike
             # A person who changed direction sharply is still who they were; a pillar does not.
-            if fit <= gate or (person.confirmed and apart(person, seen, pose) < _SAME_PERSON):
-                fits.append((not person.confirmed, fit, who, which))
+            turned = person.confirmed and apart(person, seen, pose) < _SAME_PERSON and unlike <= OTHER_CLOTHES
+            if turned or (fit.distance2 <= gate and cost <= _UNLIKELY):
+                fits.append((not person.confirmed, cost, who, which))
     pairs: dict[int, int] = {}
     for _, _, who, which in sorted(fits):
-        if who not in pairs and which not in pairs.values():
+        taken = [measurements[other] for other in pairs.values()]
+        if who not in pairs and not any(is_double(measurements[which], other) for other in taken):
             pairs[who] = which
     return pairs
 
 
+def strangeness(person: Person, seen: Measurement) -> float:
+    """Return how unlike theirs the clothes in a box are (chi-squared); 0 where clothes cannot be told.
+
+    A box of another size than theirs is on a part of somebody, and tells nothing.
+    """
+    return unlikeness(person.clothes, seen.clothes) if of_size(person, seen) else 0.0
+
+
+def is_double(seen: Measurement, other: Measurement) -> bool:
+    """Whether two boxes are on the same person: at the same place, in the same clothes."""
+    if unlikeness(other.clothes, seen.clothes) > OTHER_CLOTHES:
+        return False
+    turn = wrapped(seen.bearing - other.bearing)
+    one, two = seen.range or other.range, other.range or seen.range
+    if one is None or two is None:
+        return abs(turn) < _SAME_PERSON / _UNKNOWN_RANGE
+    return math.hypot(one - two * math.cos(turn), two * math.sin(turn)) < _SAME_PERSON
+
+
+def of_size(person: Person, seen: Measurement) -> bool:
+    """Whether a box is as large as a person's whole body at its range; any is where the range is unknown."""
+    return seen.range is None or abs(seen.range * seen.height - person.window) < _MISFIT * person.window
+
+
+def is_beyond(person: Person, seen: Measurement, pose: Odometry) -> bool:
+    """Whether a box is on something behind a person: too far away, and of another size than theirs."""
+    if seen.range is None or of_size(person, seen):
+        return False
+    return seen.range > bearing_range(person.track, pose)[1] + _SAME_PERSON
+
+
 def believed(person: Person, seen: Measurement) -> Measurement:
     """Return a box without its range where its size belies that: something stands before the person."""
-    if seen.range is None or abs(seen.range * seen.height - person.window) < _MISFIT * person.window:
-        return seen
-    return replace(seen, range=None)
+    return seen if of_size(person, seen) else replace(seen, range=None)
 
 
 def apart(person: Person, seen: Measurement, pose: Odometry) -> float:
@@ -149,7 +195,7 @@ def apart(person: Person, seen: Measurement, pose: Odometry) -> float:
     turn = wrapped(seen.bearing - bearing)
     if seen.range is None:
         return abs(distance * math.tan(turn)) if abs(turn) < 1 else math.inf
-    return math.sqrt(distance**2 + seen.range**2 - 2 * distance * seen.range * math.cos(turn))
+    return math.hypot(distance - seen.range * math.cos(turn), seen.range * math.sin(turn))
 
 
 def should_be_seen(person: Person, pose: Odometry, observation: Observation) -> bool:
@@ -186,7 +232,7 @@ def begin(number: int, seen: Measurement, stamp: float, pose: Odometry, noise: N
     if seen.range is None:
         noise = replace(noise, range=_UNKNOWN_SPREAD)
     track = found(stamp, seen.bearing, distance, pose, noise)
-    return Person(number, track, stamp, 0.0, seen.height * distance, seen.centre * distance)
+    return Person(number, track, stamp, 0.0, seen.height * distance, seen.centre * distance, clothes=seen.clothes)
 
 
 def between(one: Person, other: Person) -> float:
@@ -203,10 +249,11 @@ def is_new(seen: Measurement, people: Sequence[Person], pose: Odometry) -> bool:
 def seen_again(person: Person, seen: Measurement, pose: Odometry, noise: Noise, gate: float) -> Person:
     """Correct a person by the box that is theirs; a box beyond `gate` says that they changed their ways."""
     window, centre = person.window, person.centre
-    if seen.range is not None:
+    if seen.range is not None and (seen.range > _NEAR or not person.confirmed):
         # Learnt from what is not believed too: it may have been wrong from the beginning.
         window += _SIZE_STEP * (seen.height * seen.range - window)
         centre += _SIZE_STEP * (seen.centre * seen.range - centre)
+    clothes = worn_by(person, seen)
     seen = believed(person, seen)
     if seen.range is not None and person.track.stamp - max(person.seen, person.felt) > _STALE:
         # What they did before is no guide to how they walk now.
@@ -224,7 +271,19 @@ def seen_again(person: Person, seen: Measurement, pose: Odometry, noise: Noise, 
         seen=person.track.stamp,
         window=window,
         centre=centre,
+        clothes=clothes,
     )
+
+
+def worn_by(person: Person, seen: Measurement) -> Clothes | None:
+    """Return what somebody wears, with one more box: a mean until they are known, then slowly and with distrust."""
+    if seen.clothes is None or not of_size(person, seen):
+        return person.clothes
+    if person.clothes is None:
+        return seen.clothes
+    if person.confirmed:
+        return learnt(person.clothes, seen.clothes, _CLOTHES_STEP)
+    return person.clothes + (seen.clothes - person.clothes) / (person.age + 1)
 
 
 def judged(person: Person, evidence: float) -> Person:

@@ -9,6 +9,7 @@ import numpy as np
 
 from limo_hog.follow.body import LIMO, Body
 from limo_hog.follow.clearance import Margin, free_heading, scan_points
+from limo_hog.follow.clothes import OTHER_CLOTHES, Clothes, unlikeness
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.kalman import Noise, bearing_range, predicted, rates
 from limo_hog.follow.legs import Returns, felt, returns_of
@@ -72,8 +73,9 @@ class TrackingState:
         Frames since the whole image was searched.
     turn
         Which way to search: 1 left, -1 right.
-    ever
-        Whether anybody was followed before.
+    clothes, parted
+        What the person followed last wears, None where no camera tells; and when they were last seen or felt [s],
+        None where nobody was followed yet.
     detour
         How far off the straight way to the person the robot goes around something [rad].
     """
@@ -87,7 +89,8 @@ class TrackingState:
     period: float = 0.1
     since_full: int = 0
     turn: float = 1.0
-    ever: bool = False
+    clothes: Clothes | None = None
+    parted: float | None = None
     detour: float = 0.0
 
 
@@ -133,6 +136,8 @@ class TrackingController:
         How long to face where an unseen person should be before searching all around [s].
     forget
         How long somebody unseen is remembered, and waited for where something hides them [s].
+    faithful
+        How long to look for a person who was lost before somebody in other clothes will do [s].
     search_rate
         Turn rate of a search [rad/s].
     full_every
@@ -160,6 +165,7 @@ class TrackingController:
     blind: float = 4.0
     chase: float = 2.0
     forget: float = 8.0
+    faithful: float = 20.0
     search_rate: float = 0.7
     full_every: int = 15
     back_off: float = 0.15
@@ -187,6 +193,8 @@ class TrackingController:
         if lost > (self.forget if aim.hidden else self.chase):
             return self._search(state)
         twist, mode, reason = self._steer(person, aim, unseen, lost)
+        if _is_other(person, state):
+            reason = "turning to somebody else: the person did not come back"
         region = self._region(person, state, observation) if unseen == 0 else None
         state = replace(
             state,
@@ -197,7 +205,9 @@ class TrackingController:
 
     def _search(self, state: TrackingState) -> Decision[TrackingState]:
         turn = Twist(0.0, state.turn * self.search_rate)
-        if state.ever:
+        if any(one.seen == state.stamp and self._is_stranger(one, state) for one in state.people):
+            return Decision(turn, state, Mode.LOST, "looking all around for the person: here is somebody else")
+        if state.parted is not None:
             return Decision(turn, state, Mode.LOST, "looking all around for the person")
         return Decision(turn, state, Mode.SEARCH, "looking all around for somebody")
 
@@ -257,11 +267,12 @@ class TrackingController:
 
     def _choose(self, state: TrackingState) -> TrackingState:
         """Stay with a person once confirmed, while they are remembered; else take the most trusted."""
-        seen = [one for one in state.people if one.seen == state.stamp]
-        hopeful = [one for one in seen if self._worth(one)]
         followed = next((one for one in state.people if one.number == state.followed), None)
         if followed is not None and followed.confirmed:
-            state = replace(state, ever=True)
+            state = replace(state, clothes=followed.clothes, parted=max(followed.seen, followed.felt))
+        seen = [one for one in state.people if one.seen == state.stamp]
+        hopeful = [one for one in seen if self._worth(one) and not self._is_stranger(one, state)]
+        if followed is not None and followed.confirmed:
             lost = followed.track.stamp - max(followed.seen, followed.felt)
             if lost <= self.chase:
                 return state
@@ -269,13 +280,19 @@ class TrackingController:
             hopeful = [one for one in hopeful if between(one, followed) < _SAME_PERSON + _HASTE * lost]
             if not hopeful:
                 return state
-        elif followed is not None and self._worth(followed) and followed not in hopeful:
+        elif followed is not None and self._worth(followed) and not self._is_stranger(followed, state):
             hopeful.append(followed)
         if not hopeful:
             return replace(state, followed=None)
         # Whoever is faced already keeps a small lead.
         best = max(hopeful, key=lambda one: one.trust + 0.1 * (one is followed))
         return replace(state, followed=best.number)
+
+    def _is_stranger(self, person: Person, state: TrackingState) -> bool:
+        """Whether somebody wears what the person who was lost does not, and it is too early to take anybody."""
+        if state.parted is None or state.stamp is None:
+            return False
+        return state.stamp - state.parted <= self.faithful and _is_other(person, state)
 
     def _worth(self, person: Person) -> bool:
         """Whether somebody is, or may yet turn out to be, a person."""
@@ -348,3 +365,8 @@ class TrackingController:
             observation.width,
             observation.height,
         )
+
+
+def _is_other(person: Person, state: TrackingState) -> bool:
+    """Whether somebody clearly wears something else than the person followed last."""
+    return unlikeness(state.clothes, person.clothes) > OTHER_CLOTHES

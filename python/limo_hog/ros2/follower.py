@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.clothes import clothes_in
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.detectors import Detector, detect_in
 from limo_hog.follow.observation import Observation, Odometry, Scan
@@ -194,7 +195,17 @@ def drive(
                 height, width = picture.shape[:2]
                 depth = senses.depth_at(stamp, picture.shape)
                 observation = Observation(
-                    stamp, width, height, senses.focal_px, found, region, depth, senses.scan, senses.odometry, fault
+                    stamp,
+                    width,
+                    height,
+                    senses.focal_px,
+                    found,
+                    region,
+                    depth,
+                    senses.scan,
+                    senses.odometry,
+                    fault,
+                    clothes_in(picture, found.boxes),
                 )
                 decision = guard.step(observation, state)
                 region = decision.region

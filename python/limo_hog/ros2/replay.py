@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.clothes import clothes_in
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.detectors import Detector, detect_in
 from limo_hog.follow.observation import Observation, Odometry, Scan
@@ -145,6 +146,18 @@ def _decide(
     stamp = messages.to_seconds(senses.image.header.stamp)
     depth = senses.depth if senses.depth is not None and senses.depth.shape == (height, width) else None
     found = detect_in(detector, image, region)
-    observation = Observation(stamp, width, height, senses.focal_px, found, region, depth, senses.scan, senses.odometry)
+    clothes = clothes_in(image, found.boxes)
+    observation = Observation(
+        stamp,
+        width,
+        height,
+        senses.focal_px,
+        found,
+        region,
+        depth,
+        senses.scan,
+        senses.odometry,
+        clothes=clothes,
+    )
     decision = guard.step(observation, state)
     return decision, Replayed(stamp, image, found, decision.twist, decision.target, senses.recorded, twist)

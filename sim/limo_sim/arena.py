@@ -17,7 +17,7 @@ from limo_hog.follow.twist import Twist
 from limo_sim import imu, lidar
 from limo_sim.camera import CameraPose, Contacts, Frame, PersonTruth, Truth
 from limo_sim.furniture import KINDS, Disc, Rectangle, placed
-from limo_sim.person import Pose, Walk, body
+from limo_sim.person import Pose, Walk, legs_at
 from limo_sim.renderer import Renderer, Seen
 from limo_sim.robot import HALF_LENGTH, HALF_WIDTH, Drive, integrate
 from limo_sim.scenario import ROOM_HALF, Scenario
@@ -169,7 +169,7 @@ class Arena:
             shapes: list[Disc | Rectangle] = list(self._static_scanned)
             for person, pose in zip(self.scenario.people, self._poses(state.time), strict=True):
                 if pose is not None:
-                    shapes += lidar.shins(body(person, pose))
+                    shapes += legs_at(person, pose, lidar.MOUNT_HEIGHT)
             x = state.x + lidar.MOUNT_AHEAD * math.cos(state.yaw)
             y = state.y + lidar.MOUNT_AHEAD * math.sin(state.yaw)
             ranges = lidar.measure(

@@ -1,4 +1,4 @@
-"""The planar lidar: rays against the walls, the furniture and the shins of people, all at once."""
+"""The planar lidar: rays against the walls, the furniture and the legs of people, all at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_sim.furniture import Disc, Rectangle
-from limo_sim.person import Body
 from limo_sim.scenario import ROOM_HALF
 
 BEAMS = 292
@@ -20,25 +19,6 @@ MOUNT_AHEAD, MOUNT_HEIGHT = 0.103, 0.111
 """Where it sits: ahead of the base centre and above the floor [m]."""
 
 _ANGLES = np.linspace(-ANGLE_MAX, ANGLE_MAX, BEAMS)
-
-
-def shins(body: Body) -> list[Disc]:
-    """Cut a body with the lidar's plane."""
-    cut = []
-    ends = zip(
-        body.start.tolist(),
-        body.end.tolist(),
-        body.start_radius.tolist(),
-        body.end_radius.tolist(),
-        strict=True,
-    )
-    for (x0, y0, z0), (x1, y1, z1), r0, r1 in ends:
-        rise = z1 - z0
-        share = min(max((MOUNT_HEIGHT - z0) / rise if rise else 0.5, 0.0), 1.0)
-        radius, above = r0 + share * (r1 - r0), MOUNT_HEIGHT - (z0 + share * rise)
-        if abs(above) < radius:
-            cut.append(Disc(x0 + share * (x1 - x0), y0 + share * (y1 - y0), math.sqrt(radius**2 - above**2)))
-    return cut
 
 
 def cast(x: float, y: float, yaw: float, shapes: Iterable[Disc | Rectangle]) -> NDArray[np.float64]:

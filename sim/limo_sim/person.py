@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_sim.furniture import Disc
 from limo_sim.scenario import Person
 
 Point = tuple[float, float, float]
@@ -169,14 +170,12 @@ def _raise(point: Point, height: float) -> Point:
     return point[0], point[1], point[2] + height
 
 
-def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
-    """Capsules (ends, radii, colour) and ellipsoids (centre, semi-axes, twist, colour) for stature 1."""
-    phase, swing = pose.phase, pose.swing
-    twist = swing * 0.12 * math.sin(phase)
+def _legs(pose: Pose) -> tuple[list[Capsule], float]:
+    """Capsules of both legs (ends, radii, colour) and the height of the hips, for stature 1."""
     capsules: list[Capsule] = []
     soles = []
-    for side, leg_phase in ((1, phase), (-1, phase + math.pi)):
-        hip, shin, foot = _leg(leg_phase, swing)
+    for side, phase in ((1, pose.phase), (-1, pose.phase + math.pi)):
+        hip, shin, foot = _leg(phase, pose.swing)
         y = side * 0.05
         knee = (_THIGH * math.sin(hip), y, -_THIGH * math.cos(hip))
         ankle = (knee[0] + _SHIN * math.sin(shin), y, knee[2] - _SHIN * math.cos(shin))
@@ -191,8 +190,14 @@ def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
         ]
         soles.append(min(heel[2] - 0.026, toe[2] - 0.021))
     hips = -min(soles)
-    capsules = [(_raise(a, hips), _raise(b, hips), r0, r1, name) for a, b, r0, r1, name in capsules]
+    return [(_raise(a, hips), _raise(b, hips), r0, r1, name) for a, b, r0, r1, name in capsules], hips
 
+
+def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
+    """Capsules (ends, radii, colour) and ellipsoids (centre, semi-axes, twist, colour) for stature 1."""
+    phase, swing = pose.phase, pose.swing
+    twist = swing * 0.12 * math.sin(phase)
+    capsules, hips = _legs(pose)
     cos, sin = math.cos(twist), math.sin(twist)
     shoulders = hips + 0.285
     capsules.append(
@@ -274,3 +279,19 @@ def body(person: Person, pose: Pose) -> Body:
         axes=turn @ axes,
         colours=np.array([palette[name] for name in colours], dtype=np.float64),
     )
+
+
+def legs_at(person: Person, pose: Pose, height: float) -> list[Disc]:
+    """Cut somebody's legs with a level plane at a height [m] below the hands."""
+    cut = []
+    cos, sin = person.height * math.cos(pose.yaw), person.height * math.sin(pose.yaw)
+    level = height / person.height
+    for (x0, y0, z0), (x1, y1, z1), r0, r1, _ in _legs(pose)[0]:
+        rise = z1 - z0
+        share = min(max((level - z0) / rise if rise else 0.5, 0.0), 1.0)
+        radius, above = person.girth * (r0 + share * (r1 - r0)), level - (z0 + share * rise)
+        if abs(above) < radius:
+            x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+            size = person.height * math.sqrt(radius**2 - above**2)
+            cut.append(Disc(pose.x + cos * x - sin * y, pose.y + sin * x + cos * y, size))
+    return cut

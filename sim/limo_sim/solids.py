@@ -7,6 +7,7 @@ frusta and boxes are cast in exact perspective. Camera frame and pixels as in `c
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,8 @@ NEAR = 0.08
 _UPRIGHT = 0.2  # a capsule whose axis leans less than this [sine] is cast as if it lay in the image plane
 TONES = 4.0
 """Brightness stays below this, so that a solid's number and its brightness fit in one value."""
+BAND = 1 << 16
+"""Pixels that are worked on at a time, so that scratch arrays stay small enough to be had without page faults."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +57,8 @@ class Sun:
 class Canvas:
     """A z-buffer over a window of the image, on which the solids of one object are cast.
 
-    `stride` casts every so many pixels only, which is enough to measure an area. Solids are cast half a pixel
-    too wide, and `cover` falls from 1 to 0 over the last pixel: the edges come out smooth.
+    Solids are cast half a pixel too wide, and `cover` falls from 1 to 0 over the last pixel: the edges come out
+    smooth.
 
     Attributes
     ----------
@@ -67,26 +70,28 @@ class Canvas:
         float32, number of the solid x `TONES` + brightness.
     """
 
-    def __init__(self, window: Window, stride: int = 1) -> None:
+    def __init__(self, window: Window, sheet: F32) -> None:
+        """Begin on scratch memory, float32 (3, at least as many as there are pixels)."""
         left, top, right, bottom = window
         self.window = window
-        self.stride = stride
-        self.xs: F32 = np.arange(left, right, stride, dtype=np.float32)
-        self.ys: F32 = np.arange(top, bottom, stride, dtype=np.float32)[:, None]
-        shape = (len(self.ys), len(self.xs))
-        self.depth: F32 = np.full(shape, np.inf, np.float32)
-        self.cover: F32 = np.zeros(shape, np.float32)
-        self.tone: F32 = np.zeros(shape, np.float32)
+        self.xs: F32 = np.arange(left, right, dtype=np.float32)
+        self.ys: F32 = np.arange(top, bottom, dtype=np.float32)[:, None]
+        shape = bottom - top, right - left
+        self.depth, self.cover, self.tone = sheet[:, : shape[0] * shape[1]].reshape(3, *shape)
+        self.depth.fill(np.inf)
+        self.cover.fill(0.0)
+        self.tone.fill(0.0)
 
-    def crop(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice] | None:
-        """Rows and columns of the canvas that a box in image pixels touches."""
+    def bands(self, left: float, top: float, right: float, bottom: float) -> Iterator[tuple[slice, slice]]:
+        """Rows and columns of the canvas that a box in image pixels touches, in bands that fit the cache."""
         x0, y0 = self.window[0], self.window[1]
         rows, columns = self.depth.shape
-        c0 = max(0, math.floor((left - x0) / self.stride))
-        r0 = max(0, math.floor((top - y0) / self.stride))
-        c1 = min(columns, math.ceil((right - x0) / self.stride) + 1)
-        r1 = min(rows, math.ceil((bottom - y0) / self.stride) + 1)
-        return (slice(r0, r1), slice(c0, c1)) if c0 < c1 and r0 < r1 else None
+        c0, c1 = max(0, math.floor(left - x0)), min(columns, math.ceil(right - x0) + 1)
+        r0, r1 = max(0, math.floor(top - y0)), min(rows, math.ceil(bottom - y0) + 1)
+        if c0 < c1:
+            step = max(1, BAND // (c1 - c0))
+            for row in range(r0, r1, step):
+                yield slice(row, min(row + step, r1)), slice(c0, c1)
 
     def put(self, at: tuple[slice, slice], depth: F32, cover: F32, tone: F32) -> None:
         """Draw one solid where it is nearest; its depth is NaN where it is not."""
@@ -178,63 +183,73 @@ def cast_body(canvas: Canvas, shape: Outline, sun: Sun) -> None:
 def _cast_strip(canvas: Canvas, strip: list[float], sun: Sun) -> None:
     part, u, v, axis_u, axis_v, length, radius, taper, near, slope, metre, lean = strip
     end_u, end_v, end_radius = u + axis_u * length, v + axis_v * length, radius + taper * length
-    at = canvas.crop(
-        min(u - radius, end_u - end_radius),
-        min(v - radius, end_v - end_radius),
-        max(u + radius, end_u + end_radius),
-        max(v + radius, end_v + end_radius),
-    )
-    if at is None:
-        return
-    dx, dy = canvas.xs[at[1]] - np.float32(u), canvas.ys[at[0]] - np.float32(v)
-    along = axis_u * dx + axis_v * dy
-    across = axis_u * dy - axis_v * dx
-    on_axis = np.minimum(np.maximum(along, 0.0), length)
-    radii = taper * on_axis
-    radii += radius
-    beyond = along - on_axis
-    room = radii * radii
-    room -= across * across
-    inner = room - beyond * beyond
-    root = np.sqrt(inner)
-    if abs(lean) > _UPRIGHT:
-        # the ray meets a leaning capsule first in a ball that is not the one beneath the pixel
-        on_axis = np.minimum(np.maximum(along - lean * root, 0.0), length)
-        beyond = along - on_axis
-        room -= beyond * beyond
-        root = np.sqrt(np.maximum(room, 0.0 * root))
-    depth = slope * on_axis
-    depth += near
-    depth -= metre * root
+    left, right = min(u - radius, end_u - end_radius), max(u + radius, end_u + end_radius)
+    top, bottom = min(v - radius, end_v - end_radius), max(v + radius, end_v + end_radius)
     x, y, z = sun.towards
-    beyond *= sun.gain * (x * axis_u + y * axis_v)
-    across *= sun.gain * (y * axis_u - x * axis_v)
-    beyond += across
-    beyond -= (sun.gain * z) * root
-    beyond /= radii
-    beyond += TONES * part + sun.base
-    inner *= 1.0 / (radius + end_radius)
-    canvas.put(at, depth, inner, beyond)
+    for at in canvas.bands(left, top, right, bottom):
+        dx, dy = canvas.xs[at[1]] - np.float32(u), canvas.ys[at[0]] - np.float32(v)
+        along = axis_u * dx + axis_v * dy
+        across = axis_u * dy - axis_v * dx
+        on_axis = np.minimum(np.maximum(along, 0.0), length)
+        radii = taper * on_axis
+        radii += radius
+        beyond = along - on_axis
+        room = radii * radii
+        room -= across * across
+        inner = room - beyond * beyond
+        root = np.sqrt(inner)
+        if abs(lean) > _UPRIGHT:
+            # the ray meets a leaning capsule first in a ball that is not the one beneath the pixel
+            on_axis = np.minimum(np.maximum(along - lean * root, 0.0), length)
+            beyond = along - on_axis
+            room -= beyond * beyond
+            root = np.sqrt(np.maximum(room, 0.0 * root))
+        depth = slope * on_axis
+        depth += near
+        depth -= metre * root
+        beyond *= sun.gain * (x * axis_u + y * axis_v)
+        across *= sun.gain * (y * axis_u - x * axis_v)
+        beyond += across
+        beyond -= (sun.gain * z) * root
+        beyond /= radii
+        beyond += TONES * part + sun.base
+        inner *= 1.0 / (radius + end_radius)
+        canvas.put(at, depth, inner, beyond)
 
 
 def _cast_ellipse(canvas: Canvas, ellipse: list[float], sun: Sun) -> None:
     part, u, v, w00, w10, w11, half_h, half_w, centre, slope_x, slope_y, bulge = ellipse
-    at = canvas.crop(u - half_w, v - half_h, u + half_w, v + half_h)
-    if at is None:
-        return
-    dx, dy = canvas.xs[at[1]] - np.float32(u), canvas.ys[at[0]] - np.float32(v)
-    x = w00 * dx
-    y = w10 * dx + w11 * dy
-    inner = 1.0 - x * x - y * y
-    root = np.sqrt(inner)
-    depth = (slope_x * x + centre) + slope_y * y
-    depth -= bulge * root
     sun_x, sun_y, sun_z = sun.towards
-    tone = (sun.gain * sun_x) * x + (sun.gain * sun_y) * y
-    tone -= (sun.gain * sun_z) * root
-    tone += TONES * part + sun.base
-    inner *= 0.25 * (half_w + half_h)
-    canvas.put(at, depth, inner, tone)
+    for at in canvas.bands(u - half_w, v - half_h, u + half_w, v + half_h):
+        dx, dy = canvas.xs[at[1]] - np.float32(u), canvas.ys[at[0]] - np.float32(v)
+        x = w00 * dx
+        y = w10 * dx + w11 * dy
+        inner = 1.0 - x * x - y * y
+        root = np.sqrt(inner)
+        depth = (slope_x * x + centre) + slope_y * y
+        depth -= bulge * root
+        tone = (sun.gain * sun_x) * x + (sun.gain * sun_y) * y
+        tone -= (sun.gain * sun_z) * root
+        tone += TONES * part + sun.base
+        inner *= 0.25 * (half_w + half_h)
+        canvas.put(at, depth, inner, tone)
+
+
+def covers(shape: Outline, x: F32, y: F32) -> NDArray[np.bool_]:
+    """Whether pixels at float32 (N,) columns `x` and rows `y`, in the image or not, belong to a body."""
+    inside = np.zeros(len(x), np.bool_)
+    if shape.strips:
+        _, u, v, axis_u, axis_v, length, radius, taper, *_ = np.array(shape.strips, np.float32).T[..., None]
+        along = axis_u * (x - u) + axis_v * (y - v)
+        across = axis_u * (y - v) - axis_v * (x - u)
+        on_axis = np.minimum(np.maximum(along, 0.0), length)
+        inner = (radius + taper * on_axis) ** 2 - across**2 - (along - on_axis) ** 2
+        inside |= (inner >= 0.5 * (2.0 * radius + taper * length)).any(axis=0)
+    if shape.ellipses:
+        _, u, v, w00, w10, w11, half_h, half_w, *_ = np.array(shape.ellipses, np.float32).T[..., None]
+        inner = 1.0 - (w00 * (x - u)) ** 2 - (w10 * (x - u) + w11 * (y - v)) ** 2
+        inside |= (inner >= 2.0 / (half_w + half_h)).any(axis=0)
+    return inside
 
 
 def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, part: int) -> None:
@@ -242,60 +257,60 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
     [[x0, _, z0]] = camera.to_camera(np.array([[solid.x, solid.y, 0.0]])).tolist()
     widest = max(solid.r0, solid.r1)
     bounds = upright_bounds(x0, z0, widest, solid.z0, solid.z1)
-    at = canvas.crop(*bounds) if bounds else None
-    if at is None:
+    if bounds is None:
         return
-    right, down = (canvas.xs[at[1]] - CENTRE_X) / FOCAL_PX, (canvas.ys[at[0]] - CENTRE_Y) / FOCAL_PX
     taper = (solid.r1 - solid.r0) / (solid.z1 - solid.z0)
     half_pixel = 0.5 * max(z0, NEAR) / FOCAL_PX
     level = solid.r0 + taper * (MOUNT_HEIGHT - solid.z0) + half_pixel  # radius at the camera's height
-    # a cylinder's rays differ by column only: `lift` is then a number, and most of this one row
-    lift = taper * down if taper else 0.0
-    a = right * right + (1.0 - lift * lift)
-    b = right * x0 + (z0 - level * lift)
     c = x0 * x0 + z0 * z0 - level * level
-    with np.errstate(invalid="ignore"):
-        discriminant = b * b - a * c
-        depth = (b - np.sqrt(discriminant)) / a
-        radii = level - lift * depth
-        depth += half_pixel
-        pixels = FOCAL_PX / depth
-        cover = 0.5 * pixels * discriminant / (a * radii)
-        below_top, above_foot = FOCAL_PX * down + 0.5, 0.5 - FOCAL_PX * down
-        cover = np.minimum(cover, (solid.z1 - MOUNT_HEIGHT) * pixels + below_top)
-        np.minimum(cover, (MOUNT_HEIGHT - solid.z0) * pixels + above_foot, out=cover)
-        depth = np.where((cover > 0) & (depth > NEAR), depth, np.float32(np.nan))
     x, _, z = sun.towards
-    tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)
-    canvas.put(at, depth, cover, tone)
+    for at in canvas.bands(*bounds):
+        right, down = (canvas.xs[at[1]] - CENTRE_X) / FOCAL_PX, (canvas.ys[at[0]] - CENTRE_Y) / FOCAL_PX
+        # a cylinder's rays differ by column only: `lift` is then a number, and most of this one row
+        lift = taper * down if taper else 0.0
+        a = right * right + (1.0 - lift * lift)
+        b = right * x0 + (z0 - level * lift)
+        with np.errstate(invalid="ignore"):
+            discriminant = b * b - a * c
+            depth = (b - np.sqrt(discriminant)) / a
+            radii = level - lift * depth
+            depth += half_pixel
+            pixels = FOCAL_PX / depth
+            cover = 0.5 * pixels * discriminant / (a * radii)
+            below_top, above_foot = FOCAL_PX * down + 0.5, 0.5 - FOCAL_PX * down
+            cover = np.minimum(cover, (solid.z1 - MOUNT_HEIGHT) * pixels + below_top)
+            np.minimum(cover, (MOUNT_HEIGHT - solid.z0) * pixels + above_foot, out=cover)
+            depth = np.where((cover > 0) & (depth > NEAR), depth, np.float32(np.nan))
+        tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)
+        canvas.put(at, depth, cover, tone)
 
 
 def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int) -> None:
     """Cast an upright box that stands in the arena's frame; `sun` in the arena's frame."""
     [[x0, _, z0]] = camera.to_camera(np.array([[solid.x, solid.y, 0.0]])).tolist()
     bounds = upright_bounds(x0, z0, math.hypot(solid.half_x, solid.half_y), solid.z0, solid.z1)
-    at = canvas.crop(*bounds) if bounds else None
-    if at is None:
+    if bounds is None:
         return
-    right, down = (canvas.xs[at[1]] - CENTRE_X) / FOCAL_PX, (canvas.ys[at[0]] - CENTRE_Y) / FOCAL_PX
     cos, sin = math.cos(solid.yaw), math.sin(solid.yaw)
     look_cos, look_sin = math.cos(camera.yaw - solid.yaw), math.sin(camera.yaw - solid.yaw)
     from_x, from_y = camera.x - solid.x, camera.y - solid.y
-    in_x, out_x = _slab(cos * from_x + sin * from_y, look_cos + look_sin * right, solid.half_x)
-    in_y, out_y = _slab(cos * from_y - sin * from_x, look_sin - look_cos * right, solid.half_y)
     middle, half = (solid.z0 + solid.z1) / 2, (solid.z1 - solid.z0) / 2
-    in_z, out_z = _slab(MOUNT_HEIGHT - middle, -down, half)
-    in_side = np.maximum(in_x, in_y)
-    depth = np.maximum(in_side, in_z)
-    hit = (depth < np.minimum(np.minimum(out_x, out_y), out_z)) & (depth > NEAR)
-    depth[~hit] = np.nan
     x, y, z = sun.towards
     facing_x = math.copysign(1.0, cos * from_x + sin * from_y) * (cos * x + sin * y)
     facing_y = math.copysign(1.0, cos * from_y - sin * from_x) * (cos * y - sin * x)
     facing_z = math.copysign(1.0, MOUNT_HEIGHT - middle) * z
-    side = np.where(in_x > in_y, facing_x, facing_y)
-    tone = sun.gain * np.where(in_z > in_side, facing_z, side) + (TONES * part + sun.base)
-    canvas.put(at, depth, hit.astype(np.float32), tone.astype(np.float32))
+    for at in canvas.bands(*bounds):
+        right, down = (canvas.xs[at[1]] - CENTRE_X) / FOCAL_PX, (canvas.ys[at[0]] - CENTRE_Y) / FOCAL_PX
+        in_x, out_x = _slab(cos * from_x + sin * from_y, look_cos + look_sin * right, solid.half_x)
+        in_y, out_y = _slab(cos * from_y - sin * from_x, look_sin - look_cos * right, solid.half_y)
+        in_z, out_z = _slab(MOUNT_HEIGHT - middle, -down, half)
+        in_side = np.maximum(in_x, in_y)
+        depth = np.maximum(in_side, in_z)
+        hit = (depth < np.minimum(np.minimum(out_x, out_y), out_z)) & (depth > NEAR)
+        depth[~hit] = np.nan
+        side = np.where(in_x > in_y, facing_x, facing_y)
+        tone = sun.gain * np.where(in_z > in_side, facing_z, side) + (TONES * part + sun.base)
+        canvas.put(at, depth, hit.astype(np.float32), tone.astype(np.float32))
 
 
 def _slab(origin: float, direction: F32, half: float) -> tuple[F32, F32]:
@@ -305,14 +320,11 @@ def _slab(origin: float, direction: F32, half: float) -> tuple[F32, F32]:
     return np.minimum(one, other), np.maximum(one, other)
 
 
-def upright_bounds(x: float, z: float, radius: float, low: float, high: float) -> Bounds | None:
-    """Image box that holds an upright cylinder; None behind the camera, all of a side beside it."""
-    near, far = z - radius, z + radius
-    if far < NEAR:
+def upright_bounds(x: float, z: float, radius: float, low: float, high: float, near: float = NEAR) -> Bounds | None:
+    """Image box that holds what of an upright cylinder is beyond `near` [m]; None if nothing is."""
+    near, far = max(z - radius, near), z + radius
+    if far < near:
         return None
-    if near < NEAR:
-        left, right = FOCAL_PX * (x - radius) / far, FOCAL_PX * (x + radius) / far
-        return (CENTRE_X + left if left > 0 else -1e6), -1e6, (CENTRE_X + right if right < 0 else 1e6), 1e6
     sides = [CENTRE_X + FOCAL_PX * (x + side) / depth for side in (-radius, radius) for depth in (near, far)]
     ends = [CENTRE_Y + FOCAL_PX * (MOUNT_HEIGHT - end) / depth for end in (low, high) for depth in (near, far)]
     return min(sides) - 1, min(ends) - 1, max(sides) + 1, max(ends) + 1

@@ -11,7 +11,7 @@ import pytest
 from limo_sim import lidar
 from limo_sim.arena import Arena
 from limo_sim.furniture import Disc, Rectangle
-from limo_sim.person import Pose, body
+from limo_sim.person import Pose, body, legs_at
 from limo_sim.scenario import Person, Scenario
 
 
@@ -58,11 +58,33 @@ def test_an_axis_aligned_beam_is_not_a_division_by_zero() -> None:
 
 def test_a_walking_person_shows_two_shins_of_a_shins_width() -> None:
     person = Person(route=((2, 0, 0),))
-    shins = lidar.shins(body(person, Pose(2, 0, 0.3, 1.2, 1.0)))
+    shins = legs_at(person, Pose(2, 0, 0.3, 1.2, 1.0), lidar.MOUNT_HEIGHT)
     assert len(shins) == 2
     for shin in shins:
         assert 0.02 < shin.radius < 0.05
         assert math.hypot(shin.x - 2, shin.y) < 0.3
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4, 5.6])
+def test_the_legs_are_all_that_the_plane_cuts_of_a_body(phase: float) -> None:
+    person, pose = Person(route=((2, 0, 0),), height=0.6, girth=1.3), Pose(2, -1, 0.8, phase, 1.0)
+    cut = legs_at(person, pose, lidar.MOUNT_HEIGHT)
+    whole = body(person, pose)
+    x, y = np.mgrid[1.6:2.4:0.005, -1.4:-0.6:0.005]
+    flat = np.stack([x, y, np.full_like(x, lidar.MOUNT_HEIGHT)], axis=-1)
+    inside = np.zeros(x.shape, bool)
+    for start, end, radius, end_radius in zip(
+        whole.start, whole.end, whole.start_radius, whole.end_radius, strict=True
+    ):
+        axis = end - start
+        share = np.clip((flat - start) @ axis / (axis @ axis), 0, 1)
+        gap = np.linalg.norm(flat - (start + share[..., None] * axis), axis=-1)
+        inside |= gap < radius + share * (end_radius - radius)
+    discs = np.any([np.hypot(x - disc.x, y - disc.y) < disc.radius for disc in cut], axis=0)
+    assert discs.any()
+    # a leaning shin is cut in an ellipse, of which the disc is the middle
+    assert (inside & discs).sum() > 0.95 * discs.sum()
+    assert (inside & discs).sum() > 0.6 * inside.sum()
 
 
 def test_noise_has_the_spread_asked_for_and_ranges_keep_their_limits() -> None:

@@ -183,6 +183,17 @@ def test_visible_share_falls_as_somebody_leaves_the_image() -> None:
     assert shares[-1] == (0.0, None)
 
 
+@pytest.mark.parametrize(("distance", "y"), [(0.5, 0.0), (0.8, 0.3), (1.1, -0.8), (1.6, 1.1)])
+def test_visible_share_is_that_of_the_silhouette_in_a_wider_image(distance: float, y: float) -> None:
+    """The whole silhouette from single rays: those within the image are the visible ones."""
+    pose = Pose(distance, y, 1.0, 2.0, 1.0)
+    rows, columns = (grid.reshape(-1) for grid in np.mgrid[-400:1300:6, -900:1500:6])
+    covered = np.isfinite(first_hit(body(SOMEBODY, pose), rays(columns, rows)))
+    within = (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
+    [(visible, _)] = picture(pose)[2]
+    assert visible == pytest.approx((covered & within).sum() / covered.sum(), abs=0.03)
+
+
 def test_somebody_behind_the_camera_is_not_seen() -> None:
     image, depth, [seen] = picture(Pose(-2.0, 0.0, 0.0))
     empty, empty_depth, _ = picture(None)

@@ -1,0 +1,102 @@
+"""What a frame and a scan of the arena cost, in every scenario: `uv run python benches/arena.py`.
+
+The robot keeps a metre from whoever is nearest, nearer than any follower does; every frame (colour, depth and truth)
+and every scan on the way is made several times, and the least of its times counts. One thread, processor time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Callable, Iterator
+
+import cv2
+import numpy as np
+
+from limo_hog.follow.twist import Twist
+from limo_sim import lidar
+from limo_sim.arena import STEPS_PER_SECOND, Arena
+from limo_sim.camera import CameraPose
+from limo_sim.person import Pose
+from limo_sim.renderer import Renderer
+from limo_sim.scenario import Scenario
+
+REPEATS = 5
+KEPT_M, STOP_M = 1.0, 0.4
+FRAME_STEPS = STEPS_PER_SECOND // 10
+
+
+def least_ms(action: Callable[[], object]) -> float:
+    """Least processor time of several calls [ms]."""
+    times = []
+    for _ in range(REPEATS):
+        start = time.thread_time()
+        action()
+        times.append(time.thread_time() - start)
+    return 1e3 * min(times)
+
+
+def nearest_person(arena: Arena) -> tuple[float, float] | None:
+    """Distance [m] and bearing [rad] of the nearest person."""
+    there = [(person.distance, person.bearing) for person in arena.truth().people if person is not None]
+    return min(there, default=None)
+
+
+def drive(scenario: Scenario, seconds: float) -> Iterator[tuple[float, float]]:
+    """Costs of a frame and a scan [ms], ten times a second."""
+    arena = Arena(scenario, 0)
+
+    def frame() -> None:
+        arena._frame = None
+        arena.frame()
+
+    def scan() -> None:
+        arena._scan = None
+        arena.scan()
+
+    for step in range(round(seconds * STEPS_PER_SECOND)):
+        if step % FRAME_STEPS == 0:
+            yield least_ms(frame), least_ms(scan)
+            distance, bearing = nearest_person(arena) or (KEPT_M, 0.0)
+            free = float(arena.scan().ranges[lidar.BEAMS // 4 : -lidar.BEAMS // 4].min()) > STOP_M
+            arena.command(Twist(min(0.8 * (distance - KEPT_M), 0.5 if free else 0.0), 2.0 * bearing))
+        arena.step()
+
+
+def around(distance: float, people: int) -> Iterator[float]:
+    """Cost of a frame [ms] with people side by side at a distance [m], in the middle and at the edge, turned 8 ways."""
+    somebody = Scenario.load("standing").people
+    renderer = Renderer(Scenario(people=people * somebody), np.random.default_rng(0))
+    for aside in (0.0, 0.25, 0.6):
+        for turn in range(8):
+            poses = [
+                Pose(distance * math.cos(angle), distance * math.sin(angle), turn * math.tau / 8, turn, 1.0)
+                for angle in (aside, -0.3)[:people]
+            ]
+            yield least_ms(lambda poses=poses: renderer.render(CameraPose(0, 0, 0), poses, np.random.default_rng(1)))
+
+
+def told(times: list[float]) -> str:
+    """Median, 95th percentile and maximum."""
+    return " ".join(f"{value:8.2f}" for value in (np.median(times), np.percentile(times, 95), max(times)))
+
+
+def main() -> None:
+    """Print a line a scenario, and a line a distance."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=40.0, help="simulated, of each scenario")
+    parser.add_argument("scenarios", nargs="*", default=[*Scenario.names(), *(f"random:{seed}" for seed in range(10))])
+    args = parser.parse_args()
+    cv2.setNumThreads(1)
+    print(f"{'ms':20}{'frame: median p95 max':>27}{'scan: median p95 max':>27}")
+    for name in args.scenarios:
+        frames, scans = zip(*drive(Scenario.load(name), args.seconds), strict=True)
+        print(f"{name:20}{told(frames)} {told(scans)}", flush=True)
+    for people, word in ((1, "person"), (2, "two")):
+        for distance in (0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 3.0, 4.0, 6.0):
+            print(f"{f'{word} at {distance} m':20}{told(list(around(distance, people)))}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -13,7 +13,7 @@ from limo_sim.arena import Arena
 from limo_sim.scenario import Camera, Furniture, Person, Scenario
 from limo_sim.schema import ScenarioError
 
-NAMES = ("empty", "followable", "furniture", "late", "occlusion", "two_people", "workshop", "zigzag")
+NAMES = ("crossing", "empty", "followable", "furniture", "late", "occlusion", "two_people", "workshop", "zigzag")
 
 
 def written(folder: Path, text: str) -> Path:

@@ -40,10 +40,15 @@ class ApproachController:
         """Turn towards the surest box, if there is one."""
         if len(observation.detections) == 0:
             return nobody_seen(state)
-        target = int(np.argmax(observation.detections.scores))
-        error = observation.width // 2 - box_centre(observation.detections.boxes[target])[0]
+        target, error = surest(observation)
         angular = 0.0 if abs(error) < self.dead_band_px else self.angular_gain * error
         return Decision(Twist(self.linear_speed, angular), True, Mode.FOLLOW, "driving towards a person", target)
+
+
+def surest(observation: Observation) -> tuple[int, int]:
+    """Return which box is the surest, and how far left of the image's middle it is [px]."""
+    target = int(np.argmax(observation.detections.scores))
+    return target, observation.width // 2 - box_centre(observation.detections.boxes[target])[0]
 
 
 def nobody_seen(seen_before: bool) -> Decision[bool]:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from limo_hog.follow.approach import nobody_seen
+from limo_hog.follow.approach import nobody_seen, surest
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.observation import Observation
-from limo_hog.follow.proxemics import box_centre, person_depth, zone_of
+from limo_hog.follow.proxemics import person_depth, zone_of
 from limo_hog.follow.twist import Twist
 
 
@@ -45,12 +43,11 @@ class ProxemicController:
         """Turn towards the surest box and mind its distance; stop without a box or a distance."""
         if len(observation.detections) == 0:
             return nobody_seen(state)
-        target = int(np.argmax(observation.detections.scores))
+        target, error = surest(observation)
         box = observation.detections.boxes[target]
         distance = None if observation.depth is None else person_depth(observation.depth, box)
         if distance is None:
             return Decision(Twist(), True, Mode.BLOCKED, "no depth at the person", target)
-        error = observation.width / 2 - box_centre(box)[0]
         linear = self.linear_gain * (distance - self.target_distance)
         twist = Twist(
             min(max(linear, -self.max_linear), self.max_linear),

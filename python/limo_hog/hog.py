@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limo_hog import _core, model_files
+from limo_hog import _core
 from limo_hog.arguments import Nothing, Pair, Pairs, coefficients, integer, pair, pixels, places, real, rectangles
 from limo_hog.exceptions import ParameterTypeError
 from limo_hog.geometry import Attributes, Geometry
@@ -349,7 +348,10 @@ class HOGDescriptor(Attributes):
         ParameterError
             The object's name is not a letter or `_`, then letters, digits, `-` and `_`.
         """
-        model_files.save(Path(filename), self._geometry, self._svm, objname)
+        # Imported here: what reads and writes files would double the time to import this package.
+        from limo_hog import model_files
+
+        model_files.save(filename, self._geometry, self._svm, objname)
 
     def load(self, filename: str | os.PathLike[str], objname: str = "") -> bool:
         """Take geometry and detector from a file of OpenCV's or of `save`; true, or an error.
@@ -372,7 +374,9 @@ class HOGDescriptor(Attributes):
         DetectorSizeError
             Its detector does not fit its geometry.
         """
-        geometry, svm = model_files.load(Path(filename), objname)
+        from limo_hog import model_files
+
+        geometry, svm = model_files.load(filename, objname)
         loaded = HOGDescriptor()
         loaded._set(geometry)
         loaded.getDescriptorSize()

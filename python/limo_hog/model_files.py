@@ -33,7 +33,7 @@ _GZIP_MAGIC = b"\x1f\x8b"
 _MARGIN = 71
 
 
-def load(path: Path, name: str = "") -> tuple[Geometry, list[float]]:
+def load(filename: str | os.PathLike[str], name: str = "") -> tuple[Geometry, list[float]]:
     """Return geometry and coefficients (perhaps none) of the object `name`, by default of the first in the file.
 
     As in OpenCV, single numbers that are missing count as 0.
@@ -45,6 +45,7 @@ def load(path: Path, name: str = "") -> tuple[Geometry, list[float]]:
     ModelFormatError
         It is not one of OpenCV's files, or has no such object, or that is no HOG detector.
     """
+    path = Path(filename)
     data = path.read_bytes()
     try:
         text = (gzip.decompress(data) if data.startswith(_GZIP_MAGIC) else data).decode()
@@ -54,7 +55,7 @@ def load(path: Path, name: str = "") -> tuple[Geometry, list[float]]:
         raise ModelFormatError(f"{path} holds no HOG detector: {error}") from error
 
 
-def save(path: Path, geometry: Geometry, svm: NDArray[np.float32] | None, name: str = "") -> None:
+def save(filename: str | os.PathLike[str], geometry: Geometry, svm: NDArray[np.float32] | None, name: str = "") -> None:
     """Write the object `name` (by default the file's stem) in the format of the suffix; YAML where it is no other.
 
     Raises
@@ -64,6 +65,7 @@ def save(path: Path, geometry: Geometry, svm: NDArray[np.float32] | None, name: 
     OSError
         The file cannot be written; no part of it is left behind.
     """
+    path = Path(filename)
     zipped = path.suffix == ".gz"
     plain = path.with_suffix("") if zipped else path
     if name and not re.fullmatch(r"[A-Za-z_][\w-]*", name, re.ASCII):

@@ -1,0 +1,31 @@
+"""What `import limo_hog` brings along, and what it leaves for those who need it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+
+def modules_after(statement: str) -> set[str]:
+    """Run a statement in a fresh interpreter and return the names of the modules it has then."""
+    code = f"import sys; {statement}; print(*sys.modules)"
+    return set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
+
+
+@pytest.fixture(scope="module")
+def imported() -> set[str]:
+    return modules_after("import limo_hog") - modules_after("import numpy")
+
+
+@pytest.mark.parametrize(
+    "module", ["cv2", "rich", "pathlib", "gzip", "json", "xml.etree.ElementTree", "argparse", "importlib.metadata"]
+)
+def test_importing_the_detector_does_not_import(module: str, imported: set[str]) -> None:
+    assert module not in imported
+
+
+def test_importing_the_detector_imports_neither_commands_nor_follower(imported: set[str]) -> None:
+    ours = {name.split(".")[1] for name in imported if name.startswith("limo_hog.")}
+    assert not ours & {"cli", "follow", "imaging", "ros2", "model_files"}

@@ -100,6 +100,11 @@ async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
     await tab.value("document.querySelector('#step').click()")
     await tab.until(f"now.time > {stood}")
     assert await tab.value("now.time") - stood == pytest.approx(0.1, abs=0.03)
+    # The pictures that are kept show somebody who is followed.
+    while await tab.value("now.error_px") is None:
+        stood = await tab.value("now.time")
+        await tab.value("document.querySelector('#step').click()")
+        await tab.until(f"now.time > {stood}")
     for width, height, dark in ((1280, 900, False), (1280, 900, True), (390, 844, False), (390, 844, True)):
         await tab.look(width, height, dark)
         await tab.screenshot(PICTURES / f"{'phone' if width < 600 else 'desk'}-{'dark' if dark else 'light'}.png")

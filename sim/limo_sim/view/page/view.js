@@ -50,13 +50,13 @@ function state(next, rows) {
   $("reason").textContent = now.reason;
   $("pause").textContent = now.paused ? "Go on" : "Pause";
   if (document.activeElement !== $("speed")) $("speed").value = String(now.speed);
-  $("distance").textContent = number(now.distance_m, 2, "m");
+  put("distance", now.distance_m, 2, "m");
   $("zone").textContent = now.distance_m === null ? "–" : zone(now.distance_m);
-  $("error").textContent = number(now.error_px, 0, "px");
-  $("linear").textContent = number(now.linear_m_s, 2, "m/s");
-  $("angular").textContent = number(now.angular_rad_s, 2, "rad/s");
+  put("error", now.error_px, 0, "px");
+  put("linear", now.linear_m_s, 2, "m/s");
+  put("angular", now.angular_rad_s, 2, "rad/s");
   $("boxes").textContent = now.boxes;
-  if (now.detect_ms !== null) $("detect").textContent = number(now.detect_ms, 1, "ms");
+  if (now.detect_ms !== null) put("detect", now.detect_ms, 1, "ms");
   $("contacts").textContent = now.contacts.person + now.contacts.wall;
   redraw();
 }
@@ -104,11 +104,13 @@ function notice(text) {
   $("notice").hidden = !text;
 }
 
-const number = (value, digits, unit) => {
-  if (value === null) return "–";
-  const text = value.toFixed(digits);
-  return `${Number(text) === 0 ? text.replace("-", "") : text} ${unit}`;
-};
+function put(id, value, digits, unit) {
+  const small = Object.assign(document.createElement("small"), { textContent: unit });
+  $(id).replaceChildren(...(value === null ? ["–"] : [`${number(value, digits)} `, small]));
+}
+
+// Without a minus before nothing, and with a real one before something.
+const number = (value, digits) => value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1").replace("-", "−");
 const percent = (share) => (share === undefined ? "–" : `${(100 * share).toFixed(0)} %`);
 const ZONES = ["intimate", "personal", "social", "public"];
 const zone = (distance) => ZONES[scene.zones.filter((end) => distance > end).length];
@@ -190,15 +192,20 @@ function plot(id, series, low, high, bands = []) {
     const top = y(Math.min(bands[i + 1], high));
     pen.fillRect(left, top, width - left - 4, y(bands[i]) - top);
   }
+  // The names go where there is room for them, clear of the line above and below.
   pen.fillStyle = colours.faint;
-  pen.strokeStyle = colours.line;
-  pen.lineWidth = 1;
   pen.textAlign = "right";
   pen.textBaseline = "middle";
+  for (let i = 0; i + 1 < bands.length; i++) {
+    const [top, foot] = [y(Math.min(bands[i + 1], high)), y(bands[i])];
+    if (foot - top > 13) pen.fillText(ZONES[i], width - 10, (top + foot) / 2);
+  }
+  pen.lineWidth = 1;
   const step = nice((high - low) / 6);
   for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
+    pen.strokeStyle = Math.abs(v) < step / 2 ? colours.faint : colours.line;
     line(pen, [[left, y(v)], [width - 4, y(v)]]);
-    pen.fillText(String(Number(v.toFixed(6))), left - 5, y(v));
+    pen.fillText(String(Number(v.toFixed(6))).replace("-", "−"), left - 5, y(v));
   }
   pen.textAlign = "center";
   pen.textBaseline = "bottom";
@@ -264,18 +271,18 @@ function drawMap() {
     pen.fillRect(-halfX * scale, -halfY * scale, 2 * halfX * scale, 2 * halfY * scale);
     pen.restore();
   }
+  // Zones and field of view end at the walls.
+  pen.save();
+  pen.beginPath();
+  pen.rect(...at(-scene.room, scene.room), side, side);
+  pen.clip();
   if (now.people.length) {
     const [x, y] = now.people[0];
-    pen.save();
-    pen.beginPath();
-    pen.rect(...at(-scene.room, scene.room), side, side);
-    pen.clip();
     scene.zones.forEach((radius, i) => {
       disc(x, y, radius);
       pen.fillStyle = colours[`zone-${i}`];
       pen.fill();
     });
-    pen.restore();
   }
   const [robotX, robotY, yaw] = now.robot;
   pen.fillStyle = colours.robot;
@@ -284,6 +291,7 @@ function drawMap() {
   pen.moveTo(...at(robotX, robotY));
   pen.arc(...at(robotX, robotY), 5 * scale, -yaw - scene.field / 2, -yaw + scene.field / 2);
   pen.fill();
+  pen.restore();
   pen.globalAlpha = 0.6;
   pen.lineWidth = 1.5;
   for (const [column, colour] of [[X, "robot"], [PERSON_X, "person"]]) {

@@ -22,6 +22,7 @@ from limo_sim.score import ScoreCard, score
 MEASURES = (
     "in_view",
     "detected",
+    "best_box_wrong",
     "pixel_error_mean",
     "distance_rms_error_m",
     "zone_social",

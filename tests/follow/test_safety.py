@@ -81,6 +81,13 @@ def test_what_was_seen_before_a_turn_stops_the_way_back() -> None:
     assert guard.step(later, decision.state).twist.linear == -0.3
 
 
+def test_backwards_it_goes_slowly_for_it_does_not_look_there() -> None:
+    guard = Guard(Headstrong(Twist(-0.7, 0.2)))
+    decision = guard.step(replace(look(), scan=scan()), guard.start())
+    assert decision.twist == Twist(-guard.backwards, 0.2)
+    assert decision.reason == "because"
+
+
 def test_somebody_beside_is_passed_and_somebody_in_the_way_is_not() -> None:
     margin = Margin(0.5, 0.2)
     assert room_ahead(np.array([[1.0, 0.4]]), margin, LIMO) == np.inf

@@ -34,7 +34,7 @@ _COLUMNS = (
     ("follows_first", "same\nperson", "%", ".1f"),
     ("clearance_min_m", "least\nclear", "m", ".2f"),
     ("contacts_person", "con-\ntacts", "", ".2g"),
-    ("path_wrong_m", "led\nastray", "m", ".2f"),
+    ("path_wrong_m", "led\naway", "m", ".2f"),
 )
 
 

@@ -83,6 +83,8 @@ class Guard(Generic[S]):
         Time between something being there and the robot braking [s]: a scan's, a frame's and a command's age.
     remember
         How long what was seen around the robot counts for what is behind it [s].
+    backwards
+        Highest speed backwards [m/s]: whoever has come up from behind since is in no sensor's sight.
     patience
         After so long without a camera frame, or with a scan so old, the robot stops [s].
     body
@@ -94,6 +96,7 @@ class Guard(Generic[S]):
     braking: float = 0.5
     reaction: float = 0.25
     remember: float = 10.0
+    backwards: float = 0.4
     patience: float = 0.5
     body: Body = LIMO
 
@@ -153,11 +156,12 @@ class Guard(Generic[S]):
         around = from_odometry(state.seen, pose)
         ahead = self._speed(room_ahead(np.concatenate([around, state.near]), self.margin, self.body))
         behind = self._speed(room_behind(around, self.margin, self.body))
-        linear = min(max(wish.twist.linear, -behind), ahead)
-        if linear == wish.twist.linear:
-            return decided(wish.twist, wish.mode, wish.reason)
-        where = "ahead" if wish.twist.linear > 0 else "behind"
+        wanted = max(wish.twist.linear, -self.backwards)
+        linear = min(max(wanted, -behind), ahead)
         twist = Twist(linear, wish.twist.angular)
+        if linear == wanted:
+            return decided(twist, wish.mode, wish.reason)
+        where = "ahead" if wanted > 0 else "behind"
         if linear == 0:
             return decided(twist, Mode.BLOCKED, f"something is too near {where}")
         return decided(twist, wish.mode, f"slowed by something {where}")

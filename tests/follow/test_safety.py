@@ -108,6 +108,7 @@ BAD = {
     "no valid range": replace(look(), scan=scan(np.full(292, np.nan, np.float32))),
     "outside the 640x480 image": look(boxes((700, 10, 64, 128))),
     "box (10, 10, 0, 128)": look(boxes((10, 10, 0, 128))),
+    "do not belong together": replace(look(boxes((10, 10, 64, 128))), clothes=np.zeros((2, 2, 3))),
     "not a number": look(boxes((10, 10, 64, 128), scores=(float("nan"),))),
     "odometry": replace(look(), odometry=Odometry(yaw=float("inf"))),
 }

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections, PeopleDetector
-from limo_hog.follow import ProxemicController, TrackingController, controller_named
-from limo_hog.follow.decision import Mode
+from limo_hog.follow import Decision, Mode, Observation, ProxemicController, TrackingController, controller_named
+from limo_hog.follow.tracking import TrackingState
 from limo_sim.episode import Episode, run_episode
 from limo_sim.scenario import Scenario
 from limo_sim.score import score
@@ -53,6 +53,28 @@ def test_the_tracking_controller_closes_in_on_somebody_who_stands() -> None:
     assert result.detected == 1.0
     assert result.contacts_person == 0
     assert result.modes["hold"] > 0.1
+
+
+def test_somebody_who_walks_in_between_is_not_followed_instead() -> None:
+    result = score(run("crossing", 22.0, seed=1))
+    assert result.follows_first is not None
+    assert result.follows_first > 0.95
+    assert result.contacts_person == 0
+
+
+def test_the_follower_is_told_what_people_wear() -> None:
+    told = []
+
+    class Asking(TrackingController):
+        def step(self, observation: Observation, state: TrackingState) -> Decision[TrackingState]:
+            told.append((len(observation.detections), observation.clothes))
+            return super().step(observation, state)
+
+    run("standing", 1.0, Asking())
+    assert any(count for count, _ in told)
+    for count, clothes in told:
+        assert clothes is not None
+        assert clothes.shape == (count, 2, 3)
 
 
 @pytest.mark.parametrize("name", ["approach", "proxemic"])

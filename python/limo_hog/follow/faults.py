@@ -34,6 +34,9 @@ def _boxes(observation: Observation) -> str:
         return f"boxes {boxes.shape} and scores {scores.shape} do not belong together"
     if not np.all(np.isfinite(scores)):
         return "a box has a score that is not a number"
+    clothes = observation.clothes
+    if clothes is not None and clothes.shape != (len(boxes), 2, 3):
+        return f"clothes {clothes.shape} and boxes {boxes.shape} do not belong together"
     centre = boxes[:, :2] + boxes[:, 2:] / 2
     inside = (centre >= 0).all(axis=1) & (centre < (observation.width, observation.height)).all(axis=1)
     sane = inside & (boxes[:, 2:] > 0).all(axis=1)

@@ -65,5 +65,12 @@ def test_clothes_out_of_the_image_are_not_known(box: tuple[int, int, int, int]) 
     assert not np.isfinite(worn(dressed(BOX, RED, BLUE), box)).any()
 
 
-def test_no_boxes_have_no_clothes() -> None:
-    assert clothes_in(dressed(BOX, RED, BLUE), np.empty((0, 4), np.int32)).shape == (0, 2, 3)
+def test_no_boxes_have_no_clothes_and_what_are_no_boxes_none_known() -> None:
+    image = dressed(BOX, RED, BLUE)
+    assert clothes_in(image, np.empty((0, 4), np.int32)).shape == (0, 2, 3)
+    assert np.isnan(clothes_in(image, np.ones((2, 3), np.int32))).all()
+
+
+def test_in_a_grey_image_clothes_are_light_or_dark() -> None:
+    light, dark = (worn(dressed(BOX, (grey, grey, grey), RED)[..., 2]) for grey in (230, 15))
+    assert unlikeness(light, dark) > OTHER_CLOTHES

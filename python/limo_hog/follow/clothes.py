@@ -28,7 +28,7 @@ def clothes_in(image: NDArray[np.uint8], boxes: NDArray[np.int32]) -> NDArray[np
     Parameters
     ----------
     image
-        uint8 (H, W, 3), BGR.
+        uint8 (H, W, 3), BGR, or (H, W), in which all clothes are grey.
     boxes
         int32 (N, 4): x, y, w, h of detection windows [px].
 
@@ -37,14 +37,15 @@ def clothes_in(image: NDArray[np.uint8], boxes: NDArray[np.int32]) -> NDArray[np
     float64 (N, 2, 3): `Clothes` of each; NaN where they are out of the image.
     """
     worn: NDArray[np.float64] = np.full((len(boxes), 2, 3), np.nan)
-    for index, (x, y, w, h) in enumerate(boxes.tolist()):
+    # What is no list of boxes is a fault, and told where the robot is stopped for it.
+    for index, (x, y, w, h) in enumerate(boxes.tolist() if boxes.shape[1:] == (4,) else ()):
         middle, half = x + w / 2, max(_HALF_WIDTH * h, 1)
         columns = slice(max(round(middle - half), 0), max(round(middle + half), 0))
         for part, (centre, reach) in enumerate((_CHEST, _HIPS)):
             rows = slice(max(round(y + (centre - reach) * h), 0), max(round(y + (centre + reach) * h), 0))
             patch = image[rows, columns]
             if patch.size:
-                blue, green, red = np.median(patch, axis=(0, 1)) + _DARK
+                blue, green, red = np.broadcast_to(np.median(patch, axis=(0, 1)), 3) + _DARK
                 total = blue + green + red
                 worn[index, part] = red / total, green / total, np.log(total)
     worn /= _STRAY

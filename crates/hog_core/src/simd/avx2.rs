@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::lane::Lane;
+use super::lane::{Lane, ODD};
 use super::rows::{Columns, Rows};
 
 /// Proof that the CPU has AVX2 and FMA.
@@ -37,6 +37,8 @@ impl Lane for Avx2 {
     type Sum = __m256i;
     type M = __m256;
     type Masked = __m256;
+    /// The integer below the position, and the nearest one.
+    type Slots = [__m256; 2];
 
     #[inline(always)]
     fn splat(self, x: f32) -> __m256 {
@@ -67,8 +69,16 @@ impl Lane for Avx2 {
         isa!(_mm256_min_ps(a, b))
     }
     #[inline(always)]
+    fn max(self, a: __m256, b: __m256) -> __m256 {
+        isa!(_mm256_max_ps(a, b))
+    }
+    #[inline(always)]
     fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
         isa!(_mm256_fmadd_ps(a, b, c))
+    }
+    #[inline(always)]
+    fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+        isa!(_mm256_fmsub_ps(a, b, c))
     }
     #[inline(always)]
     fn neg_mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
@@ -85,14 +95,6 @@ impl Lane for Avx2 {
     #[inline(always)]
     fn max_abs(self, a: __m256, b: __m256) -> __m256 {
         isa!(_mm256_max_ps(self.abs(a), self.abs(b)))
-    }
-    #[inline(always)]
-    fn floor(self, x: __m256) -> __m256 {
-        isa!(_mm256_floor_ps(x))
-    }
-    #[inline(always)]
-    fn round(self, x: __m256) -> __m256 {
-        isa!(_mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(x))
     }
     #[inline(always)]
     fn sqrt(self, x: __m256) -> __m256 {
@@ -135,17 +137,24 @@ impl Lane for Avx2 {
         isa!(_mm256_xor_ps(x, _mm256_and_ps(_mm256_xor_ps(a, b), _mm256_set1_ps(-0.0))))
     }
     #[inline(always)]
-    fn keep(self, x: __m256, key: __m256, wanted: f32) -> __m256 {
+    fn slots(self, position: __m256) -> (__m256, [__m256; 2]) {
+        let below = isa!(_mm256_floor_ps(position));
+        let nearest = isa!(_mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(position));
+        (self.abs(self.sub(position, nearest)), [below, nearest])
+    }
+    #[inline(always)]
+    fn keep(self, x: __m256, slots: [__m256; 2], slot: usize) -> __m256 {
         // Small whole numbers are equal exactly where their bits are.
         isa!({
-            let wanted = _mm256_set1_epi32(wanted.to_bits() as i32);
-            let mask = _mm256_cmpeq_epi32(_mm256_castps_si256(key), wanted);
+            let wanted = _mm256_set1_epi32(((slot % ODD) as f32).to_bits().cast_signed());
+            let mask = _mm256_cmpeq_epi32(_mm256_castps_si256(slots[slot / ODD]), wanted);
             _mm256_and_ps(x, _mm256_castsi256_ps(mask))
         })
     }
     #[inline(always)]
-    fn keep_either(self, one: (__m256, __m256, f32), other: (__m256, __m256, f32)) -> __m256 {
-        isa!(_mm256_or_ps(self.keep(one.0, one.1, one.2), self.keep(other.0, other.1, other.2)))
+    fn keep_either(self, slots: [__m256; 2], one: (__m256, usize), other: (__m256, usize)) -> __m256 {
+        let (one, other) = (self.keep(one.0, slots, one.1), self.keep(other.0, slots, other.1));
+        isa!(_mm256_or_ps(one, other))
     }
     #[inline(always)]
     fn mul_add_masked(self, x: __m256, weight: __m256, sum: __m256) -> __m256 {

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::lane::Lane;
+use super::lane::{Lane, ODD};
 use super::rows::{Columns, Rows};
 
 /// Proof that the CPU has AVX-512 F, BW, VL, DQ, VBMI and VNNI.
@@ -37,6 +37,8 @@ impl Lane for Avx512 {
     type Sum = __m512i;
     type M = __mmask16;
     type Masked = (__m512, __mmask16);
+    /// The integer below the position, and the nearest one.
+    type Slots = [__m512; 2];
 
     #[inline(always)]
     fn splat(self, x: f32) -> __m512 {
@@ -67,8 +69,16 @@ impl Lane for Avx512 {
         isa!(_mm512_min_ps(a, b))
     }
     #[inline(always)]
+    fn max(self, a: __m512, b: __m512) -> __m512 {
+        isa!(_mm512_max_ps(a, b))
+    }
+    #[inline(always)]
     fn mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
         isa!(_mm512_fmadd_ps(a, b, c))
+    }
+    #[inline(always)]
+    fn mul_sub(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+        isa!(_mm512_fmsub_ps(a, b, c))
     }
     #[inline(always)]
     fn neg_mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
@@ -85,14 +95,6 @@ impl Lane for Avx512 {
     #[inline(always)]
     fn max_abs(self, a: __m512, b: __m512) -> __m512 {
         isa!(_mm512_range_ps::<0b1011>(a, b))
-    }
-    #[inline(always)]
-    fn floor(self, x: __m512) -> __m512 {
-        isa!(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(x))
-    }
-    #[inline(always)]
-    fn round(self, x: __m512) -> __m512 {
-        isa!(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(x))
     }
     #[inline(always)]
     fn sqrt(self, x: __m512) -> __m512 {
@@ -144,19 +146,30 @@ impl Lane for Avx512 {
         })
     }
     #[inline(always)]
-    fn keep(self, x: __m512, key: __m512, wanted: f32) -> (__m512, __mmask16) {
-        (
-            x,
-            isa!(_mm512_cmpeq_epi32_mask(
-                _mm512_castps_si512(key),
-                _mm512_set1_epi32(wanted.to_bits().cast_signed())
-            )),
-        )
+    fn slots(self, position: __m512) -> (__m512, [__m512; 2]) {
+        let below = isa!(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(position));
+        let nearest =
+            isa!(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(position));
+        (self.abs(self.sub(position, nearest)), [below, nearest])
     }
     #[inline(always)]
-    fn keep_either(self, one: (__m512, __m512, f32), other: (__m512, __m512, f32)) -> (__m512, __mmask16) {
-        let (x, mask) = self.keep(one.0, one.1, one.2);
-        let (y, other) = self.keep(other.0, other.1, other.2);
+    fn keep(self, x: __m512, slots: [__m512; 2], slot: usize) -> (__m512, __mmask16) {
+        // Small whole numbers are equal exactly where their bits are.
+        let mask = isa!({
+            let wanted = _mm512_set1_epi32(((slot % ODD) as f32).to_bits().cast_signed());
+            _mm512_cmpeq_epi32_mask(_mm512_castps_si512(slots[slot / ODD]), wanted)
+        });
+        (x, mask)
+    }
+    #[inline(always)]
+    fn keep_either(
+        self,
+        slots: [__m512; 2],
+        one: (__m512, usize),
+        other: (__m512, usize),
+    ) -> (__m512, __mmask16) {
+        let (x, mask) = self.keep(one.0, slots, one.1);
+        let (y, other) = self.keep(other.0, slots, other.1);
         (isa!(_mm512_mask_mov_ps(x, other, y)), mask | other)
     }
     #[inline(always)]

@@ -2,6 +2,9 @@
 
 use super::rows::{Columns, Rows};
 
+/// The first of the slots for odd bins.
+pub(super) const ODD: usize = 8;
+
 /// The operations of one instruction set on vectors of [`LANES`](Self::LANES) single precision numbers.
 ///
 /// A value of an implementing type is the proof that the CPU has the instruction set: it can only be made (unsafely)
@@ -22,6 +25,8 @@ pub(super) trait Lane: Copy {
     type M: Copy;
     /// A vector of which only some lanes count; the others stand for 0.
     type Masked: Copy;
+    /// The slots of the two bins that each lane votes for.
+    type Slots: Copy;
     /// Output pixels that `mix` makes at a time ...
     const GROUP: usize;
     /// ... and the source pixels that a part of them may span.
@@ -41,8 +46,11 @@ pub(super) trait Lane: Copy {
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
     fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    fn max(self, a: Self::F, b: Self::F) -> Self::F;
     /// a·b + c.
     fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// a·b − c.
+    fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// c − a·b.
     fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     fn abs(self, x: Self::F) -> Self::F;
@@ -50,10 +58,6 @@ pub(super) trait Lane: Copy {
     fn min_abs(self, a: Self::F, b: Self::F) -> Self::F;
     /// max(|a|, |b|).
     fn max_abs(self, a: Self::F, b: Self::F) -> Self::F;
-    /// The integer below a number in 0..16.
-    fn floor(self, x: Self::F) -> Self::F;
-    /// The integer nearest to a number in 0..16.
-    fn round(self, x: Self::F) -> Self::F;
     /// The square root, correctly rounded.
     fn sqrt(self, x: Self::F) -> Self::F;
     /// The square root of a whole number of 0..=255, correctly rounded if the CPU's estimate is good enough.
@@ -73,10 +77,13 @@ pub(super) trait Lane: Copy {
     fn select(self, mask: Self::M, yes: Self::F, no: Self::F) -> Self::F;
     /// `x` with its sign flipped where exactly one of `a`, `b` is negative.
     fn flip_by_signs(self, x: Self::F, a: Self::F, b: Self::F) -> Self::F;
-    /// `x` in those lanes whose `key` is the small integer `wanted`.
-    fn keep(self, x: Self::F, key: Self::F, wanted: f32) -> Self::Masked;
-    /// `x` where `key` is `wanted`, `other` where `other_key` is `other_wanted`; never both.
-    fn keep_either(self, one: (Self::F, Self::F, f32), other: (Self::F, Self::F, f32)) -> Self::Masked;
+    /// For positions in 0..5: the distance to the nearest integer, and the slots of the integer below (0 to 4) and of
+    /// the nearest one ([`ODD`] to `ODD` + 5).
+    fn slots(self, position: Self::F) -> (Self::F, Self::Slots);
+    /// `x` in those lanes that have `slot` among their slots.
+    fn keep(self, x: Self::F, slots: Self::Slots, slot: usize) -> Self::Masked;
+    /// `one.0` in the lanes that have slot `one.1`, `other.0` in those that have `other.1`; never both.
+    fn keep_either(self, slots: Self::Slots, one: (Self::F, usize), other: (Self::F, usize)) -> Self::Masked;
     /// sum + x·weight.
     fn mul_add_masked(self, x: Self::Masked, weight: Self::F, sum: Self::F) -> Self::F;
     /// The same, given `product` = vote·weight of the vote that `x` was kept from: addition and multiplication may run

@@ -2,7 +2,7 @@
 
 use std::arch::aarch64::*;
 
-use super::lane::Lane;
+use super::lane::{Lane, ODD};
 use super::rows::{Columns, Rows};
 
 /// Proof that the CPU has NEON.
@@ -44,6 +44,8 @@ impl Lane for Neon {
     type Sum = [int32x4_t; 2];
     type M = uint32x4_t;
     type Masked = float32x4_t;
+    /// The integer below the position, and the nearest one.
+    type Slots = [float32x4_t; 2];
 
     #[inline(always)]
     fn splat(self, x: f32) -> float32x4_t {
@@ -74,8 +76,16 @@ impl Lane for Neon {
         isa!(vminq_f32(a, b))
     }
     #[inline(always)]
+    fn max(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
+        isa!(vmaxq_f32(a, b))
+    }
+    #[inline(always)]
     fn mul_add(self, a: float32x4_t, b: float32x4_t, c: float32x4_t) -> float32x4_t {
         isa!(vfmaq_f32(c, a, b))
+    }
+    #[inline(always)]
+    fn mul_sub(self, a: float32x4_t, b: float32x4_t, c: float32x4_t) -> float32x4_t {
+        isa!(vnegq_f32(vfmsq_f32(c, a, b)))
     }
     #[inline(always)]
     fn neg_mul_add(self, a: float32x4_t, b: float32x4_t, c: float32x4_t) -> float32x4_t {
@@ -92,14 +102,6 @@ impl Lane for Neon {
     #[inline(always)]
     fn max_abs(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
         isa!(vmaxq_f32(vabsq_f32(a), vabsq_f32(b)))
-    }
-    #[inline(always)]
-    fn floor(self, x: float32x4_t) -> float32x4_t {
-        isa!(vrndmq_f32(x))
-    }
-    #[inline(always)]
-    fn round(self, x: float32x4_t) -> float32x4_t {
-        isa!(vrndnq_f32(x))
     }
     #[inline(always)]
     fn sqrt(self, x: float32x4_t) -> float32x4_t {
@@ -146,19 +148,26 @@ impl Lane for Neon {
         })
     }
     #[inline(always)]
-    fn keep(self, x: float32x4_t, key: float32x4_t, wanted: f32) -> float32x4_t {
+    fn slots(self, position: float32x4_t) -> (float32x4_t, [float32x4_t; 2]) {
+        let below = isa!(vrndmq_f32(position));
+        let nearest = isa!(vrndnq_f32(position));
+        (self.abs(self.sub(position, nearest)), [below, nearest])
+    }
+    #[inline(always)]
+    fn keep(self, x: float32x4_t, slots: [float32x4_t; 2], slot: usize) -> float32x4_t {
         isa!({
-            let mask = vceqq_f32(key, vdupq_n_f32(wanted));
+            let mask = vceqq_f32(slots[slot / ODD], vdupq_n_f32((slot % ODD) as f32));
             vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(x), mask))
         })
     }
     #[inline(always)]
     fn keep_either(
         self,
-        one: (float32x4_t, float32x4_t, f32),
-        other: (float32x4_t, float32x4_t, f32),
+        slots: [float32x4_t; 2],
+        one: (float32x4_t, usize),
+        other: (float32x4_t, usize),
     ) -> float32x4_t {
-        let (one, other) = (self.keep(one.0, one.1, one.2), self.keep(other.0, other.1, other.2));
+        let (one, other) = (self.keep(one.0, slots, one.1), self.keep(other.0, slots, other.1));
         isa!(vreinterpretq_f32_u32(vorrq_u32(vreinterpretq_u32_f32(one), vreinterpretq_u32_f32(other))))
     }
     #[inline(always)]

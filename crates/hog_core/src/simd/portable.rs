@@ -1,6 +1,6 @@
 //! Four lanes in plain Rust, which the compiler turns into what the architecture has for certain (SSE2 on x86-64).
 
-use super::lane::Lane;
+use super::lane::{Lane, ODD};
 use super::rows::{Columns, Rows};
 
 /// No instruction set beyond the architecture's baseline.
@@ -47,6 +47,8 @@ impl Lane for Portable {
     type Sum = ();
     type M = Four<bool>;
     type Masked = Four<f32>;
+    /// The integer below the position, and the nearest one.
+    type Slots = [Four<f32>; 2];
 
     #[inline(always)]
     fn splat(self, x: f32) -> Four<f32> {
@@ -79,8 +81,16 @@ impl Lane for Portable {
         lanes!(I => if a.0[I] < b.0[I] { a.0[I] } else { b.0[I] })
     }
     #[inline(always)]
+    fn max(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
+        lanes!(I => if a.0[I] > b.0[I] { a.0[I] } else { b.0[I] })
+    }
+    #[inline(always)]
     fn mul_add(self, a: Four<f32>, b: Four<f32>, c: Four<f32>) -> Four<f32> {
         lanes!(I => a.0[I] * b.0[I] + c.0[I])
+    }
+    #[inline(always)]
+    fn mul_sub(self, a: Four<f32>, b: Four<f32>, c: Four<f32>) -> Four<f32> {
+        lanes!(I => a.0[I] * b.0[I] - c.0[I])
     }
     #[inline(always)]
     fn neg_mul_add(self, a: Four<f32>, b: Four<f32>, c: Four<f32>) -> Four<f32> {
@@ -98,14 +108,6 @@ impl Lane for Portable {
     fn max_abs(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
         let (a, b) = (self.abs(a), self.abs(b));
         lanes!(I => if a.0[I] > b.0[I] { a.0[I] } else { b.0[I] })
-    }
-    #[inline(always)]
-    fn floor(self, x: Four<f32>) -> Four<f32> {
-        lanes!(I => whole(x.0[I]) as f32)
-    }
-    #[inline(always)]
-    fn round(self, x: Four<f32>) -> Four<f32> {
-        lanes!(I => whole(x.0[I] + 0.5) as f32)
     }
     #[inline(always)]
     fn sqrt(self, x: Four<f32>) -> Four<f32> {
@@ -149,12 +151,24 @@ impl Lane for Portable {
         lanes!(I => f32::from_bits(x.0[I].to_bits() ^ ((a.0[I].to_bits() ^ b.0[I].to_bits()) & SIGN)))
     }
     #[inline(always)]
-    fn keep(self, x: Four<f32>, key: Four<f32>, wanted: f32) -> Four<f32> {
-        lanes!(I => if key.0[I] == wanted { x.0[I] } else { 0.0 })
+    fn slots(self, position: Four<f32>) -> (Four<f32>, [Four<f32>; 2]) {
+        let below = lanes!(I => whole(position.0[I]) as f32);
+        let nearest = lanes!(I => whole(position.0[I] + 0.5) as f32);
+        (self.abs(self.sub(position, nearest)), [below, nearest])
     }
     #[inline(always)]
-    fn keep_either(self, one: (Four<f32>, Four<f32>, f32), other: (Four<f32>, Four<f32>, f32)) -> Four<f32> {
-        let (one, other) = (self.keep(one.0, one.1, one.2), self.keep(other.0, other.1, other.2));
+    fn keep(self, x: Four<f32>, slots: [Four<f32>; 2], slot: usize) -> Four<f32> {
+        let wanted = (slot % ODD) as f32;
+        lanes!(I => if slots[slot / ODD].0[I] == wanted { x.0[I] } else { 0.0 })
+    }
+    #[inline(always)]
+    fn keep_either(
+        self,
+        slots: [Four<f32>; 2],
+        one: (Four<f32>, usize),
+        other: (Four<f32>, usize),
+    ) -> Four<f32> {
+        let (one, other) = (self.keep(one.0, slots, one.1), self.keep(other.0, slots, other.1));
         lanes!(I => f32::from_bits(one.0[I].to_bits() | other.0[I].to_bits()))
     }
     #[inline(always)]

@@ -13,7 +13,7 @@
 use std::hint::black_box;
 use std::ops::Range;
 
-use super::lane::Lane;
+use super::lane::{Lane, ODD};
 use super::plan::{Gamma, Plan};
 
 /// Pixels of a cell along one axis.
@@ -46,14 +46,13 @@ pub(super) struct Job<'a> {
 
 /// A gradient's two votes. Of two neighbouring bins one is even and one is odd, so each vote is kept by parity and a
 /// bin has to look at one of them only. Bins 8 and 0 are neighbours too: there the odd vote belongs to the other one.
+///
+/// Even bin b has slot b / 2, odd bin b has slot `ODD` + (b + 1) / 2; `ODD` stands for bin 8, `ODD` + 5 for bin 0.
 #[derive(Clone, Copy)]
-pub(super) struct Votes<F> {
-    pub even: F,
-    pub odd: F,
-    /// Half the even bin.
-    pub even_key: F,
-    /// Half of the odd bin plus one; 0 stands for bin 8, 5 for bin 0.
-    pub odd_key: F,
+pub(super) struct Votes<L: Lane> {
+    pub even: L::F,
+    pub odd: L::F,
+    pub slots: L::Slots,
 }
 
 /// Computes the blocks of the strip of cells that begins at lane `first`.
@@ -64,32 +63,48 @@ pub(super) struct Votes<F> {
 #[inline(always)]
 pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, first: usize) {
     let zero = l.splat(0.0);
-    // Two rows from the cell above, eight of the cell, each with one neighbour on both sides.
+    // Two rows from the cell above, eight of the cell, each with one neighbour on both sides. In colour only the last
+    // three are kept, in turn in three places: all would not leave room for the rest in the first-level cache.
     let mut rows = [[[zero; CELL + 2]; CHANNELS]; CELL + 2];
+    let mut gradients = [[[zero; 2]; CELL]; CELL];
     // SAFETY: aligned room for the strip's lanes is the caller's promise; any bits are numbers.
     let carry = unsafe { &mut *job.carry.add(CARRY * first).cast::<[[[L::F; 2]; BINS]; CELL]>() };
     if job.cells.start == 0 {
         *carry = [[[zero; 2]; BINS]; CELL];
     }
     let mut sums = [[zero; CELL]; 2 * BINS];
-    let mut votes = [Votes { even: zero, odd: zero, even_key: zero, odd_key: zero }; CELL];
+    let mut votes = [vote(l, [zero; 2]); CELL];
     // SAFETY: promised by the caller.
     unsafe {
         fill(l, job, first, 0, &mut rows[0]);
         fill(l, job, first, 1, &mut rows[1]);
     }
     for (i, cell_y) in job.cells.clone().enumerate() {
-        for (y, to) in rows[2..].iter_mut().enumerate() {
+        for y in 0..CELL {
+            let place = |y: usize| if CHANNELS > 1 { (CELL * i + y) % 3 } else { y };
             // SAFETY: promised by the caller.
-            unsafe { fill(l, job, first, CELL * i + y + 2, to) };
+            unsafe { fill(l, job, first, CELL * i + y + 2, &mut rows[place(y + 2)]) };
+            if CHANNELS > 1 {
+                let around = [&rows[place(y)], &rows[place(y + 1)], &rows[place(y + 2)]];
+                for phase in 0..CELL {
+                    gradients[phase][y] = strongest(l, around, phase);
+                }
+            }
         }
         for phase in 0..CELL {
             for (y, votes) in votes.iter_mut().enumerate() {
-                *votes = vote::<L, CHANNELS>(l, &rows, phase, y);
+                let gradient = if CHANNELS > 1 {
+                    gradients[phase][y]
+                } else {
+                    strongest(l, [&rows[y], &rows[y + 1], &rows[y + 2]], phase)
+                };
+                *votes = vote(l, gradient);
             }
             spread_all(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
         }
-        rows.copy_within(CELL.., 0);
+        if CHANNELS == 1 {
+            rows.copy_within(CELL.., 0);
+        }
         if cell_y > 0 {
             // SAFETY: the strip's lanes of this row of blocks are the caller's promise.
             unsafe { finish(l, job, &sums, cell_y - 1, first) };
@@ -147,24 +162,52 @@ unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL 
     to[CELL + 1] = l.shift_in(columns[0], plan.table[usize::from(after)]);
 }
 
-/// The votes of pixel (`phase`, `y`) of every cell.
+/// The gradient (dx, dy) of pixel column `phase` of every cell, from the rows above, of, and below the pixel, in the channel where it is strongest.
 #[inline(always)]
-pub(super) fn vote<L: Lane, const CHANNELS: usize>(
+fn strongest<L: Lane, const CHANNELS: usize>(
     l: L,
-    rows: &[[[L::F; CELL + 2]; CHANNELS]; CELL + 2],
+    around: [&[[L::F; CELL + 2]; CHANNELS]; 3],
     phase: usize,
-    y: usize,
-) -> Votes<L::F> {
-    let [mut dx, mut dy, mut xx, mut yy, mut squared] = derive(l, rows, 0, phase, y);
-    for channel in 1..CHANNELS {
-        let other = derive(l, rows, channel, phase, y);
-        let stronger = l.less(squared, other[4]);
-        dx = l.select(stronger, other[0], dx);
-        dy = l.select(stronger, other[1], dy);
-        xx = l.select(stronger, other[2], xx);
-        yy = l.select(stronger, other[3], yy);
-        squared = l.select(stronger, other[4], squared);
+) -> [L::F; 2] {
+    let mut best = derive(l, around, 0, phase);
+    if CHANNELS > 1 {
+        let mut most = square(l, best);
+        for channel in 1..CHANNELS {
+            let other = derive(l, around, channel, phase);
+            let squared = square(l, other);
+            let stronger = l.less(most, squared);
+            best = [l.select(stronger, other[0], best[0]), l.select(stronger, other[1], best[1])];
+            most = l.max(most, squared);
+        }
     }
+    best
+}
+
+/// dx and dy in one channel.
+#[inline(always)]
+fn derive<L: Lane, const CHANNELS: usize>(
+    l: L,
+    [above, own, below]: [&[[L::F; CELL + 2]; CHANNELS]; 3],
+    channel: usize,
+    phase: usize,
+) -> [L::F; 2] {
+    let dx = l.sub(own[channel][phase + 2], own[channel][phase]);
+    let dy = l.sub(below[channel][phase + 1], above[channel][phase + 1]);
+    [dx, dy]
+}
+
+/// dx² + dy²: two products and a sum, never fused, as a fused step would make another channel the strongest than
+/// OpenCV's.
+#[inline(always)]
+fn square<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> L::F {
+    l.add(l.mul(dx, dx), l.mul(dy, dy))
+}
+
+/// The votes of one pixel of every cell.
+#[inline(always)]
+pub(super) fn vote<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> Votes<L> {
+    let (xx, yy) = (l.mul(dx, dx), l.mul(dy, dy));
+    let squared = l.add(xx, yy);
     let magnitude = l.root(squared);
     // OpenCV's polynomial for the arctangent of 0..=1, in units of two bins.
     let c = l.ratio(l.min_abs(dx, dy), l.max_abs(dx, dy));
@@ -178,30 +221,9 @@ pub(super) fn vote<L: Lane, const CHANNELS: usize>(
     let arc = l.mul_add(p, l.negate_where(steep, c), l.zero_where(steep, l.splat(-2.25)));
     let position = l.add(l.splat(2.5), l.flip_by_signs(arc, dx, dy));
     // A triangle wave: how near the even bin is. Votes are halved here, the weights doubled.
-    let odd_key = l.round(position);
-    let share = l.abs(l.sub(position, odd_key));
-    Votes {
-        even: l.mul(magnitude, share),
-        odd: l.mul(magnitude, l.sub(l.splat(0.5), share)),
-        even_key: l.floor(position),
-        odd_key,
-    }
-}
-
-/// dx, dy, their squares, and the sum of these. Two products and a sum, never fused: a fused step would make another
-/// channel the strongest than OpenCV's.
-#[inline(always)]
-fn derive<L: Lane, const CHANNELS: usize>(
-    l: L,
-    rows: &[[[L::F; CELL + 2]; CHANNELS]; CELL + 2],
-    channel: usize,
-    phase: usize,
-    y: usize,
-) -> [L::F; 5] {
-    let dx = l.sub(rows[y + 1][channel][phase + 2], rows[y + 1][channel][phase]);
-    let dy = l.sub(rows[y + 2][channel][phase + 1], rows[y][channel][phase + 1]);
-    let (xx, yy) = (l.mul(dx, dx), l.mul(dy, dy));
-    [dx, dy, xx, yy, l.add(xx, yy)]
+    let (share, slots) = l.slots(position);
+    let even = l.mul(magnitude, share);
+    Votes { even, odd: l.mul_sub(magnitude, l.splat(0.5), even), slots }
 }
 
 /// The polynomial's coefficients: radians to units of two bins of π/9.
@@ -220,7 +242,7 @@ const ARC: [f32; 4] = {
 pub(super) fn spread_all<L: Lane>(
     l: L,
     weights: &[[f32; 3]; CELL],
-    votes: &[Votes<L::F>; CELL],
+    votes: &[Votes<L>; CELL],
     carry: &mut [[L::F; 2]; BINS],
     sums: &mut [[L::F; CELL]; 2 * BINS],
     phase: usize,
@@ -244,7 +266,7 @@ pub(super) fn spread_all<L: Lane>(
 fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
     l: L,
     weights: &[[f32; 3]; CELL],
-    votes: &[Votes<L::F>; CELL],
+    votes: &[Votes<L>; CELL],
     carry: &mut [[L::F; 2]; BINS],
     sums: &mut [[L::F; CELL]; 2 * BINS],
     phase: usize,
@@ -258,7 +280,7 @@ fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
     }
     for half in 0..2 {
         // A length that the compiler cannot see keeps the loop rolled; unrolled, its sums spill.
-        let rows: (&[Votes<L::F>], &[[f32; 3]]) =
+        let rows: (&[Votes<L>], &[[f32; 3]]) =
             black_box((&votes[CELL / 2 * half..][..CELL / 2], &weights[CELL / 2 * half..][..CELL / 2]));
         for (votes, weights) in rows.0.iter().zip(rows.1) {
             let w = [l.splat(weights[0]), l.splat(weights[1]), l.splat(weights[2])];
@@ -291,12 +313,12 @@ fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
 
 /// What the votes give to `bin`.
 #[inline(always)]
-fn of_bin<L: Lane>(l: L, votes: &Votes<L::F>, bin: usize) -> L::Masked {
+fn of_bin<L: Lane>(l: L, votes: &Votes<L>, bin: usize) -> L::Masked {
     match bin {
-        0 => l.keep_either((votes.even, votes.even_key, 0.0), (votes.odd, votes.odd_key, 5.0)),
-        8 => l.keep_either((votes.even, votes.even_key, 4.0), (votes.odd, votes.odd_key, 0.0)),
-        _ if bin.is_multiple_of(2) => l.keep(votes.even, votes.even_key, (bin / 2) as f32),
-        _ => l.keep(votes.odd, votes.odd_key, bin.div_ceil(2) as f32),
+        0 => l.keep_either(votes.slots, (votes.even, 0), (votes.odd, ODD + 5)),
+        8 => l.keep_either(votes.slots, (votes.even, 4), (votes.odd, ODD)),
+        _ if bin.is_multiple_of(2) => l.keep(votes.even, votes.slots, bin / 2),
+        _ => l.keep(votes.odd, votes.slots, ODD + bin.div_ceil(2)),
     }
 }
 

@@ -285,23 +285,26 @@ impl Hog {
         {
             return SCRATCH.with(|scratch| {
                 simd::detect(self.backend, plan, planes, size, grid, hit_threshold, scratch);
-                let mut level = None;
-                let mut hits = Vec::new();
-                for &(x, y, score) in &scratch.found {
-                    let weight = if (score - hit_threshold).abs() > doubt {
-                        score
-                    } else {
-                        let level = match &mut level {
-                            Some(level) => level,
-                            none => none.insert(Shrunk::new(image, size)?),
-                        };
-                        reference::window_score(level.view()?, grid, (x, y), &self.spec, svm)
-                    };
-                    if weight >= hit_threshold {
-                        hits.push(Hit::new(grid, (x, y), weight));
-                    }
+                let sure = |score: f64| (score - hit_threshold).abs() > doubt;
+                let hits = |weigh: &dyn Fn(usize, usize, f64) -> f64| {
+                    let found = scratch.found.iter();
+                    let weighed = found.map(|&(x, y, score)| Hit::new(grid, (x, y), weigh(x, y, score)));
+                    Ok(weighed.filter(|hit| hit.weight >= hit_threshold).collect())
+                };
+                let close = scratch.found.iter().filter(|&&(_, _, score)| !sure(score)).count();
+                if close == 0 {
+                    return hits(&|_, _, score| score);
                 }
-                Ok(hits)
+                let level = Shrunk::new(image, size)?;
+                let level = level.view()?;
+                // Neighbouring windows share pixels and blocks: many are scored all at once.
+                let many = close * self.spec.win.area() > grid.padded.area();
+                let all = if many { reference::scores(level, grid, &self.spec, svm) } else { Vec::new() };
+                hits(&|x, y, score| {
+                    let index = y / grid.stride.height * grid.windows.width + x / grid.stride.width;
+                    let one = || reference::window_score(level, grid, (x, y), &self.spec, svm);
+                    if sure(score) { score } else { all.get(index).copied().unwrap_or_else(one) }
+                })
             });
         }
         let level = Shrunk::new(image, size)?;

@@ -17,6 +17,11 @@ impl Size {
     pub const fn new(width: usize, height: usize) -> Self {
         Self { width, height }
     }
+
+    /// Width times height.
+    pub const fn area(self) -> usize {
+        self.width * self.height
+    }
 }
 
 /// The constructor arguments of `cv2.HOGDescriptor`, unchecked; sizes are (x, y) [px].

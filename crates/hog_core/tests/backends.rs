@@ -138,6 +138,21 @@ fn pyramids_are_equal_on_every_backend_at_every_number_of_threads() {
 }
 
 #[test]
+fn many_hits_of_a_loud_detector_weigh_what_each_weighs_alone() {
+    // Weights of hundreds: the kernels' sums are too coarse, and every hit is weighed exactly.
+    let loud: Vec<f32> = model::default_people().iter().map(|w| 1e4 * w).collect();
+    let data = pixels(150, 170, 3, 9);
+    let image = ImageView::new(&data, 150, 170, 3, 450).unwrap();
+    let hog = Hog::new(&HogParams::default(), Some(&loud)).unwrap();
+    for hit_threshold in [-1e9, -1e4] {
+        let search = Search { hit_threshold, win_stride: (8, 4), padding: (8, 8) };
+        let found = hog.detect(image, &search, None).unwrap();
+        assert!(!found.is_empty());
+        assert_same(&found, &one_by_one(&hog, image, &search, &found), 0.0, "loud");
+    }
+}
+
+#[test]
 fn a_detector_with_a_weight_that_is_no_number_scores_as_the_reference_does() {
     let mut model = model::default_people().to_vec();
     model[7] = f32::NAN;

@@ -1,6 +1,6 @@
 //! Stage 2: weighted block histograms, and their L2-Hys normalisation, summed in OpenCV's own order.
 
-use crate::gradient::Gradient;
+use crate::gradient::{Vote, Votes};
 use crate::params::{HogSpec, Size};
 use crate::simd::{MulAdd, Work, run};
 
@@ -98,41 +98,40 @@ impl BlockWeights {
     }
 }
 
-/// The normalised histograms of the blocks that begin at the pixels `firsts` (indices into `gradient`), one block after
+/// The normalised histograms of the blocks that begin at the pixels `firsts` (indices into `votes`), one block after
 /// the other into `out` (`spec.block_len` elements each: cells column by column, bins within).
-pub fn block_histograms(gradient: &Gradient, firsts: &[usize], spec: &HogSpec, out: &mut [f32]) {
+pub fn block_histograms(votes: &Votes, firsts: &[usize], spec: &HogSpec, out: &mut [f32]) {
     let weights = &spec.weights;
-    if !weights.abreast_4.is_empty() {
-        run(CellsAbreast { gradient, firsts, spec, pixels: &weights.abreast_4, out });
-    } else if !weights.abreast_16.is_empty() {
-        run(CellsAbreast { gradient, firsts, spec, pixels: &weights.abreast_16, out });
+    if spec.nbins <= BINS && !weights.abreast_4.is_empty() {
+        run(CellsAbreast { votes, firsts, spec, pixels: &weights.abreast_4, out });
+    } else if spec.nbins <= BINS && !weights.abreast_16.is_empty() {
+        run(CellsAbreast { votes, firsts, spec, pixels: &weights.abreast_16, out });
     } else {
         for (&first, block) in firsts.iter().zip(out.chunks_exact_mut(spec.block_len)) {
-            block_histogram(gradient, first, spec, block);
+            block_histogram(votes, first, spec, block);
         }
     }
 }
 
 /// The plain form for one block, of any number of cells: what the faster form equals to the last bit.
-fn block_histogram(gradient: &Gradient, first: usize, spec: &HogSpec, block: &mut [f32]) {
+fn block_histogram(votes: &Votes, first: usize, spec: &HogSpec, block: &mut [f32]) {
     block.fill(0.0);
-    add_votes(gradient, first, spec.nbins, &spec.weights.one, block);
-    add_votes(gradient, first, spec.nbins, &spec.weights.two, block);
-    add_votes(gradient, first, spec.nbins, &spec.weights.four, block);
+    add_votes(votes, first, spec.nbins, &spec.weights.one, block);
+    add_votes(votes, first, spec.nbins, &spec.weights.two, block);
+    add_votes(votes, first, spec.nbins, &spec.weights.four, block);
     normalise(block, spec.l2_hys_threshold);
 }
 
 fn add_votes<const CELLS: usize>(
-    gradient: &Gradient,
+    votes: &Votes,
     first: usize,
     nbins: usize,
     pixels: &[Pixel<CELLS>],
     block: &mut [f32],
 ) {
     for pixel in pixels {
-        let at = first + pixel.row * gradient.width + pixel.column;
-        let [g0, g1] = gradient.shares[at];
-        let [b0, b1] = gradient.bins[at].map(usize::from);
+        let Vote { shares: [g0, g1], bins } = votes.pixels[first + pixel.row * votes.width + pixel.column];
+        let [b0, b1] = bins.map(usize::from);
         for (cell, weight) in pixel.cells {
             let cell = cell * nbins;
             // Both sums start from the old values: with a single bin the second share replaces the first.
@@ -144,12 +143,14 @@ fn add_votes<const CELLS: usize>(
 }
 
 /// Blocks whose sums are made in turns, so that none waits for its own last store.
-const TOGETHER: usize = 4;
+const TOGETHER: usize = 6;
+/// Bins that blocks summed in turns may have.
+const BINS: usize = 32;
 
 /// Blocks of up to `LANES` cells, each cell in its lane: a pixel votes in all of them at once, with weight zero in
 /// those it does not reach, which leaves their sums as they are.
 struct CellsAbreast<'a, const LANES: usize> {
-    gradient: &'a Gradient,
+    votes: &'a Votes,
     firsts: &'a [usize],
     spec: &'a HogSpec,
     pixels: &'a [Abreast<LANES>],
@@ -159,23 +160,19 @@ struct CellsAbreast<'a, const LANES: usize> {
 impl<const LANES: usize> Work for CellsAbreast<'_, LANES> {
     #[inline(always)]
     fn run<M: MulAdd>(self) {
-        let Self { gradient, firsts, spec, pixels, out } = self;
-        // Every byte is a bin's index.
-        #[expect(
-            clippy::useless_vec,
-            reason = "memory comes zeroed from the heap; an array would be copied there"
-        )]
-        let mut sums = vec![[[0.0f32; LANES]; 256]; TOGETHER];
-        let Some(sums) = sums.first_chunk_mut::<TOGETHER>() else { return };
+        let Self { votes, firsts, spec, pixels, out } = self;
+        let reach = (spec.block.height - 1) * votes.width + spec.block.width;
+        let mut sums = [[[0.0f32; LANES]; BINS]; TOGETHER];
         for (firsts, out) in firsts.chunks(TOGETHER).zip(out.chunks_mut(TOGETHER * spec.block_len)) {
             // Places without a block repeat the last.
             let firsts: [usize; TOGETHER] = std::array::from_fn(|block| firsts[block.min(firsts.len() - 1)]);
             sums.iter_mut().for_each(|sums| sums[..spec.nbins].fill([0.0; LANES]));
+            let blocks = firsts.map(|first| &votes.pixels[first..][..reach]);
             for &Abreast { column, row, weights } in pixels {
-                let offset = row * gradient.width + column;
-                for (sums, first) in sums.iter_mut().zip(firsts) {
-                    let [g0, g1] = gradient.shares[first + offset];
-                    let [b0, b1] = gradient.bins[first + offset].map(usize::from);
+                let at = row * votes.width + column;
+                for (sums, block) in sums.iter_mut().zip(blocks) {
+                    let Vote { shares: [g0, g1], bins } = block[at];
+                    let [b0, b1] = bins.map(|bin| usize::from(bin) % BINS);
                     // As above: both sums start from the old values.
                     let (mut sum0, mut sum1) = (sums[b0], sums[b1]);
                     for lane in 0..LANES {
@@ -186,7 +183,7 @@ impl<const LANES: usize> Work for CellsAbreast<'_, LANES> {
                     sums[b1] = sum1;
                 }
             }
-            for (block, sums) in out.chunks_exact_mut(spec.block_len).zip(&*sums) {
+            for (block, sums) in out.chunks_exact_mut(spec.block_len).zip(&sums) {
                 for (cell, histogram) in block.chunks_exact_mut(spec.nbins).enumerate() {
                     for (value, sums) in histogram.iter_mut().zip(sums) {
                         *value = sums[cell];
@@ -249,16 +246,13 @@ mod tests {
                 ..HogParams::default()
             }).unwrap();
             let bins = |bin: u8| [bin % nbins as u8, (bin + 1) % nbins as u8];
-            let gradient = Gradient {
-                width: 40,
-                shares: votes.iter().map(|&(a, b, _)| [a, b]).collect(),
-                bins: votes.iter().map(|&(_, _, bin)| bins(bin)).collect(),
-            };
+            let vote = |&(a, b, bin): &(f32, f32, u8)| Vote { shares: [a, b], bins: bins(bin) };
+            let votes = Votes { width: 40, pixels: votes.iter().map(vote).collect() };
             let mut together = vec![f32::NAN; firsts.len() * spec.block_len];
-            block_histograms(&gradient, &firsts, &spec, &mut together);
+            block_histograms(&votes, &firsts, &spec, &mut together);
             for (&first, found) in firsts.iter().zip(together.chunks_exact(spec.block_len)) {
                 let mut alone = vec![f32::NAN; spec.block_len];
-                block_histogram(&gradient, first, &spec, &mut alone);
+                block_histogram(&votes, first, &spec, &mut alone);
                 prop_assert_eq!(&alone, found);
             }
         }

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::error::{HogError, Result};
-use crate::gradient::{Gradient, Padding, Region, gradient};
+use crate::gradient::{Gradient, Padding, gradient};
 use crate::grid::{Grid, Steps};
 use crate::group::{Candidate, Rect, clip, group_candidates, mean_shift};
 use crate::image::ImageView;
@@ -127,8 +127,7 @@ impl Hog {
                 size.width, size.height
             )));
         }
-        let region = Region { x: 0, y: 0, width: size.width, height: size.height };
-        Ok((gradient(image, Padding { left, top, size }, region, &self.spec), size))
+        Ok((gradient(image, Padding { left, top, size }, &self.spec), size))
     }
 
     /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).

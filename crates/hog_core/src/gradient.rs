@@ -32,15 +32,32 @@ pub struct Padding {
     pub size: Size,
 }
 
-/// The two votes of each pixel of a region: `shares` weigh `bins`.
+/// The gradient of an image as OpenCV returns it: of each pixel, two shares of its magnitude for two bins.
 #[derive(Debug, Clone, Default)]
 pub struct Gradient {
-    /// Columns of the region.
-    pub width: usize,
-    /// Gradient magnitude shared between the two bins, row by row.
+    /// Row by row.
     pub shares: Vec<[f32; 2]>,
     /// The two neighbouring orientation bins, row by row.
     pub bins: Vec<[u8; 2]>,
+}
+
+/// A pixel's two votes: `shares` for `bins`.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(16))]
+pub struct Vote {
+    /// Gradient magnitude shared between the two bins.
+    pub shares: [f32; 2],
+    /// The two neighbouring orientation bins.
+    pub bins: [u8; 2],
+}
+
+/// The votes of the pixels of a region.
+#[derive(Debug, Clone, Default)]
+pub struct Votes {
+    /// Columns of the region.
+    pub width: usize,
+    /// Row by row.
+    pub pixels: Vec<Vote>,
 }
 
 /// OpenCV computes angles in runs of this many columns ...
@@ -48,54 +65,78 @@ const POLAR_RUN: usize = 1024;
 /// ... and a run shorter than this (two vectors) with a differently rounded last step.
 const POLAR_VECTOR_MIN: usize = 16;
 
-/// The gradient of `region` of the padded image, as if the whole padded image had been computed.
-pub fn gradient(image: ImageView, padding: Padding, region: Region, spec: &HogSpec) -> Gradient {
-    let mut out = Gradient::default();
-    gradient_into(image, padding, region, spec, &mut out);
+/// The gradient of the whole padded image.
+pub fn gradient(image: ImageView, padding: Padding, spec: &HogSpec) -> Gradient {
+    let Size { width, height } = padding.size;
+    let mut out =
+        Gradient { shares: Vec::with_capacity(width * height), bins: Vec::with_capacity(width * height) };
+    let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
+        out.shares.extend(a.iter().zip(b).map(|(&a, &b)| [a, b]));
+        out.bins.extend(first.iter().zip(second).map(|(&first, &second)| [first, second]));
+    };
+    run(Rows { image, padding, region: Region { x: 0, y: 0, width, height }, spec, put });
     out
 }
 
-/// [`gradient`] into memory that is used again.
-pub fn gradient_into(image: ImageView, padding: Padding, region: Region, spec: &HogSpec, out: &mut Gradient) {
-    out.width = region.width;
-    out.shares = vec![[0.0; 2]; region.width * region.height];
-    out.bins = vec![[0; 2]; region.width * region.height];
-    if region.width > 0 && region.height > 0 {
-        run(Rows { image, padding, region, spec, out });
-    }
+/// The votes of `region` of the padded image, as if the whole padded image had been computed.
+pub fn votes(image: ImageView, padding: Padding, region: Region, spec: &HogSpec) -> Votes {
+    let mut pixels = Vec::with_capacity(region.width * region.height);
+    let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
+        let bins = first.iter().zip(second);
+        let votes = a.iter().zip(b).zip(bins);
+        pixels.extend(
+            votes.map(|((&a, &b), (&first, &second))| Vote { shares: [a, b], bins: [first, second] }),
+        );
+    };
+    run(Rows { image, padding, region, spec, put });
+    Votes { width: region.width, pixels }
 }
 
-struct Rows<'a> {
+/// The votes of a row of pixels.
+struct Row {
+    /// What the two bins get.
+    shares: [Vec<f32>; 2],
+    /// Which bins these are.
+    bins: [Vec<u8>; 2],
+}
+
+/// Hands the votes of a region to `put`, row by row.
+struct Rows<'a, P> {
     image: ImageView<'a>,
     padding: Padding,
     region: Region,
     spec: &'a HogSpec,
-    out: &'a mut Gradient,
+    put: P,
 }
 
-impl Work for Rows<'_> {
+impl<P: FnMut(&Row)> Work for Rows<'_, P> {
     #[inline(always)]
     fn run<M: MulAdd>(self) {
-        let Self { image, padding, region, spec, out } = self;
+        let Self { image, padding, region, spec, mut put } = self;
+        if region.width == 0 {
+            return;
+        }
         let source = Source::new(image, padding, region, spec);
-        let mut buffer = [(); 4].map(|()| vec![0.0f32; region.width]);
-        let [dx, dy, magnitude, angle] = &mut buffer;
+        let row = || vec![0.0f32; region.width];
+        let [mut dx, mut dy, mut magnitude, mut angle] = [(); 4].map(|()| row());
+        let bins = || vec![0u8; region.width];
+        let mut votes = Row { shares: [row(), row()], bins: [bins(), bins()] };
         let mut rows = [(); 3].map(|()| vec![0.0; (region.width + 2) * image.channels()]);
         source.fill(0, &mut rows[0]);
         source.fill(1, &mut rows[1]);
-        let out = out.shares.chunks_exact_mut(region.width).zip(out.bins.chunks_exact_mut(region.width));
-        for (y, (shares, bins)) in out.enumerate() {
+        for y in 0..region.height {
             source.fill(y + 2, &mut rows[(y + 2) % 3]);
             let neighbours = [y, y + 1, y + 2].map(|row| rows[row % 3].as_slice());
             if image.channels() == 1 {
-                derive_gray(neighbours, dx, dy);
+                derive_gray(neighbours, &mut dx, &mut dy);
             } else {
                 let first_of_tail = (padding.size.width / 4 * 4).saturating_sub(region.x).min(region.width);
-                derive_colour::<false>(neighbours, 0..first_of_tail, dx, dy);
-                derive_colour::<true>(neighbours, first_of_tail..region.width, dx, dy);
+                derive_colour::<false>(neighbours, 0..first_of_tail, &mut dx, &mut dy);
+                derive_colour::<true>(neighbours, first_of_tail..region.width, &mut dx, &mut dy);
             }
-            polar_row::<M>(region.x, padding.size.width, [dx, dy], [magnitude, angle]);
-            vote(spec, magnitude, angle, shares, bins);
+            polar_row::<M>(region.x, padding.size.width, [&dx, &dy], [&mut magnitude, &mut angle]);
+            vote(spec, &magnitude, &angle, &mut votes);
+            put(&votes);
         }
     }
 }
@@ -108,32 +149,57 @@ pub(crate) fn gamma_table(gamma_correction: bool) -> [f32; 256] {
 /// Rows of the padded image with gamma applied, one column and row wider than the region on every side.
 struct Source<'a> {
     image: ImageView<'a>,
-    gamma: [f32; 256],
-    /// Where in an image row each column reads.
-    columns: Vec<usize>,
-    /// Image row, before mirroring, of the row above the region.
-    first: i64,
+    gamma: &'a [f32; 256],
+    /// Columns, and image row before mirroring, of the upper left corner.
+    width: usize,
+    left: i64,
+    top: i64,
+    /// Columns that lie in the image, and where the others read.
+    inside: Range<usize>,
+    mirrored: Vec<(usize, usize)>,
 }
 
 impl<'a> Source<'a> {
-    fn new(image: ImageView<'a>, padding: Padding, region: Region, spec: &HogSpec) -> Self {
+    fn new(image: ImageView<'a>, padding: Padding, region: Region, spec: &'a HogSpec) -> Self {
         let left = region.x as i64 - 1 - padding.left;
-        let column = |i: usize| reflect_101(left + i as i64, image.width()) * image.channels();
+        let width = region.width + 2;
+        let within = |x: i64| x.clamp(0, width as i64) as usize;
+        let inside = within(-left)..within(image.width() as i64 - left);
+        let outside = (0..inside.start).chain(inside.end.max(inside.start)..width);
         Self {
             image,
-            gamma: gamma_table(spec.gamma_correction),
-            columns: (0..region.width + 2).map(column).collect(),
-            first: region.y as i64 - 1 - padding.top,
+            gamma: &spec.gamma,
+            width,
+            left,
+            top: region.y as i64 - 1 - padding.top,
+            mirrored: outside.map(|i| (i, reflect_101(left + i as i64, image.width()))).collect(),
+            inside,
         }
     }
 
     /// Writes the channels of row `y`, one after the other.
     #[inline(always)]
     fn fill(&self, y: usize, out: &mut [f32]) {
-        let row = self.image.row(reflect_101(self.first + y as i64, self.image.height()));
-        for (c, plane) in out.chunks_exact_mut(self.columns.len()).enumerate() {
-            for (value, &column) in plane.iter_mut().zip(&self.columns) {
-                *value = self.gamma[row[column + c] as usize];
+        let Self { image, gamma, width, .. } = self;
+        let row = image.row(reflect_101(self.top + y as i64, image.height()));
+        let first = (self.left + self.inside.start as i64).max(0) as usize;
+        if image.channels() == 1 {
+            for (value, &pixel) in out[self.inside.clone()].iter_mut().zip(&row[first..]) {
+                *value = gamma[pixel as usize];
+            }
+        } else {
+            let (blue, others) = out.split_at_mut(*width);
+            let (green, red) = others.split_at_mut(*width);
+            let [blue, green, red] = [blue, green, red].map(|plane| plane[self.inside.clone()].iter_mut());
+            for (((blue, green), red), pixel) in
+                blue.zip(green).zip(red).zip(row.as_chunks::<3>().0[first..].iter())
+            {
+                [*blue, *green, *red] = pixel.map(|value| gamma[value as usize]);
+            }
+        }
+        for (c, plane) in out.chunks_exact_mut(*width).enumerate() {
+            for &(to, from) in &self.mirrored {
+                plane[to] = gamma[row[from * image.channels() + c] as usize];
             }
         }
     }
@@ -207,20 +273,28 @@ fn polar_row<M: MulAdd>(
 
 /// Splits each gradient between the two bins whose centres are nearest.
 #[inline(always)]
-fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], shares: &mut [[f32; 2]], bins: &mut [[u8; 2]]) {
+fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut Row) {
     let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
     let bins_per_radian = (spec.nbins as f64 / range) as f32;
-    let nbins = spec.nbins as i32;
-    let votes = shares.iter_mut().zip(bins);
-    for ((magnitude, angle), (shares, bins)) in magnitude.iter().zip(angle).zip(votes) {
+    let nbins = spec.nbins as f32;
+    let Row { shares: [near, far], bins: [firsts, seconds] } = votes;
+    let shares = near.iter_mut().zip(far);
+    let bins = firsts.iter_mut().zip(seconds);
+    for (((magnitude, angle), shares), bins) in magnitude.iter().zip(angle).zip(shares).zip(bins) {
         let position = bins_per_radian * angle - 0.5;
         let floor = position.floor();
         let share = position - floor;
-        let floor = floor as i32;
-        let turn = if floor < 0 { nbins } else { 0 } - if floor >= nbins { nbins } else { 0 };
+        let turn = if floor < 0.0 { nbins } else { 0.0 } - if floor >= nbins { nbins } else { 0.0 };
         let first = floor + turn;
-        let second = if first + 1 < nbins { first + 1 } else { 0 };
-        *shares = [magnitude * (1.0 - share), magnitude * share];
-        *bins = [first as u8, second as u8];
+        let second = if first + 1.0 < nbins { first + 1.0 } else { 0.0 };
+        (*shares.0, *shares.1) = (magnitude * (1.0 - share), magnitude * share);
+        (*bins.0, *bins.1) = (byte(first), byte(second));
     }
+}
+
+/// A whole number of 0..=255 as a byte. (A cast would also mind other numbers, one by one.)
+#[inline(always)]
+fn byte(whole: f32) -> u8 {
+    const LAST_BIT_IS_ONE: f32 = (1 << 23) as f32;
+    (whole + LAST_BIT_IS_ONE).to_bits() as u8
 }

@@ -2,6 +2,7 @@
 
 use crate::blocks::BlockWeights;
 use crate::error::{HogError, Result};
+use crate::gradient::gamma_table;
 
 /// Width and height [px] (or a stride or padding along x and y).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -105,6 +106,8 @@ pub struct HogSpec {
     pub signed_gradient: bool,
     /// The block's Gaussian [px].
     pub sigma: f32,
+    /// What each pixel value stands for before the gradient.
+    pub gamma: [f32; 256],
     /// Which pixel of a block adds how much to which cell.
     pub weights: BlockWeights,
 }
@@ -173,6 +176,7 @@ impl HogSpec {
             nlevels: params.nlevels.min(i64::from(i32::MAX)) as usize,
             signed_gradient: params.signed_gradient,
             sigma,
+            gamma: gamma_table(params.gamma_correction),
             weights: BlockWeights::new(block, cell, sigma),
         })
     }

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use crate::blocks::block_histograms;
-use crate::gradient::{Gradient, Region, gradient};
+use crate::gradient::{Region, Votes, votes};
 use crate::grid::Grid;
 use crate::image::ImageView;
 use crate::params::{HogSpec, Size};
@@ -15,7 +15,7 @@ use crate::svm::Svm;
 /// further down needs it.
 struct BlockRows<'a> {
     spec: &'a HogSpec,
-    gradient: Gradient,
+    votes: Votes,
     /// Padded x of every block of any window.
     columns: Vec<usize>,
     /// For each window along x and each of its blocks along x: the place in `columns`.
@@ -32,26 +32,23 @@ impl<'a> BlockRows<'a> {
         columns.sort_unstable();
         columns.dedup();
         let places = wanted.iter().map(|x| columns.partition_point(|column| column < x)).collect();
-        let gradient = gradient(image, grid.padding(), grid.whole(), spec);
-        Self { spec, gradient, columns, places, rows: BTreeMap::new() }
+        let votes = votes(image, grid.padding(), grid.whole(), spec);
+        Self { spec, votes, columns, places, rows: BTreeMap::new() }
     }
 
     /// Makes the rows of blocks that windows at padded row `y` need.
     fn advance(&mut self, y: usize) {
-        let Self { spec, gradient, columns, rows, .. } = self;
-        let mut spare: Vec<Vec<f32>> = Vec::new();
-        while let Some(entry) = rows.first_entry().filter(|entry| *entry.key() < y) {
-            spare.push(entry.remove());
-        }
-        for block in 0..spec.blocks.height {
-            let y = y + block * spec.stride.height;
-            rows.entry(y).or_insert_with(|| {
-                let mut row = spare.pop().unwrap_or_default();
-                row.resize(columns.len() * spec.block_len, 0.0);
-                let firsts: Vec<usize> = columns.iter().map(|x| y * gradient.width + x).collect();
-                block_histograms(gradient, &firsts, spec, &mut row);
-                row
-            });
+        let Self { spec, votes, columns, rows, .. } = self;
+        *rows = rows.split_off(&y);
+        let below = (0..spec.blocks.height).map(|block| y + block * spec.stride.height);
+        let votes: &Votes = votes;
+        let missing: Vec<usize> = below.filter(|y| !rows.contains_key(y)).collect();
+        let firsts: Vec<usize> =
+            missing.iter().flat_map(|y| columns.iter().map(move |x| y * votes.width + x)).collect();
+        let mut blocks = vec![0.0; firsts.len() * spec.block_len];
+        block_histograms(votes, &firsts, spec, &mut blocks);
+        for (y, row) in missing.into_iter().zip(blocks.chunks_exact(columns.len() * spec.block_len)) {
+            rows.insert(y, row.to_vec());
         }
     }
 
@@ -107,7 +104,7 @@ pub fn scores(image: ImageView, grid: &Grid, spec: &HogSpec, svm: &Svm) -> Vec<f
 pub struct Windows<'a> {
     spec: &'a HogSpec,
     region: Region,
-    gradient: Gradient,
+    votes: Votes,
     /// First pixel of each block, and its histograms, in descriptor order.
     firsts: Vec<usize>,
     descriptor: Vec<f32>,
@@ -123,9 +120,9 @@ impl<'a> Windows<'a> {
         let (x, width) = along(|place| place.0, spec.win.width);
         let (y, height) = along(|place| place.1, spec.win.height);
         let region = Region { x, y, width, height };
-        let gradient = gradient(image, grid.padding(), region, spec);
+        let votes = votes(image, grid.padding(), region, spec);
         let descriptor = vec![0.0; spec.descriptor_len()];
-        Self { spec, region, gradient, firsts: Vec::new(), descriptor }
+        Self { spec, region, votes, firsts: Vec::new(), descriptor }
     }
 
     /// The descriptor of the window at padded (`x`, `y`), one of those prepared.
@@ -134,10 +131,10 @@ impl<'a> Windows<'a> {
         let (x, y) = (x - self.region.x, y - self.region.y);
         self.firsts.clear();
         for bx in 0..self.spec.blocks.width {
-            let first = |by| (y + by * height) * self.gradient.width + x + bx * width;
+            let first = |by| (y + by * height) * self.votes.width + x + bx * width;
             self.firsts.extend((0..self.spec.blocks.height).map(first));
         }
-        block_histograms(&self.gradient, &self.firsts, self.spec, &mut self.descriptor);
+        block_histograms(&self.votes, &self.firsts, self.spec, &mut self.descriptor);
         &self.descriptor
     }
 

@@ -165,7 +165,7 @@ impl<'a> Source<'a> {
         let width = region.width + 2;
         let within = |x: i64| x.clamp(0, width as i64) as usize;
         let inside = within(-left)..within(image.width() as i64 - left);
-        let outside = (0..inside.start).chain(inside.end.max(inside.start)..width);
+        let outside = (0..inside.start).chain(inside.end..width);
         Self {
             image,
             gamma: &spec.gamma,
@@ -182,7 +182,8 @@ impl<'a> Source<'a> {
     fn fill(&self, y: usize, out: &mut [f32]) {
         let Self { image, gamma, width, .. } = self;
         let row = image.row(reflect_101(self.top + y as i64, image.height()));
-        let first = (self.left + self.inside.start as i64).max(0) as usize;
+        // (A region may lie beyond the image altogether.)
+        let first = (self.left + self.inside.start as i64).clamp(0, image.width() as i64) as usize;
         if image.channels() == 1 {
             for (value, &pixel) in out[self.inside.clone()].iter_mut().zip(&row[first..]) {
                 *value = gamma[pixel as usize];
@@ -297,4 +298,31 @@ fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut Row) {
 fn byte(whole: f32) -> u8 {
     const LAST_BIT_IS_ONE: f32 = (1 << 23) as f32;
     (whole + LAST_BIT_IS_ONE).to_bits() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::HogParams;
+
+    #[test]
+    fn a_region_votes_as_it_does_in_the_whole_image_also_beyond_a_narrow_one() {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let data: Vec<u8> = (0..300).map(|i| (i * i % 251) as u8).collect();
+        for channels in [1, 3] {
+            for (width, height) in [(1, 1), (1, 9), (5, 3), (20, 5)] {
+                let image = ImageView::new(&data, width, height, channels, width * channels).unwrap();
+                let padding = Padding { left: 12, top: 3, size: Size::new(width + 30, height + 6) };
+                let Size { width, height } = padding.size;
+                let whole = votes(image, padding, Region { x: 0, y: 0, width, height }, &spec);
+                for x in 0..width {
+                    let part = votes(image, padding, Region { x, y: 2, width: width - x, height: 2 }, &spec);
+                    for (i, vote) in part.pixels.iter().enumerate() {
+                        let there = whole.pixels[(2 + i / part.width) * width + x + i % part.width];
+                        assert_eq!((vote.shares, vote.bins), (there.shares, there.bins));
+                    }
+                }
+            }
+        }
+    }
 }

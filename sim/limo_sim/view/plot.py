@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limo_hog.atomic import whole_file
+from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
 from limo_hog.follow.proxemics import ZONE_ENDS, Zone
 from limo_sim.episode import Episode, Step
@@ -60,7 +60,7 @@ def plot(episode: Episode, path: Path) -> None:
         axes.set_xlim(0, episode.seconds)
     for axes in (error, distance):
         axes.set_xticklabels([])
-    with whole_file(path) as part:
+    with whole_file(path) as part, about(path):
         figure.savefig(part)
 
 

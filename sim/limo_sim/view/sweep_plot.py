@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.atomic import whole_file
+from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
 from limo_sim.sweep import Summary
 
@@ -47,7 +47,7 @@ def plot(summaries: Sequence[Summary], path: Path) -> None:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=len(controllers), frameon=False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as part:
+    with whole_file(path) as part, about(path):
         figure.savefig(part)
 
 

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
-from limo_hog.follow.clothes import clothes_in
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.detectors import Detector, detect_in
-from limo_hog.follow.observation import Observation, Odometry, Scan
+from limo_hog.follow.observation import Observation, Odometry, Scan, observed
 from limo_hog.follow.region import Region
 from limo_hog.follow.safety import Guard, GuardState
 from limo_hog.follow.twist import Twist
@@ -205,9 +204,5 @@ def _decide(
     except Exception as error:  # whatever a detector raises, the robot must stop and the run must go on
         found, fault = NOTHING, f"the detector failed: {error}"
     detect_ms = 1e3 * (time.perf_counter() - began)
-    height, width = frame.image.shape[:2]
-    clothes = clothes_in(frame.image, found.boxes)
-    observation = Observation(
-        frame.stamp, width, height, FOCAL_PX, found, region, frame.depth, scan, odometry, fault, clothes
-    )
+    observation = observed(frame.stamp, frame.image, FOCAL_PX, found, region, frame.depth, scan, odometry, fault)
     return guard.step(observation, state), observation, detect_ms

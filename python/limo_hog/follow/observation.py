@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
-from limo_hog.follow.clothes import Clothes
+from limo_hog.follow.clothes import Clothes, clothes_in
 from limo_hog.follow.region import Region
 
 
@@ -100,3 +100,20 @@ class Observation:
         if self.odometry is not None:
             stamps.append(self.odometry.stamp)
         return max(stamps)
+
+
+def observed(
+    stamp: float,
+    image: NDArray[np.uint8],
+    focal_px: float,
+    detections: Detections,
+    region: Region | None,
+    depth: NDArray[np.float32] | None,
+    scan: Scan | None,
+    odometry: Odometry | None,
+    fault: str = "",
+) -> Observation:
+    """Return what one camera image, uint8 (H, W, 3) BGR, and the other sensors tell: its size and clothes filled in."""
+    height, width = image.shape[:2]
+    clothes = clothes_in(image, detections.boxes)
+    return Observation(stamp, width, height, focal_px, detections, region, depth, scan, odometry, fault, clothes)

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow.clothes import clothes_in
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.detectors import Detector, detect_in
-from limo_hog.follow.observation import Observation, Odometry, Scan
+from limo_hog.follow.observation import Odometry, Scan, observed
 from limo_hog.follow.safety import Guard
 from limo_hog.follow.twist import Twist
 from limo_hog.imaging.drawing import annotate
@@ -192,20 +191,9 @@ def drive(
                     found, fault = detect_in(detector, picture, region), ""
                 except Exception as error:  # whatever a detector raises, the robot must stop and the drive go on
                     found, fault = _NOTHING, f"the detector failed: {error}"
-                height, width = picture.shape[:2]
                 depth = senses.depth_at(stamp, picture.shape)
-                observation = Observation(
-                    stamp,
-                    width,
-                    height,
-                    senses.focal_px,
-                    found,
-                    region,
-                    depth,
-                    senses.scan,
-                    senses.odometry,
-                    fault,
-                    clothes_in(picture, found.boxes),
+                observation = observed(
+                    stamp, picture, senses.focal_px, found, region, depth, senses.scan, senses.odometry, fault
                 )
                 decision = guard.step(observation, state)
                 region = decision.region

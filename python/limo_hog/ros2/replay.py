@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow.clothes import clothes_in
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.detectors import Detector, detect_in
-from limo_hog.follow.observation import Observation, Odometry, Scan
+from limo_hog.follow.observation import Odometry, Scan, observed
 from limo_hog.follow.region import Region
 from limo_hog.follow.safety import Guard, GuardState
 from limo_hog.follow.twist import Twist
@@ -142,22 +141,9 @@ def _decide(
     image = messages.pixels_of(senses.image)
     if senses.image.encoding == "rgb8":
         image = np.ascontiguousarray(image[..., ::-1])
-    height, width = image.shape[:2]
     stamp = messages.to_seconds(senses.image.header.stamp)
-    depth = senses.depth if senses.depth is not None and senses.depth.shape == (height, width) else None
+    depth = senses.depth if senses.depth is not None and senses.depth.shape == image.shape[:2] else None
     found = detect_in(detector, image, region)
-    clothes = clothes_in(image, found.boxes)
-    observation = Observation(
-        stamp,
-        width,
-        height,
-        senses.focal_px,
-        found,
-        region,
-        depth,
-        senses.scan,
-        senses.odometry,
-        clothes=clothes,
-    )
+    observation = observed(stamp, image, senses.focal_px, found, region, depth, senses.scan, senses.odometry)
     decision = guard.step(observation, state)
     return decision, Replayed(stamp, image, found, decision.twist, decision.target, senses.recorded, twist)

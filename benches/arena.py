@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 
 from limo_hog.follow.twist import Twist
-from limo_sim import lidar
-from limo_sim.arena import STEPS_PER_SECOND, Arena
-from limo_sim.camera import CameraPose
-from limo_sim.person import Pose
-from limo_sim.renderer import Renderer
-from limo_sim.scenario import Scenario
+from limo_sim.run.arena import STEPS_PER_SECOND, Arena
+from limo_sim.sensing import lidar
+from limo_sim.sensing.camera import CameraPose
+from limo_sim.sensing.renderer import Renderer
+from limo_sim.world.person import Pose
+from limo_sim.world.scenario import Scenario
 
 REPEATS = 5
 KEPT_M, STOP_M = 1.0, 0.4

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 import limo_hog
-from limo_hog.cli.scene import street
+from limo_hog.cli.support.scene import street
 
 SECONDS_A_LINE, LEAST_ROUNDS = 0.6, 5
 

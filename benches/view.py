@@ -14,11 +14,11 @@ from multiprocessing.synchronize import Event
 from typing import Any
 
 from limo_hog.detector import PeopleDetector
-from limo_hog.follow.naming import controller_named
-from limo_sim.episode import run_episode
-from limo_sim.scenario import Scenario
+from limo_hog.follow.control.naming import controller_named
+from limo_sim.run.episode import run_episode
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
+from limo_sim.world.scenario import Scenario
 
 SCENARIO = Scenario.load("workshop")
 

@@ -3,6 +3,21 @@
 from __future__ import annotations
 
 from limo_hog._core import get_num_threads, set_num_threads
+from limo_hog.cv2_api.functions import (
+    HOGDESCRIPTOR_DEFAULT_NLEVELS,
+    HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL,
+    HOGDESCRIPTOR_DESCR_FORMAT_ROW_BY_ROW,
+    HOGDESCRIPTOR_L2HYS,
+    HOGDescriptor_DEFAULT_NLEVELS,
+    HOGDescriptor_DESCR_FORMAT_COL_BY_COL,
+    HOGDescriptor_DESCR_FORMAT_ROW_BY_ROW,
+    HOGDescriptor_getDaimlerPeopleDetector,
+    HOGDescriptor_getDefaultPeopleDetector,
+    HOGDescriptor_L2Hys,
+    groupRectangles,
+)
+from limo_hog.cv2_api.hog import HOGDescriptor
+from limo_hog.cv2_api.install import install_into_cv2
 from limo_hog.detector import Detections, PeopleDetector
 from limo_hog.exceptions import (
     BackendError,
@@ -17,21 +32,6 @@ from limo_hog.exceptions import (
     ParameterTypeError,
 )
 from limo_hog.extras import MissingExtraError
-from limo_hog.functions import (
-    HOGDESCRIPTOR_DEFAULT_NLEVELS,
-    HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL,
-    HOGDESCRIPTOR_DESCR_FORMAT_ROW_BY_ROW,
-    HOGDESCRIPTOR_L2HYS,
-    HOGDescriptor_DEFAULT_NLEVELS,
-    HOGDescriptor_DESCR_FORMAT_COL_BY_COL,
-    HOGDescriptor_DESCR_FORMAT_ROW_BY_ROW,
-    HOGDescriptor_getDaimlerPeopleDetector,
-    HOGDescriptor_getDefaultPeopleDetector,
-    HOGDescriptor_L2Hys,
-    groupRectangles,
-)
-from limo_hog.hog import HOGDescriptor
-from limo_hog.opencv import install_into_cv2
 from limo_hog.visualize import visualize
 
 __version__ = "0.1.0"

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog import _core
-from limo_hog.arguments import pixels
+from limo_hog.cv2_api.arguments import pixels
 from limo_hog.suppression import soften, suppress
 
 #: The person inside a window: x + .1 w, y + .07 h, .8 w, .8 h. The rest is the margin it was trained with.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limo_hog.arguments import coefficients
+from limo_hog.cv2_api.arguments import coefficients
+from limo_hog.cv2_api.hog import HOGDescriptor
 from limo_hog.exceptions import DetectorSizeError, ParameterError
-from limo_hog.hog import HOGDescriptor
 
 #: Colours (B, G, R) of what speaks for and against; descriptors have only the first.
 _FOR, _AGAINST = np.array([150.0, 215.0, 255.0]), np.array([255.0, 120.0, 20.0])

@@ -13,12 +13,12 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from limo_hog.follow.twist import Twist
-from limo_sim import lidar
-from limo_sim.arena import STEPS_PER_SECOND, Arena
-from limo_sim.camera import HEIGHT, WIDTH, Contacts, Truth
-from limo_sim.robot import WHEEL_SEPARATION
-from limo_sim.scenario import Scenario
-from limo_sim.variants import made_up
+from limo_sim.run.arena import STEPS_PER_SECOND, Arena
+from limo_sim.sensing import lidar
+from limo_sim.sensing.camera import HEIGHT, WIDTH, Contacts, Truth
+from limo_sim.world.robot import WHEEL_SEPARATION
+from limo_sim.world.scenario import Scenario
+from limo_sim.world.variants import made_up
 
 ACTIONS_PER_SECOND = 10
 TARGET_M = 1.5

@@ -13,7 +13,7 @@ import pytest
 import limo_hog
 from limo_hog.cli import bench
 from limo_hog.cli.main import main
-from limo_hog.cli.scene import street
+from limo_hog.cli.support.scene import street
 
 
 @pytest.fixture(autouse=True)

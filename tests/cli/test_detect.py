@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from limo_hog.cli.main import main
-from limo_hog.cli.scene import street
+from limo_hog.cli.support.scene import street
 from limo_hog.detector import PeopleDetector
 from limo_hog.imaging.writing import video_writer, write_image
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from limo_hog.cli.scene import street
+from limo_hog.cli.support.scene import street
 from limo_hog.detector import PeopleDetector
 from limo_hog.imaging.writing import write_image
 

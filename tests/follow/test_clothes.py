@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from tests.follow.views import BLUE, GREEN, RED, dressed
 
-from limo_hog.follow.clothes import OTHER_CLOTHES, clothes_in, learnt, unlikeness
+from limo_hog.follow.sense.appearance import OTHER_CLOTHES, clothes_in, learnt, unlikeness
 
 BOX = (200, 100, 120, 240)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tests.follow.onnx_file import dark_cells
 
 from limo_hog.detector import Detections, PeopleDetector
-from limo_hog.follow.detectors import (
+from limo_hog.follow.sense.detectors import (
     Cv2Detector,
     DetectorError,
     HalfSize,
@@ -20,9 +20,9 @@ from limo_hog.follow.detectors import (
     detect_in,
     detector_named,
 )
-from limo_hog.follow.region import Region
-from limo_sim.arena import Arena
-from limo_sim.scenario import Scenario
+from limo_hog.follow.sense.region import Region
+from limo_sim.run.arena import Arena
+from limo_sim.world.scenario import Scenario
 
 
 @dataclass

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from limo_hog.follow.kalman import Noise, bearing_range, found, innovation, predicted, rates, updated
-from limo_hog.follow.observation import Odometry
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.tracks.kalman import Noise, bearing_range, found, innovation, predicted, rates, updated
 
 NOISE = Noise()
 HERE = Odometry()

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.clothes import OTHER_CLOTHES, unlikeness
-from limo_hog.follow.kalman import Noise, found
-from limo_hog.follow.observation import Odometry
-from limo_hog.follow.people import Measurement, Person, associate, moved_on, seen_again
+from limo_hog.follow.sense.appearance import OTHER_CLOTHES, unlikeness
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.tracks.association import Measurement, Person, associate, moved_on, seen_again
+from limo_hog.follow.tracks.kalman import Noise, found
 
 NOISE, POSE, GATE = Noise(), Odometry(), 18.0
 WINDOW = 536.0

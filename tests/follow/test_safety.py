@@ -9,8 +9,8 @@ import pytest
 from tests.follow.views import boxes, flat, look, scan, scan_of
 
 from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Twist
-from limo_hog.follow.body import LIMO
-from limo_hog.follow.clearance import Margin, depth_points, room_ahead, scan_points
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.clearance import Margin, depth_points, room_ahead, scan_points
 
 
 @dataclass(frozen=True)

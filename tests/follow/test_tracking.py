@@ -11,9 +11,9 @@ from tests.follow.views import GREEN, NOBODY, RED, World, scan_of
 
 from limo_hog.detector import Detections
 from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingController
-from limo_hog.follow.clothes import clothes_in
-from limo_hog.follow.people import pose_at
-from limo_hog.follow.tracking import TrackingState
+from limo_hog.follow.control.tracking import TrackingState
+from limo_hog.follow.sense.appearance import clothes_in
+from limo_hog.follow.tracks.association import pose_at
 
 CONTROLLER = TrackingController()
 

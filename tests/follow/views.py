@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
-from limo_hog.follow.observation import Observation, Odometry, Scan
+from limo_hog.follow.sense.observation import Observation, Odometry, Scan
 from limo_hog.follow.twist import Twist
 
 WIDTH, HEIGHT, FOCAL = 640, 480, 448.6

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from limo_sim.rclpy_stub.script import Outcome, run_script
-from limo_sim.scenario import Person, Scenario
+from limo_sim.ros.script import Outcome, run_script
+from limo_sim.world.scenario import Person, Scenario
 
 #: Somebody stands 2.5 m ahead, to the left.
 STANDING = Scenario(name="standing", people=(Person(route=((2.5, 0.5, 3600.0),)),))

@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 from limo_hog.ros2 import names
-from limo_sim.rclpy_stub.context import Context
-from limo_sim.rclpy_stub.front import _offered
-from limo_sim.rclpy_stub.world import World
-from limo_sim.scenario import Scenario
+from limo_sim.ros.lockstep.world import World
+from limo_sim.ros.rclpy_stub.context import Context
+from limo_sim.ros.rclpy_stub.front import _offered
+from limo_sim.world.scenario import Scenario
 
 TEXT = (Path(__file__).parents[2] / "docs" / "ros2.md").read_text(encoding="utf-8")
 

@@ -14,11 +14,11 @@ import pytest
 
 from limo_hog.cli.main import main
 from limo_hog.ros2 import names
-from limo_sim.episode import Moment
-from limo_sim.rclpy_stub.script import run_script, score_of
-from limo_sim.rclpy_stub.world import StubError
-from limo_sim.scenario import Person
+from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.script import run_script, score_of
+from limo_sim.run.episode import Moment
 from limo_sim.view.server import View
+from limo_sim.world.scenario import Person
 
 from .conftest import NOBODY, STANDING, Run, node
 
@@ -123,8 +123,8 @@ def test_a_bad_callback_ends_in_its_own_traceback_and_a_robot_that_stands(
     assert said in outcome.failure
     assert "the watchdog stopped the robot" in outcome.failure
     assert line in outcome.traceback
-    assert "rclpy_stub" not in outcome.traceback.replace("limo_sim.rclpy_stub.world.StubError", "").replace(
-        "limo_sim.rclpy_stub.patience.HungError", ""
+    assert "rclpy_stub" not in outcome.traceback.replace("limo_sim.ros.lockstep.world.StubError", "").replace(
+        "limo_sim.ros.lockstep.patience.HungError", ""
     )
     assert outcome.world.arena.odometry().linear == 0.0
 

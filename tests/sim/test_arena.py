@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from limo_hog.follow.twist import Twist
-from limo_sim.arena import Arena
-from limo_sim.scenario import ROOM_HALF, Camera, Lidar, Scenario, Wheels
-from limo_sim.variants import made_up
+from limo_sim.run.arena import Arena
+from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Scenario, Wheels
+from limo_sim.world.variants import made_up
 
 FOLLOWABLE = Scenario.load("followable")
 

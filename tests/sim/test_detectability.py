@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_sim.camera import CameraPose
-from limo_sim.person import Pose
-from limo_sim.renderer import Renderer
-from limo_sim.scenario import Person, Scenario
-from limo_sim.variants import varied
+from limo_sim.sensing.camera import CameraPose
+from limo_sim.sensing.renderer import Renderer
+from limo_sim.world.person import Pose
+from limo_sim.world.scenario import Person, Scenario
+from limo_sim.world.variants import varied
 
 DISTANCES = (1.75, 2.0, 2.5, 3.0, 3.5, 4.0)
 SOMEBODY = Scenario(people=(Person(route=((2, 0, 0),)),))

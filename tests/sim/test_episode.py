@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections, PeopleDetector
 from limo_hog.follow import Decision, Mode, Observation, ProxemicController, TrackingController, controller_named
-from limo_hog.follow.tracking import TrackingState
-from limo_sim.episode import Episode, run_episode
-from limo_sim.scenario import Scenario
-from limo_sim.score import score
+from limo_hog.follow.control.tracking import TrackingState
+from limo_sim.run.episode import Episode, run_episode
+from limo_sim.run.score import score
+from limo_sim.world.scenario import Scenario
 
 WALL_CLOCK = {"detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor"}
 

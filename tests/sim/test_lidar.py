@@ -8,11 +8,11 @@ import numpy as np
 import pymunk
 import pytest
 
-from limo_sim import lidar
-from limo_sim.arena import Arena
-from limo_sim.furniture import Disc, Rectangle
-from limo_sim.person import Pose, body, legs_at
-from limo_sim.scenario import Person, Scenario
+from limo_sim.run.arena import Arena
+from limo_sim.sensing import lidar
+from limo_sim.world.furniture import Disc, Rectangle
+from limo_sim.world.person import Pose, body, legs_at
+from limo_sim.world.scenario import Person, Scenario
 
 
 def by_physics(x: float, y: float, yaw: float, shapes: list[Disc | Rectangle]) -> list[float]:

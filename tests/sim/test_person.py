@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from limo_sim.person import Body, Pose, Walk, body
-from limo_sim.scenario import Person, Scenario
+from limo_sim.world.person import Body, Pose, Walk, body
+from limo_sim.world.scenario import Person, Scenario
 
 PATROL = Scenario.load("workshop").people[0]
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_sim.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, CameraPose
-from limo_sim.furniture import KINDS, Box
-from limo_sim.person import Body, Pose, body
-from limo_sim.renderer import Renderer, Seen
-from limo_sim.scenario import Camera, Depth, Furniture, Person, Scenario
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, CameraPose
+from limo_sim.sensing.renderer import Renderer, Seen
+from limo_sim.world.furniture import KINDS, Box
+from limo_sim.world.person import Body, Pose, body
+from limo_sim.world.scenario import Camera, Depth, Furniture, Person, Scenario
 
 HERE = CameraPose(0.0, 0.0, 0.0)
 EYE = np.array([0.0, 0.0, 0.175])

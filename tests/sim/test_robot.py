@@ -8,9 +8,9 @@ import math
 import pytest
 
 from limo_hog.follow.twist import Twist
-from limo_sim.arena import Arena
-from limo_sim.robot import Drive, integrate
-from limo_sim.scenario import Person, Robot, Scenario, Wheels
+from limo_sim.run.arena import Arena
+from limo_sim.world.robot import Drive, integrate
+from limo_sim.world.scenario import Person, Robot, Scenario, Wheels
 
 EMPTY = dataclasses.replace(Scenario.load("empty"), odometry=Wheels(slip=0.0))
 

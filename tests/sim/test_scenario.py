@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from limo_hog.exceptions import LimoHogError
-from limo_sim.arena import Arena
-from limo_sim.scenario import Camera, Furniture, Person, Scenario
-from limo_sim.schema import ScenarioError
+from limo_sim.run.arena import Arena
+from limo_sim.world.scenario import Camera, Furniture, Person, Scenario
+from limo_sim.world.schema import ScenarioError
 
 NAMES = ("crossing", "empty", "followable", "furniture", "late", "occlusion", "two_people", "workshop", "zigzag")
 

@@ -12,11 +12,11 @@ from scipy.stats import t as student  # type: ignore[import-untyped]
 from limo_hog.detector import Detections
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.twist import Twist
-from limo_sim.camera import Contacts, PersonTruth, Truth
-from limo_sim.episode import NOTHING, Episode, Step
-from limo_sim.scenario import Scenario
-from limo_sim.score import ScoreCard, on_person, score
-from limo_sim.sweep import estimate, summarise
+from limo_sim.run.episode import NOTHING, Episode, Step
+from limo_sim.run.score import ScoreCard, on_person, score
+from limo_sim.run.sweep import estimate, summarise
+from limo_sim.sensing.camera import Contacts, PersonTruth, Truth
+from limo_sim.world.scenario import Scenario
 
 BOX = (300, 100, 60, 120)
 ON, OFF = [285, 90, 80, 160], [20, 90, 80, 160]

@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 
 from limo_hog.follow.twist import Twist
-from limo_sim.arena import Arena
-from limo_sim.camera import CameraPose
-from limo_sim.person import Pose
-from limo_sim.renderer import Renderer
-from limo_sim.scenario import Scenario
+from limo_sim.run.arena import Arena
+from limo_sim.sensing.camera import CameraPose
+from limo_sim.sensing.renderer import Renderer
+from limo_sim.world.person import Pose
+from limo_sim.world.scenario import Scenario
 
 NOISY_MACHINE = 3.0
 WORKSHOP = Scenario.load("workshop")

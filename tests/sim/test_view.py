@@ -12,11 +12,11 @@ from typing import Any
 import aiohttp
 import pytest
 
-from limo_hog.follow.naming import controller_named
-from limo_sim.scenario import Scenario
+from limo_hog.follow.control.naming import controller_named
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import ServeError, View
 from limo_sim.view.tuning import ParameterError, Tunable
+from limo_sim.world.scenario import Scenario
 
 WORKSHOP = Scenario.load("workshop")
 

@@ -13,13 +13,13 @@ import pytest
 from tests.sim.chromium import CHROMIUM, Tab, chromium, open_tab
 
 from limo_hog.detector import PeopleDetector
-from limo_hog.follow.naming import controller_named
-from limo_sim.episode import run_episode
-from limo_sim.scenario import Scenario
-from limo_sim.score import score
+from limo_hog.follow.control.naming import controller_named
+from limo_sim.run.episode import run_episode
+from limo_sim.run.score import score
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable
+from limo_sim.world.scenario import Scenario
 
 PICTURES = Path(__file__).parents[2] / "out" / "view"
 SECONDS = 90.0  # at twice real time: longer than the browser takes to start and look

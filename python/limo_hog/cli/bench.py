@@ -18,11 +18,11 @@ from rich.console import Console
 from rich.table import Table
 
 import limo_hog
-from limo_hog.cli.arguments import size, threads
-from limo_hog.cli.environment import cores, environment
-from limo_hog.cli.output import STDOUT, write_json
-from limo_hog.cli.progress import progress
-from limo_hog.cli.scene import street
+from limo_hog.cli.support.arguments import size, threads
+from limo_hog.cli.support.environment import cores, environment
+from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.progress import progress
+from limo_hog.cli.support.scene import street
 from limo_hog.exceptions import LimoHogError
 
 #: The workshop's parameters.

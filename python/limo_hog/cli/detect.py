@@ -8,8 +8,8 @@ import sys
 import time
 from pathlib import Path
 
-from limo_hog.cli.arguments import count, number, threads
-from limo_hog.cli.output import STDOUT, UsageError
+from limo_hog.cli.support.arguments import count, number, threads
+from limo_hog.cli.support.output import STDOUT, UsageError
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -63,9 +63,9 @@ def run(args: argparse.Namespace) -> int:
     # One line of ours says what is wrong with a file; its decoders shall not add theirs.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    from limo_hog.cli.pictures import Run
-    from limo_hog.cli.progress import progress
-    from limo_hog.cli.results import json_lines
+    from limo_hog.cli.support.pictures import Run
+    from limo_hog.cli.support.progress import progress
+    from limo_hog.cli.support.results import json_lines
 
     with json_lines(args.json, args.resume) as results, progress("pictures") as bar:
         run = Run(args, results, bar)

@@ -8,7 +8,7 @@ import os
 from rich.console import Console
 from rich.table import Table
 
-from limo_hog.cli.environment import environment
+from limo_hog.cli.support.environment import environment
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -1,7 +1,8 @@
 """Routes `limo-hog COMMAND` to the command's module, and turns named errors into one line.
 
-A command is a module beside this one, named as the command, with `add_parser(subparsers) -> None` and
-`run(args) -> int`. Only the module of the command that was asked for is imported.
+A command is a module with `add_parser(subparsers) -> None` and `run(args) -> int`. The detector's and the robot's
+commands are modules beside this one, named as the command; other distributions offer theirs as entry points of the
+group `limo_hog.commands`. Only the module of the command that was asked for is imported.
 """
 
 from __future__ import annotations
@@ -11,22 +12,29 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from types import ModuleType
 
-from limo_hog.cli.output import UsageError, one_line
+from limo_hog.cli.support.output import UsageError, one_line
 from limo_hog.exceptions import LimoHogError
+from limo_hog.extras import MissingExtraError
 
-#: Every command and its line in `limo-hog --help`.
-COMMANDS = {
+#: Entry points of this group are commands: the name is the command's, the value its module.
+ENTRY_POINTS = "limo_hog.commands"
+#: Commands of this package and their line in `limo-hog --help`.
+BUILT_IN = {
+    "detect": "find people in photographs, folders and videos",
+    "bench": "time this detector against OpenCV's, with parity checked in the same run",
+    "replay": "run the detector and the follower on a recording",
+    "topic": "look at ROS 2 topics, as `ros2 topic` does",
+    "info": "versions, CPU features, chosen backend, and what OpenCV is installed",
+}
+#: Commands of the distribution limo-sim and their line in `limo-hog --help`.
+ARENA = {
     "follow": "watch a robot find and follow a walking person in the arena, and score it",
     "run": "run an ordinary ROS 2 Python node against the arena, without ROS",
     "workshop": "learn it: a template node, a checker, and model solutions",
     "arena": "the arena alone, in real time, for ROS 2 nodes to drive",
-    "topic": "look at ROS 2 topics, as `ros2 topic` does",
-    "detect": "find people in photographs, folders and videos",
     "score": "compare controllers over scenarios and seeds, on all cores",
-    "replay": "let detector and follower look at a recording",
-    "bench": "time this detector against OpenCV's, with parity checked in the same run",
-    "info": "versions, CPU features, chosen backend, and what OpenCV is installed",
 }
 
 
@@ -62,13 +70,14 @@ def _run(arguments: list[str]) -> int:
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     module = None
-    for name, line in COMMANDS.items():
+    for name, line in (ARENA | BUILT_IN).items():
         if name != wanted:
             commands.add_parser(name, help=line)
-            continue
-        module = importlib.import_module(f"limo_hog.cli.{name}")
+    if wanted is not None:
+        module = _module_of(wanted, arguments)
+    if wanted is not None and module is not None:
         module.add_parser(commands)
-        commands.choices[name].add_argument(
+        commands.choices[wanted].add_argument(
             "--debug", action="store_true", default=argparse.SUPPRESS, help="show the traceback of an error"
         )
     try:
@@ -85,6 +94,30 @@ def _run(arguments: list[str]) -> int:
         parser.print_help(sys.stderr)
         return 2
     return int(module.run(args))
+
+
+def _module_of(command: str, arguments: list[str]) -> ModuleType | None:
+    """Import a command's module; None where no distribution has such a command.
+
+    Raises
+    ------
+    MissingExtraError
+        A command of the arena, which is not installed.
+    """
+    if command == "follow" and "--ros2" in arguments:
+        # A robot has no arena installed.
+        return importlib.import_module("limo_hog.cli.follow_robot")
+    if command in BUILT_IN:
+        return importlib.import_module(f"limo_hog.cli.{command}")
+    from importlib.metadata import entry_points
+
+    offered = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+    if command in offered:
+        module: ModuleType = offered[command].load()
+        return module
+    if command in ARENA:
+        raise MissingExtraError(f"limo-hog {command} needs the simulator: pip install limo-sim")
+    return None
 
 
 if __name__ == "__main__":

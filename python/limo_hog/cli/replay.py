@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from limo_hog.cli.output import STDOUT, write_json
-from limo_hog.cli.progress import progress
-from limo_hog.cli.watching import file_ending
+from limo_hog.cli.support.arguments import file_ending
+from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.progress import progress
 from limo_hog.detector import Detections
-from limo_hog.follow.detectors import NAMES, Detector, detector_named
-from limo_hog.follow.naming import CONTROLLERS, controller_named
+from limo_hog.follow.control.naming import CONTROLLERS, controller_named
+from limo_hog.follow.sense.detectors import NAMES, Detector, detector_named
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

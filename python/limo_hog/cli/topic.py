@@ -12,7 +12,7 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from limo_hog.cli.follow import seconds
+from limo_hog.cli.support.arguments import seconds
 from limo_hog.exceptions import LimoHogError
 
 if TYPE_CHECKING:

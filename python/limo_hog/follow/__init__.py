@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from limo_hog.follow.approach import ApproachController
+from limo_hog.follow.control.approach import ApproachController
+from limo_hog.follow.control.distance import ProxemicController
+from limo_hog.follow.control.naming import CONTROLLERS, controller_named
+from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.decision import Controller, Decision, Mode
-from limo_hog.follow.detectors import Detector, detector_named
-from limo_hog.follow.naming import CONTROLLERS, controller_named
-from limo_hog.follow.observation import Observation, Odometry, Scan
-from limo_hog.follow.proxemic import ProxemicController
-from limo_hog.follow.proxemics import Zone, zone_of
-from limo_hog.follow.region import Region
-from limo_hog.follow.safety import Guard
-from limo_hog.follow.tracking import TrackingController
+from limo_hog.follow.safety.guard import Guard
+from limo_hog.follow.sense.detectors import Detector, detector_named
+from limo_hog.follow.sense.observation import Observation, Odometry, Scan
+from limo_hog.follow.sense.ranging import Zone, zone_of
+from limo_hog.follow.sense.region import Region
 from limo_hog.follow.twist import Twist
 
 __all__ = [

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
 
-from limo_hog.follow.observation import Observation
-from limo_hog.follow.region import Region
+from limo_hog.follow.sense.observation import Observation
+from limo_hog.follow.sense.region import Region
 from limo_hog.follow.twist import Twist
 
 S = TypeVar("S")

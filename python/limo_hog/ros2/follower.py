@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller, Decision
-from limo_hog.follow.detectors import Detector, detect_in
-from limo_hog.follow.observation import Odometry, Scan, observed
-from limo_hog.follow.safety import Guard
+from limo_hog.follow.safety.guard import Guard
+from limo_hog.follow.sense.detectors import Detector, detect_in
+from limo_hog.follow.sense.observation import Odometry, Scan, observed
 from limo_hog.follow.twist import Twist
 from limo_hog.imaging.drawing import annotate
 from limo_hog.ros2 import messages, names

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller, Decision
-from limo_hog.follow.detectors import Detector, detect_in
-from limo_hog.follow.observation import Odometry, Scan, observed
-from limo_hog.follow.region import Region
-from limo_hog.follow.safety import Guard, GuardState
+from limo_hog.follow.safety.guard import Guard, GuardState
+from limo_hog.follow.sense.detectors import Detector, detect_in
+from limo_hog.follow.sense.observation import Odometry, Scan, observed
+from limo_hog.follow.sense.region import Region
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import DETECTIONS, Record, to_detections

@@ -10,11 +10,11 @@ import numpy as np
 
 from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
-from limo_hog.follow.proxemics import ZONE_ENDS, Zone
-from limo_sim.episode import Episode, Step
-from limo_sim.furniture import Disc
-from limo_sim.scenario import ROOM_HALF, Scenario
+from limo_hog.follow.sense.ranging import ZONE_ENDS, Zone
+from limo_sim.run.episode import Episode, Step
 from limo_sim.view.reading import reading
+from limo_sim.world.furniture import Disc
+from limo_sim.world.scenario import ROOM_HALF, Scenario
 
 with needed(by="--plot", what="matplotlib", install="'limo-hog[plot]'"):
     from matplotlib.figure import Figure

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.proxemics import box_centre, person_depth, zone_of
+from limo_hog.follow.sense.ranging import box_centre, person_depth, zone_of
 from limo_hog.imaging.drawing import annotate
-from limo_sim.camera import WIDTH, Frame
-from limo_sim.episode import Step
+from limo_sim.run.episode import Step
+from limo_sim.sensing.camera import WIDTH, Frame
 
 
 @dataclass(frozen=True, slots=True)

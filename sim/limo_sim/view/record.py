@@ -9,8 +9,8 @@ from pathlib import Path
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import bag_writer, detections_message
 from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
-from limo_sim.camera import FOCAL_PX
-from limo_sim.episode import Moment
+from limo_sim.run.episode import Moment
+from limo_sim.sensing.camera import FOCAL_PX
 
 DETECTIONS = "/limo_camera/detections"
 

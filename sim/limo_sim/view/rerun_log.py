@@ -11,9 +11,9 @@ import numpy as np
 
 from limo_hog.atomic import whole_file
 from limo_hog.extras import needed
-from limo_sim.episode import Moment
-from limo_sim.scenario import ROOM_HALF
+from limo_sim.run.episode import Moment
 from limo_sim.view.reading import reading
+from limo_sim.world.scenario import ROOM_HALF
 
 with needed(by="--rerun", what="the Rerun SDK", install="'limo-hog[viz]'"):
     import rerun as rr

@@ -24,16 +24,16 @@ from aiohttp import WSMsgType, web
 from numpy.typing import NDArray
 
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow.observation import Scan
-from limo_hog.follow.proxemics import ZONE_ENDS
-from limo_sim.camera import FIELD
-from limo_sim.episode import Moment
-from limo_sim.furniture import Disc
-from limo_sim.lidar import MOUNT_AHEAD
-from limo_sim.scenario import ROOM_HALF, Scenario
+from limo_hog.follow.sense.observation import Scan
+from limo_hog.follow.sense.ranging import ZONE_ENDS
+from limo_sim.run.episode import Moment
+from limo_sim.sensing.camera import FIELD
+from limo_sim.sensing.lidar import MOUNT_AHEAD
 from limo_sim.view.pace import Pace
 from limo_sim.view.reading import annotated, depth_picture, reading
 from limo_sim.view.tuning import ParameterError, Tunable
+from limo_sim.world.furniture import Disc
+from limo_sim.world.scenario import ROOM_HALF, Scenario
 
 LOOPBACK = "127.0.0.1"
 #: How often the page is brought up to date [s].

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
-from limo_sim.sweep import Summary
+from limo_sim.run.sweep import Summary
 
 with needed(by="--plot", what="matplotlib", install="'limo-hog[plot]'"):
     from matplotlib.figure import Figure

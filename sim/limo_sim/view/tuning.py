@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller, Decision
-from limo_hog.follow.observation import Observation
+from limo_hog.follow.sense.observation import Observation
 
 S = TypeVar("S")
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from limo_hog.imaging.writing import video_writer
-from limo_sim.episode import Moment
+from limo_sim.run.episode import Moment
 from limo_sim.view.reading import annotated
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_sim.rclpy_stub.script import run_script, score_of
-from limo_sim.scenario import Scenario
+from limo_sim.ros.script import run_script, score_of
 from limo_sim.workshop.scenes import FOLLOWER_SCENES, PROXEMIC_SCENES, Look, Take, play
+from limo_sim.world.scenario import Scenario
 
 #: A command must follow within this time, or the watchdog stops the robot [s].
 SILENCE = 0.5

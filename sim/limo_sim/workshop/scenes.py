@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
 from limo_hog.follow.twist import Twist
-from limo_sim.episode import Moment
-from limo_sim.rclpy_stub.script import Outcome, run_script
-from limo_sim.rclpy_stub.world import Found, World
-from limo_sim.scenario import Person, Scenario
+from limo_sim.ros.lockstep.world import Found, World
+from limo_sim.ros.script import Outcome, run_script
+from limo_sim.run.episode import Moment
+from limo_sim.world.scenario import Person, Scenario
 
 
 @dataclass(frozen=True, slots=True)

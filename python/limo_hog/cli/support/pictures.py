@@ -1,0 +1,243 @@
+"""The work of `limo-hog detect`: read, look, draw and write, on all cores, results in the order of the inputs."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from rich.progress import Progress
+
+import limo_hog
+from limo_hog.cli.support.environment import cores
+from limo_hog.cli.support.output import one_line
+from limo_hog.cli.support.results import Results
+from limo_hog.detector import PeopleDetector
+from limo_hog.exceptions import ImageError
+from limo_hog.imaging.drawing import annotate
+from limo_hog.imaging.reading import (
+    STDIN,
+    Kind,
+    ReadError,
+    Source,
+    find_sources,
+    open_video,
+    read_image,
+    standard_input,
+)
+from limo_hog.imaging.search import Search
+from limo_hog.imaging.writing import video_writer, write_image
+
+Image = NDArray[np.uint8]
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def in_order(work: Callable[[Item], Result], items: Iterable[Item], workers: int) -> Iterator[Result]:
+    """Map like `map`, on several threads, with few items in flight however many there are."""
+    with ThreadPoolExecutor(workers) as pool:
+        flying: deque[Future[Result]] = deque()
+        try:
+            for item in items:
+                flying.append(pool.submit(work, item))
+                if len(flying) > 2 * workers:
+                    yield flying.popleft().result()
+            while flying:
+                yield flying.popleft().result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was found in one picture."""
+
+    source: str
+    frame: int
+    width: int
+    height: int
+    boxes: list[list[int]]
+    scores: list[float]
+    ms: float
+
+
+class Run:
+    """One `detect` run: its options, and what came of it so far."""
+
+    def __init__(self, args: argparse.Namespace, results: Results, bar: Progress) -> None:
+        self._args, self._results, self._bar = args, results, bar
+        detector = PeopleDetector(threshold=args.threshold)
+        if args.nms is not None:
+            detector = replace(detector, nms="iou", overlap=args.nms)
+        self._search = Search(detector, args.min_height, args.max_height)
+        self._copies: dict[Source, Path] = {}
+        self._workers = 1
+        self._task = bar.add_task("looking", total=0)
+        self.pictures = self.peopled = self.people = self.failed = self.known = 0
+        self._ms = 0.0
+
+    def look(self) -> None:
+        """Look at every input."""
+        with ExitStack() as stack:
+            # What two inputs stand for is looked at once.
+            named = dict.fromkeys(s for name in self._args.inputs for s in self._sources(name, stack))
+            sources = list(named)
+            if self._args.out is not None:
+                self._copies = _copies(sources, self._args.out)
+            self._share_cores(sources)
+            self._expect(sum(source.kind is Kind.IMAGE for source in sources))
+            for images, group in groupby(sources, key=lambda source: source.kind is Kind.IMAGE):
+                if images:
+                    self._look_at_images(list(group))
+                else:
+                    for source in group:
+                        self._look_at_video(source)
+
+    def summary(self, seconds: float) -> str:
+        """Say what came of it in one line."""
+        pictures = "picture" if self.pictures == 1 else "pictures"
+        words = [f"{self.pictures} {pictures}, {self.people} people in {self.peopled} of them"]
+        if self.pictures:
+            words.append(f"{self._ms / self.pictures:.1f} ms each, {self.pictures / seconds:.4g} a second")
+        if self.known:
+            words.append(f"{self.known} done before")
+        if self.failed:
+            words.append(f"{self.failed} could not be read")
+        return "; ".join(words)
+
+    def _sources(self, name: str, stack: ExitStack) -> list[Source]:
+        try:
+            return [stack.enter_context(standard_input())] if name == STDIN else find_sources(name)
+        except ReadError as error:
+            self._fail(str(error))
+            return []
+
+    def _share_cores(self, sources: list[Source]) -> None:
+        """Give each picture a core of its own where there are many, and one picture all cores."""
+        threads = self._args.threads or cores()
+        many = len(sources) > 1 or any(source.kind is Kind.VIDEO for source in sources)
+        self._workers = threads if many else 1
+        limo_hog.set_num_threads(1 if many else threads)
+        cv2.setNumThreads(1 if many else threads)
+
+    def _look_at_images(self, sources: list[Source]) -> None:
+        def work(source: Source) -> Found | str:
+            try:
+                found, picture = self._find(source, 0, read_image(source))
+            except (ReadError, ImageError, OSError) as error:
+                return one_line(error)
+            if picture is not None:
+                write_image(self._copies[source], picture)
+            return found
+
+        new = [source for source in sources if not self._is_done(source)]
+        self.known += len(sources) - len(new)
+        for found in in_order(work, new, self._workers):
+            if isinstance(found, Found):
+                self._keep(found)
+            else:
+                self._fail(found)
+            self._bar.advance(self._task)
+
+    def _look_at_video(self, source: Source) -> None:
+        copy = self._copies.get(source)
+        if self._args.resume and copy is not None and copy.exists():
+            self.known += 1
+            return
+        with ExitStack() as stack:
+            try:
+                video = stack.enter_context(open_video(source))
+            except (ReadError, OSError) as error:
+                self._fail(one_line(error))
+                return
+            every, done = self._args.every, (self._results.done or {}).get(source.name, set())
+            write = copy and stack.enter_context(video_writer(copy, video.fps / every))
+            # An annotated copy is made anew from its first frame.
+            skip = set() if write else done
+            self.known += len(skip)
+            self._expect(max(0, -(-video.frame_count // every) - len(skip)))
+
+            def frames() -> Iterator[tuple[int, Image]]:
+                try:
+                    yield from video.frames(every, skip)
+                except ReadError as error:
+                    self._fail(str(error))
+
+            def work(job: tuple[int, Image]) -> tuple[Found, Image | None]:
+                return self._find(source, *job)
+
+            try:
+                for found, picture in in_order(work, frames(), self._workers):
+                    if write and picture is not None:
+                        write(picture)
+                    if found.frame not in done:
+                        self._keep(found)
+                    self._bar.advance(self._task)
+            except KeyboardInterrupt:
+                # A camera has no other end: what was seen until now is whole.
+                if source.kind is not Kind.CAMERA:
+                    raise
+
+    def _find(self, source: Source, frame: int, image: Image) -> tuple[Found, Image | None]:
+        start = time.perf_counter()
+        detections = self._search.detect(image)
+        ms = 1e3 * (time.perf_counter() - start)
+        height, width = image.shape[:2]
+        boxes = detections.person_boxes if self._args.person_box else detections.boxes
+        scores = detections.scores.tolist()
+        found = Found(source.name, frame, width, height, boxes.tolist(), scores, round(ms, 3))
+        if source not in self._copies:
+            return found, None
+        return found, annotate(image, boxes, [f"{score:.1f}" for score in scores])
+
+    def _is_done(self, source: Source) -> bool:
+        if not self._args.resume:
+            return False
+        written = self._results.done is None or 0 in self._results.done.get(source.name, ())
+        return written and (source not in self._copies or self._copies[source].exists())
+
+    def _expect(self, pictures: int) -> None:
+        self._bar.update(self._task, total=(self._bar.tasks[0].total or 0) + pictures)
+
+    def _keep(self, found: Found) -> None:
+        self._results.write(vars(found))
+        self.pictures += 1
+        self.people += len(found.scores)
+        self.peopled += bool(found.scores)
+        self._ms += found.ms
+        if self._args.json is None and self._args.out is None:
+            where = f"{found.source}:{found.frame}" if found.frame else found.source
+            print(f"{where}  {len(found.scores)} people ", *(f"{score:.2f}" for score in found.scores))
+
+    def _fail(self, line: str) -> None:
+        self.failed += 1
+        self._bar.console.print(f"limo-hog: {line}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _copies(sources: list[Source], folder: Path) -> dict[Source, Path]:
+    """Name each source's annotated copy: its place below what all sources have in common, in `folder`."""
+    folders = {source: source.path.absolute().parent for source in sources if source.name != STDIN}
+    root = os.path.commonpath(folders.values()) if folders else ""
+    names: dict[Source, Path] = {}
+    for source in sources:
+        suffix = ".png" if source.kind is Kind.IMAGE else ".mp4"
+        place = folder / folders[source].relative_to(root) if source in folders else folder
+        stem = "stdin" if source.name == STDIN else source.path.stem
+        names[source] = place / f"{stem}{suffix}"
+    # Two pictures of one stem, such as a.jpg and a.png, keep their whole names.
+    taken = Counter(names.values())
+    return {
+        source: path if taken[path] == 1 else path.with_name(source.path.name + path.suffix)
+        for source, path in names.items()
+    }

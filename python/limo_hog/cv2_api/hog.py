@@ -1,0 +1,457 @@
+"""`cv2.HOGDescriptor` as OpenCV 4.14 has it: a program moves by writing `limo_hog.` for `cv2.`.
+
+`docs/parity.md` lists where it differs on purpose.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, SupportsFloat, SupportsIndex
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limo_hog import _core
+from limo_hog.cv2_api.arguments import (
+    Nothing,
+    Pair,
+    Pairs,
+    coefficients,
+    integer,
+    pair,
+    pixels,
+    places,
+    real,
+    rectangles,
+)
+from limo_hog.cv2_api.geometry import Attributes, Geometry
+from limo_hog.exceptions import ParameterTypeError
+
+#: Rectangles or places and their weights.
+Found = tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]
+
+
+class HOGDescriptor(Attributes):
+    """Histograms of oriented gradients, and a linear SVM that finds people by them.
+
+    `HOGDescriptor()` has the geometry of OpenCV's default people detector, gamma correction on. With arguments the
+    first five are mandatory and gamma correction is off unless asked for, as in OpenCV 4.14; None stands for a
+    default. `HOGDescriptor(filename)` loads a file. Sizes are (width, height) [px]. The geometry is checked at its
+    first use: what does not fit raises `GeometryError`.
+    """
+
+    __slots__ = ("_armed", "_bare", "_svm")
+
+    def __init__(
+        self,
+        _winSize: Pair | str | os.PathLike[str] | None = None,
+        _blockSize: Pair | None = None,
+        _blockStride: Pair | None = None,
+        _cellSize: Pair | None = None,
+        _nbins: SupportsIndex | None = None,
+        _derivAperture: SupportsIndex | None = None,
+        _winSigma: SupportsFloat | None = None,
+        _histogramNormType: SupportsIndex | None = None,
+        _L2HysThreshold: SupportsFloat | None = None,
+        _gammaCorrection: bool | None = None,
+        _nlevels: SupportsIndex | None = None,
+        _signedGradient: bool | None = None,
+        *,
+        filename: str | os.PathLike[str] | None = None,
+    ) -> None:
+        if isinstance(_winSize, (str, os.PathLike)):
+            filename, _winSize = _winSize, None
+        sizes = {
+            "_winSize": _winSize,
+            "_blockSize": _blockSize,
+            "_blockStride": _blockStride,
+            "_cellSize": _cellSize,
+            "_nbins": _nbins,
+        }
+        missing = [name for name, value in sizes.items() if value is None]
+        if 0 < len(missing) < len(sizes):
+            raise ParameterTypeError(f"HOGDescriptor(...) needs {', '.join(sizes)}; missing: {', '.join(missing)}")
+        default = Geometry()
+        self._svm: NDArray[np.float32] | None = None
+        self._set(
+            Geometry(
+                pair("_winSize", _winSize, default.winSize),
+                pair("_blockSize", _blockSize, default.blockSize),
+                pair("_blockStride", _blockStride, default.blockStride),
+                pair("_cellSize", _cellSize, default.cellSize),
+                integer("_nbins", _nbins, default.nbins),
+                integer("_derivAperture", _derivAperture, default.derivAperture),
+                real("_winSigma", _winSigma, default.winSigma),
+                integer("_histogramNormType", _histogramNormType, default.histogramNormType),
+                real("_L2HysThreshold", _L2HysThreshold, default.L2HysThreshold),
+                bool(missing) if _gammaCorrection is None else bool(_gammaCorrection),
+                integer("_nlevels", _nlevels, default.nlevels),
+                bool(_signedGradient),
+            )
+        )
+        if filename is not None:
+            self.load(filename)
+
+    def _set(self, geometry: Geometry) -> None:
+        self._geometry = geometry
+        # The compiled detector without and with its SVM, each made when first needed.
+        self._bare: _core.Hog | None = None
+        self._armed: _core.Hog | None = None
+
+    @property
+    def svmDetector(self) -> NDArray[np.float32] | Nothing:
+        """float32 (n,): the coefficients in force, the bias last if there is one; `()` when unset."""
+        return () if self._svm is None else self._svm.copy()
+
+    def getDescriptorSize(self) -> int:
+        """Elements of one window's descriptor: bins × cells of a block × blocks of a window."""
+        return self._features.descriptor_len
+
+    def getWinSigma(self) -> float:
+        """Gaussian window in force [px]: `winSigma`, or (block width + block height) / 8 where that is not positive."""
+        return self._geometry.sigma
+
+    def checkDetectorSize(self) -> bool:
+        """Whether the detector, if any, fits the geometry; false only after `load` of a file without a detector."""
+        size = self.getDescriptorSize()
+        return self._svm is None or len(self._svm) in (size, size + 1)
+
+    def setSVMDetector(self, svmdetector: ArrayLike | None) -> None:
+        """Set the coefficients of the SVM: one per descriptor element, and perhaps the bias after them.
+
+        Parameters
+        ----------
+        svmdetector
+            Numbers of shape (n,), (n, 1) or (1, n); None or nothing clears the detector.
+
+        Raises
+        ------
+        DetectorSizeError
+            `n` is neither the descriptor's size nor one more; the detector in force stays.
+        """
+        svm = coefficients(svmdetector)
+        self._armed = None if svm is None else self._compiled(svm)
+        self._svm = svm
+
+    @staticmethod
+    def getDefaultPeopleDetector() -> NDArray[np.float32]:
+        """float32 (3781,): OpenCV's people detector for the default geometry, bias last."""
+        return _core.default_people_detector()
+
+    @staticmethod
+    def getDaimlerPeopleDetector() -> NDArray[np.float32]:
+        """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
+        return _core.daimler_people_detector()
+
+    def computeGradient(
+        self,
+        img: NDArray[np.uint8],
+        grad: NDArray[np.float32] | None = None,
+        angleOfs: NDArray[np.uint8] | None = None,
+        paddingTL: Pair | None = None,
+        paddingBR: Pair | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]] | tuple[Nothing, Nothing]:
+        """Gradient magnitudes shared between the two nearest orientation bins.
+
+        Parameters
+        ----------
+        img
+            uint8 (H, W), (H, W, 1) or (H, W, 3).
+        grad, angleOfs
+            Arrays to fill, of the results' shapes and types; others, and None, are left alone.
+        paddingTL, paddingBR
+            Columns and rows (x, y) to add (or, if negative, to drop) at the top left and the bottom right [px].
+
+        Returns
+        -------
+        grad, angleOfs
+            float32 (H', W', 2) magnitudes and uint8 (H', W', 2) bins; `((), ())` where no pixel is left.
+        """
+        image = pixels(img)
+        (left, top), (right, bottom) = pair("paddingTL", paddingTL), pair("paddingBR", paddingBR)
+        if 0 in (image.shape[0] + top + bottom, image.shape[1] + left + right):
+            return (), ()
+        shares, bins = self._features.gradient(image, (left, top, right, bottom))
+        return _filled(grad, shares), _filled(angleOfs, bins)
+
+    def compute(
+        self,
+        img: NDArray[np.uint8],
+        winStride: Pair | None = None,
+        padding: Pair | None = None,
+        locations: Pairs | None = None,
+    ) -> NDArray[np.float32] | Nothing:
+        """Descriptors of the windows of an image.
+
+        Parameters
+        ----------
+        img
+            uint8 (H, W), (H, W, 1) or (H, W, 3).
+        winStride
+            Distance of neighbouring windows (x, y) [px]; by default the cell size.
+        padding
+            Border around the image (x, y) [px], mirrored.
+        locations
+            Top left corners (x, y) of the windows [px]; by default the whole grid, row by row.
+
+        Returns
+        -------
+        descriptors
+            float32 (windows × descriptor size,), blocks column by column; zeros for a location outside. `()` when
+            no window fits.
+        """
+        descriptors = self._features.compute(
+            pixels(img),
+            pair("winStride", winStride),
+            pair("padding", padding),
+            places("locations", locations),
+        )
+        return descriptors if len(descriptors) else ()
+
+    def detect(
+        self,
+        img: NDArray[np.uint8],
+        hitThreshold: SupportsFloat | None = 0.0,
+        winStride: Pair | None = None,
+        padding: Pair | None = None,
+        searchLocations: Pairs | None = None,
+    ) -> Found:
+        """Windows of an image, at its own size, that the SVM takes for a person.
+
+        Parameters
+        ----------
+        img
+            uint8 (H, W), (H, W, 1) or (H, W, 3).
+        hitThreshold
+            Least score of a hit.
+        winStride
+            Distance of neighbouring windows (x, y) [px]; by default the cell size.
+        padding
+            Border around the image (x, y) [px], mirrored.
+        searchLocations
+            Top left corners (x, y) of the windows to look at [px]; by default the whole grid.
+
+        Returns
+        -------
+        foundLocations, weights
+            int32 (n, 2) top left corners (negative inside the padding) and float64 (n,) scores, in search order;
+            `((), ())` when there are none, or no detector is set.
+        """
+        if self._svm is None:
+            return (), ()
+        found, weights = self._detector.detect(
+            pixels(img),
+            real("hitThreshold", hitThreshold, 0.0),
+            pair("winStride", winStride),
+            pair("padding", padding),
+            places("searchLocations", searchLocations),
+        )
+        return (found, weights) if len(found) else ((), ())
+
+    def detectMultiScale(
+        self,
+        img: NDArray[np.uint8],
+        hitThreshold: SupportsFloat | None = 0.0,
+        winStride: Pair | None = None,
+        padding: Pair | None = None,
+        scale: SupportsFloat | None = 1.05,
+        groupThreshold: SupportsFloat | None = 2.0,
+        useMeanshiftGrouping: bool = False,
+        *,
+        finalThreshold: SupportsFloat | None = None,
+    ) -> Found:
+        """People of any size in an image.
+
+        Parameters
+        ----------
+        img
+            uint8 (H, W), (H, W, 1) or (H, W, 3).
+        hitThreshold
+            Least score of a hit.
+        winStride
+            Distance of neighbouring windows (x, y) [px of each level]; by default the block stride.
+        padding
+            Border around each level (x, y) [px], mirrored.
+        scale
+            How much each level is smaller than the one before; 1 or less searches the image's own size alone.
+        groupThreshold
+            Similar rectangles must be more than this to count; below 1 every hit is returned. With
+            `useMeanshiftGrouping`, the least weight of a mode.
+        useMeanshiftGrouping
+            Group by mean-shift instead.
+        finalThreshold
+            The old name of `groupThreshold`; used in its place when given.
+
+        Returns
+        -------
+        foundLocations, foundWeights
+            int32 (n, 4) x, y, width, height, clipped to the image, and float64 (n,) scores, in level order whatever
+            the number of threads; `((), ())` when there are none, or no detector is set.
+        """
+        if self._svm is None:
+            return (), ()
+        boxes, weights = self._detector.detect_multi_scale(
+            pixels(img),
+            real("hitThreshold", hitThreshold, 0.0),
+            pair("winStride", winStride),
+            pair("padding", padding),
+            real("scale", scale, 1.05),
+            real("groupThreshold", groupThreshold if finalThreshold is None else finalThreshold, 2.0),
+            bool(useMeanshiftGrouping),
+        )
+        return (boxes, weights) if len(boxes) else ((), ())
+
+    def detectROI(
+        self,
+        img: NDArray[np.uint8],
+        regions: Sequence[Sequence[int]] | NDArray[np.integer[Any]],
+        hitThreshold: SupportsFloat | None = 0.0,
+        **options: Any,
+    ) -> Found:
+        """People of any size in regions of an image, each searched as if it were an image of its own.
+
+        (For single windows at given places, as OpenCV's C++ method of this name has it, use `detect` with
+        `searchLocations`.)
+
+        Parameters
+        ----------
+        img
+            uint8 (H, W), (H, W, 1) or (H, W, 3).
+        regions
+            (n, 4) integers: x, y, width, height [px]; what lies outside the image is passed over.
+        hitThreshold
+            Least score of a hit.
+        **options
+            The other arguments of `detectMultiScale`, by name.
+
+        Returns
+        -------
+        foundLocations, foundWeights
+            As of `detectMultiScale`, in pixels of the whole image, region by region.
+        """
+        image = pixels(img)
+        boxes, weights = [np.empty((0, 4), np.int32)], [np.empty(0)]
+        for x, y, width, height in rectangles("regions", regions):
+            left, top = max(x, 0), max(y, 0)
+            region = image[top : max(y + height, 0), left : max(x + width, 0)]
+            if region.size:
+                found, scores = self.detectMultiScale(region, hitThreshold, **options)
+                boxes.append(np.reshape(np.asarray(found, np.int32), (-1, 4)) + np.array([left, top, 0, 0], np.int32))
+                weights.append(np.asarray(scores, np.float64))
+        all_boxes = np.concatenate(boxes)
+        return (all_boxes, np.concatenate(weights)) if len(all_boxes) else ((), ())
+
+    def save(self, filename: str | os.PathLike[str], objname: str = "") -> None:
+        """Write geometry and detector to a file that OpenCV reads, too.
+
+        Parameters
+        ----------
+        filename
+            .xml, .yml, .yaml or .json, with .gz after it compressed; YAML under any other suffix.
+        objname
+            Name of the object in the file; by default the file's stem.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        ParameterError
+            The object's name is not a letter or `_`, then letters, digits, `-` and `_`.
+        """
+        # Imported here: what reads and writes files would double the time to import this package.
+        from limo_hog.cv2_api import model_files
+
+        model_files.save(filename, self._geometry, self._svm, objname)
+
+    def load(self, filename: str | os.PathLike[str], objname: str = "") -> bool:
+        """Take geometry and detector from a file of OpenCV's or of `save`; true, or an error.
+
+        As in OpenCV a file without a detector keeps the one in force, and what else is missing counts as 0.
+
+        Parameters
+        ----------
+        filename
+            XML, YAML or JSON, plain or gzipped, whatever its suffix.
+        objname
+            Name of the object in the file; by default the first.
+
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        ModelFormatError
+            It holds no HOG detector.
+        DetectorSizeError
+            Its detector does not fit its geometry.
+        """
+        from limo_hog.cv2_api import model_files
+
+        geometry, svm = model_files.load(filename, objname)
+        loaded = HOGDescriptor()
+        loaded._set(geometry)
+        loaded.getDescriptorSize()
+        loaded.setSVMDetector(svm)
+        self._set(geometry)
+        if svm:
+            self._svm = loaded._svm
+        return True
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, HOGDescriptor):
+            return NotImplemented
+        return self._geometry == other._geometry and np.array_equal(self.svmDetector, other.svmDetector)
+
+    def __hash__(self) -> int:
+        # It may change while it is a key, so nothing it holds may go in.
+        return hash(HOGDescriptor)
+
+    def __repr__(self) -> str:
+        held = ", ".join(f"{name}={value}" for name, value in self._geometry._asdict().items())
+        svm = "no detector" if self._svm is None else f"a detector of {len(self._svm)} coefficients"
+        return f"<{type(self).__name__} {held}; {svm}>"
+
+    def __reduce__(self) -> tuple[Callable[..., HOGDescriptor], tuple[Any, ...]]:
+        return _restored, (type(self), tuple(self._geometry), self._svm)
+
+    @property
+    def _features(self) -> _core.Hog:
+        if self._bare is None:
+            self._bare = self._compiled(None)
+        return self._bare
+
+    @property
+    def _detector(self) -> _core.Hog:
+        if self._armed is None:
+            self._armed = self._compiled(self._svm)
+        return self._armed
+
+    def _compiled(self, svm: NDArray[np.float32] | None) -> _core.Hog:
+        g = self._geometry
+        return _core.Hog(
+            g.winSize,
+            g.blockSize,
+            g.blockStride,
+            g.cellSize,
+            g.nbins,
+            g.winSigma,
+            g.L2HysThreshold,
+            g.gammaCorrection,
+            g.nlevels,
+            g.signedGradient,
+            svm,
+        )
+
+
+def _restored(kind: type[HOGDescriptor], geometry: tuple[Any, ...], svm: NDArray[np.float32] | None) -> HOGDescriptor:
+    hog = kind(*geometry)
+    hog._svm = svm
+    return hog
+
+
+def _filled(target: Any, result: Any) -> Any:
+    """Return `target` holding `result` where it can, else `result` itself."""
+    if isinstance(target, np.ndarray) and target.shape == result.shape and target.dtype == result.dtype:
+        target[...] = result
+        return target
+    return result

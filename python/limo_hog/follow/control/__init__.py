@@ -1,0 +1,1 @@
+"""Controllers: from an observation and a state to a wanted command."""

@@ -1,0 +1,57 @@
+"""The workshop's first controller: turn towards the surest box and drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.sense.observation import Observation
+from limo_hog.follow.sense.ranging import box_centre
+from limo_hog.follow.twist import Twist
+
+
+@dataclass(frozen=True, slots=True)
+class ApproachController:
+    """Steer by the horizontal error of the surest box, drive at one speed, stop when nobody is seen.
+
+    The state is whether anybody was seen before.
+
+    Attributes
+    ----------
+    angular_gain
+        Turn rate for each pixel between the box and the middle of the image [rad/s/px].
+    dead_band_px
+        Errors smaller than this do not turn the robot [px].
+    linear_speed
+        Speed towards a person [m/s].
+    """
+
+    angular_gain: float = 0.005
+    dead_band_px: float = 20.0
+    linear_speed: float = 0.2
+
+    def start(self) -> bool:
+        """Nobody has been seen yet."""
+        return False
+
+    def step(self, observation: Observation, state: bool) -> Decision[bool]:
+        """Turn towards the surest box, if there is one."""
+        if len(observation.detections) == 0:
+            return nobody_seen(state)
+        target, error = surest(observation)
+        angular = 0.0 if abs(error) < self.dead_band_px else self.angular_gain * error
+        return Decision(Twist(self.linear_speed, angular), True, Mode.FOLLOW, "driving towards a person", target)
+
+
+def surest(observation: Observation) -> tuple[int, int]:
+    """Return which box is the surest, and how far left of the image's middle it is [px]."""
+    target = int(np.argmax(observation.detections.scores))
+    return target, observation.width // 2 - box_centre(observation.detections.boxes[target])[0]
+
+
+def nobody_seen(seen_before: bool) -> Decision[bool]:
+    """Stop, as both workshop controllers do without a box."""
+    mode = Mode.LOST if seen_before else Mode.SEARCH
+    return Decision(Twist(), seen_before, mode, "nobody seen")

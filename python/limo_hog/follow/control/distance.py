@@ -1,0 +1,56 @@
+"""The workshop's second controller: hold a distance to the person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from limo_hog.follow.control.approach import nobody_seen, surest
+from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.sense.observation import Observation
+from limo_hog.follow.sense.ranging import person_depth, zone_of
+from limo_hog.follow.twist import Twist
+
+
+@dataclass(frozen=True, slots=True)
+class ProxemicController:
+    """Two proportional controllers: the box to the middle of the image, the person to a distance.
+
+    The state is whether anybody was seen before.
+
+    Attributes
+    ----------
+    target_distance
+        Distance to hold, by the depth image [m].
+    linear_gain
+        Speed for each metre of error [1/s].
+    angular_gain
+        Turn rate for each pixel of error [rad/s/px].
+    max_linear, max_angular
+        Limits of the command, either way [m/s, rad/s].
+    """
+
+    target_distance: float = 1.5
+    linear_gain: float = 0.5
+    angular_gain: float = 0.005
+    max_linear: float = 0.3
+    max_angular: float = 0.8
+
+    def start(self) -> bool:
+        """Nobody has been seen yet."""
+        return False
+
+    def step(self, observation: Observation, state: bool) -> Decision[bool]:
+        """Turn towards the surest box and mind its distance; stop without a box or a distance."""
+        if len(observation.detections) == 0:
+            return nobody_seen(state)
+        target, error = surest(observation)
+        box = observation.detections.boxes[target]
+        distance = None if observation.depth is None else person_depth(observation.depth, box)
+        if distance is None:
+            return Decision(Twist(), True, Mode.BLOCKED, "no depth at the person", target)
+        linear = self.linear_gain * (distance - self.target_distance)
+        twist = Twist(
+            min(max(linear, -self.max_linear), self.max_linear),
+            min(max(self.angular_gain * error, -self.max_angular), self.max_angular),
+        )
+        return Decision(twist, True, Mode.FOLLOW, f"person in the {zone_of(distance).value} zone", target)

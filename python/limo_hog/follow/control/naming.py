@@ -1,0 +1,37 @@
+"""The controllers by the names the command line and the score card use."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.control.approach import ApproachController
+from limo_hog.follow.control.distance import ProxemicController
+from limo_hog.follow.control.tracking import TrackingController
+from limo_hog.follow.decision import Controller
+
+#: From the workshop's first task to what is worth trusting.
+CONTROLLERS = ("approach", "proxemic", "tracking")
+
+
+class ControllerError(LimoHogError):
+    """A controller that is not to be had, or a parameter it does not know."""
+
+
+def controller_named(name: str, target_distance: float | None = None) -> Controller[Any]:
+    """Return a controller, with another distance to hold [m] where one is given.
+
+    Raises
+    ------
+    ControllerError
+        There is no such controller, or it holds no distance.
+    """
+    if name == "approach":
+        if target_distance is not None:
+            raise ControllerError("the approach controller holds no distance: use proxemic or tracking")
+        return ApproachController()
+    if name not in CONTROLLERS:
+        raise ControllerError(f"no controller {name!r}: want one of {', '.join(CONTROLLERS)}")
+    controller = ProxemicController() if name == "proxemic" else TrackingController()
+    return controller if target_distance is None else replace(controller, target_distance=target_distance)

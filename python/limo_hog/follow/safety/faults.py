@@ -1,0 +1,74 @@
+"""Reasons not to trust an observation, each in one line."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from limo_hog.follow.sense.observation import Observation, Odometry, Scan
+
+
+def find_fault(observation: Observation, last_stamp: float | None) -> str:
+    """Return what is wrong with an observation, "" if nothing is.
+
+    Parameters
+    ----------
+    observation
+        What the sensors and the detector say.
+    last_stamp
+        Stamp of the observation before [s]; None for the first.
+    """
+    if observation.fault:
+        return observation.fault
+    if not math.isfinite(observation.stamp):
+        return f"the frame's stamp is {observation.stamp}, not a time"
+    if last_stamp is not None and observation.stamp < last_stamp:
+        return f"time runs backwards: a frame of {observation.stamp:.3f} s after one of {last_stamp:.3f} s"
+    return _boxes(observation) or _depth(observation) or _scan(observation.scan) or _odometry(observation.odometry)
+
+
+def _boxes(observation: Observation) -> str:
+    boxes, scores = observation.detections.boxes, observation.detections.scores
+    if boxes.ndim != 2 or boxes.shape[1] != 4 or len(boxes) != len(scores):
+        return f"boxes {boxes.shape} and scores {scores.shape} do not belong together"
+    if not np.all(np.isfinite(scores)):
+        return "a box has a score that is not a number"
+    clothes = observation.clothes
+    if clothes is not None and clothes.shape != (len(boxes), 2, 3):
+        return f"clothes {clothes.shape} and boxes {boxes.shape} do not belong together"
+    centre = boxes[:, :2] + boxes[:, 2:] / 2
+    inside = (centre >= 0).all(axis=1) & (centre < (observation.width, observation.height)).all(axis=1)
+    sane = inside & (boxes[:, 2:] > 0).all(axis=1)
+    if sane.all():
+        return ""
+    box = ", ".join(str(value) for value in boxes[~sane][0])
+    return f"box ({box}) lies outside the {observation.width}x{observation.height} image"
+
+
+def _depth(observation: Observation) -> str:
+    depth = observation.depth
+    if depth is None:
+        return ""
+    if depth.shape != (observation.height, observation.width):
+        return f"the depth image is {depth.shape}, the camera's {(observation.height, observation.width)}"
+    if not np.any(np.isfinite(depth) & (depth > 0)):
+        return "the depth image has no valid pixel"
+    return ""
+
+
+def _scan(scan: Scan | None) -> str:
+    if scan is None:
+        return ""
+    if scan.ranges.size == 0:
+        return "the scan is empty"
+    if np.isnan(scan.ranges).all():
+        return "the scan has no valid range"
+    return ""
+
+
+def _odometry(odometry: Odometry | None) -> str:
+    if odometry is None:
+        return ""
+    values = (odometry.x, odometry.y, odometry.yaw, odometry.linear, odometry.angular)
+    return "" if all(math.isfinite(value) for value in values) else "the odometry is not a number"

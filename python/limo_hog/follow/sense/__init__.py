@@ -1,0 +1,1 @@
+"""What one instant shows: sensor readings, detections, ranges, appearance and free space."""

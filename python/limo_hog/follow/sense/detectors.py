@@ -1,0 +1,181 @@
+"""What the follower finds people with: our HOG, OpenCV's, or a network of the user's, behind one protocol."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.detector import Detections
+from limo_hog.exceptions import LimoHogError
+from limo_hog.extras import needed
+from limo_hog.follow.sense.region import Region
+from limo_hog.suppression import suppress
+
+if TYPE_CHECKING:
+    import cv2
+
+Image = NDArray[np.uint8]
+
+#: Followed people whose window is at least so high are searched for at half the size [px]; HOG's least is 128.
+_LARGE = 280
+#: Names `detector_named` knows; `onnx:FILE` is the fourth kind.
+NAMES = ("hog", "hog-half", "hog-iou", "hog-soft", "cv2")
+
+
+class DetectorError(LimoHogError):
+    """A people detector that is not to be had, or a network that is not one."""
+
+
+class Detector(Protocol):
+    """Finds people in images."""
+
+    def detect(self, image: Image) -> Detections:
+        """Return the people in a uint8 (H, W, 3) BGR image, best first."""
+        ...
+
+
+def detector_named(name: str) -> Detector:
+    """Return a detector: one of `NAMES`, or `onnx:FILE`.
+
+    Raises
+    ------
+    DetectorError
+        There is no such detector, OpenCV has no HOG, or the file is no network.
+    """
+    if name == "cv2":
+        return Cv2Detector()
+    if name.startswith("onnx:"):
+        return OnnxDetector(Path(name.removeprefix("onnx:")))
+    if name not in NAMES:
+        raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}, onnx:FILE")
+    from limo_hog.detector import PeopleDetector
+
+    if name == "hog-half":
+        return HalfSize(PeopleDetector())
+    kinds: dict[str, Literal["group", "iou", "soft"]] = {"hog-iou": "iou", "hog-soft": "soft"}
+    return PeopleDetector(nms=kinds.get(name, "group"))
+
+
+def detect_in(detector: Detector, image: Image, region: Region | None) -> Detections:
+    """Search a region of an image, or all of it where `region` is None; boxes are in the whole image."""
+    if region is None:
+        return detector.detect(image)
+    rows, columns = slice(region.y, region.y + region.height), slice(region.x, region.x + region.width)
+    if region.window_height >= _LARGE:
+        # The finest levels cost most, and could only hold people half as tall.
+        detector = HalfSize(detector)
+    found = detector.detect(np.ascontiguousarray(image[rows, columns]))
+    return Detections(found.boxes + np.array([region.x, region.y, 0, 0], np.int32), found.scores)
+
+
+def best_first(boxes: NDArray[Any], scores: NDArray[Any]) -> Detections:
+    """Return boxes (N, 4) and scores (N,) of any type as `Detections`, the surest first."""
+    order = np.argsort(-scores, kind="stable")
+    return Detections(boxes[order].astype(np.int32), scores[order].astype(np.float64))
+
+
+@dataclass(frozen=True)
+class HalfSize:
+    """The workshop's speed tip: search the image at half its size. Blind to people lower than 200 px."""
+
+    detector: Detector
+
+    def detect(self, image: Image) -> Detections:
+        """Find people in every second pixel, each the mean of four; boxes are in the whole image."""
+        height, width = image.shape[0] // 2 * 2, image.shape[1] // 2 * 2
+        rows = image[0:height:2].astype(np.uint16) + image[1:height:2]
+        half = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
+        found = self.detector.detect(half)
+        return Detections(found.boxes * 2, found.scores)
+
+
+@dataclass(frozen=True)
+class Cv2Detector:
+    """OpenCV's own HOG with the workshop's parameters, where the installed OpenCV has one."""
+
+    def detect(self, image: Image) -> Detections:
+        """Find people, best first."""
+        boxes, scores = self._hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)
+        return best_first(np.asarray(boxes).reshape(-1, 4), np.asarray(scores).reshape(-1))
+
+    @cached_property
+    def _hog(self) -> cv2.HOGDescriptor:
+        with needed(by="the detector cv2", what="OpenCV", install="'limo-hog[cv]'"):
+            import cv2
+        if not hasattr(cv2, "HOGDescriptor"):
+            raise DetectorError(f"OpenCV {cv2.__version__} has no HOGDescriptor: use --detector hog, or OpenCV 4")
+        hog = cv2.HOGDescriptor()
+        hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
+        return hog
+
+
+@dataclass(frozen=True)
+class OnnxDetector:
+    """A network from a file, run by `cv2.dnn`.
+
+    The network takes float32 (1, 3, size, size), RGB in 0..1, and gives (1, 4 + classes, N): centre x, centre y,
+    width, height [px of its input] and a score in 0..1 for each class, people first: what YOLOv8 exports. The image
+    is made to fit at its own aspect, grey below or beside it.
+
+    Attributes
+    ----------
+    path
+        The ONNX file.
+    size
+        Side of the network's input [px].
+    threshold
+        Least score of a person.
+    overlap
+        Boxes with a larger intersection over union than this are the same person.
+    """
+
+    path: Path
+    size: int = 640
+    threshold: float = 0.25
+    overlap: float = 0.45
+
+    def __post_init__(self) -> None:
+        # A wrong file is told before the robot starts, not frame by frame.
+        _ = self._network
+
+    def detect(self, image: Image) -> Detections:
+        """Find people, best first."""
+        import cv2
+
+        shrink = self.size / max(image.shape[:2])
+        fitted = cv2.resize(image, (0, 0), fx=shrink, fy=shrink)
+        square = np.full((self.size, self.size, 3), 114, np.uint8)
+        square[: fitted.shape[0], : fitted.shape[1]] = fitted[: self.size, : self.size]
+        self._network.setInput(cv2.dnn.blobFromImage(square, 1 / 255, swapRB=True))
+        try:
+            output = np.asarray(self._network.forward())
+        except cv2.error as error:
+            raise DetectorError(f"{self.path}: the network failed: {error}") from error
+        if output.ndim != 3 or output.shape[0] != 1 or output.shape[1] < 5:
+            raise DetectorError(f"{self.path}: the network gives {output.shape}, want (1, 4 + classes, boxes)")
+        x, y, w, h, score = output[0, :5]
+        likely = score >= self.threshold
+        boxes = np.stack([x - w / 2, y - h / 2, w, h], axis=1)[likely] / shrink
+        kept = suppress(boxes, score[likely], self.overlap)
+        # As an SVM's margin: 0 at the threshold, and without an upper end.
+        sure = np.clip(score[likely][kept], 1e-6, 1 - 1e-6).astype(np.float64)
+        margin = np.log(sure / (1 - sure)) - math.log(self.threshold / (1 - self.threshold))
+        return best_first(np.rint(boxes[kept]), margin)
+
+    @cached_property
+    def _network(self) -> cv2.dnn.Net:
+        with needed(by="an ONNX detector", what="OpenCV", install="'limo-hog[cv]'"):
+            import cv2
+
+        if not self.path.is_file():
+            raise DetectorError(f"{self.path}: no such file; --detector onnx:FILE wants an ONNX network")
+        try:
+            return cv2.dnn.readNetFromONNX(str(self.path))
+        except cv2.error as error:
+            raise DetectorError(f"{self.path}: OpenCV cannot read this as an ONNX network") from error

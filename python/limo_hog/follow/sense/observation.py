@@ -1,0 +1,119 @@
+"""What a follower knows at one instant: everything a controller may look at, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.detector import Detections
+from limo_hog.follow.sense.appearance import Clothes, clothes_in
+from limo_hog.follow.sense.region import Region
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """One turn of a planar lidar.
+
+    Attributes
+    ----------
+    stamp
+        When the turn was finished [s], on the clock of `Observation.stamp`.
+    ranges
+        float32 (N,) [m], counter-clockwise from `angle_min`; inf where nothing was hit.
+    angle_min, angle_max
+        Direction of the first and the last beam [rad], 0 straight ahead, counter-clockwise positive.
+    range_min, range_max
+        Limits between which a range is valid [m].
+    """
+
+    stamp: float
+    ranges: NDArray[np.float32]
+    angle_min: float
+    angle_max: float
+    range_min: float
+    range_max: float
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Where the wheels say the robot is: pose in the start frame [m, rad] and speeds [m/s, rad/s].
+
+    `stamp` is when that was so [s], on the clock of `Observation.stamp`: a camera frame may be older.
+    """
+
+    stamp: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+    linear: float = 0.0
+    angular: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One camera frame's detections with the other sensors' newest readings.
+
+    Attributes
+    ----------
+    stamp
+        When the camera frame was taken [s].
+    width, height
+        Size of the camera image [px].
+    focal_px
+        Focal length of the camera [px]; the principal point is the image centre.
+    detections
+        People found in the frame, best first.
+    region
+        Part of the image that was searched; None where all of it was.
+    depth
+        float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; or None.
+    scan
+        The newest lidar scan; None without a lidar.
+    odometry
+        The newest odometry; None without wheel encoders.
+    fault
+        Why the senses cannot be trusted this time, "" where they can; the robot then stands still.
+    clothes
+        float64 (N, 2, 3): what the person in each detection wears, by `clothes_in`; None without a colour image.
+    """
+
+    stamp: float
+    width: int
+    height: int
+    focal_px: float
+    detections: Detections
+    region: Region | None = None
+    depth: NDArray[np.float32] | None = None
+    scan: Scan | None = None
+    odometry: Odometry | None = None
+    fault: str = ""
+    clothes: Clothes | None = None
+
+    @property
+    def now(self) -> float:
+        """The newest stamp of all [s]: the camera frame may have taken its time to arrive."""
+        stamps = [self.stamp]
+        if self.scan is not None:
+            stamps.append(self.scan.stamp)
+        if self.odometry is not None:
+            stamps.append(self.odometry.stamp)
+        return max(stamps)
+
+
+def observed(
+    stamp: float,
+    image: NDArray[np.uint8],
+    focal_px: float,
+    detections: Detections,
+    region: Region | None,
+    depth: NDArray[np.float32] | None,
+    scan: Scan | None,
+    odometry: Odometry | None,
+    fault: str = "",
+) -> Observation:
+    """Return what one camera image, uint8 (H, W, 3) BGR, and the other sensors tell: its size and clothes filled in."""
+    height, width = image.shape[:2]
+    clothes = clothes_in(image, detections.boxes)
+    return Observation(stamp, width, height, focal_px, detections, region, depth, scan, odometry, fault, clothes)

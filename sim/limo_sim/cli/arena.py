@@ -1,0 +1,52 @@
+"""`limo-hog arena`: the arena alone, in real time, for nodes to drive."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from typing import TYPE_CHECKING
+
+from limo_hog.cli.support.output import UsageError
+from limo_sim.cli.options import add_scenario
+from limo_sim.cli.watching import add_watching, watching
+
+if TYPE_CHECKING:
+    from limo_hog.ros2.dds import Bus
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `arena`."""
+    parser = subparsers.add_parser(
+        "arena",
+        description="Let the arena go on in real time, until Ctrl-C. With --ros2 its sensors are ROS 2 topics, and "
+        "whatever publishes /cmd_vel drives the robot: Humble, Jazzy, or limo-hog follow --ros2.",
+    )
+    parser.add_argument("--ros2", action="store_true", help="speak ROS 2 over DDS, on this machine alone")
+    add_scenario(parser, math.inf, "stop after so long")
+    add_watching(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the arena."""
+    if not args.ros2 and not any((args.view, args.video, args.record)):
+        raise UsageError("an arena that nobody sees: give --ros2, --view, --video or --record")
+    from limo_sim.ros.live import run_live
+    from limo_sim.world.scenario import Scenario
+
+    scenario = Scenario.load(args.scenario)
+    bus: Bus | None = None
+    if args.ros2:
+        from limo_hog.ros2.dds import Bus
+
+        bus = Bus()
+        print(f"arena {scenario.name!r} is on ROS domain {bus.domain}; Ctrl-C ends it", file=sys.stderr)
+    with watching(args, scenario) as audience:
+        arena = run_live(scenario, args.seed, args.seconds, bus, audience.watch if audience.watchers else None)
+    contacts = arena.contacts
+    print(
+        f"{arena.time:.1f} s; contacts: person {contacts.person}, wall {contacts.wall}; "
+        f"watchdog stops {arena.watchdog_stops}; commands refused {arena.rejected_commands}",
+        file=sys.stderr,
+    )
+    return 0

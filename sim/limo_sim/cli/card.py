@@ -1,0 +1,107 @@
+"""The score card, as a terminal shows it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console, Group
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from limo_sim.run.score import ScoreCard
+
+_BAR = 24
+_MODE_STYLES = {"search": "blue", "follow": "green", "hold": "cyan", "blocked": "red", "lost": "yellow"}
+_ZONE_STYLES = {"intimate": "red", "personal": "yellow", "social": "green", "public": "blue"}
+
+
+def show(card: ScoreCard) -> None:
+    """Print a score card on standard output."""
+    Console(highlight=False).print(picture(card))
+
+
+def picture(card: ScoreCard) -> Panel:
+    """Lay a score card out: figures on the left, shares of time as bars below."""
+    figures = Table.grid(padding=(0, 2))
+    figures.add_column(style="dim", no_wrap=True)
+    figures.add_column(no_wrap=True)
+    figures.add_column(style="dim", no_wrap=True)
+    figures.add_column(no_wrap=True)
+    contacts = card.contacts_person + card.contacts_wall
+    for row in (
+        ("first found", _unit(card.first_detection_s, "s"), "distance", _unit(card.distance_mean_m, "m", 2)),
+        ("in view", _share(card.in_view, 0.95, 1), "nearest", _unit(card.distance_min_m, "m", 2)),
+        (
+            "found when in view",
+            _share(card.detected, 0.95, 1),
+            "error to 1.5 m",
+            _unit(card.distance_rms_error_m, "m", 2),
+        ),
+        ("longest gap", _unit(card.longest_gap_s, "s"), "least clearance", _unit(card.clearance_min_m, "m", 2)),
+        ("best box wrong", _share(card.best_box_wrong, 0, 0.05), "contacts", _good(str(contacts), contacts == 0)),
+        ("pixel error", _pixels(card), "path", _unit(card.path_m, "m")),
+        ("lost", _losses(card), "turn-rate change", _unit(card.mean_abs_domega, "rad/s", 3)),
+    ):
+        figures.add_row(*row)
+    bars = Table.grid(padding=(0, 2))
+    bars.add_column(no_wrap=True)
+    bars.add_column(no_wrap=True)
+    bars.add_column(justify="right", no_wrap=True)
+    bars.add_row(Text("distance zones", style="bold"), "", "")
+    for zone, style in _ZONE_STYLES.items():
+        bars.add_row(*_bar(zone, getattr(card, f"zone_{zone}"), style))
+    bars.add_row(Text("what it did", style="bold"), "", "")
+    for mode, share in card.modes.items():
+        bars.add_row(*_bar(mode, share, _MODE_STYLES[mode]))
+    reasons = Table.grid(padding=(0, 2))
+    reasons.add_column(justify="right", style="dim", no_wrap=True)
+    reasons.add_column(overflow="fold")
+    for reason, share in list(card.reasons.items())[:5]:
+        reasons.add_row(_percent(share), reason)
+    detection = f"{card.detect_ms_p50:.1f} ms a frame" if card.detect_ms_p50 is not None else "no frame"
+    return Panel(
+        Group(figures, "", bars, "", Text("and why", style="bold"), reasons),
+        title=f"[bold]{card.scenario}[/] · {card.controller} · {card.detector} · seed {card.seed}",
+        subtitle=f"{card.seconds:g} s, {card.real_time_factor:.1f}× real time · detection {detection}",
+        box=box.ROUNDED,
+        padding=(1, 2),
+        expand=False,
+    )
+
+
+def _bar(name: str, share: float | None, style: str) -> tuple[str, Text, str]:
+    full = round(_BAR * (share or 0.0))
+    # However short, what happened at all is to be seen.
+    full = max(full, 1) if share else 0
+    return f"  {name}", Text("━" * full, style=style) + Text("─" * (_BAR - full), style="dim"), _percent(share)
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.1f} %"
+
+
+def _share(share: float | None, low: float, high: float) -> Text:
+    return Text("–") if share is None else _good(_percent(share), low <= share <= high)
+
+
+def _good(text: str, good: bool) -> Text:
+    return Text(text, style="green" if good else "yellow")
+
+
+def _unit(value: float | None, unit: str, digits: int = 1) -> str:
+    return "–" if value is None else f"{value:.{digits}f} {unit}"
+
+
+def _pixels(card: ScoreCard) -> str:
+    if card.pixel_error_mean is None or card.pixel_error_p95 is None:
+        return "–"
+    return f"{card.pixel_error_mean:.0f} px, 95 % below {card.pixel_error_p95:.0f}"
+
+
+def _losses(card: ScoreCard) -> str:
+    if card.found_again is None:
+        return "never"
+    return f"{card.lost}×, found again within 3 s: {_percent(card.found_again)}"

@@ -1,0 +1,73 @@
+"""`limo-hog follow`: the workshop in closed loop, and its score card."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from limo_hog.cli.support.arguments import add_follower
+from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.progress import progress
+from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.cli.options import add_scenario
+from limo_sim.cli.watching import add_watching, watching
+
+if TYPE_CHECKING:
+    from limo_sim.run.episode import Moment
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `follow`."""
+    parser = subparsers.add_parser(
+        "follow",
+        description="Let the robot find and follow a walking person in the arena, steered by a people "
+        "detector, behind a safety layer; ends with a score card.",
+    )
+    add_follower(parser)
+    add_scenario(parser, 60.0, "simulated time (60)")
+    parser.add_argument("--json", metavar="FILE", help="write the score card as JSON; - is standard output")
+    parser.add_argument(
+        "--ros2",
+        action="store_true",
+        help="follow on a ROS 2 robot instead (see `follow --ros2 --help`)",
+    )
+    add_watching(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run one episode and show how it went."""
+    from limo_sim.run.episode import run_episode
+    from limo_sim.run.score import score
+    from limo_sim.view.tuning import Tunable
+    from limo_sim.world.scenario import Scenario
+
+    scenario = Scenario.load(args.scenario)
+    controller = Tunable(controller_named(args.controller, args.target))
+    detector = detector_named(args.detector)
+    with watching(args, scenario, controller) as audience:
+        with progress("s") as bar:
+            task = bar.add_task("search", total=args.seconds)
+
+            def watch(moment: Moment) -> None:
+                bar.update(task, completed=round(moment.step.time, 1), description=moment.step.mode.value)
+                audience.watch(moment)
+
+            episode = run_episode(
+                scenario,
+                controller,
+                detector,
+                args.seconds,
+                args.seed,
+                names=(args.controller, args.detector),
+                watch=watch,
+            )
+        card = score(episode)
+        audience.end(episode, card)
+    if args.json:
+        write_json(args.json, card.to_json())
+    if args.json != STDOUT:
+        from limo_sim.cli.card import show
+
+        show(card)
+    return 0

@@ -1,0 +1,96 @@
+"""`limo-hog run`: an ordinary ROS 2 Python node against the arena, without ROS."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.progress import progress
+from limo_hog.exceptions import LimoHogError
+from limo_hog.extras import needed
+from limo_sim.cli.options import add_scenario
+from limo_sim.cli.watching import add_watching, watching
+
+if TYPE_CHECKING:
+    from limo_sim.run.episode import Moment
+
+
+class ScriptError(LimoHogError):
+    """The node failed; its own traceback has been shown before."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `run`."""
+    parser = subparsers.add_parser(
+        "run",
+        description="Run an rclpy script against the arena, in one process and in lock step: time passes only while "
+        "the node waits, so the same file, scenario and seed give the same run. Ends with the score card of `follow`.",
+        epilog="docs/ros2.md lists what of ROS 2's Python API is offered.",
+    )
+    parser.add_argument("node", metavar="NODE.py", type=Path, help="the script")
+    add_scenario(parser, 60.0, "simulated time (60)")
+    parser.add_argument("--json", metavar="FILE", help="write the score card as JSON; - is standard output")
+    parser.add_argument("--real", action="store_true", help="with this computer's own rclpy: in real time, no score")
+    add_watching(parser)
+    parser.add_argument(
+        "--ros-args",
+        nargs=argparse.REMAINDER,
+        default=[],
+        metavar="...",
+        help="-p name:=value, -r from:=to and --params-file FILE, as ROS 2 takes them; comes last",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the node and show how it went."""
+    if args.real:
+        from limo_sim.cli.real import run_real
+
+        return run_real(args)
+    from limo_sim.world.scenario import Scenario
+
+    with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
+        from limo_sim.ros.script import run_script, score_of
+    scenario = Scenario.load(args.scenario)
+    with contextlib.ExitStack() as stack:
+        if args.json == STDOUT:
+            # What the node prints must not mix with the JSON.
+            stack.enter_context(contextlib.redirect_stdout(sys.stderr))
+        audience = stack.enter_context(watching(args, scenario))
+        bar = stack.enter_context(progress("s"))
+        task = bar.add_task("search", total=args.seconds)
+
+        def watch(moment: Moment) -> None:
+            bar.update(task, completed=round(moment.step.time, 1), description=moment.step.mode.value)
+            audience.watch(moment)
+
+        def log(time: float, level: str, name: str, message: str) -> None:
+            line = f"[{level}] [{time:.9f}] [{name}]: {message}"
+            bar.console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+        outcome = run_script(
+            args.node,
+            scenario,
+            args.seconds,
+            args.seed,
+            arguments=["--ros-args", *args.ros_args],
+            log=log,
+            watch=watch,
+        )
+        card = score_of(outcome)
+        bar.stop()
+        audience.end(outcome.episode, card)
+    if outcome.failure:
+        sys.stderr.write(outcome.traceback)
+        raise ScriptError(outcome.failure)
+    if args.json:
+        write_json(args.json, card.to_json())
+    if args.json != STDOUT:
+        from limo_sim.cli.card import show
+
+        show(card)
+    return 0

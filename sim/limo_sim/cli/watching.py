@@ -1,0 +1,123 @@
+"""What `follow`, `run` and `arena` offer to watch a run and to keep it: --view, --video, --record, --plot, --rerun."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from limo_hog.cli.support.arguments import file_ending
+
+if TYPE_CHECKING:
+    from limo_sim.run.episode import Episode, Moment
+    from limo_sim.run.score import ScoreCard
+    from limo_sim.view.server import View
+    from limo_sim.view.tuning import Tunable
+    from limo_sim.world.scenario import Scenario
+
+PORT = 8488
+
+
+def add_watching(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    group = parser.add_argument_group("to watch it, and to keep it")
+    group.add_argument(
+        "--view",
+        nargs="?",
+        const=("127.0.0.1", PORT),
+        type=_address,
+        metavar="[HOST:]PORT",
+        help=f"show the run, in real time, on a page of its own ({PORT}); without HOST to this machine alone",
+    )
+    group.add_argument(
+        "--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="film what the follower saw (H.264)"
+    )
+    group.add_argument(
+        "--record",
+        type=file_ending(".mcap"),
+        metavar="FILE.mcap",
+        help="record everything sensed, found and commanded as ROS 2 messages (8 MB/s)",
+    )
+    group.add_argument(
+        "--plot",
+        type=file_ending(".png", ".svg", ".pdf"),
+        metavar="FILE.png",
+        help="draw path, error, distance and speed in one figure",
+    )
+    group.add_argument("--rerun", type=file_ending(".rrd"), metavar="FILE.rrd", help="log the run for the Rerun viewer")
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not port.isdecimal() or int(port) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is no [HOST:]PORT such as {PORT} or 0.0.0.0:{PORT}")
+    return host.strip("[]") or "127.0.0.1", int(port)
+
+
+@dataclass
+class Watching:
+    """All that looks on at one run: hand `watch` to it, and call `end` when it is over."""
+
+    watchers: list[Callable[[Moment], None]] = field(default_factory=list)
+    plot: Path | None = None
+    view: View | None = None
+
+    def watch(self, moment: Moment) -> None:
+        """Show a moment to everybody; returns when the run may go on."""
+        for watcher in self.watchers:
+            watcher(moment)
+
+    def end(self, episode: Episode, card: ScoreCard) -> None:
+        """Draw the figure, and say goodbye to those who watch."""
+        if self.plot is not None:
+            from limo_sim.view.plot import plot
+
+            plot(episode, self.plot)
+        if self.view is not None:
+            self.view.end(card.to_json())
+
+
+@contextmanager
+def watching(
+    args: argparse.Namespace, scenario: Scenario, controller: Tunable[Any] | None = None
+) -> Iterator[Watching]:
+    """Open what was asked for: what cannot be had is said before the run. It is closed whole, also on Ctrl-C.
+
+    `controller` is whose parameters the page may set.
+    """
+    stopped: KeyboardInterrupt | None = None
+    with ExitStack() as stack:
+        all_ = Watching()
+        if args.plot is not None:
+            # Drawn at the end; what is missing for it is said now.
+            import limo_sim.view.plot  # noqa: F401
+
+            all_.plot = args.plot
+        if args.video is not None:
+            from limo_sim.view.video import filmed
+
+            all_.watchers.append(stack.enter_context(filmed(args.video, scenario.camera.rate_hz)))
+        if args.record is not None:
+            from limo_sim.view.record import recorded
+
+            all_.watchers.append(stack.enter_context(recorded(args.record)))
+        if args.rerun is not None:
+            from limo_sim.view.rerun_log import logged
+
+            all_.watchers.append(stack.enter_context(logged(args.rerun)))
+        if args.view is not None:
+            from limo_sim.view.server import View
+
+            all_.view = stack.enter_context(View(scenario, controller, *args.view))
+            all_.watchers.append(all_.view.watch)
+            print(f"watch the run at {all_.view.url}", file=sys.stderr)
+        try:
+            yield all_
+        except KeyboardInterrupt as error:
+            stopped = error
+    if stopped is not None:
+        raise stopped

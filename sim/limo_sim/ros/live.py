@@ -1,0 +1,89 @@
+"""The arena in real time, on ROS 2's network: others drive it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from limo_hog.follow.decision import Mode
+from limo_hog.follow.twist import Twist
+from limo_hog.ros2 import names
+from limo_hog.ros2.dds import Bus
+from limo_hog.ros2.messages import to_twist
+from limo_sim.ros.outlet import Outlet
+from limo_sim.run.arena import Arena
+from limo_sim.run.episode import NOTHING, Moment, Step
+from limo_sim.world.scenario import Scenario
+
+#: Time that is made up for after a hold-up [s]; what is more is lost.
+_CATCH_UP = 0.2
+
+
+def run_live(
+    scenario: Scenario,
+    seed: int,
+    seconds: float,
+    bus: Bus | None,
+    watch: Callable[[Moment], None] | None = None,
+) -> Arena:
+    """Let the arena go on with the wall's clock, its topics on the bus, driven by /cmd_vel.
+
+    Parameters
+    ----------
+    scenario, seed
+        The arena and its random numbers.
+    seconds
+        How long; inf until interrupted.
+    bus
+        Where the topics are; None for an arena that nobody drives.
+    watch
+        Called with every camera frame.
+    """
+    arena = Arena(scenario, seed)
+    outlet = Outlet(arena)
+    writers = {}
+    commands = None
+    if bus is not None:
+        spoken = [topic for topic in names.TYPES if topic not in (names.COMMAND, names.ANNOTATED)]
+        writers = {topic: bus.publisher(topic, names.TYPES[topic]) for topic in spoken}
+        commands = bus.subscription(names.COMMAND, names.TYPES[names.COMMAND])
+    twist, shown = Twist(), -1.0
+    began = time.monotonic()
+    while arena.time < seconds:
+        for message in commands.take() if commands is not None else ():
+            twist = to_twist(message)
+            arena.command(twist)
+        for topic, make in outlet.new():
+            writer = writers.get(topic)
+            if writer is not None and writer.has_readers:
+                writer.publish(make())
+        if watch is not None and arena.frame().stamp > shown:
+            shown = arena.frame().stamp
+            watch(_moment(arena, twist))
+        arena.step()
+        late = time.monotonic() - began - arena.time
+        if late < 0:
+            time.sleep(-late)
+        elif late > _CATCH_UP:
+            # A machine that is too slow runs slower than the wall's clock, and does not hurry for ever after.
+            began += late - _CATCH_UP
+    return arena
+
+
+def _moment(arena: Arena, twist: Twist) -> Moment:
+    frame = arena.frame()
+    mode = Mode.HOLD if twist == Twist() else Mode.FOLLOW
+    step = Step(
+        time=arena.time,
+        truth=arena.truth(),
+        seen=frame.truth,
+        detections=NOTHING,
+        target=None,
+        region=None,
+        twist=twist,
+        mode=mode,
+        reason="driven by /cmd_vel",
+        detect_ms=0.0,
+        render_ms=0.0,
+    )
+    return Moment(step, frame, arena.scan(), arena.odometry())

@@ -1,0 +1,118 @@
+"""What a script does with OpenCV, seen from outside: its windows, and what its HOG detector finds.
+
+Windows need no display: the last picture of each is kept for who watches the run.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.cv2_api.install import install_into_cv2
+from limo_hog.detector import Detections
+from limo_sim.ros.lockstep.world import Found, World
+
+_MISSING = object()
+
+
+@contextmanager
+def watched_cv2(world: World) -> Iterator[None]:
+    """Put windows that need no display and a detector that is watched into cv2, for one run."""
+    # OpenCV 5 has no HOG: for this run, ours takes its place.
+    installed = install_into_cv2()
+    replacements = {**_windows(world), "HOGDescriptor": _watched(cv2.HOGDescriptor, world)}
+    before = {name: getattr(cv2, name, _MISSING) for name in replacements}
+    for name, value in replacements.items():
+        setattr(cv2, name, value)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is _MISSING:
+                delattr(cv2, name)
+            else:
+                setattr(cv2, name, value)
+        for name in installed:
+            delattr(cv2, name)
+
+
+def _windows(world: World) -> dict[str, Callable[..., Any]]:
+    def imshow(winname: str, mat: Any) -> None:
+        if not isinstance(mat, np.ndarray) or mat.size == 0:
+            raise cv2.error(f"imshow: want a picture that is not empty, came {type(mat).__name__}")
+        world.show(str(winname), _as_shown(mat))
+
+    def wait_key(delay: int = 0) -> int:  # noqa: ARG001 — OpenCV's signature
+        return -1
+
+    def destroy_window(winname: str) -> None:
+        world.windows.pop(winname, None)
+
+    def destroy_all() -> None:
+        world.windows.clear()
+
+    def nothing(*_: Any, **__: Any) -> None:
+        return None
+
+    return {
+        "imshow": imshow,
+        "waitKey": wait_key,
+        "waitKeyEx": wait_key,
+        "pollKey": wait_key,
+        "destroyWindow": destroy_window,
+        "destroyAllWindows": destroy_all,
+        "namedWindow": nothing,
+        "moveWindow": nothing,
+        "resizeWindow": nothing,
+        "setWindowTitle": nothing,
+        "setWindowProperty": nothing,
+        "setMouseCallback": nothing,
+        "startWindowThread": nothing,
+        "createTrackbar": nothing,
+    }
+
+
+def _as_shown(picture: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return a copy as imshow draws it: 8 bits as they are, 16 bits divided by 256, numbers from 0 to 1 times 255."""
+    if picture.dtype == np.uint8:
+        return np.array(picture, np.uint8)
+    scaled = picture / 256 if picture.dtype == np.uint16 else picture * 255.0
+    shown: NDArray[np.uint8] = np.clip(np.nan_to_num(scaled), 0, 255).astype(np.uint8)
+    return shown
+
+
+def _watched(base: Any, world: World) -> Any:
+    class HOGDescriptor:
+        """OpenCV's or limo-hog's own, with an eye on what it finds.
+
+        It holds the descriptor: a Python class derived from one of cv2's crashes the garbage collector.
+        """
+
+        getDefaultPeopleDetector = staticmethod(base.getDefaultPeopleDetector)  # noqa: N815 — OpenCV's names
+        getDaimlerPeopleDetector = staticmethod(base.getDaimlerPeopleDetector)  # noqa: N815
+
+        def __init__(self, *args: Any, **kwargs: Any) -> None:
+            self._descriptor = base(*args, **kwargs)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._descriptor, name)
+
+        def detectMultiScale(self, img: Any, *args: Any, **kwargs: Any) -> Any:  # noqa: N802 — OpenCV's name
+            looked_at = f"{getattr(img, 'dtype', type(img).__name__)} {np.shape(img)}"
+            if looked_at not in world.asked:
+                world.asked.append(looked_at)
+            began = time.perf_counter()
+            rects, weights = self._descriptor.detectMultiScale(img, *args, **kwargs)
+            ms = 1e3 * (time.perf_counter() - began)
+            boxes = np.array(rects, np.int32).reshape(-1, 4)
+            scores = np.array(weights, np.float64).reshape(-1)
+            world.note(Found(np.shape(img), Detections(boxes, scores), ms))
+            return rects, weights
+
+    return HOGDescriptor

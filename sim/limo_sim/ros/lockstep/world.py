@@ -1,0 +1,290 @@
+"""The arena behind the topics, in lock step with a node: time passes only while the node waits.
+
+A callback therefore takes no simulated time, unless it sleeps; the same file, scenario and seed give the same run.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.detector import Detections
+from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.decision import Mode
+from limo_hog.follow.twist import Twist
+from limo_hog.ros2 import names
+from limo_hog.ros2.messages import to_twist
+from limo_sim.ros.interfaces import Message, from_wire
+from limo_sim.ros.lockstep.patience import Patience
+from limo_sim.ros.outlet import Outlet
+from limo_sim.run.arena import Arena
+from limo_sim.run.episode import CONTROL_PERIOD, NOTHING, Episode, Moment, Step
+from limo_sim.sensing.camera import Frame
+from limo_sim.world.scenario import Scenario
+
+#: Takes what a script logs: time [s], level, logger, message.
+Log = Callable[[float, str, str, str], None]
+
+
+class StubError(LimoHogError):
+    """A script asks for something that `limo-hog run` does not offer, or says something a robot cannot do."""
+
+
+class RunOver(KeyboardInterrupt):
+    """The run's time is up."""
+
+
+class Reader(Protocol):
+    """A subscription."""
+
+    topic: str
+
+    def offer(self, message: Message) -> None:
+        """Queue a message, which is the reader's own."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What the script's HOG detector found in one image, in pixels of that image."""
+
+    shape: tuple[int, ...]
+    detections: Detections
+    ms: float
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command the script sent, and when [s]."""
+
+    time: float
+    twist: Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Callback:
+    """When a callback began, how long it slept [s of the arena's time], and how long it worked [s of the wall's]."""
+
+    time: float
+    slept: float
+    worked: float
+
+
+class World:
+    """One run: the arena, who listens, and the log that the score is made of.
+
+    Attributes
+    ----------
+    commands
+        Every Twist on /cmd_vel.
+    found
+        What the script's detector found since the last camera frame.
+    asked
+        What the detector was asked to look at in the run, as "uint8 (480, 640, 3)", each once.
+    callbacks
+        How long each callback took.
+    fault
+        What went wrong first in the script, even if the script hid it.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        seconds: float,
+        *,
+        script: Path,
+        log: Log,
+        watch: Callable[[Moment], None] | None = None,
+        patience: float = 20.0,
+    ) -> None:
+        self.arena = Arena(scenario, seed)
+        self.seconds = seconds
+        self.log = log
+        self.script = script
+        self.watch = watch
+        self.patience = Patience(patience)
+        self.readers: list[Reader] = []
+        self.published: dict[str, str] = {}
+        self.commands: list[Command] = []
+        self.found: list[Found] = []
+        self.windows: dict[str, NDArray[np.uint8]] = {}
+        self.fault: BaseException | None = None
+        self.callbacks: list[Callback] = []
+        self.asked: list[str] = []
+        self._outlet = Outlet(self.arena)
+        self._steps: list[Step] = []
+        self._frame: Frame | None = None
+        self._render_ms = 0.0
+        self._logged = self._logged_frame = -math.inf
+        self._seen_before = False
+        self._began = time.perf_counter()
+        self._collected = False
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start of the run."""
+        return self.arena.time
+
+    @property
+    def over(self) -> bool:
+        """Whether the run's time is up."""
+        return self.arena.time >= self.seconds - 1e-9
+
+    def advance(self) -> None:
+        """Let the arena go on by one step; what the sensors have to say is offered to those who listen.
+
+        Raises
+        ------
+        RunOver
+            When the time is up.
+        """
+        if self.over:
+            raise RunOver
+        if self._collected:
+            self._log()
+            self.arena.step()
+        self._collected = True
+        self._collect()
+        self.patience.progress()
+
+    def sleep(self, seconds: float) -> None:
+        """Let simulated time pass, as a script's `time.sleep`: nothing is delivered meanwhile, only queued."""
+        until = self.time + seconds
+        while self.time < until - 1e-9:
+            self.advance()
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Call back into the script, and remember how that went wrong."""
+        began, since = time.perf_counter(), self.time
+        try:
+            function(*arguments)
+        except (RunOver, SystemExit):
+            raise
+        except BaseException as error:
+            self.fault = self.fault or error
+            raise
+        finally:
+            self.callbacks.append(Callback(since, self.time - since, time.perf_counter() - began))
+
+    def show(self, window: str, picture: NDArray[np.uint8]) -> None:
+        """Keep the newest picture of a window."""
+        self.windows[window] = picture
+
+    def note(self, found: Found) -> None:
+        """Take what the script's detector found."""
+        self.found.append(found)
+
+    def publish(self, topic: str, message: Message) -> None:
+        """Take a message from the script: a command drives the robot, others go to the script's own readers.
+
+        Raises
+        ------
+        StubError
+            If a command is not a number.
+        """
+        self.published[topic] = message._type_name
+        if topic == names.COMMAND and message._type_name == names.TYPES[topic]:
+            self._drive(message)
+        for reader in self.readers:
+            if reader.topic == topic:
+                reader.offer(copy.deepcopy(message))
+
+    def episode(self) -> Episode:
+        """Return the log."""
+        return Episode(
+            scenario=self.arena.scenario,
+            controller=self.script.name,
+            detector="hog" if self.asked else "the node's own",
+            seed=self.arena.seed,
+            seconds=self.time,
+            steps=tuple(self._steps),
+            contacts=self.arena.contacts,
+            wall_seconds=time.perf_counter() - self._began,
+        )
+
+    def _drive(self, message: Any) -> None:
+        parts = {
+            f"{vector}.{axis}": getattr(getattr(message, vector), axis)
+            for vector in ("linear", "angular")
+            for axis in "xyz"
+        }
+        for name, value in parts.items():
+            if not math.isfinite(value):
+                raise StubError(f"the command's {name} is {value}: a robot can be given finite numbers alone")
+        twist = to_twist(message)
+        self.commands.append(Command(self.time, twist))
+        self.arena.command(twist)
+
+    def _collect(self) -> None:
+        drawing = time.perf_counter()
+        frame = self.arena.frame()
+        if self._frame is None or frame.stamp > self._frame.stamp:
+            self._render_ms = 1e3 * (time.perf_counter() - drawing)
+            self._frame, self.found = frame, []
+        wanted = {reader.topic for reader in self.readers}
+        for topic, make in self._outlet.new():
+            if topic not in wanted:
+                continue
+            message = make()
+            for reader in self.readers:
+                if reader.topic == topic:
+                    reader.offer(from_wire(message))
+
+    def _log(self) -> None:
+        """Note the period that ends now: what was seen, and what the script made of it."""
+        frame = self._frame
+        fresh = frame is not None and frame.stamp > self._logged_frame
+        if not fresh and self.time - self._logged < CONTROL_PERIOD - 0.01:
+            return
+        self._logged = self.time
+        if frame is not None and fresh:
+            self._logged_frame = frame.stamp
+        found = self._in_frame_pixels(frame) if frame is not None and fresh else NOTHING
+        twist = self.commands[-1].twist if self.commands else Twist()
+        target = int(np.argmax(found.scores)) if len(found) else None
+        mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
+        self._seen_before |= target is not None
+        step = Step(
+            time=self.time,
+            truth=self.arena.truth(),
+            seen=frame.truth if frame is not None and fresh else None,
+            detections=found,
+            target=target,
+            region=None,
+            twist=twist,
+            mode=mode,
+            reason=f"as {self.script.name} says",
+            detect_ms=sum(found.ms for found in self.found) if fresh else 0.0,
+            render_ms=self._render_ms if fresh else 0.0,
+        )
+        self._steps.append(step)
+        if self.watch is not None:
+            with self.patience.suspended():
+                self.watch(
+                    Moment(
+                        step,
+                        frame if fresh else None,
+                        self.arena.scan(),
+                        self.arena.odometry(),
+                        windows=dict(self.windows),
+                    )
+                )
+
+    def _in_frame_pixels(self, frame: Frame) -> Detections:
+        """Return the boxes found last since the frame came, in its pixels: a smaller copy is scaled back."""
+        height, width = frame.image.shape[:2]
+        for found in reversed(self.found):
+            scale = height / found.shape[0]
+            if abs(found.shape[1] * scale - width) <= scale:
+                boxes = np.rint(found.detections.boxes * scale).astype(np.int32)
+                return Detections(boxes, found.detections.scores)
+        return NOTHING

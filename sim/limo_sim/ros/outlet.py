@@ -1,0 +1,52 @@
+"""The arena's readings as ROS 2 messages, each once, on the topics of the workshop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from limo_hog.ros2 import messages, names
+from limo_sim.run.arena import Arena
+from limo_sim.sensing.camera import FOCAL_PX, HEIGHT, WIDTH
+from limo_sim.sensing.imu import ImuReading
+
+#: A topic and how to make its message: made only where somebody listens.
+Outgoing = tuple[str, Callable[[], Any]]
+
+
+class Outlet:
+    """Tells what is new since it was last asked."""
+
+    def __init__(self, arena: Arena) -> None:
+        self._arena = arena
+        self._camera = self._lidar = self._wheels = -math.inf
+
+    def new(self) -> list[Outgoing]:
+        """Return what has arrived: the clock first, then depth before colour, so that colour makes the pair."""
+        arena = self._arena
+        out: list[Outgoing] = [(names.CLOCK, lambda: messages.clock(arena.time))]
+        out += [(names.IMU, partial(_imu, reading)) for reading in arena.imu()]
+        odometry, scan, frame = arena.odometry(), arena.scan(), arena.frame()
+        if odometry.stamp > self._wheels:
+            self._wheels = odometry.stamp
+            out.append((names.ODOMETRY, lambda: messages.odometry(odometry)))
+        if scan.stamp > self._lidar:
+            self._lidar = scan.stamp
+            period = 1 / arena.scenario.lidar.rate_hz
+            out.append((names.SCAN, lambda: messages.laser_scan(scan, period)))
+        if frame.stamp > self._camera:
+            self._camera = stamp = frame.stamp
+            out += [
+                (names.CAMERA_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX)),
+                (names.DEPTH, lambda: messages.image(stamp, frame.depth)),
+                (names.DEPTH_LCAS, lambda: messages.image(stamp, frame.depth)),
+                (names.IMAGE, lambda: messages.image(stamp, frame.image)),
+                (names.IMAGE_COMPRESSED, lambda: messages.compressed_image(stamp, frame.image)),
+            ]
+        return out
+
+
+def _imu(reading: ImuReading) -> Any:
+    return messages.imu(reading.stamp, reading.angular_velocity, reading.acceleration)

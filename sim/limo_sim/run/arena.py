@@ -1,0 +1,288 @@
+"""The world: walls, furniture, people who walk and a robot that is driven, in fixed steps of 1/50 s.
+
+Everything depends on the scenario, the seed and the commands alone. Each sensor draws its noise from its own
+stream by the number of the reading, so that it does not matter which sensors are read, or when.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pymunk
+
+from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.twist import Twist
+from limo_sim.sensing import imu, lidar
+from limo_sim.sensing.camera import CameraPose, Contacts, Frame, PersonTruth, Truth
+from limo_sim.sensing.delivery import Channel, Exposure
+from limo_sim.sensing.renderer import Renderer, Seen
+from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
+from limo_sim.world.person import Pose, Walk, legs_at
+from limo_sim.world.robot import HALF_LENGTH, HALF_WIDTH, Drive, integrate
+from limo_sim.world.scenario import ROOM_HALF, Scenario
+
+STEPS_PER_SECOND = 50
+STEP_S = 1 / STEPS_PER_SECOND
+
+_ROBOT, _OBSTACLE, _PERSON = 1, 2, 3
+_WALL_HALF = 0.1
+_SAME_CONTACT = STEPS_PER_SECOND // 2  # touching again within half a second is the same contact
+_CAMERA_STREAM, _LIDAR_STREAM, _IMU_STREAM, _DROP_STREAM, _SLIP_STREAM, _PATTERN_STREAM = range(6)
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """The robot at the end of a step: its pose, how it moves, and what its wheels say."""
+
+    step: int
+    x: float
+    y: float
+    yaw: float
+    velocity: tuple[float, float]
+    turn_rate: float
+    odometry: Odometry
+
+    @property
+    def time(self) -> float:
+        return self.step / STEPS_PER_SECOND
+
+
+class Arena:
+    """One run of a scenario.
+
+    Raises
+    ------
+    ScenarioError
+        When the scenario cannot be run.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int = 0) -> None:
+        scenario.check(f"scenario {scenario.name!r}: ")
+        self.scenario = scenario
+        self.seed = seed
+        self._walks = [Walk(person) for person in scenario.people]
+        robot = scenario.robot
+        self._drive = Drive(robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
+        self._slip = self._stream(_SLIP_STREAM)
+        self._touched = {_OBSTACLE: -STEPS_PER_SECOND, _PERSON: -STEPS_PER_SECOND}
+        self._contacts = {_OBSTACLE: 0, _PERSON: 0}
+        self._space = pymunk.Space()
+        self._space.collision_slop = 0.001
+        self._robot = self._add_robot()
+        self._add_obstacles()
+        self._people: list[pymunk.Body | None] = [None] * len(scenario.people)
+        self._place_people(0.0)
+        for other in (_OBSTACLE, _PERSON):
+            self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
+        self._state = self._before = _State(0, robot.x, robot.y, robot.yaw, (0.0, 0.0), 0.0, Odometry())
+        camera = scenario.camera
+        self._camera = Channel(
+            camera.rate_hz,
+            STEPS_PER_SECOND,
+            self._state,
+            latency_s=camera.latency_s,
+            drop_probability=camera.drop_probability,
+            drops=self._stream(_DROP_STREAM),
+        )
+        self._lidar = Channel(scenario.lidar.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.lidar.latency_s)
+        self._wheels = Channel(
+            scenario.odometry.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.odometry.latency_s
+        )
+        self._static_scanned = [
+            placed(shape, piece.x, piece.y, piece.yaw)
+            for piece in scenario.furniture
+            for shape in KINDS[piece.kind].scanned
+        ]
+        self._renderer: Renderer | None = None
+        self._frame: Frame | None = None
+        self._scan: tuple[int, Scan] | None = None
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start."""
+        return self._state.time
+
+    @property
+    def contacts(self) -> Contacts:
+        """How often the robot has touched a person, and a wall or furniture."""
+        return Contacts(person=self._contacts[_PERSON], wall=self._contacts[_OBSTACLE])
+
+    @property
+    def rejected_commands(self) -> int:
+        """How many commands were not finite numbers; each stopped the robot."""
+        return self._drive.rejected
+
+    @property
+    def watchdog_stops(self) -> int:
+        """How often the robot was stopped because no command came."""
+        return self._drive.watchdog_stops
+
+    def command(self, twist: Twist) -> None:
+        """Drive like this until the next command, or until the watchdog bites."""
+        self._drive.command(twist, self.time)
+
+    def step(self) -> None:
+        """Go on by one fiftieth of a second."""
+        before = self._state
+        self._drive.advance(before.time, STEP_S)
+        step = before.step + 1
+        self._place_people(step / STEPS_PER_SECOND)
+        self._space.step(STEP_S)
+        robot = self._robot
+        rolled = STEP_S * (1.0 + self.scenario.odometry.slip * self._slip.standard_normal(2))
+        twist = self._drive.twist
+        measured = Twist(twist.linear * rolled[0], twist.angular * rolled[1])
+        wheels = before.odometry
+        x, y, yaw = integrate(wheels.x, wheels.y, wheels.yaw, float(measured.linear), float(measured.angular))
+        self._before = before
+        self._state = _State(
+            step=step,
+            x=robot.position.x,
+            y=robot.position.y,
+            yaw=robot.angle,
+            velocity=(robot.velocity.x, robot.velocity.y),
+            turn_rate=robot.angular_velocity,
+            odometry=Odometry(step / STEPS_PER_SECOND, x, y, yaw, twist.linear, twist.angular),
+        )
+        for channel in (self._camera, self._lidar, self._wheels):
+            channel.advance(step, self._state)
+
+    def frame(self) -> Frame:
+        """Return the newest camera frame that has arrived: the same one until another does."""
+        exposure = self._camera.newest
+        if self._frame is None or self._frame.stamp != exposure.state.time:
+            image, depth, seen = self._render().render(
+                _camera_at(exposure.state),
+                self._poses(exposure.state.time),
+                self._stream(_CAMERA_STREAM, exposure),
+            )
+            self._frame = Frame(exposure.state.time, image, depth, self._tell(exposure.state, seen))
+        return self._frame
+
+    def scan(self) -> Scan:
+        """Return the newest lidar scan that has arrived."""
+        exposure = self._lidar.newest
+        if self._scan is None or self._scan[0] != exposure.index:
+            state = exposure.state
+            shapes: list[Disc | Rectangle] = list(self._static_scanned)
+            for person, pose in zip(self.scenario.people, self._poses(state.time), strict=True):
+                if pose is not None:
+                    shapes += legs_at(person, pose, lidar.MOUNT_HEIGHT)
+            x = state.x + lidar.MOUNT_AHEAD * math.cos(state.yaw)
+            y = state.y + lidar.MOUNT_AHEAD * math.sin(state.yaw)
+            ranges = lidar.measure(
+                lidar.cast(x, y, state.yaw, shapes),
+                self.scenario.lidar.noise_m,
+                self._stream(_LIDAR_STREAM, exposure),
+            )
+            scan = Scan(state.time, ranges, -lidar.ANGLE_MAX, lidar.ANGLE_MAX, lidar.RANGE_MIN, lidar.RANGE_MAX)
+            self._scan = exposure.index, scan
+        return self._scan[1]
+
+    def odometry(self) -> Odometry:
+        """Return the newest odometry that has arrived."""
+        return self._wheels.newest.state.odometry
+
+    def imu(self) -> tuple[imu.ImuReading, ...]:
+        """Return the readings of the last step, oldest first."""
+        before, now = self._before, self._state
+        gained = [(new - old) / STEP_S for new, old in zip(now.velocity, before.velocity, strict=True)]
+        cos, sin = math.cos(now.yaw), math.sin(now.yaw)
+        forward, sideways = cos * gained[0] + sin * gained[1], cos * gained[1] - sin * gained[0]
+        noise = np.random.default_rng([self.seed, _IMU_STREAM, now.step])
+        return tuple(
+            imu.sample(now.time - early, now.turn_rate, forward, sideways, self.scenario.imu, noise)
+            for early in (1 / imu.RATE_HZ, 0.0)
+        )
+
+    def truth(self) -> Truth:
+        """How things are now; a frame's own truth tells how they were when it was taken."""
+        if self._frame is not None and self._frame.stamp == self.time:
+            return self._frame.truth
+        seen = self._render().look(_camera_at(self._state), self._poses(self.time))
+        return self._tell(self._state, seen)
+
+    def _render(self) -> Renderer:
+        if self._renderer is None:
+            self._renderer = Renderer(self.scenario, self._stream(_PATTERN_STREAM))
+        return self._renderer
+
+    def _stream(self, sensor: int, exposure: Exposure[_State] | None = None) -> np.random.Generator:
+        return np.random.default_rng([self.seed, sensor, exposure.index if exposure else 0])
+
+    def _poses(self, time: float) -> list[Pose | None]:
+        return [walk.pose(time) for walk in self._walks]
+
+    def _tell(self, state: _State, seen: list[Seen]) -> Truth:
+        people: list[PersonTruth | None] = []
+        for pose, (visible, box) in zip(self._poses(state.time), seen, strict=True):
+            if pose is None:
+                people.append(None)
+                continue
+            dx, dy = pose.x - state.x, pose.y - state.y
+            bearing = (math.atan2(dy, dx) - state.yaw + math.pi) % math.tau - math.pi
+            people.append(PersonTruth(pose.x, pose.y, pose.yaw, math.hypot(dx, dy), bearing, visible, box))
+        return Truth(state.time, (state.x, state.y, state.yaw), tuple(people), self.contacts)
+
+    def _add_robot(self) -> pymunk.Body:
+        settings = self.scenario.robot
+        size = (2 * HALF_LENGTH, 2 * HALF_WIDTH)
+        robot = pymunk.Body(mass=4.2, moment=pymunk.moment_for_box(4.2, size))
+        robot.position = settings.x, settings.y
+        robot.angle = settings.yaw
+        robot.velocity_func = self._roll
+        shape = pymunk.Poly.create_box(robot, size)
+        shape.friction, shape.collision_type = 0.3, _ROBOT
+        self._space.add(robot, shape)
+        return robot
+
+    def _roll(self, robot: pymunk.Body, _gravity: tuple[float, float], _damping: float, _dt: float) -> None:
+        """Let the wheels set the velocity; contacts then take away what they must."""
+        twist = self._drive.twist
+        robot.velocity = twist.linear * math.cos(robot.angle), twist.linear * math.sin(robot.angle)
+        robot.angular_velocity = twist.angular
+
+    def _add_obstacles(self) -> None:
+        ground = self._space.static_body
+        middle, half = ROOM_HALF + _WALL_HALF, ROOM_HALF + 2 * _WALL_HALF
+        footprints: list[Disc | Rectangle] = []
+        for side in (middle, -middle):
+            footprints += [Rectangle(side, 0, _WALL_HALF, half), Rectangle(0, side, half, _WALL_HALF)]
+        footprints += [piece.footprint for piece in self.scenario.furniture]
+        for footprint in footprints:
+            shape: pymunk.Shape
+            if isinstance(footprint, Disc):
+                shape = pymunk.Circle(ground, footprint.radius, (footprint.x, footprint.y))
+            else:
+                turned = pymunk.Transform.translation(footprint.x, footprint.y).rotated(footprint.yaw)
+                x, y = footprint.half_x, footprint.half_y
+                shape = pymunk.Poly(ground, [(-x, -y), (x, -y), (x, y), (-x, y)], turned)
+            shape.friction, shape.collision_type = 0.3, _OBSTACLE
+            self._space.add(shape)
+
+    def _place_people(self, time: float) -> None:
+        """Give everybody the velocity that takes them where they will be at `time`."""
+        for index, pose in enumerate(self._poses(time)):
+            if pose is None:
+                continue
+            person = self._people[index]
+            if person is None:
+                person = self._people[index] = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+                person.position = pose.x, pose.y
+                shape = pymunk.Circle(person, self.scenario.people[index].radius)
+                shape.friction, shape.collision_type = 0.3, _PERSON
+                self._space.add(person, shape)
+            x, y = person.position
+            person.velocity = (pose.x - x) / STEP_S, (pose.y - y) / STEP_S
+
+    def _on_touch(self, _arbiter: pymunk.Arbiter, _space: pymunk.Space, other: int) -> None:
+        step = self._state.step
+        if step - self._touched[other] > _SAME_CONTACT:
+            self._contacts[other] += 1
+        self._touched[other] = step
+
+
+def _camera_at(state: _State) -> CameraPose:
+    return CameraPose.on_robot(state.x, state.y, state.yaw)

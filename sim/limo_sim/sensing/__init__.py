@@ -1,0 +1,1 @@
+"""The sensors: from the state of the world to readings, with noise and delay."""

@@ -1,0 +1,44 @@
+"""The inertial unit: turn rate and acceleration in the robot's frame, 100 times a second."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from limo_sim.world.scenario import Imu
+
+RATE_HZ = 100.0
+GRAVITY = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class ImuReading:
+    """One sample.
+
+    Attributes
+    ----------
+    stamp
+        When it was taken [s].
+    angular_velocity
+        About x, y, z [rad/s].
+    acceleration
+        Along x, y, z, gravity's reaction included: a robot at rest reads +9.8 on z [m/s²].
+    """
+
+    stamp: float
+    angular_velocity: tuple[float, float, float]
+    acceleration: tuple[float, float, float]
+
+
+def sample(
+    stamp: float, turn_rate: float, forward: float, sideways: float, settings: Imu, noise: np.random.Generator
+) -> ImuReading:
+    """Measure a true turn rate [rad/s] and accelerations along x and y [m/s²]."""
+    gyro = settings.gyro_noise * noise.standard_normal(3)
+    accel = settings.accel_noise * noise.standard_normal(3)
+    return ImuReading(
+        stamp=stamp,
+        angular_velocity=(float(gyro[0]), float(gyro[1]), turn_rate + float(gyro[2])),
+        acceleration=(forward + float(accel[0]), sideways + float(accel[1]), GRAVITY + float(accel[2])),
+    )

@@ -1,0 +1,73 @@
+"""The planar lidar: rays against the walls, the furniture and the legs of people, all at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_sim.world.furniture import Disc, Rectangle
+from limo_sim.world.scenario import ROOM_HALF
+
+BEAMS = 292
+ANGLE_MAX = 2.0
+"""First and last beam [rad], right and left of straight ahead."""
+RANGE_MIN, RANGE_MAX = 0.12, 8.0
+MOUNT_AHEAD, MOUNT_HEIGHT = 0.103, 0.111
+"""Where it sits: ahead of the base centre and above the floor [m]."""
+
+_ANGLES = np.linspace(-ANGLE_MAX, ANGLE_MAX, BEAMS)
+
+
+def cast(x: float, y: float, yaw: float, shapes: Iterable[Disc | Rectangle]) -> NDArray[np.float64]:
+    """Distance [m] along every beam to the nearest wall or shape.
+
+    Parameters
+    ----------
+    x, y, yaw
+        The lidar's pose in the arena's frame, inside the walls.
+    shapes
+        Obstacles at the height of its plane.
+
+    Returns
+    -------
+    float64 (292,), counter-clockwise from -2 rad, without noise or limits.
+    """
+    angles = _ANGLES + yaw
+    cos, sin = np.cos(angles), np.sin(angles)
+    with np.errstate(divide="ignore"):
+        walls_x = (np.copysign(ROOM_HALF, cos) - x) / cos
+        walls_y = (np.copysign(ROOM_HALF, sin) - y) / sin
+    ranges = np.minimum(walls_x, walls_y)
+    discs = [(shape.x - x, shape.y - y, shape.radius) for shape in shapes if isinstance(shape, Disc)]
+    if discs:
+        dx, dy, radius = np.array(discs).T[..., None]
+        along = dx * cos + dy * sin
+        inner = radius * radius - (dx * sin - dy * cos) ** 2
+        hits = np.where((inner > 0) & (along > 0), along - np.sqrt(np.maximum(inner, 0.0)), np.inf)
+        ranges = np.minimum(ranges, hits.min(axis=0))
+    for shape in shapes:
+        if isinstance(shape, Rectangle):
+            ranges = np.minimum(ranges, _rectangle(shape, x, y, angles))
+    return ranges
+
+
+def _rectangle(shape: Rectangle, x: float, y: float, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
+    from_x, from_y = cos * (x - shape.x) + sin * (y - shape.y), cos * (y - shape.y) - sin * (x - shape.x)
+    ahead_x, ahead_y = np.cos(angles - shape.yaw), np.sin(angles - shape.yaw)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x0, x1 = (-shape.half_x - from_x) / ahead_x, (shape.half_x - from_x) / ahead_x
+        y0, y1 = (-shape.half_y - from_y) / ahead_y, (shape.half_y - from_y) / ahead_y
+    enters = np.maximum(np.minimum(x0, x1), np.minimum(y0, y1))
+    leaves = np.minimum(np.maximum(x0, x1), np.maximum(y0, y1))
+    return np.where((enters < leaves) & (enters > 0), enters, np.inf)
+
+
+def measure(ranges: NDArray[np.float64], noise_m: float, noise: np.random.Generator) -> NDArray[np.float32]:
+    """Turn true distances into what the sensor reports: noisy, and inf outside its limits."""
+    measured = ranges + noise_m * noise.standard_normal(len(ranges))
+    measured[(measured < RANGE_MIN) | (measured > RANGE_MAX)] = np.inf
+    return measured.astype(np.float32)

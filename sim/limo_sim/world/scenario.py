@@ -1,0 +1,261 @@
+"""Scenarios: who walks where, what stands around, and how good the sensors are; data, checked when read.
+
+x forward, y left, yaw counter-clockwise [rad], metres, seconds; the arena's centre is the origin.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from limo_sim.world.furniture import KINDS, Disc, Rectangle, distance_to, placed
+from limo_sim.world.schema import ScenarioError, build, check_fields, one_of, required, within
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # type: ignore[import-not-found]
+
+ROOM_HALF = 4.9
+"""The walls' inner faces stand at ± this [m] (0.2 m thick, centred on ± 5 m)."""
+WALL_HEIGHT = 1.0
+ROBOT_RADIUS = 0.19
+"""The circle about the base centre that holds the robot's 0.29 × 0.22 m body [m]."""
+_ROUTE_HALF = 4.3
+_CLEARANCE = 0.2
+_FOLDER = Path(__file__).parents[1] / "scenarios"
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """Somebody who walks a route, around and around.
+
+    Attributes
+    ----------
+    route
+        Corners (x, y, pause): walked in order, then from the last to the first again, with `pause` seconds at
+        each on arrival [m, m, s]. One corner: the person stands there.
+    speed
+        Walking speed [m/s].
+    height
+        Stature [m]; the whole body scales with it.
+    girth
+        Breadth of limbs and trunk relative to the recipe's.
+    arrives_s
+        Nobody is there before this time [s].
+    facing
+        Where somebody with a single corner looks [rad].
+    shirt, trousers, skin, hair
+        Colours, red, green, blue, 0 … 255.
+    """
+
+    route: tuple[tuple[float, float, float], ...] = required(-_ROUTE_HALF, 3600.0)
+    speed: float = within(0.75, 0.05, 2.0)
+    height: float = within(0.9, 0.6, 1.3)
+    girth: float = within(1.0, 0.7, 1.4)
+    arrives_s: float = within(0.0, 0.0, 3600.0)
+    facing: float = within(math.pi, -2 * math.pi, 2 * math.pi)
+    shirt: tuple[float, float, float] = within((34, 52, 128), 0, 255)
+    trousers: tuple[float, float, float] = within((38, 42, 56), 0, 255)
+    skin: tuple[float, float, float] = within((198, 154, 124), 0, 255)
+    hair: tuple[float, float, float] = within((56, 38, 28), 0, 255)
+
+    @property
+    def radius(self) -> float:
+        """Of the upright cylinder the robot can bump into [m]."""
+        return 0.17 * self.height
+
+
+@dataclass(frozen=True, slots=True)
+class Furniture:
+    """A piece of one of the known kinds, standing at (x, y)."""
+
+    kind: str = one_of(tuple(KINDS))
+    x: float = required(-4.7, 4.7)
+    y: float = required(-4.7, 4.7)
+    yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
+
+    @property
+    def footprint(self) -> Disc | Rectangle:
+        """What the robot bumps into, in the arena's frame."""
+        return placed(KINDS[self.kind].footprint, self.x, self.y, self.yaw)
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """Where the Limo starts, and what its drive can do."""
+
+    x: float = within(0.0, -4.6, 4.6)
+    y: float = within(0.0, -4.6, 4.6)
+    yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
+    wheel_speed: float = within(1.0, 0.05, 3.0)
+    wheel_acceleration: float = within(1.0, 0.1, 10.0)
+    watchdog_s: float = within(0.5, 0.05, 60.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """The colour camera: rate [Hz], age of a frame on arrival [s], share of frames lost, noise [of 255]."""
+
+    rate_hz: float = within(10.0, 0.5, 50.0)
+    latency_s: float = within(0.0, 0.0, 5.0)
+    drop_probability: float = within(0.0, 0.0, 1.0)
+    noise: float = within(1.0, 0.0, 20.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Depth:
+    """The depth image, taken with the colour image: limits [m], relative noise, share of unknown pixels."""
+
+    near_m: float = within(0.15, 0.01, 1.0)
+    far_m: float = within(8.0, 1.0, 20.0)
+    noise: float = within(0.004, 0.0, 0.2)
+    invalid: float = within(0.001, 0.0, 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Lidar:
+    """The planar lidar: rate [Hz], age of a scan on arrival [s], range noise [m]."""
+
+    rate_hz: float = within(8.0, 0.5, 50.0)
+    latency_s: float = within(0.0, 0.0, 5.0)
+    noise_m: float = within(0.01, 0.0, 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Wheels:
+    """The wheel odometry: rate [Hz], age on arrival [s], noise relative to the distance each wheel rolled."""
+
+    rate_hz: float = within(50.0, 0.5, 50.0)
+    latency_s: float = within(0.0, 0.0, 5.0)
+    slip: float = within(0.005, 0.0, 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """The inertial unit, 100 Hz: noise of its gyroscope [rad/s] and accelerometer [m/s²]."""
+
+    gyro_noise: float = within(0.004, 0.0, 1.0)
+    accel_noise: float = within(0.05, 0.0, 5.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """The sun and the grey things it falls on: direction it shines in, strengths, brightness 0 … 1."""
+
+    sun: tuple[float, float, float] = within((-0.5, 0.1, -0.9), -1.0, 1.0)
+    diffuse: float = within(0.8, 0.0, 1.2)
+    ambient: float = within(0.4, 0.1, 1.0)
+    sky: float = within(0.70, 0.2, 1.0)
+    floor: float = within(0.45, 0.1, 0.9)
+    wall: float = within(0.95, 0.3, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One test bed; `dataclasses.replace` makes another, checked when an `Arena` is built on it."""
+
+    name: str = ""
+    summary: str = ""
+    people: tuple[Person, ...] = ()
+    furniture: tuple[Furniture, ...] = ()
+    robot: Robot = dataclasses.field(default_factory=Robot)
+    camera: Camera = dataclasses.field(default_factory=Camera)
+    depth: Depth = dataclasses.field(default_factory=Depth)
+    lidar: Lidar = dataclasses.field(default_factory=Lidar)
+    odometry: Wheels = dataclasses.field(default_factory=Wheels)
+    imu: Imu = dataclasses.field(default_factory=Imu)
+    light: Light = dataclasses.field(default_factory=Light)
+
+    @staticmethod
+    def names() -> tuple[str, ...]:
+        """Names of the scenarios that come with limo-sim."""
+        return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+
+    @staticmethod
+    def load(name_or_path: str | Path) -> Scenario:
+        """Read one of `Scenario.names()`, or a TOML file of your own.
+
+        "NAME:SEED" varies a scenario's clothes, light and sensors, "random:SEED" makes all of it up.
+
+        Raises
+        ------
+        ScenarioError
+            With the file, the key and what is allowed there.
+        """
+        name, _, seed = str(name_or_path).rpartition(":")
+        if name in ("random", *Scenario.names()) and seed.isdecimal():
+            from limo_sim.world.variants import made_up, varied  # they are built on this module
+
+            return made_up(int(seed)) if name == "random" else varied(Scenario.load(name), int(seed))
+        path = Path(name_or_path)
+        if path.suffix != ".toml":
+            path = _FOLDER / f"{name_or_path}.toml"
+            if str(name_or_path) not in Scenario.names():
+                known = ", ".join(Scenario.names())
+                raise ScenarioError(
+                    f"unknown scenario {name_or_path}: want one of {known}, random:SEED, or a .toml file"
+                )
+        try:
+            table = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise ScenarioError(f"{path}: cannot be read: {error}") from error
+        except tomllib.TOMLDecodeError as error:
+            raise ScenarioError(f"{path}: not TOML: {error}") from error
+        scenario = build(Scenario, {"name": path.stem, **table}, f"{path.name}: ")
+        scenario.check(f"{path.name}: ")
+        return scenario
+
+    def check(self, where: str = "") -> None:
+        """Raise `ScenarioError`, its message beginning with `where`, unless this scenario can be run."""
+        check_fields(self, where)
+        if math.hypot(*self.light.sun) < 0.1:
+            raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
+        for index, piece in enumerate(self.furniture):
+            gap = distance_to(piece.footprint, self.robot.x, self.robot.y)
+            self._check_robot_free(gap, f"{where}furniture[{index}]")
+        for index, person in enumerate(self.people):
+            self._check_person(person, f"{where}people[{index}]")
+
+    def _check_robot_free(self, distance: float, where: str) -> None:
+        if distance < ROBOT_RADIUS:
+            raise ScenarioError(
+                f"{where}: is {max(distance, 0.0):.2f} m from the robot's centre, want at least {ROBOT_RADIUS} m"
+            )
+
+    def _check_person(self, person: Person, where: str) -> None:
+        if not person.route:
+            raise ScenarioError(f"{where}.route: is empty, want at least one corner [x, y, pause]")
+        for index, (x, y, pause) in enumerate(person.route):
+            if max(abs(x), abs(y)) > _ROUTE_HALF:
+                raise ScenarioError(
+                    f"{where}.route[{index}]: ({x:g}, {y:g}) goes through a wall or too near one, "
+                    f"want x and y in {-_ROUTE_HALF:g} … {_ROUTE_HALF:g}"
+                )
+            if pause < 0:
+                raise ScenarioError(f"{where}.route[{index}]: pause {pause:g} s, want 0 … 3600")
+        x, y, _ = person.route[0]
+        if person.arrives_s == 0:
+            robot = math.hypot(x - self.robot.x, y - self.robot.y)
+            self._check_robot_free(robot - person.radius, f"{where}.route[0]")
+        for index, corner in enumerate(person.route):
+            after = person.route[(index + 1) % len(person.route)]
+            for number, piece in enumerate(self.furniture):
+                gap = _gap(corner, after, piece.footprint) - person.radius
+                if gap < _CLEARANCE:
+                    raise ScenarioError(
+                        f"{where}.route[{index}]: the way to the next corner passes {max(gap, 0.0):.2f} m "
+                        f"from furniture[{number}] ({piece.kind}), want at least {_CLEARANCE} m"
+                    )
+
+
+def _gap(start: tuple[float, float, float], end: tuple[float, float, float], shape: Disc | Rectangle) -> float:
+    """Smallest distance [m] from the straight way between two corners to a shape, to within a centimetre."""
+    steps = max(1, math.ceil(math.dist(start[:2], end[:2]) / 0.02))
+    ways = (index / steps for index in range(steps + 1))
+    return min(
+        distance_to(shape, start[0] + way * (end[0] - start[0]), start[1] + way * (end[1] - start[1])) for way in ways
+    )

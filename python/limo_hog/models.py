@@ -67,14 +67,16 @@ class Model:
         return self.person_box.height * self.geometry.winSize[1]
 
 
+# The calibrations were fitted to the boxes that `PeopleDetector(threshold=-1.2)` finds in the 100 photographs of USC-C,
+# 561 and 1,223, of which 209 and 203 are people; mean calibration error in ten bins .036 and .021.
 def _opencv() -> Model:
-    return Model(Geometry(), _core.default_people_detector())
+    return Model(Geometry(), _core.default_people_detector(), calibration=Calibration(3.13, -0.59))
 
 
 def _daimler() -> Model:
     # With gamma correction off, as OpenCV's constructor with a window size has it.
     geometry = Geometry(winSize=(48, 96), gammaCorrection=False)
-    return Model(geometry, _core.daimler_people_detector())
+    return Model(geometry, _core.daimler_people_detector(), calibration=Calibration(2.36, -3.34))
 
 
 _NAMED: dict[str, Callable[[], Model]] = {"opencv": _opencv, "default": _opencv, "daimler": _daimler}

@@ -341,6 +341,12 @@ def test_no_detections_are_empty_arrays() -> None:
     assert len(none) == 0 and list(none) == [] and none.person_boxes.shape == (0, 4)
 
 
+def test_opencvs_models_have_a_calibration_in_which_surer_is_likelier() -> None:
+    for model, even in (("opencv", 0.19), ("daimler", 1.41)):
+        found = replace(PeopleDetector(model=model).detect(picture()), scores=np.array([3.0, even, -1.0]))
+        assert found.probabilities == pytest.approx([1.0, 0.5, 0.0], abs=0.05)
+
+
 def test_probabilities_need_a_calibration() -> None:
     with pytest.raises(limo_hog.HogError, match="no calibration"):
         _ = some().probabilities

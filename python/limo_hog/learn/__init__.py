@@ -1,0 +1,1 @@
+"""Measuring detectors on labelled pictures (extra `cv`; `plot` for reports)."""

@@ -25,6 +25,36 @@ def test_wrong_arguments_end_with_2(arguments: list[str], capsys: pytest.Capture
     assert "usage: limo-hog" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["detect", "a.png", "--json", "."], "'.' is a folder"),
+        (["detect", "a.png", "--json", "/"], "'/' is a folder"),
+        (["detect", "a.png", "--json", ""], "'' is no file"),
+        (["bench", "--json", ".."], "'..' is a folder"),
+        (["bench", "--size", "99999x99999"], "at most 64 megapixels"),
+        (["bench", "--size", f"{'9' * 5000}x1"], "at most 64 megapixels"),
+        (["bench", "--threads", "9" * 5000], "is no number of threads"),
+    ],
+)
+def test_an_argument_that_could_only_fail_later_is_refused_at_once(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    shown = capsys.readouterr().err
+    assert told in shown
+    assert len(shown.splitlines()[-1]) < 300
+
+
+def test_too_little_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def starve(_: object) -> int:
+        raise MemoryError("Unable to allocate 3 TiB")
+
+    monkeypatch.setattr("limo_hog.cli.info.run", starve)
+    assert main(["info"]) == 1
+    assert capsys.readouterr().err == "limo-hog: out of memory: Unable to allocate 3 TiB\n"
+
+
 def test_a_named_error_is_one_line_and_with_debug_a_traceback(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["bench", "--image", "no-such-file.jpg"]
     assert main(arguments) == 1

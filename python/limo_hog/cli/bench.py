@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 import limo_hog
-from limo_hog.cli.support.arguments import size, threads
+from limo_hog.cli.support.arguments import output_file, size, threads
 from limo_hog.cli.support.environment import cores, environment
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
@@ -71,7 +71,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--channels", choices=["gray", "bgr"], help="only this kind of image (both)")
     parser.add_argument("--threads", type=threads, nargs="+", metavar="N", help="thread counts, 0 for all cores (1 0)")
     parser.add_argument("--image", type=Path, metavar="FILE", help="a picture instead of the drawn street")
-    parser.add_argument("--json", metavar="FILE", help="write the result as JSON; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write the result as JSON; - is standard output"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from limo_hog.cli.support.arguments import count, number, threads
+from limo_hog.cli.support.arguments import count, number, output_file, threads
 from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
@@ -23,7 +23,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("inputs", nargs="+", metavar="INPUT")
     parser.add_argument("--out", type=Path, metavar="DIR", help="write annotated copies: PNG, and MP4 of videos")
-    parser.add_argument("--json", metavar="FILE", help="write one JSON object a line; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write one JSON object a line; - is standard output"
+    )
     parser.add_argument(
         "--model",
         default="opencv",

@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader has seen enough; Python must not complain again when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (LimoHogError, OSError) as error:
+    except (LimoHogError, OSError, MemoryError) as error:
         if "--debug" in arguments:
             raise
         print(f"limo-hog: {one_line(error)}", file=sys.stderr)

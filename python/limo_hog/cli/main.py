@@ -86,9 +86,9 @@ def _run(arguments: list[str]) -> int:
         # argparse has printed its help (0) or what was wrong (2).
         return int(exit_.code or 0)
     if args.version:
-        from importlib.metadata import version
+        import limo_hog
 
-        print(f"limo-hog {version('limo-hog')}")
+        print(f"limo-hog {limo_hog.__version__}")
         return 0
     if module is None:
         parser.print_help(sys.stderr)

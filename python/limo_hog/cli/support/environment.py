@@ -16,7 +16,7 @@ def environment() -> dict[str, str | int | float | bool | list[str] | None]:
     """Describe machine and libraries; plain values, for a table or JSON."""
     opencv, has_hog = _opencv()
     return {
-        "limo_hog": importlib.metadata.version("limo-hog"),
+        "limo_hog": limo_hog.__version__,
         "backend": _core.backend(),
         "cpu_features": [name for name in _core.available_backends() if name != "scalar"],
         "cpu": _cpu(),

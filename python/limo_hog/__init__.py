@@ -76,4 +76,4 @@ def __getattr__(name: str) -> str:
     # Imported here: it would double the time to import this package.
     from importlib.metadata import version
 
-    return globals().setdefault(name, version("limo-hog"))
+    return version("limo-hog")

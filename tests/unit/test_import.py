@@ -40,7 +40,7 @@ def test_importing_the_detector_imports_neither_commands_nor_follower(imported: 
 
 def test_the_version_is_that_of_the_crate_for_both_distributions() -> None:
     stated = [
-        re.search(r'^version = "(.+)"$', (ROOT / file).read_text(), re.M)
+        re.search(r'^version = "(.+)"$', (ROOT / file).read_text(), re.MULTILINE)
         for file in ("Cargo.toml", "sim/pyproject.toml")
     ]
     assert [found and found[1] for found in stated] == [limo_hog.__version__] * 2

@@ -212,5 +212,5 @@ def test_opencv_4_keeps_its_own_names(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_without_opencv_there_is_nothing_to_install_into(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(limo_hog.MissingExtraError, match=r"pip install limo-hog\[cv\]"):
+    with pytest.raises(limo_hog.MissingExtraError, match=r"pip install 'limo-hog\[cv\]'"):
         limo_hog.install_into_cv2()

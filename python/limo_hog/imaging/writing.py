@@ -1,4 +1,4 @@
-"""Images and videos that appear under their name only when they are whole."""
+"""Writing images and videos; a file appears under its name only when it is whole."""
 
 from __future__ import annotations
 

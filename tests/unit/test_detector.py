@@ -89,11 +89,11 @@ def test_the_height_of_a_window_without_enlarging_is_the_models_own() -> None:
 
 
 def test_people_taller_than_asked_for_are_left_out() -> None:
-    everybody = PeopleDetector().detect(picture())
-    heights = np.sort(everybody.person_boxes[:, 3])
+    all_of_them = PeopleDetector().detect(picture())
+    heights = np.sort(all_of_them.person_boxes[:, 3])
     limit = float(heights[:-1].mean())
     found = PeopleDetector(max_height=limit).detect(picture())
-    assert 0 < len(found) < len(everybody)
+    assert 0 < len(found) < len(all_of_them)
     assert found.person_boxes[:, 3].max() <= limit + 1
     assert PeopleDetector(min_height=64, max_height=64).max_height == 64
 

@@ -80,10 +80,7 @@ class Detections:
     @property
     def person_boxes(self) -> NDArray[np.int32]:
         """int32 (N, 4): the boxes without the window's margin, tight around the person [px]."""
-        x, y, w, h = self.boxes.T.astype(np.float64)
-        share = self.person_box
-        person = np.stack([x + share.x * w, y + share.y * h, share.width * w, share.height * h], axis=1)
-        return np.asarray(np.rint(person), np.int32)
+        return np.rint(self.person_box.inside(self.boxes)).astype(np.int32)
 
     @property
     def probabilities(self) -> NDArray[np.float64]:
@@ -144,9 +141,10 @@ class PeopleDetector:
         Least SVM margin of a hit; raise it for fewer false alarms, lower it (to -1 and below) for fewer misses. None
         is the model's own: 0 for OpenCV's.
     nms
-        How one box is made of a person's many hits. "overlap": the best hit stays and removes those that share more
-        than `overlap` of the smaller box's area; "iou": as that, by intersection over union; "soft": as "iou", but
-        others' scores are lowered instead, so that people half hidden by others may stay; "group": OpenCV's grouping.
+        How one box is made of a person's many hits, which are compared by the person boxes inside of the windows.
+        "overlap": the best hit stays and removes those that share more than `overlap` of the smaller box's area;
+        "iou": as that, by intersection over union; "soft": as "iou", but others' scores are lowered instead, so that
+        people half hidden by others may stay; "group": OpenCV's grouping of the windows.
     overlap
         0..1; for "soft", the overlap that lowers a score to 37 %. None: 0.65 for "overlap", 0.3 for "iou" and "soft".
     group_threshold
@@ -277,10 +275,12 @@ class PeopleDetector:
         return resize(image, width, height)
 
     def _one_of_many(
-        self, boxes: NDArray[np.int32], scores: NDArray[np.float64], threshold: float
+        self, windows: NDArray[np.int32], scores: NDArray[np.float64], threshold: float
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Return the indices of the hits that stay, best first, and their scores."""
         overlap = _NMS[self.nms] if self.overlap is None else self.overlap
+        # People are compared, not windows: those of two people side by side share most of their margins.
+        boxes = self._model.person_box.inside(windows)
         if overlap is None:
             kept = np.argsort(-scores, kind="stable")
         elif self.nms == "soft":

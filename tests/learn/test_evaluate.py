@@ -127,4 +127,4 @@ def test_opencvs_model_finds_people_on_the_validation_photographs(capsys: pytest
     assert main(["evaluate", "opencv", str(USC), "--json", "-"]) == 0
     result = _figures(capsys.readouterr().out)
     assert (result["pictures"], result["people"]) == (100, 232)
-    assert result["models"][0]["lamr"] == pytest.approx(0.331, abs=0.01)
+    assert result["models"][0]["lamr"] == pytest.approx(0.298, abs=0.01)

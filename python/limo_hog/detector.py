@@ -33,6 +33,11 @@ class Detections:
     boxes: NDArray[np.int32]
     scores: NDArray[np.float64]
 
+    @classmethod
+    def none(cls) -> Detections:
+        """No people at all."""
+        return cls(np.empty((0, 4), np.int32), np.empty(0))
+
     def __len__(self) -> int:
         return len(self.scores)
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections, PeopleDetector
-from limo_hog.follow import Decision, Mode, Observation, ProxemicController, TrackingController, controller_named
+from limo_hog.follow import Decision, Mode, Observation, ProxemicController, TrackingController, Twist, controller_named
 from limo_hog.follow.control.tracking import TrackingState
 from limo_sim.run.episode import Episode, run_episode
 from limo_sim.run.score import score
@@ -106,11 +106,11 @@ def test_nobody_is_approached_nearer_than_the_safety_layer_allows() -> None:
 
 def test_a_detector_that_raises_stops_the_robot_until_it_works_again() -> None:
     episode = run("standing", 6.0, detector=Failing())
-    failed = [step for step in episode.steps if "GPU fell off" in step.reason]
+    failed = [step for step in episode.steps if "GPU fell off" in step.decision.reason]
     assert len(failed) == 10
-    assert all(step.mode is Mode.BLOCKED and step.twist.linear == step.twist.angular == 0 for step in failed)
+    assert all(step.decision.mode is Mode.BLOCKED and step.decision.twist == Twist() for step in failed)
     after = [step for step in episode.steps if step.time > failed[-1].time]
-    assert after[-1].mode in (Mode.FOLLOW, Mode.HOLD)
+    assert after[-1].decision.mode in (Mode.FOLLOW, Mode.HOLD)
 
 
 def test_nobody_is_found_where_nobody_is() -> None:

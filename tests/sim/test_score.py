@@ -10,9 +10,9 @@ import pytest
 from scipy.stats import t as student  # type: ignore[import-untyped]
 
 from limo_hog.detector import Detections
-from limo_hog.follow.decision import Mode
+from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
-from limo_sim.run.episode import NOTHING, Episode, Step
+from limo_sim.run.episode import Episode, FrameRecord, Step
 from limo_sim.run.score import ScoreCard, on_person, score
 from limo_sim.run.sweep import estimate, summarise
 from limo_sim.sensing.camera import Contacts, PersonTruth, Truth
@@ -34,9 +34,10 @@ def step(
     at: float = 0.0,
 ) -> Step:
     truth = Truth(0.1 * number, (at, 0.0, 0.0), people, Contacts(0, 0))
-    found = NOTHING if not boxes else Detections(np.array(boxes, np.int32), np.arange(len(boxes), 0.0, -1.0))
+    found = Detections.none() if not boxes else Detections(np.array(boxes, np.int32), np.arange(len(boxes), 0.0, -1.0))
     twist = Twist(0.0, 0.1 * number)
-    return Step(0.1 * number, truth, truth, found, target, None, twist, Mode.FOLLOW, "because", 2.0, 1.0)
+    decision = Decision(twist, None, Mode.FOLLOW, "because", target)
+    return Step(0.1 * number, truth, decision, FrameRecord(truth, found, None, 2.0, 1.0))
 
 
 def card(*steps: Step) -> ScoreCard:

@@ -135,7 +135,8 @@ def score(episode: Episode) -> ScoreCard:
     boxed = [hit for step, hit in zip(frames, hits, strict=True) if len(step.detections)]
     errors = [_pixel_error(view) for view, ok in zip(views[after], visible[after], strict=True) if ok and view]
     gaps = _gaps(frames, targets, subject)
-    detect_ms = [step.detect_ms for step in frames]
+    detect_ms = [step.frame.detect_ms for step in frames if step.frame]
+    render_ms = [step.frame.render_ms for step in frames if step.frame]
     stamps = [step.seen.stamp for step, ok in zip(frames, found, strict=True) if ok and step.seen]
     known = [who for who in targets if who is not None]
     zones = Counter(zone_of(distance) for distance in distances)
@@ -167,14 +168,14 @@ def score(episode: Episode) -> ScoreCard:
         found_again=_mean([gap <= FOUND_WITHIN for gap in gaps]),
         follows_first=_mean([who == subject for who in known]),
         path_wrong_m=_path_wrong(steps),
-        mean_abs_domega=_mean(np.abs(np.diff([step.twist.angular for step in steps]))) or 0.0,
+        mean_abs_domega=_mean(np.abs(np.diff([step.decision.twist.angular for step in steps]))) or 0.0,
         path_m=_path(steps),
-        modes=_shares([step.mode.value for step in steps], [mode.value for mode in Mode]),
-        reasons=_shares([step.reason for step in steps], []),
+        modes=_shares([step.decision.mode.value for step in steps], [mode.value for mode in Mode]),
+        reasons=_shares([step.decision.reason for step in steps], []),
         detect_ms_p50=float(np.percentile(detect_ms, 50)) if detect_ms else None,
         detect_ms_p95=float(np.percentile(detect_ms, 95)) if detect_ms else None,
         detect_ms_mean=_mean(detect_ms),
-        render_ms_p50=float(np.percentile([step.render_ms for step in frames], 50)) if frames else None,
+        render_ms_p50=float(np.percentile(render_ms, 50)) if render_ms else None,
         real_time_factor=episode.seconds / episode.wall_seconds if episode.wall_seconds > 0 else 0.0,
     )
 
@@ -208,7 +209,7 @@ def _hit(box: NDArray[np.int32], people: Sequence[PersonTruth | None]) -> int:
 
 def _target(step: Step, hits: Sequence[int]) -> int | None:
     """Who is followed: -1 nobody, None without a target."""
-    return None if step.target is None else hits[step.target]
+    return None if step.decision.target is None else hits[step.decision.target]
 
 
 def _people(truth: Truth | None) -> tuple[PersonTruth | None, ...]:
@@ -272,8 +273,8 @@ def _path_wrong(steps: Sequence[Step]) -> float:
     """Return the distance driven while the last target is nobody [m]."""
     total, wrong = 0.0, False
     for step, after in itertools.pairwise(steps):
-        if step.target is not None:
-            wrong = _hits(step)[step.target] < 0
+        if step.decision.target is not None:
+            wrong = _hits(step)[step.decision.target] < 0
         if wrong:
             total += math.dist(step.truth.robot[:2], after.truth.robot[:2])
     return total

@@ -38,22 +38,22 @@ class Reading:
 
 def reading(step: Step) -> Reading:
     """Read a control period."""
-    error = None
-    if step.target is not None:
-        error = WIDTH / 2 - box_centre(step.detections.boxes[step.target])[0]
+    error, twist = None, step.decision.twist
+    if step.decision.target is not None:
+        error = WIDTH / 2 - box_centre(step.detections.boxes[step.decision.target])[0]
     distances = [person.distance for person in step.truth.people if person is not None]
-    return Reading(step.time, error, min(distances, default=None), float(step.twist.linear), float(step.twist.angular))
+    return Reading(step.time, error, min(distances, default=None), float(twist.linear), float(twist.angular))
 
 
 def annotated(frame: Frame, step: Step) -> NDArray[np.uint8]:
     """Draw what the follower saw: all boxes, whom it follows, how far that is by the depth image, and what it does."""
-    words = [f"{step.time:.1f} s", step.mode.value]
-    if step.target is not None:
-        distance = person_depth(frame.depth, step.detections.boxes[step.target])
+    target, words = step.decision.target, [f"{step.time:.1f} s", step.decision.mode.value]
+    if target is not None:
+        distance = person_depth(frame.depth, step.detections.boxes[target])
         if distance is not None:
             words += [f"{distance:.2f} m", zone_of(distance).value]
     labels = [f"{score:.1f}" for score in step.detections.scores]
-    return annotate(frame.image, step.detections.boxes, labels, step.target, "  ".join(words))
+    return annotate(frame.image, step.detections.boxes, labels, target, "  ".join(words))
 
 
 def depth_picture(depth: NDArray[np.float32], far: float) -> NDArray[np.uint8]:

@@ -224,12 +224,12 @@ class View:
         step = moment.step
         return {
             **asdict(reading(step)),
-            "mode": step.mode.value,
-            "reason": step.reason,
+            "mode": step.decision.mode.value,
+            "reason": step.decision.reason,
             "robot": step.truth.robot,
             "people": [(p.x, p.y) for p in step.truth.people if p is not None],
             "scan": _hits(moment.scan, list(self._poses)),
-            "detect_ms": step.detect_ms or None,
+            "detect_ms": step.frame.detect_ms or None if step.frame else None,
             "boxes": len(step.detections),
             "contacts": asdict(step.truth.contacts),
             "paused": self.pace.paused,

@@ -133,7 +133,7 @@ def _blend(start: float, end: float, share: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class BodyMesh:
     """The solids a person is made of, in the arena's frame.
 
     Attributes
@@ -246,7 +246,7 @@ def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
     return capsules, ellipsoids
 
 
-def body(person: Person, pose: Pose) -> Body:
+def body(person: Person, pose: Pose) -> BodyMesh:
     """Build somebody's body in a pose; the lowest foot touches the floor."""
     capsules, ellipsoids = _skeleton(pose)
     palette = {
@@ -270,7 +270,7 @@ def body(person: Person, pose: Pose) -> Body:
         ]
     )
     colours = [capsule[4] for capsule in capsules] + [ellipsoid[3] for ellipsoid in ellipsoids]
-    return Body(
+    return BodyMesh(
         start=points[0::2],
         end=points[1::2],
         start_radius=radii[:, 0],

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from limo_hog.follow.decision import Decision, Mode
-from limo_hog.follow.robot import LIMO, Body
+from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.appearance import OTHER_CLOTHES, Clothes, unlikeness
 from limo_hog.follow.sense.clearance import Margin, free_heading, scan_points
 from limo_hog.follow.sense.observation import Observation, Odometry
@@ -170,7 +170,7 @@ class TrackingController:
     full_every: int = 15
     back_off: float = 0.15
     margin: Margin = field(default_factory=lambda: Margin(0.65, 0.25))
-    body: Body = LIMO
+    body: RobotGeometry = LIMO
 
     def start(self) -> TrackingState:
         """Nobody is known yet."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Controller, Decision, Mode
-from limo_hog.follow.robot import LIMO, Body
+from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.safety.faults import find_fault
 from limo_hog.follow.sense.clearance import (
     NO_POINTS,
@@ -98,7 +98,7 @@ class Guard(Generic[S]):
     remember: float = 10.0
     backwards: float = 0.4
     patience: float = 0.5
-    body: Body = LIMO
+    body: RobotGeometry = LIMO
 
     def start(self) -> GuardState[S]:
         """Return the state before the first observation."""
@@ -124,12 +124,16 @@ class Guard(Generic[S]):
     def recheck(
         self, now: float, scan: Scan | None, odometry: Odometry | None, state: GuardState[S]
     ) -> Decision[GuardState[S]]:
-        """Check the last wish against a newer scan, for a control period without a camera frame."""
+        """Check the last wish against a newer scan, for a control period without a camera frame.
+
+        The decision has no target and no region: these belong to a frame.
+        """
         if state.wish is None:
             return Decision(Twist(), state, Mode.BLOCKED, "no camera frame to go by")
         if now - state.heard > self.patience:
             return Decision(Twist(), state, Mode.BLOCKED, f"no camera frame for {now - state.heard:.1f} s")
-        return self._allowed(state.wish, state, scan, odometry, now)
+        wish = replace(state.wish, target=None, region=None)
+        return self._allowed(wish, state, scan, odometry, now)
 
     def _allowed(
         self,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import Body
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.observation import Odometry, Scan
 
 Points = NDArray[np.float64]
@@ -26,7 +26,7 @@ _DEPTH_STEP = 8
 _FLOOR = 0.05
 
 
-def scan_points(scan: Scan, body: Body) -> Points:
+def scan_points(scan: Scan, body: RobotGeometry) -> Points:
     """Return what the lidar has hit."""
     ranges = scan.ranges.astype(np.float64)
     angles = np.linspace(scan.angle_min, scan.angle_max, len(ranges))
@@ -35,7 +35,7 @@ def scan_points(scan: Scan, body: Body) -> Points:
     return np.stack([x, ranges[hit] * np.sin(angles[hit])], axis=1)
 
 
-def depth_points(depth: NDArray[np.float32], focal_px: float, reach: float, body: Body) -> Points:
+def depth_points(depth: NDArray[np.float32], focal_px: float, reach: float, body: RobotGeometry) -> Points:
     """Return what the depth camera sees above the floor and nearer than `reach` [m]."""
     height, width = depth.shape
     rows = np.arange(_DEPTH_STEP // 2, height, _DEPTH_STEP)
@@ -56,7 +56,7 @@ class Margin:
     beside: float = 0.2
 
 
-def room_ahead(points: Points, margin: Margin, body: Body) -> float:
+def room_ahead(points: Points, margin: Margin, body: RobotGeometry) -> float:
     """Return how far the robot can drive straight on before a point comes into the ground kept free [m].
 
     Negative where a point ahead is too near already, inf where nothing is in the way.
@@ -70,13 +70,13 @@ def room_ahead(points: Points, margin: Margin, body: Body) -> float:
     return float(np.min(gap - margin.ahead * np.sqrt(1 - beside[in_the_way] ** 2)))
 
 
-def room_behind(points: Points, margin: Margin, body: Body) -> float:
+def room_behind(points: Points, margin: Margin, body: RobotGeometry) -> float:
     """Return how far the robot can drive straight back, as `room_ahead`."""
     return room_ahead(-points, margin, body)
 
 
 def free_heading(
-    points: Points, wanted: float, leaning: float, reach: float, margin: Margin, body: Body
+    points: Points, wanted: float, leaning: float, reach: float, margin: Margin, body: RobotGeometry
 ) -> float | None:
     """Return the direction nearest to `wanted` in which the robot can drive at least `reach` [rad, m].
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import Body
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.appearance import OTHER_CLOTHES, Clothes, learnt, unlikeness
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_hog.follow.sense.ranging import box_centre, person_depth
@@ -105,7 +105,7 @@ class Measurement:
     clothes: Clothes | None = None
 
 
-def measure(observation: Observation, body: Body) -> list[Measurement]:
+def measure(observation: Observation, body: RobotGeometry) -> list[Measurement]:
     """Turn every box into a bearing and a range, the range from the depth image."""
     measurements = []
     for index, (box, score) in enumerate(observation.detections):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from limo_hog.follow.robot import Body
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predicted, updated
@@ -35,7 +35,7 @@ class Returns:
     pose: Odometry
 
 
-def returns_of(scan: Scan, pose: Odometry, body: Body) -> Returns:
+def returns_of(scan: Scan, pose: Odometry, body: RobotGeometry) -> Returns:
     """Take a scan into the odometry frame; `pose` is where the robot was when it was taken."""
     return Returns(scan.stamp, to_odometry(scan_points(scan, body), pose), pose)
 

@@ -1,6 +1,7 @@
 //! Borrowed views of 8-bit images, and the border rule.
 
 use crate::error::{HogError, Result};
+use crate::geometry::Size;
 
 /// A borrowed 8-bit image: rows of interleaved pixels, `row_stride` bytes apart.
 #[derive(Debug, Clone, Copy)]
@@ -49,6 +50,11 @@ impl<'a> ImageView<'a> {
     /// Height [px].
     pub fn height(&self) -> usize {
         self.height
+    }
+
+    /// Width and height [px].
+    pub fn size(&self) -> Size {
+        Size::new(self.width, self.height)
     }
 
     /// 1 (gray) or 3 (colour, in any order).

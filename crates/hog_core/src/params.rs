@@ -1,29 +1,7 @@
-//! What the user says ([`HogParams`]) and what follows from it ([`HogSpec`]): every derived count, validated once.
+//! What the user asks for ([`HogParams`]) and the counts that follow from it ([`HogSpec`]), checked once.
 
-use crate::blocks::BlockWeights;
 use crate::error::{HogError, Result};
-use crate::gradient::gamma_table;
-
-/// Width and height [px] (or a stride or padding along x and y).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Size {
-    /// Along x.
-    pub width: usize,
-    /// Along y.
-    pub height: usize,
-}
-
-impl Size {
-    /// A size of `width` by `height`.
-    pub const fn new(width: usize, height: usize) -> Self {
-        Self { width, height }
-    }
-
-    /// Width times height.
-    pub const fn area(self) -> usize {
-        self.width * self.height
-    }
-}
+use crate::geometry::Size;
 
 /// The constructor arguments of `cv2.HOGDescriptor`, unchecked; sizes are (x, y) [px].
 #[derive(Debug, Clone, PartialEq)]
@@ -79,7 +57,7 @@ impl HogParams {
     }
 }
 
-/// A checked geometry with all that is derived from it. Functions that take a `HogSpec` cannot fail on geometry.
+/// A checked geometry with its derived counts. Functions that take a `HogSpec` cannot fail on geometry.
 #[derive(Debug, Clone)]
 pub struct HogSpec {
     /// Detection window [px].
@@ -106,10 +84,6 @@ pub struct HogSpec {
     pub signed_gradient: bool,
     /// The block's Gaussian [px].
     pub sigma: f32,
-    /// What each pixel value stands for before the gradient.
-    pub gamma: [f32; 256],
-    /// Which pixel of a block adds how much to which cell.
-    pub weights: BlockWeights,
 }
 
 /// Largest side that keeps every derived count far from overflow.
@@ -162,7 +136,6 @@ impl HogSpec {
         if elements > i32::MAX as usize {
             return Err(HogError::Geometry(format!("a window's descriptor would have {elements} elements")));
         }
-        let sigma = params.effective_win_sigma() as f32;
         Ok(Self {
             win,
             block,
@@ -175,9 +148,7 @@ impl HogSpec {
             gamma_correction: params.gamma_correction,
             nlevels: params.nlevels.min(i64::from(i32::MAX)) as usize,
             signed_gradient: params.signed_gradient,
-            sigma,
-            gamma: gamma_table(params.gamma_correction),
-            weights: BlockWeights::new(block, cell, sigma),
+            sigma: params.effective_win_sigma() as f32,
         })
     }
 

@@ -4,8 +4,8 @@
 mod common;
 
 use common::{Detector, Picture, available};
+use hog_core::exact::Svm;
 use hog_core::group::{Candidate, group_rectangles, mean_shift};
-use hog_core::svm::Svm;
 use hog_core::{Grouping, Hog, HogParams, HogSpec, ImageView, Rect, Search};
 
 fn rect([x, y, width, height]: [i32; 4]) -> Rect {

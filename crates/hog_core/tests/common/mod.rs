@@ -1,9 +1,9 @@
 //! Images and the exact path's answers, for the tests of the fast path.
 #![allow(dead_code, reason = "each test binary uses a part")]
 
-use hog_core::grid::{Grid, Steps};
-use hog_core::svm::Svm;
-use hog_core::{Backend, Hit, HogParams, HogSpec, ImageView, Search, Size, model, reference};
+use hog_core::exact::{self, Svm, Tables};
+use hog_core::pyramid::{Grid, Steps};
+use hog_core::{Backend, Hit, HogParams, HogSpec, ImageView, Search, Size, model};
 
 /// The backends of this CPU.
 pub fn available() -> impl Iterator<Item = Backend> {
@@ -71,7 +71,7 @@ impl Detector {
         let spec = self.spec();
         let svm = Svm::new(&self.coefficients, &spec).unwrap();
         let grid = self.grid(image, search);
-        let scores = reference::scores(image, &grid, &spec, &svm);
+        let scores = exact::scores(image, &grid, &spec, &Tables::new(&spec), &svm);
         assert_eq!(scores.len(), grid.windows.width * grid.windows.height);
         let hit = |(index, weight): (usize, f64)| {
             let (column, row) = (index % grid.windows.width, index / grid.windows.width);

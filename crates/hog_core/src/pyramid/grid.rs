@@ -1,8 +1,8 @@
 //! Which windows of an image are looked at: window stride, padding, and where each window lies.
 
 use crate::error::{HogError, Result};
-use crate::gradient::{Padding, Region};
-use crate::params::{HogSpec, Size};
+use crate::geometry::{Padding, Region, Size};
+use crate::params::HogSpec;
 
 /// The windows of one image, row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

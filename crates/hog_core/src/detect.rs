@@ -1,6 +1,6 @@
 //! Composes the stages: descriptors and hits of one image, and of a whole pyramid on several threads.
 
-use crate::error::{HogError, Result};
+use crate::error::{BackendError, ParameterError, Result};
 use crate::exact::{self, Gradient, Svm, Tables};
 use crate::fast::{self, Backend, Plan, Planes};
 use crate::geometry::{Padding, Rect, Size};
@@ -58,7 +58,7 @@ impl Hog {
     /// [`new`](Self::new) with a backend other than the one in force; this CPU must have it.
     pub fn with_backend(params: &HogParams, coefficients: Option<&[f32]>, backend: Backend) -> Result<Self> {
         if !backend.is_available() {
-            return Err(HogError::Backend(format!("this machine has no {}", backend.name())));
+            return Err(BackendError::Missing { name: backend.name() }.into());
         }
         let spec = HogSpec::new(params)?;
         let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
@@ -77,24 +77,19 @@ impl Hog {
         image: ImageView,
         [left, top, right, bottom]: [i64; 4],
     ) -> Result<(Gradient, Size)> {
-        let side = |name: &str, length: usize, before: i64, after: i64| {
+        let side = |axis: &'static str, length: usize, before: i64, after: i64| {
             let padded = (length as i64).saturating_add(before).saturating_add(after);
             if (1..=i64::from(i32::MAX)).contains(&padded) {
                 return Ok(padded as usize);
             }
-            Err(HogError::Parameter(format!(
-                "the padded {name} would be {padded} pixels; at least 1 is wanted"
-            )))
+            Err(ParameterError::PaddedSide { axis, got: padded })
         };
         let size = Size::new(
             side("width", image.width(), left, right)?,
             side("height", image.height(), top, bottom)?,
         );
         if size.width.saturating_mul(size.height) > i32::MAX as usize {
-            return Err(HogError::Parameter(format!(
-                "the padded image would have {} x {} pixels; at most 2^31 - 1 are allowed",
-                size.width, size.height
-            )));
+            return Err(ParameterError::PaddedArea { width: size.width, height: size.height }.into());
         }
         Ok((exact::gradient(image, Padding { left, top, size }, &self.spec, &self.tables), size))
     }
@@ -109,15 +104,13 @@ impl Hog {
         locations: Option<&[(i64, i64)]>,
     ) -> Result<usize> {
         let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
-        let count = locations.map_or(grid.len(), <[_]>::len);
-        let elements = count.saturating_mul(self.spec.descriptor_len());
-        if elements > i32::MAX as usize {
-            return Err(HogError::Parameter(format!(
-                "{count} windows of {} elements are too many for one array; use a larger winStride",
-                self.spec.descriptor_len()
-            )));
+        let windows = locations.map_or(grid.len(), <[_]>::len);
+        let elements = self.spec.descriptor_len();
+        let all = windows.saturating_mul(elements);
+        if all > i32::MAX as usize {
+            return Err(ParameterError::Descriptors { windows, elements }.into());
         }
-        Ok(elements)
+        Ok(all)
     }
 
     /// Writes the descriptors whose elements [`Hog::compute_len`] counts, one after the other, into `out`.
@@ -182,16 +175,17 @@ impl Hog {
         let steps = self.steps(search, self.spec.stride)?;
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
         let levels = levels(image.size(), scale, &self.spec);
-        let mut candidates = Vec::new();
         // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
         let exact_weights = matches!(grouping, Grouping::MeanShift(_));
-        self.with_scorer(image, svm, search, exact_weights, |scorer| {
+        let search_levels = |scorer: &Scorer| -> Result<Vec<Candidate>> {
             let of_level = |level: &Level| self.level_candidates(scorer, level, &steps);
+            let mut candidates = Vec::new();
             for found in in_order(&levels, threads, of_level) {
                 candidates.append(&mut found?);
             }
-            Ok(())
-        })?;
+            Ok(candidates)
+        };
+        let candidates = self.with_scorer(image, svm, search, exact_weights, search_levels)?;
         let win = self.spec.win;
         let found = match grouping {
             Grouping::Similar(threshold) => group_candidates(&candidates, threshold),

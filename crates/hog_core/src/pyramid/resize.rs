@@ -1,6 +1,6 @@
 //! The exact linear resize, bit for bit OpenCV's INTER_LINEAR_EXACT.
 
-use crate::error::{HogError, Result};
+use crate::error::{ImageError, Result};
 use crate::geometry::Size;
 use crate::image::ImageView;
 
@@ -37,7 +37,7 @@ pub fn taps(from: usize, to: usize) -> impl ExactSizeIterator<Item = Tap> + Clon
 pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
     let channels = image.channels();
     if size.width == 0 || size.height == 0 {
-        return Err(HogError::Image(format!("cannot resize to {} x {} pixels", size.width, size.height)));
+        return Err(ImageError::Resize { width: size.width, height: size.height }.into());
     }
     let across: Vec<Tap> = taps(image.width(), size.width).collect();
     let down = taps(image.height(), size.height);

@@ -1,6 +1,15 @@
 //! The vector a kernel is written for: one trait, an implementation per instruction set.
 
-use super::rows::{Columns, Rows};
+#[cfg(target_arch = "x86_64")]
+pub(super) mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub(super) mod avx512;
+mod mix;
+#[cfg(target_arch = "aarch64")]
+pub(super) mod neon;
+pub(super) mod portable;
+
+pub(super) use mix::{Columns, RowPointers};
 
 /// The first of the slots for odd bins.
 pub(super) const ODD: usize = 8;
@@ -127,9 +136,9 @@ pub(super) trait Lane: Copy {
     /// One row of a level in `C` channels: neighbouring pixels of two rows (each byte flipped by 0x80) mixed as
     /// `columns` tells, then (upper·(256 − weight) + lower·weight) / 2¹⁶, rounded half up.
     /// # Safety
-    /// The taps of `columns` and [`rows::SLACK`](super::rows::SLACK) bytes after them are readable in all rows; `to`
+    /// The taps of `columns` and [`SLACK`](super::layout::SLACK) bytes after them are readable in all rows; `to`
     /// has room for all groups.
-    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns);
+    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns);
 
     /// Splits `len` interleaved pixels of three channels, flipping every byte by 0x80.
     /// # Safety

@@ -4,17 +4,21 @@
 
 use std::collections::BTreeMap;
 
-use crate::blocks::block_histograms;
-use crate::gradient::{Region, Votes, votes};
-use crate::grid::Grid;
+use crate::geometry::{Region, Size};
 use crate::image::ImageView;
-use crate::params::{HogSpec, Size};
-use crate::svm::Svm;
+use crate::params::HogSpec;
+use crate::pyramid::Grid;
+
+use super::blocks::block_histograms;
+use super::gradient::{Votes, votes};
+use super::svm::Svm;
+use super::tables::Tables;
 
 /// Block histograms of an image, row of blocks by row of blocks, each computed once and dropped when no window
 /// further down needs it.
 struct BlockRows<'a> {
     spec: &'a HogSpec,
+    tables: &'a Tables,
     votes: Votes,
     /// Padded x of every block of any window.
     columns: Vec<usize>,
@@ -24,7 +28,7 @@ struct BlockRows<'a> {
 }
 
 impl<'a> BlockRows<'a> {
-    fn new(image: ImageView, grid: &Grid, spec: &'a HogSpec) -> Self {
+    fn new(image: ImageView, grid: &Grid, spec: &'a HogSpec, tables: &'a Tables) -> Self {
         let of_window =
             |i: usize| (0..spec.blocks.width).map(move |b| i * grid.stride.width + b * spec.stride.width);
         let mut columns: Vec<usize> = (0..grid.windows.width).flat_map(of_window).collect();
@@ -32,13 +36,13 @@ impl<'a> BlockRows<'a> {
         columns.sort_unstable();
         columns.dedup();
         let places = wanted.iter().map(|x| columns.partition_point(|column| column < x)).collect();
-        let votes = votes(image, grid.padding(), grid.whole(), spec);
-        Self { spec, votes, columns, places, rows: BTreeMap::new() }
+        let votes = votes(image, grid.padding(), grid.whole(), spec, tables);
+        Self { spec, tables, votes, columns, places, rows: BTreeMap::new() }
     }
 
     /// Makes the rows of blocks that windows at padded row `y` need.
     fn advance(&mut self, y: usize) {
-        let Self { spec, votes, columns, rows, .. } = self;
+        let Self { spec, tables, votes, columns, rows, .. } = self;
         *rows = rows.split_off(&y);
         let below = (0..spec.blocks.height).map(|block| y + block * spec.stride.height);
         let votes: &Votes = votes;
@@ -46,7 +50,7 @@ impl<'a> BlockRows<'a> {
         let firsts: Vec<usize> =
             missing.iter().flat_map(|y| columns.iter().map(move |x| y * votes.width + x)).collect();
         let mut blocks = vec![0.0; firsts.len() * spec.block_len];
-        block_histograms(votes, &firsts, spec, &mut blocks);
+        block_histograms(votes, &firsts, spec, tables, &mut blocks);
         for (y, row) in missing.into_iter().zip(blocks.chunks_exact(columns.len() * spec.block_len)) {
             rows.insert(y, row.to_vec());
         }
@@ -67,11 +71,11 @@ impl<'a> BlockRows<'a> {
 }
 
 /// The descriptors of all windows, one after the other.
-pub fn descriptors(image: ImageView, grid: &Grid, spec: &HogSpec, out: &mut [f32]) {
+pub fn descriptors(image: ImageView, grid: &Grid, spec: &HogSpec, tables: &Tables, out: &mut [f32]) {
     if spec.descriptor_len() == 0 || grid.is_empty() {
         return;
     }
-    let mut blocks = BlockRows::new(image, grid, spec);
+    let mut blocks = BlockRows::new(image, grid, spec, tables);
     let row_len = grid.windows.width * spec.descriptor_len();
     for (j, out) in out.chunks_exact_mut(row_len).enumerate() {
         let y = j * grid.stride.height;
@@ -85,11 +89,11 @@ pub fn descriptors(image: ImageView, grid: &Grid, spec: &HogSpec, out: &mut [f32
 }
 
 /// The scores of all windows, row by row.
-pub fn scores(image: ImageView, grid: &Grid, spec: &HogSpec, svm: &Svm) -> Vec<f64> {
+pub fn scores(image: ImageView, grid: &Grid, spec: &HogSpec, tables: &Tables, svm: &Svm) -> Vec<f64> {
     if grid.is_empty() || spec.descriptor_len() == 0 {
         return vec![f64::from(svm.bias()); grid.len()];
     }
-    let mut blocks = BlockRows::new(image, grid, spec);
+    let mut blocks = BlockRows::new(image, grid, spec, tables);
     let mut scores = Vec::with_capacity(grid.len());
     for j in 0..grid.windows.height {
         let y = j * grid.stride.height;
@@ -103,6 +107,7 @@ pub fn scores(image: ImageView, grid: &Grid, spec: &HogSpec, svm: &Svm) -> Vec<f
 /// Some windows of an image, for which the gradient is computed no further than they reach.
 pub struct Windows<'a> {
     spec: &'a HogSpec,
+    tables: &'a Tables,
     region: Region,
     votes: Votes,
     /// First pixel of each block, and its histograms, in descriptor order.
@@ -112,7 +117,13 @@ pub struct Windows<'a> {
 
 impl<'a> Windows<'a> {
     /// Prepares the windows that begin at `places` of the padded image.
-    pub fn new(image: ImageView, grid: &Grid, places: &[(usize, usize)], spec: &'a HogSpec) -> Self {
+    pub fn new(
+        image: ImageView,
+        grid: &Grid,
+        places: &[(usize, usize)],
+        spec: &'a HogSpec,
+        tables: &'a Tables,
+    ) -> Self {
         let along = |of: fn(&(usize, usize)) -> usize, win: usize| {
             let first = places.iter().map(of).min().unwrap_or(0);
             (first, places.iter().map(of).max().map_or(0, |last| last + win - first))
@@ -120,9 +131,9 @@ impl<'a> Windows<'a> {
         let (x, width) = along(|place| place.0, spec.win.width);
         let (y, height) = along(|place| place.1, spec.win.height);
         let region = Region { x, y, width, height };
-        let votes = votes(image, grid.padding(), region, spec);
+        let votes = votes(image, grid.padding(), region, spec, tables);
         let descriptor = vec![0.0; spec.descriptor_len()];
-        Self { spec, region, votes, firsts: Vec::new(), descriptor }
+        Self { spec, tables, region, votes, firsts: Vec::new(), descriptor }
     }
 
     /// The descriptor of the window at padded (`x`, `y`), one of those prepared.
@@ -134,7 +145,7 @@ impl<'a> Windows<'a> {
             let first = |by| (y + by * height) * self.votes.width + x + bx * width;
             self.firsts.extend((0..self.spec.blocks.height).map(first));
         }
-        block_histograms(&self.votes, &self.firsts, self.spec, &mut self.descriptor);
+        block_histograms(&self.votes, &self.firsts, self.spec, self.tables, &mut self.descriptor);
         &self.descriptor
     }
 
@@ -146,6 +157,13 @@ impl<'a> Windows<'a> {
 }
 
 /// The score of the one window at padded (`x`, `y`).
-pub fn window_score(image: ImageView, grid: &Grid, at: (usize, usize), spec: &HogSpec, svm: &Svm) -> f64 {
-    Windows::new(image, grid, &[at], spec).score(at, svm)
+pub fn window_score(
+    image: ImageView,
+    grid: &Grid,
+    at: (usize, usize),
+    spec: &HogSpec,
+    tables: &Tables,
+    svm: &Svm,
+) -> f64 {
+    Windows::new(image, grid, &[at], spec, tables).score(at, svm)
 }

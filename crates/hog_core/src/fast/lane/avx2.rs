@@ -2,18 +2,17 @@
 
 use std::arch::x86_64::*;
 
-use super::lane::{Lane, ODD};
-use super::rows::{Columns, Rows};
+use super::{Columns, Lane, ODD, RowPointers};
 
 /// Proof that the CPU has AVX2 and FMA.
 #[derive(Clone, Copy)]
-pub(super) struct Avx2(());
+pub(in crate::fast) struct Avx2(());
 
 impl Avx2 {
     /// # Safety
     /// The CPU has AVX2 and FMA.
     #[inline(always)]
-    pub(super) unsafe fn new() -> Self {
+    pub(in crate::fast) unsafe fn new() -> Self {
         Self(())
     }
 }
@@ -253,7 +252,7 @@ impl Lane for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns) {
+    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
         // Two groups at a time, one in each half of a vector.
         isa!({
             let (index, weights) = (columns.index.as_ptr(), columns.weight.as_ptr());

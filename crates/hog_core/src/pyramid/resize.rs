@@ -1,48 +1,8 @@
-//! The image pyramid: scales, level sizes, the exact linear resize, and boxes back to the image.
+//! The exact linear resize, bit for bit OpenCV's INTER_LINEAR_EXACT.
 
-use crate::error::{HogError, Result};
-use crate::group::Rect;
+use crate::error::{ImageError, Result};
+use crate::geometry::Size;
 use crate::image::ImageView;
-use crate::params::{HogSpec, Size};
-
-/// One level: the image shrunk by `scale`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Level {
-    /// How many image pixels a level pixel spans.
-    pub scale: f64,
-    /// Size of the level's image [px].
-    pub size: Size,
-}
-
-/// The levels of an image: scale 1, then `step` times more each, while the window still fits.
-///
-/// A step that does not shrink (≤ 1, NaN, infinite) leaves level 0 alone. Level 0 is there even if the image is
-/// smaller than the window.
-pub fn levels(image: Size, step: f64, spec: &HogSpec) -> Vec<Level> {
-    let mut levels = vec![Level { scale: 1.0, size: image }];
-    let mut scale = 1.0;
-    while step > 1.0 && levels.len() < spec.nlevels {
-        scale *= step;
-        let width = (image.width as f64 / scale).round_ties_even();
-        let height = (image.height as f64 / scale).round_ties_even();
-        if !(width >= spec.win.width as f64 && height >= spec.win.height as f64) {
-            break;
-        }
-        levels.push(Level { scale, size: Size::new(width as usize, height as usize) });
-    }
-    levels
-}
-
-/// The window at (`x`, `y`) of a level, in image pixels.
-pub fn to_image(x: i64, y: i64, scale: f64, spec: &HogSpec) -> Rect {
-    let back = |value: f64| (value * scale).round_ties_even() as i32;
-    Rect {
-        x: back(x as f64),
-        y: back(y as f64),
-        width: back(spec.win.width as f64),
-        height: back(spec.win.height as f64),
-    }
-}
 
 /// Where one output pixel reads along one axis: two neighbours and the weight of the second, in 1/256.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,7 +37,7 @@ pub fn taps(from: usize, to: usize) -> impl ExactSizeIterator<Item = Tap> + Clon
 pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
     let channels = image.channels();
     if size.width == 0 || size.height == 0 {
-        return Err(HogError::Image(format!("cannot resize to {} x {} pixels", size.width, size.height)));
+        return Err(ImageError::Resize { width: size.width, height: size.height }.into());
     }
     let across: Vec<Tap> = taps(image.width(), size.width).collect();
     let down = taps(image.height(), size.height);
@@ -117,7 +77,6 @@ pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::HogParams;
 
     #[test]
     fn halving_averages_four_pixels_rounding_up() {
@@ -131,17 +90,5 @@ mod tests {
         let data: Vec<u8> = (0..60).collect();
         let image = ImageView::new(&data, 5, 4, 3, 15).unwrap();
         assert_eq!(resize(image, Size::new(5, 4)).unwrap(), data);
-    }
-
-    #[test]
-    fn levels_shrink_until_the_window_no_longer_fits() {
-        let spec = HogSpec::new(&HogParams::default()).unwrap();
-        let of = |w, h, step| levels(Size::new(w, h), step, &spec);
-        assert_eq!(of(640, 480, 1.05).len(), 28);
-        assert_eq!(of(640, 480, 1.0).len(), 1);
-        assert_eq!(of(640, 480, f64::NAN).len(), 1);
-        assert_eq!(of(640, 480, f64::INFINITY).len(), 1);
-        assert_eq!(of(10, 10, 1.05).len(), 1);
-        assert_eq!(of(64, 128, 1.001).len(), 4); // 128 / 1.001³ still rounds to 128, 127.5 no longer
     }
 }

@@ -4,33 +4,13 @@
 
 use std::ops::Range;
 
+use crate::geometry::{Padding, Region, Size};
 use crate::image::{ImageView, reflect_101};
-use crate::params::{HogSpec, Size};
-use crate::simd::{MulAdd, Work, polar, run};
+use crate::params::HogSpec;
 
-/// A part of the padded image, in padded coordinates: image pixel (x, y) is at (x + left, y + top).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Region {
-    /// First column.
-    pub x: usize,
-    /// First row.
-    pub y: usize,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-}
-
-/// How far the padded image reaches beyond the image [px]; may be negative (a crop).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Padding {
-    /// Columns before the first.
-    pub left: i64,
-    /// Rows before the first.
-    pub top: i64,
-    /// Columns and rows of the padded image.
-    pub size: Size,
-}
+use super::isa::{MulAdd, Work, run};
+use super::polar::polar;
+use super::tables::Tables;
 
 /// The gradient of an image as OpenCV returns it: of each pixel, two shares of its magnitude for two bins.
 #[derive(Debug, Clone, Default)]
@@ -44,7 +24,7 @@ pub struct Gradient {
 /// A pixel's two votes: `shares` for `bins`.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(16))]
-pub struct Vote {
+pub(super) struct Vote {
     /// Gradient magnitude shared between the two bins.
     pub shares: [f32; 2],
     /// The two neighbouring orientation bins.
@@ -53,7 +33,7 @@ pub struct Vote {
 
 /// The votes of the pixels of a region.
 #[derive(Debug, Clone, Default)]
-pub struct Votes {
+pub(super) struct Votes {
     /// Columns of the region.
     pub width: usize,
     /// Row by row.
@@ -66,7 +46,7 @@ const POLAR_RUN: usize = 1024;
 const POLAR_VECTOR_MIN: usize = 16;
 
 /// The gradient of the whole padded image.
-pub fn gradient(image: ImageView, padding: Padding, spec: &HogSpec) -> Gradient {
+pub fn gradient(image: ImageView, padding: Padding, spec: &HogSpec, tables: &Tables) -> Gradient {
     let Size { width, height } = padding.size;
     let mut out =
         Gradient { shares: Vec::with_capacity(width * height), bins: Vec::with_capacity(width * height) };
@@ -74,12 +54,18 @@ pub fn gradient(image: ImageView, padding: Padding, spec: &HogSpec) -> Gradient 
         out.shares.extend(a.iter().zip(b).map(|(&a, &b)| [a, b]));
         out.bins.extend(first.iter().zip(second).map(|(&first, &second)| [first, second]));
     };
-    run(Rows { image, padding, region: Region { x: 0, y: 0, width, height }, spec, put });
+    run(Rows { image, padding, region: Region { x: 0, y: 0, width, height }, spec, tables, put });
     out
 }
 
 /// The votes of `region` of the padded image, as if the whole padded image had been computed.
-pub fn votes(image: ImageView, padding: Padding, region: Region, spec: &HogSpec) -> Votes {
+pub(super) fn votes(
+    image: ImageView,
+    padding: Padding,
+    region: Region,
+    spec: &HogSpec,
+    tables: &Tables,
+) -> Votes {
     let mut pixels = Vec::with_capacity(region.width * region.height);
     let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
         let bins = first.iter().zip(second);
@@ -88,7 +74,7 @@ pub fn votes(image: ImageView, padding: Padding, region: Region, spec: &HogSpec)
             votes.map(|((&a, &b), (&first, &second))| Vote { shares: [a, b], bins: [first, second] }),
         );
     };
-    run(Rows { image, padding, region, spec, put });
+    run(Rows { image, padding, region, spec, tables, put });
     Votes { width: region.width, pixels }
 }
 
@@ -106,17 +92,18 @@ struct Rows<'a, P> {
     padding: Padding,
     region: Region,
     spec: &'a HogSpec,
+    tables: &'a Tables,
     put: P,
 }
 
 impl<P: FnMut(&Row)> Work for Rows<'_, P> {
     #[inline(always)]
     fn run<M: MulAdd>(self) {
-        let Self { image, padding, region, spec, mut put } = self;
+        let Self { image, padding, region, spec, tables, mut put } = self;
         if region.width == 0 {
             return;
         }
-        let source = Source::new(image, padding, region, spec);
+        let source = Source::new(image, padding, region, tables);
         let row = || vec![0.0f32; region.width];
         let [mut dx, mut dy, mut magnitude, mut angle] = [(); 4].map(|()| row());
         let bins = || vec![0u8; region.width];
@@ -141,11 +128,6 @@ impl<P: FnMut(&Row)> Work for Rows<'_, P> {
     }
 }
 
-/// What each pixel value stands for: its square root, or itself.
-pub(crate) fn gamma_table(gamma_correction: bool) -> [f32; 256] {
-    std::array::from_fn(|value| if gamma_correction { (value as f32).sqrt() } else { value as f32 })
-}
-
 /// Rows of the padded image with gamma applied, one column and row wider than the region on every side.
 struct Source<'a> {
     image: ImageView<'a>,
@@ -160,7 +142,7 @@ struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    fn new(image: ImageView<'a>, padding: Padding, region: Region, spec: &'a HogSpec) -> Self {
+    fn new(image: ImageView<'a>, padding: Padding, region: Region, tables: &'a Tables) -> Self {
         let left = region.x as i64 - 1 - padding.left;
         let width = region.width + 2;
         let within = |x: i64| x.clamp(0, width as i64) as usize;
@@ -168,7 +150,7 @@ impl<'a> Source<'a> {
         let outside = (0..inside.start).chain(inside.end..width);
         Self {
             image,
-            gamma: &spec.gamma,
+            gamma: &tables.gamma,
             width,
             left,
             top: region.y as i64 - 1 - padding.top,
@@ -308,15 +290,22 @@ mod tests {
     #[test]
     fn a_region_votes_as_it_does_in_the_whole_image_also_beyond_a_narrow_one() {
         let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let tables = Tables::new(&spec);
         let data: Vec<u8> = (0..300).map(|i| (i * i % 251) as u8).collect();
         for channels in [1, 3] {
             for (width, height) in [(1, 1), (1, 9), (5, 3), (20, 5)] {
                 let image = ImageView::new(&data, width, height, channels, width * channels).unwrap();
                 let padding = Padding { left: 12, top: 3, size: Size::new(width + 30, height + 6) };
                 let Size { width, height } = padding.size;
-                let whole = votes(image, padding, Region { x: 0, y: 0, width, height }, &spec);
+                let whole = votes(image, padding, Region { x: 0, y: 0, width, height }, &spec, &tables);
                 for x in 0..width {
-                    let part = votes(image, padding, Region { x, y: 2, width: width - x, height: 2 }, &spec);
+                    let part = votes(
+                        image,
+                        padding,
+                        Region { x, y: 2, width: width - x, height: 2 },
+                        &spec,
+                        &tables,
+                    );
                     for (i, vote) in part.pixels.iter().enumerate() {
                         let there = whole.pixels[(2 + i / part.width) * width + x + i % part.width];
                         assert_eq!((vote.shares, vote.bins), (there.shares, there.bins));

@@ -1,8 +1,8 @@
 //! Which windows of an image are looked at: window stride, padding, and where each window lies.
 
-use crate::error::{HogError, Result};
-use crate::gradient::{Padding, Region};
-use crate::params::{HogSpec, Size};
+use crate::error::{ParameterError, Result};
+use crate::geometry::{Padding, Region, Size};
+use crate::params::HogSpec;
 
 /// The windows of one image, row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,18 +41,12 @@ impl Steps {
         let stride = match stride {
             (0, 0) => default_stride,
             (x @ 1.., y @ 1..) => Size::new(x as usize, y as usize),
-            (x, y) => {
-                return Err(HogError::Parameter(format!(
-                    "winStride is ({x}, {y}); both must be 1 pixel or more"
-                )));
-            }
+            (x, y) => return Err(ParameterError::WinStride { x, y }.into()),
         };
         let along = |pad: i64, win_stride: usize, block_stride: usize| {
             let common = gcd(win_stride, block_stride) as i64;
             if pad > PADDING_MAX {
-                return Err(HogError::Parameter(format!(
-                    "padding is {pad}; at most {PADDING_MAX} pixels are allowed"
-                )));
+                return Err(ParameterError::Padding { got: pad, most: PADDING_MAX });
             }
             Ok(((pad.max(0) + common - 1) & -common) as usize)
         };

@@ -1,16 +1,14 @@
-//! One level, from planes to hits: lattices, strips, scores, and the choice of instruction set.
+//! One level, from planes to hits: lattices of blocks, bands of rows, strips, scores.
 
-use crate::grid::Grid;
-use crate::image::ImageView;
-use crate::params::Size;
+use crate::geometry::Size;
+use crate::pyramid::Grid;
 
-use super::backend::Backend;
 use super::lane::Lane;
-use super::plan::{Plan, WORDS};
-use super::portable::Portable;
+use super::layout::{BAND, BLOCK, CARRY, CELL, WORDS};
+use super::plan::Plan;
 use super::rows::{Band, Planes};
-use super::score::{Windows, score};
-use super::strip::{BLOCK, CARRY, CELL, Job, strip};
+use super::score::{WindowGrid, score};
+use super::strip::{Job, strip};
 
 /// Scratch memory of one level, used again from level to level and call to call.
 #[derive(Debug, Default)]
@@ -44,137 +42,19 @@ impl Lines {
     }
 }
 
-/// Bytes of pixels that the strips work on at a time: a part of the second-level cache.
-const BAND: usize = 384 << 10;
-
 /// What to look at.
 #[derive(Clone, Copy)]
-struct Task<'a> {
-    plan: &'a Plan,
-    source: &'a Planes,
-    size: Size,
-    grid: &'a Grid,
-    threshold: f64,
-}
-
-/// Whether the backend's estimated square root is right for every pixel value; CPUs differ in their estimates.
-pub(super) fn gamma_is_exact(backend: Backend) -> bool {
-    match backend {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => unsafe { avx512_gamma_is_exact() },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Backend::Avx2 => unsafe { avx2_gamma_is_exact() },
-        _ => false,
-    }
-}
-
-#[inline(always)]
-fn is_exact<L: Lane>(l: L) -> bool {
-    (0..=255u8).all(|value| {
-        let value = f32::from(value);
-        l.first(l.gamma(l.splat(value))) == value.sqrt()
-    })
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
-fn avx512_gamma_is_exact() -> bool {
-    use super::{avx2::Avx2, avx512::Avx512};
-    // SAFETY: this function's features are the tokens'; a level's last strip is AVX2's.
-    unsafe { is_exact(Avx512::new()) && is_exact(Avx2::new()) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2_gamma_is_exact() -> bool {
-    // SAFETY: this function's features are the token's.
-    unsafe { is_exact(super::avx2::Avx2::new()) }
-}
-
-/// Whether the kernels can serve windows of this stride.
-pub(crate) fn serves(grid: &Grid) -> bool {
-    grid.stride.width.is_multiple_of(4) && grid.stride.height.is_multiple_of(4)
-}
-
-/// Puts into `scratch.found` every window of `grid` whose score is at least `threshold`, up to the plan's noise: x, y
-/// in padded pixels, row by row.
-pub(crate) fn detect(
-    backend: Backend,
-    plan: &Plan,
-    source: &Planes,
-    size: Size,
-    grid: &Grid,
-    threshold: f64,
-    scratch: &mut Scratch,
-) {
-    scratch.found.clear();
-    if grid.is_empty() {
-        return;
-    }
-    let task = Task { plan, source, size, grid, threshold };
-    match backend {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => unsafe { avx512(task, scratch) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Backend::Avx2 => unsafe { avx2(task, scratch) },
-        #[cfg(target_arch = "aarch64")]
-        Backend::Neon => neon(task, scratch),
-        _ => level(Portable, Portable, task, scratch),
-    }
-    scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
-}
-
-/// Fills `planes` with the pixels of `image`.
-pub(crate) fn split(backend: Backend, planes: &mut Planes, image: ImageView) {
-    match backend {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: a backend is only chosen where it is available; who has AVX-512 has AVX2.
-        Backend::Avx512 | Backend::Avx2 => unsafe { avx2_split(planes, image) },
-        #[cfg(target_arch = "aarch64")]
-        // SAFETY: as in `neon`.
-        Backend::Neon => planes.fill(unsafe { super::neon::Neon::new() }, image),
-        _ => planes.fill(Portable, image),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2_split(planes: &mut Planes, image: ImageView) {
-    // SAFETY: this function's features are the token's.
-    planes.fill(unsafe { super::avx2::Avx2::new() }, image);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
-fn avx512(task: Task, scratch: &mut Scratch) {
-    use super::{avx2::Avx2, avx512::Avx512};
-    // SAFETY: this function's features are the tokens'.
-    unsafe { level(Avx512::new(), Avx2::new(), task, scratch) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2(task: Task, scratch: &mut Scratch) {
-    use super::avx2::Avx2;
-    // SAFETY: this function's features are the token's.
-    let l = unsafe { Avx2::new() };
-    level(l, l, task, scratch);
-}
-
-#[cfg(target_arch = "aarch64")]
-fn neon(task: Task, scratch: &mut Scratch) {
-    // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
-    let l = unsafe { super::neon::Neon::new() };
-    level(l, l, task, scratch);
+pub(super) struct Task<'a> {
+    pub plan: &'a Plan,
+    pub source: &'a Planes,
+    pub size: Size,
+    pub grid: &'a Grid,
+    pub threshold: f64,
 }
 
 /// `tail` serves what is narrow: single windows, and a level's last strip if that is at most half a vector of `l`.
 #[inline(always)]
-fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) {
+pub(super) fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) {
     scratch.band.begin(task.source, task.size, task.grid.pad.width, L::GROUP, L::REACH);
     let Task { grid, .. } = task;
     // Windows whose distance is no multiple of 8 lie on several lattices of blocks.
@@ -233,7 +113,7 @@ fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usi
         }
     }
     let before = found.len();
-    let windows = Windows { plan, blocks, bytes, lanes, width, height };
+    let windows = WindowGrid { plan, blocks, bytes, lanes, width, height };
     // SAFETY: the strips have filled the blocks of all windows; `lanes` is as wide as wanted.
     unsafe { score(l, tail, &windows, threshold, masks, found) };
     let mut kept = before;

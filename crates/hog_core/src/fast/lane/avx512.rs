@@ -2,18 +2,17 @@
 
 use std::arch::x86_64::*;
 
-use super::lane::{Lane, ODD};
-use super::rows::{Columns, Rows};
+use super::{Columns, Lane, ODD, RowPointers};
 
 /// Proof that the CPU has AVX-512 F, BW, VL, DQ, VBMI and VNNI.
 #[derive(Clone, Copy)]
-pub(super) struct Avx512(());
+pub(in crate::fast) struct Avx512(());
 
 impl Avx512 {
     /// # Safety
     /// The CPU has AVX-512 F, BW, VL, DQ, VBMI and VNNI.
     #[inline(always)]
-    pub(super) unsafe fn new() -> Self {
+    pub(in crate::fast) unsafe fn new() -> Self {
         Self(())
     }
 }
@@ -268,7 +267,7 @@ impl Lane for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns) {
+    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
         isa!({
             let (index, weights) = (columns.index.as_ptr(), columns.weight.as_ptr());
             let (base, parts, one_vector) = (columns.base.as_ptr(), columns.parts, columns.span <= 64);

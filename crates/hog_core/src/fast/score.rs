@@ -3,14 +3,14 @@
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
 use super::lane::Lane;
-use super::plan::{ACROSS, Plan, WORDS};
-use super::strip::BLOCK;
+use super::layout::{ACROSS, BLOCK, WORDS};
+use super::plan::Plan;
 
 /// Rows of windows that the first look takes at a time.
 const ROWS: usize = 8;
 
 /// The windows of a level's lattice and the blocks they are made of.
-pub(super) struct Windows<'a> {
+pub(super) struct WindowGrid<'a> {
     pub plan: &'a Plan,
     pub blocks: *const f32,
     pub bytes: *const u32,
@@ -32,7 +32,7 @@ pub(super) struct Windows<'a> {
 pub(super) unsafe fn score<L: Lane, T: Lane>(
     l: L,
     narrow: T,
-    windows: &Windows,
+    windows: &WindowGrid,
     threshold: f64,
     masks: &mut Vec<u32>,
     found: &mut Vec<(usize, usize, f64)>,
@@ -41,7 +41,7 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
     let groups = windows.width.div_ceil(L::LANES);
     masks.clear();
     masks.resize(groups * windows.height, u32::MAX);
-    let least = (threshold - plan.bias - plan.noise - plan.coarse.bound) / plan.coarse.unit;
+    let least = (threshold - plan.bias - plan.score_error_bound - plan.coarse.bound) / plan.coarse.unit;
     let least = least.floor().clamp(f64::from(i32::MIN), f64::from(i32::MAX)) as i32;
     let mut top = 0;
     while L::COARSE_VECTORS > 0 && top < windows.height {
@@ -79,7 +79,7 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
 
 /// The score of one window. Lanes are the blocks of a row, so that one window costs no more than it must.
 #[inline(always)]
-unsafe fn exact<L: Lane>(l: L, windows: &Windows, x: usize, y: usize) -> f64 {
+unsafe fn exact<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) -> f64 {
     let plan = windows.plan;
     let padded = plan.blocks.width.next_multiple_of(ACROSS);
     let mut score = plan.bias;
@@ -112,7 +112,7 @@ unsafe fn exact<L: Lane>(l: L, windows: &Windows, x: usize, y: usize) -> f64 {
 #[allow(clippy::too_many_arguments, reason = "a tile is named by all of them")]
 unsafe fn coarse<L: Lane, const V: usize>(
     l: L,
-    windows: &Windows,
+    windows: &WindowGrid,
     least: i32,
     top: usize,
     rows: usize,
@@ -152,7 +152,7 @@ unsafe fn coarse<L: Lane, const V: usize>(
 #[inline(always)]
 unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>(
     l: L,
-    windows: &Windows,
+    windows: &WindowGrid,
     bytes: *const u32,
     y: usize,
     totals: &mut [[L::Sum; V]; ROWS],

@@ -1,124 +1,38 @@
 //! Stage 2: weighted block histograms, and their L2-Hys normalisation, summed in OpenCV's own order.
 
-use crate::gradient::{Vote, Votes};
-use crate::params::{HogSpec, Size};
-use crate::simd::{MulAdd, Work, run};
+use crate::params::HogSpec;
 
-/// What a block's pixels add to its cells: Gaussian times bilinear share, precomputed.
-///
-/// Pixels that reach one cell come first, then those of two, then those of four; each group column by column.
-/// Single precision sums depend on that order, and descriptors are to equal OpenCV's to the last bit.
-#[derive(Debug, Clone, Default)]
-pub struct BlockWeights {
-    one: Vec<Pixel<1>>,
-    two: Vec<Pixel<2>>,
-    four: Vec<Pixel<4>>,
-    /// The same pixels in the same order, for blocks of up to 4 and up to 16 cells.
-    abreast_4: Vec<Abreast<4>>,
-    abreast_16: Vec<Abreast<16>>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Pixel<const CELLS: usize> {
-    column: usize,
-    row: usize,
-    /// The cells that the pixel reaches, and its weight in each.
-    cells: [(usize, f32); CELLS],
-}
-
-/// A pixel with its weight in every cell of the block: zero in those it does not reach.
-#[derive(Debug, Clone, Copy)]
-struct Abreast<const LANES: usize> {
-    column: usize,
-    row: usize,
-    weights: [f32; LANES],
-}
-
-impl<const CELLS: usize> Pixel<CELLS> {
-    fn abreast<const LANES: usize>(&self) -> Abreast<LANES> {
-        let mut weights = [0.0; LANES];
-        self.cells.iter().for_each(|&(cell, weight)| weights[cell] = weight);
-        Abreast { column: self.column, row: self.row, weights }
-    }
-}
-
-/// Up to two cells (index and share) that a pixel reaches along one axis.
-fn cells_along(pixel: usize, cell: usize, cells: usize) -> Vec<(usize, f32)> {
-    let position = (pixel as f32 + 0.5) / cell as f32 - 0.5;
-    let first = position.floor();
-    let share = position - first;
-    let inside = |index: f32| index >= 0.0 && (index as usize) < cells;
-    let mut reached = Vec::with_capacity(2);
-    if inside(first) {
-        reached.push((first as usize, 1.0 - share));
-    }
-    if inside(first + 1.0) {
-        reached.push(((first + 1.0) as usize, share));
-    }
-    reached
-}
-
-impl BlockWeights {
-    /// The weights of a block of `block` pixels in cells of `cell` pixels under a Gaussian of `sigma` pixels.
-    pub fn new(block: Size, cell: Size, sigma: f32) -> Self {
-        let cells = Size::new(block.width / cell.width, block.height / cell.height);
-        let scale = 1.0 / ((sigma * sigma) * 2.0);
-        // Centred on (width / 2, height / 2), not on the middle pixel: the models were trained that way.
-        let squared = |index: usize, side: usize| (index as f32 - side as f32 * 0.5).powi(2);
-        let mut weights = Self::default();
-        for column in 0..block.width {
-            let across = cells_along(column, cell.width, cells.width);
-            for row in 0..block.height {
-                let down = cells_along(row, cell.height, cells.height);
-                let exponent = -(squared(row, block.height) + squared(column, block.width)) * scale;
-                let gauss = f64::from(exponent).exp() as f32;
-                let reached = down.iter().flat_map(|&(cy, sy)| {
-                    across.iter().map(move |&(cx, sx)| (cx * cells.height + cy, gauss * (sx * sy)))
-                });
-                let reached: Vec<_> = reached.collect();
-                match *reached.as_slice() {
-                    [a] => weights.one.push(Pixel { column, row, cells: [a] }),
-                    [a, b] => weights.two.push(Pixel { column, row, cells: [a, b] }),
-                    [a, b, c, d] => weights.four.push(Pixel { column, row, cells: [a, b, c, d] }),
-                    _ => {}
-                }
-            }
-        }
-        match cells.width * cells.height {
-            0..=4 => weights.abreast_4 = weights.abreast(),
-            5..=16 => weights.abreast_16 = weights.abreast(),
-            _ => {}
-        }
-        weights
-    }
-
-    fn abreast<const LANES: usize>(&self) -> Vec<Abreast<LANES>> {
-        let one = self.one.iter().map(Pixel::abreast);
-        one.chain(self.two.iter().map(Pixel::abreast)).chain(self.four.iter().map(Pixel::abreast)).collect()
-    }
-}
+use super::gradient::{Vote, Votes};
+use super::isa::{MulAdd, Work, run};
+use super::tables::{Abreast, Pixel, Tables};
 
 /// The normalised histograms of the blocks that begin at the pixels `firsts` (indices into `votes`), one block after
 /// the other into `out` (`spec.block_len` elements each: cells column by column, bins within).
-pub fn block_histograms(votes: &Votes, firsts: &[usize], spec: &HogSpec, out: &mut [f32]) {
-    let weights = &spec.weights;
+pub(super) fn block_histograms(
+    votes: &Votes,
+    firsts: &[usize],
+    spec: &HogSpec,
+    tables: &Tables,
+    out: &mut [f32],
+) {
+    let weights = &tables.weights;
     if spec.nbins <= BINS && !weights.abreast_4.is_empty() {
         run(CellsAbreast { votes, firsts, spec, pixels: &weights.abreast_4, out });
     } else if spec.nbins <= BINS && !weights.abreast_16.is_empty() {
         run(CellsAbreast { votes, firsts, spec, pixels: &weights.abreast_16, out });
     } else {
         for (&first, block) in firsts.iter().zip(out.chunks_exact_mut(spec.block_len)) {
-            block_histogram(votes, first, spec, block);
+            block_histogram(votes, first, spec, tables, block);
         }
     }
 }
 
 /// The plain form for one block, of any number of cells: what the faster form equals to the last bit.
-fn block_histogram(votes: &Votes, first: usize, spec: &HogSpec, block: &mut [f32]) {
+fn block_histogram(votes: &Votes, first: usize, spec: &HogSpec, tables: &Tables, block: &mut [f32]) {
     block.fill(0.0);
-    add_votes(votes, first, spec.nbins, &spec.weights.one, block);
-    add_votes(votes, first, spec.nbins, &spec.weights.two, block);
-    add_votes(votes, first, spec.nbins, &spec.weights.four, block);
+    add_votes(votes, first, spec.nbins, &tables.weights.one, block);
+    add_votes(votes, first, spec.nbins, &tables.weights.two, block);
+    add_votes(votes, first, spec.nbins, &tables.weights.four, block);
     normalise(block, spec.l2_hys_threshold);
 }
 
@@ -249,22 +163,14 @@ mod tests {
             let vote = |&(a, b, bin): &(f32, f32, u8)| Vote { shares: [a, b], bins: bins(bin) };
             let votes = Votes { width: 40, pixels: votes.iter().map(vote).collect() };
             let mut together = vec![f32::NAN; firsts.len() * spec.block_len];
-            block_histograms(&votes, &firsts, &spec, &mut together);
+            let tables = Tables::new(&spec);
+            block_histograms(&votes, &firsts, &spec, &tables, &mut together);
             for (&first, found) in firsts.iter().zip(together.chunks_exact(spec.block_len)) {
                 let mut alone = vec![f32::NAN; spec.block_len];
-                block_histogram(&votes, first, &spec, &mut alone);
+                block_histogram(&votes, first, &spec, &tables, &mut alone);
                 prop_assert_eq!(&alone, found);
             }
         }
-    }
-
-    #[test]
-    fn a_block_of_two_by_two_cells_shares_its_pixels_in_nine_zones() {
-        // 1 2 1     corners reach one cell, edges two, the middle four
-        // 2 4 2
-        // 1 2 1     (zones of 4, 8 and 4 pixels)
-        let weights = BlockWeights::new(Size::new(16, 16), Size::new(8, 8), 4.0);
-        assert_eq!((weights.one.len(), weights.two.len(), weights.four.len()), (4 * 16, 4 * 32, 64));
     }
 
     #[test]

@@ -1,31 +1,13 @@
 //! What a detector's geometry and SVM mean to the kernels, computed once.
 
-use crate::gradient::gamma_table;
-use crate::params::{HogSpec, Size};
-use crate::svm::Svm;
+use crate::exact::{Svm, gamma_table};
+use crate::geometry::Size;
+use crate::params::HogSpec;
 
-use super::backend::Backend;
-use super::level;
-use super::strip::BLOCK;
-
-/// The blocks of a window's row are padded to a multiple of this, the most lanes that sum one window.
-pub(super) const ACROSS: usize = 8;
-/// Words of a block's bytes.
-pub(super) const WORDS: usize = BLOCK / 4;
+use super::layout::{ACROSS, BLOCK, Gamma, WORDS};
 
 /// More blocks than this in a window might overflow the 32-bit sums of the first look.
 const BLOCKS_MAX: usize = 400;
-
-/// How pixel values are turned into their square roots.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Gamma {
-    /// Not at all.
-    Off,
-    /// By Newton's method from the CPU's estimate, which was found right for all 256 values.
-    Estimated,
-    /// By the square root instruction.
-    Exact,
-}
 
 /// The constants of the fast path of one detector.
 #[derive(Debug, Clone)]
@@ -47,7 +29,7 @@ pub(crate) struct Plan {
     pub(super) bias: f64,
     pub(super) coarse: Coarse,
     /// How far a score of this path can be from the reference's: a hundred times the rounding step, of every block.
-    pub(super) noise: f64,
+    pub(super) score_error_bound: f64,
 }
 
 /// The SVM in bytes, for a first look that may only err by `bound`.
@@ -68,7 +50,10 @@ pub(super) struct Coarse {
 
 impl Plan {
     /// The plan of `spec` and `svm`, if the kernels can serve them.
-    pub(crate) fn new(spec: &HogSpec, svm: &Svm, backend: Backend) -> Option<Self> {
+    ///
+    /// `gamma_is_exact`: the estimated square root is right for every pixel value. `wide_sums`: the prefilter sums in
+    /// 32 bits, not in 16.
+    pub(super) fn new(spec: &HogSpec, svm: &Svm, gamma_is_exact: bool, wide_sums: bool) -> Option<Self> {
         let eight = Size::new(8, 8);
         let served = spec.block == Size::new(16, 16)
             && spec.cell == eight
@@ -89,7 +74,7 @@ impl Plan {
         let norms: f64 = svm.weights().as_chunks::<BLOCK>().0.iter().map(|block| norm(block)).sum();
         let across = profile(spec.sigma);
         Some(Self {
-            gamma: match (spec.gamma_correction, level::gamma_is_exact(backend)) {
+            gamma: match (spec.gamma_correction, gamma_is_exact) {
                 (false, _) => Gamma::Off,
                 (true, true) => Gamma::Estimated,
                 (true, false) => Gamma::Exact,
@@ -101,16 +86,16 @@ impl Plan {
             across,
             weights: by_rows(svm.weights(), spec.blocks),
             bias: f64::from(svm.bias()),
-            coarse: Coarse::new(svm.weights(), spec.blocks, backend != Backend::Avx2),
-            noise: 4e-7 * norms,
+            coarse: Coarse::new(svm.weights(), spec.blocks, wide_sums),
+            score_error_bound: 4e-7 * norms,
         })
     }
 }
 
 impl Plan {
-    /// How far a score of the kernels can be from the reference's.
-    pub(crate) fn noise(&self) -> f64 {
-        self.noise
+    /// How far a score of the kernels can be from the exact path's.
+    pub(crate) fn score_error_bound(&self) -> f64 {
+        self.score_error_bound
     }
 }
 

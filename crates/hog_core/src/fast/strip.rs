@@ -14,15 +14,8 @@ use std::hint::black_box;
 use std::ops::Range;
 
 use super::lane::{Lane, ODD};
-use super::plan::{Gamma, Plan};
-
-/// Pixels of a cell along one axis.
-pub(super) const CELL: usize = 8;
-const BINS: usize = 9;
-/// Elements of a block: 2 × 2 cells.
-pub(super) const BLOCK: usize = 4 * BINS;
-/// Sums per lane that one row of cells leaves to the next.
-pub(super) const CARRY: usize = CELL * BINS * 2;
+use super::layout::{BINS, BLOCK, CARRY, CELL, Gamma};
+use super::plan::Plan;
 
 /// What the strips of a level read and write.
 pub(super) struct Job<'a> {
@@ -49,7 +42,7 @@ pub(super) struct Job<'a> {
 ///
 /// Even bin b has slot b / 2, odd bin b has slot `ODD` + (b + 1) / 2; `ODD` stands for bin 8, `ODD` + 5 for bin 0.
 #[derive(Clone, Copy)]
-pub(super) struct Votes<L: Lane> {
+pub(super) struct LaneVotes<L: Lane> {
     pub even: L::F,
     pub odd: L::F,
     pub slots: L::Slots,
@@ -205,7 +198,7 @@ fn square<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> L::F {
 
 /// The votes of one pixel of every cell.
 #[inline(always)]
-pub(super) fn vote<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> Votes<L> {
+pub(super) fn vote<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> LaneVotes<L> {
     let (xx, yy) = (l.mul(dx, dx), l.mul(dy, dy));
     let squared = l.add(xx, yy);
     let magnitude = l.root(squared);
@@ -223,7 +216,7 @@ pub(super) fn vote<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> Votes<L> {
     // A triangle wave: how near the even bin is. Votes are halved here, the weights doubled.
     let (share, slots) = l.slots(position);
     let even = l.mul(magnitude, share);
-    Votes { even, odd: l.mul_sub(magnitude, l.splat(0.5), even), slots }
+    LaneVotes { even, odd: l.mul_sub(magnitude, l.splat(0.5), even), slots }
 }
 
 /// The polynomial's coefficients: radians to units of two bins of π/9.
@@ -242,7 +235,7 @@ const ARC: [f32; 4] = {
 pub(super) fn spread_all<L: Lane>(
     l: L,
     weights: &[[f32; 3]; CELL],
-    votes: &[Votes<L>; CELL],
+    votes: &[LaneVotes<L>; CELL],
     carry: &mut [[L::F; 2]; BINS],
     sums: &mut [[L::F; CELL]; 2 * BINS],
     phase: usize,
@@ -266,7 +259,7 @@ pub(super) fn spread_all<L: Lane>(
 fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
     l: L,
     weights: &[[f32; 3]; CELL],
-    votes: &[Votes<L>; CELL],
+    votes: &[LaneVotes<L>; CELL],
     carry: &mut [[L::F; 2]; BINS],
     sums: &mut [[L::F; CELL]; 2 * BINS],
     phase: usize,
@@ -280,7 +273,7 @@ fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
     }
     for half in 0..2 {
         // A length that the compiler cannot see keeps the loop rolled; unrolled, its sums spill.
-        let rows: (&[Votes<L>], &[[f32; 3]]) =
+        let rows: (&[LaneVotes<L>], &[[f32; 3]]) =
             black_box((&votes[CELL / 2 * half..][..CELL / 2], &weights[CELL / 2 * half..][..CELL / 2]));
         for (votes, weights) in rows.0.iter().zip(rows.1) {
             let w = [l.splat(weights[0]), l.splat(weights[1]), l.splat(weights[2])];
@@ -313,7 +306,7 @@ fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
 
 /// What the votes give to `bin`.
 #[inline(always)]
-fn of_bin<L: Lane>(l: L, votes: &Votes<L>, bin: usize) -> L::Masked {
+fn of_bin<L: Lane>(l: L, votes: &LaneVotes<L>, bin: usize) -> L::Masked {
     match bin {
         0 => l.keep_either(votes.slots, (votes.even, 0), (votes.odd, ODD + 5)),
         8 => l.keep_either(votes.slots, (votes.even, 4), (votes.odd, ODD)),

@@ -2,7 +2,7 @@
 //!
 //! OpenCV fuses multiply and add where the CPU can, and rounds twice where it cannot; so does this.
 
-use super::exact::MulAdd;
+use super::isa::MulAdd;
 
 /// Degrees of the odd polynomial that stands for the arctangent on 0..=1.
 const DEGREES: f32 = (180.0 / std::f64::consts::PI) as f32;
@@ -16,7 +16,7 @@ const RADIANS: f32 = (std::f64::consts::PI / 180.0) as f32;
 ///
 /// `vector_rule` tells how angles beyond 45° are rounded: as OpenCV's vector code does, or as its scalar code does.
 #[inline(always)]
-pub(crate) fn polar<M: MulAdd>(
+pub(super) fn polar<M: MulAdd>(
     dx: &[f32],
     dy: &[f32],
     vector_rule: bool,
@@ -55,7 +55,7 @@ fn polar_of<M: MulAdd, const VECTOR_RULE: bool>(dx: f32, dy: f32) -> (f32, f32) 
 
 #[cfg(test)]
 mod tests {
-    use super::super::exact::{Fused, Separate};
+    use super::super::isa::{Fused, Separate};
     use super::*;
 
     #[test]

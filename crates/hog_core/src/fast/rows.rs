@@ -1,17 +1,11 @@
 //! Pixels for the kernels: the image as planes, shrunk to a level, each row mirrored outwards.
 
+use crate::geometry::Size;
 use crate::image::{ImageView, reflect_101};
-use crate::params::Size;
 use crate::pyramid::{Tap, taps};
 
-use super::lane::Lane;
-
-/// Bytes that a kernel may read (and ignore) behind a plane.
-pub(super) const SLACK: usize = 192;
-/// Rows of mixed columns and of bytes are written in steps of this many elements.
-const STEP: usize = 64;
-/// A strip reads this far beyond the padded row: the rest of its last vector, and one neighbour.
-const OVERREAD: usize = 8 * 16 + 16;
+use super::lane::{Columns, Lane, RowPointers};
+use super::layout::{OVERREAD, SLACK, STEP};
 
 /// The image as one plane per channel, rows without gaps, every byte flipped by 0x80 (signed, as the resize wants it).
 #[derive(Debug, Default)]
@@ -53,76 +47,6 @@ impl Planes {
     fn row(&self, channel: usize, y: usize) -> &[u8] {
         &self.data[(channel * self.size.height + y) * self.size.width..]
     }
-}
-
-/// How a row is shrunk: for every output pixel two neighbours and their weights, in groups that one shuffle fills.
-///
-/// Where the pixels of a group lie further apart than a shuffle reaches, the group is a sum of several parts, each of
-/// which gives the output pixels of the others the weight 0.
-#[derive(Debug, Default)]
-pub(super) struct Columns {
-    /// Parts of a group.
-    pub parts: usize,
-    /// First source pixel of each part.
-    pub base: Vec<u32>,
-    /// Two offsets per output pixel, from its part's base.
-    pub index: Vec<u8>,
-    /// Two weights per output pixel, together 256.
-    pub weight: Vec<u8>,
-    /// Most source pixels that a part spans.
-    pub span: usize,
-    taps: Vec<Tap>,
-}
-
-impl Columns {
-    /// Prepares to shrink rows of `from` pixels to `to`, in groups of `group` whose parts span at most `reach`.
-    fn fill(&mut self, from: usize, to: usize, group: usize, reach: usize) {
-        self.taps.clear();
-        self.taps.extend(taps(from, to));
-        let spanned = |taps: &[Tap]| match taps {
-            [first, .., last] => last.second + 1 - first.first,
-            _ => 2,
-        };
-        self.parts = 1;
-        loop {
-            self.span = self.taps.chunks(group / self.parts).map(spanned).max().unwrap_or(0);
-            if self.span <= reach {
-                break;
-            }
-            self.parts *= 2;
-        }
-        let all = to.div_ceil(STEP) * (STEP / group) * self.parts;
-        for list in [&mut self.index, &mut self.weight] {
-            list.clear();
-            list.resize(2 * group * all, 0);
-        }
-        self.base.clear();
-        self.base.resize(all, 0);
-        let size = group / self.parts;
-        for (part, taps) in self.taps.chunks(size).enumerate() {
-            let base = taps.first().map_or(0, |tap| tap.first);
-            self.base[part] = base as u32;
-            for (i, tap) in taps.iter().enumerate() {
-                // A weight of 256 does not fit a byte: the one pixel then counts 255 times and once more.
-                let (first, second, weight) = match tap.weight {
-                    0 => (tap.first, tap.first, 1),
-                    256 => (tap.second, tap.second, 1),
-                    weight => (tap.first, tap.second, weight),
-                };
-                let at = 2 * (part * group + part % self.parts * size + i);
-                self.index[at..at + 2].copy_from_slice(&[(first - base) as u8, (second - base) as u8]);
-                self.weight[at..at + 2].copy_from_slice(&[(256 - weight) as u8, weight as u8]);
-            }
-        }
-    }
-}
-
-/// Where a channel's row of a level comes from, and where it goes.
-#[derive(Clone, Copy)]
-pub(super) struct Rows {
-    pub upper: *const u8,
-    pub lower: *const u8,
-    pub to: *mut u8,
 }
 
 /// Rows of one level, each mirrored outwards by the padding and one pixel more: as many at a time as stay in the
@@ -172,7 +96,7 @@ impl Band {
         for (i, all) in self.data.chunks_exact_mut(self.stride).take(count).enumerate() {
             let y = reflect_101(from + i as i64, height);
             if let Some(tap) = self.down.get(y) {
-                let rows = std::array::from_fn(|channel| Rows {
+                let rows = std::array::from_fn(|channel| RowPointers {
                     upper: source.row(channel, tap.first).as_ptr(),
                     lower: source.row(channel, tap.second).as_ptr(),
                     to: all[channel * self.plane + self.left..][..width.next_multiple_of(STEP)].as_mut_ptr(),
@@ -217,7 +141,7 @@ fn mirror(row: &mut [u8], left: usize, width: usize, count: usize) {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may fail")]
 mod tests {
-    use super::super::portable::Portable;
+    use super::super::lane::portable::Portable;
     use super::*;
     use crate::pyramid::resize;
 
@@ -262,7 +186,8 @@ mod tests {
         assert_levels(Portable);
         #[cfg(target_arch = "x86_64")]
         {
-            use super::super::{avx2::Avx2, avx512::Avx512, backend::Backend};
+            use super::super::backend::Backend;
+            use super::super::lane::{avx2::Avx2, avx512::Avx512};
             if Backend::Avx2.is_available() {
                 // SAFETY: the CPU has it.
                 assert_levels(unsafe { Avx2::new() });
@@ -274,6 +199,6 @@ mod tests {
         }
         #[cfg(target_arch = "aarch64")]
         // SAFETY: every aarch64 CPU has it.
-        assert_levels(unsafe { super::super::neon::Neon::new() });
+        assert_levels(unsafe { super::super::lane::neon::Neon::new() });
     }
 }

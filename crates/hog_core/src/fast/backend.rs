@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::error::{HogError, Result};
+use crate::error::{BackendError, Result};
 
 /// An instruction set that the kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,8 +75,8 @@ impl Backend {
             return Ok(available().next().unwrap_or(Self::Scalar));
         }
         available().find(|backend| backend.name() == name).ok_or_else(|| {
-            let names: Vec<_> = available().map(Self::name).collect();
-            HogError::Backend(format!("{VARIABLE} is {name:?}; this machine has auto, {}", names.join(", ")))
+            let available = available().map(Self::name).collect();
+            BackendError::Unknown { variable: VARIABLE, name: name.to_owned(), available }.into()
         })
     }
 }

@@ -1,16 +1,15 @@
 //! Four lanes in plain Rust, which the compiler turns into what the architecture has for certain (SSE2 on x86-64).
 
-use super::lane::{Lane, ODD};
-use super::rows::{Columns, Rows};
+use super::{Columns, Lane, ODD, RowPointers};
 
 /// No instruction set beyond the architecture's baseline.
 #[derive(Clone, Copy)]
-pub(super) struct Portable;
+pub(in crate::fast) struct Portable;
 
 /// Four numbers, aligned as a vector.
 #[derive(Clone, Copy)]
 #[repr(align(16))]
-pub(super) struct Four<T>([T; 4]);
+pub(in crate::fast) struct Four<T>([T; 4]);
 
 /// `expression` of every lane `i`.
 macro_rules! lanes {
@@ -238,7 +237,7 @@ impl Lane for Portable {
     }
 
     #[inline(always)]
-    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns) {
+    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
         let shares = [256 - weight.cast_unsigned(), weight.cast_unsigned()];
         let pairs = columns.index.as_chunks::<16>().0.iter().zip(columns.weight.as_chunks::<16>().0);
         for (part, ((index, weight), &base)) in pairs.zip(&columns.base).enumerate() {

@@ -2,18 +2,17 @@
 
 use std::arch::aarch64::*;
 
-use super::lane::{Lane, ODD};
-use super::rows::{Columns, Rows};
+use super::{Columns, Lane, ODD, RowPointers};
 
 /// Proof that the CPU has NEON.
 #[derive(Clone, Copy)]
-pub(super) struct Neon(());
+pub(in crate::fast) struct Neon(());
 
 impl Neon {
     /// # Safety
     /// The CPU has NEON.
     #[inline(always)]
-    pub(super) unsafe fn new() -> Self {
+    pub(in crate::fast) unsafe fn new() -> Self {
         Self(())
     }
 }
@@ -272,7 +271,7 @@ impl Lane for Neon {
     }
 
     #[inline(always)]
-    unsafe fn mix<const C: usize>(self, rows: [Rows; C], weight: i16, columns: &Columns) {
+    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
         isa!({
             let bias = vdupq_n_s32((1 << 23) + (1 << 15)); // undoes −2¹⁵ of both rows, rounds half up
             let parts = columns.parts;

@@ -2,8 +2,8 @@
 
 Noise is `numpy.random.default_rng(seed).integers(...)`. NumPy promises the stream of the bit generator (PCG64), though
 not formally what `integers` makes of it; that has not changed since it appeared in NumPy 1.17. Drawings use +, -, × and
-÷ of float64 on single values, which IEEE 754 rounds alike everywhere. The photographs are those in scikit-image's wheel;
-the wheel is all they need. `answers.json` holds an MD5 of every image, so that another image is not taken for another
+÷ of float64 on single values, which IEEE 754 rounds alike everywhere. The photographs are files of scikit-image's
+wheel; none is downloaded. `answers.json` holds an MD5 of every image, so that another image is not taken for another
 answer.
 """
 
@@ -90,27 +90,30 @@ class Figure:
         ]
 
 
-def covered(figure: Figure, height: int, width: int) -> NDArray[np.float64]:
-    """Share of each pixel that a figure covers, in 16ths."""
-    y, x = (((np.arange(side * FINE) + 0.5) / FINE) for side in (height, width))
-    inside = np.zeros((height * FINE, width * FINE), bool)
+def coverage(figure: Figure, ys: range, xs: range) -> NDArray[np.float64]:
+    """Share of each pixel of some rows and columns that a figure covers, in 16ths."""
+    x, y = (side.start + (np.arange(len(side) * FINE) + 0.5) / FINE for side in (xs, ys))
+    inside = np.zeros((len(y), len(x)), bool)
     for x0, y0, x1, y1, radius in figure.capsules():
         along, down = x1 - x0, y1 - y0
         from_x, from_y = (x - figure.x - x0)[None, :], (y - figure.y - y0)[:, None]
-        length = along * along + down * down
-        at = np.clip((from_x * along + from_y * down) / length, 0, 1) if length else np.zeros((1, 1))
+        at = np.clip((from_x * along + from_y * down) / (along * along + down * down), 0, 1)
         off_x, off_y = from_x - at * along, from_y - at * down
         inside |= off_x * off_x + off_y * off_y <= radius * radius
-    return inside.reshape(height, FINE, width, FINE).mean((1, 3))
+    return inside.reshape(len(ys), FINE, len(xs), FINE).mean((1, 3))
 
 
 def people(seed: int, height: int, width: int, figures: Sequence[Figure]) -> Image:
     """Draw persons on a ground of coarse and fine noise, in colour."""
-    ground = 150.0 + blocks(seed, height, width, size=24)[:, :, None] / 8 + noise(seed + 1, height, width, 3) / 16
+    picture = 150.0 + blocks(seed, height, width, size=24)[:, :, None] / 8 + noise(seed + 1, height, width, 3) / 16
     for figure in figures:
-        share = covered(figure, height, width)[:, :, None]
-        ground = ground * (1 - share) + np.asarray(figure.colour, np.float64) * share
-    return ground.astype(np.uint8)
+        reach = figure.height // 4
+        ys = range(max(figure.y, 0), min(figure.y + figure.height, height))
+        xs = range(max(figure.x - reach, 0), min(figure.x + reach, width))
+        share = coverage(figure, ys, xs)[:, :, None]
+        place = picture[ys.start : ys.stop, xs.start : xs.stop]
+        place[:] = place * (1 - share) + np.asarray(figure.colour, np.float64) * share
+    return picture.astype(np.uint8)
 
 
 def gray(image: Image) -> Image:

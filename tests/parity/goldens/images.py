@@ -47,12 +47,12 @@ def flat(value: int, *shape: int) -> Image:
 def ramp(height: int, width: int) -> Image:
     """Brighten by 3 per column and 5 per row, wrapping round at 256: constant angles between sharp edges."""
     y, x = np.mgrid[:height, :width]
-    return ((3 * x + 5 * y) % 256).astype(np.uint8)
+    return np.asarray((3 * x + 5 * y) % 256, np.uint8)
 
 
 def checkers(height: int, width: int, side: int) -> Image:
     y, x = np.mgrid[:height, :width]
-    return ((x // side + y // side) % 2 * 255).astype(np.uint8)
+    return np.asarray((x // side + y // side) % 2 * 255, np.uint8)
 
 
 def view(seed: int) -> Image:
@@ -100,7 +100,7 @@ def coverage(figure: Figure, ys: range, xs: range) -> NDArray[np.float64]:
         at = np.clip((from_x * along + from_y * down) / (along * along + down * down), 0, 1)
         off_x, off_y = from_x - at * along, from_y - at * down
         inside |= off_x * off_x + off_y * off_y <= radius * radius
-    return inside.reshape(len(ys), FINE, len(xs), FINE).mean((1, 3))
+    return np.asarray(inside.reshape(len(ys), FINE, len(xs), FINE).mean((1, 3)))
 
 
 def people(seed: int, height: int, width: int, figures: Sequence[Figure]) -> Image:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
 from typing import Any
@@ -11,6 +11,8 @@ import numpy as np
 from tests.parity.goldens import images
 from tests.parity.goldens.case import DAIMLER, PEOPLE, Case
 from tests.parity.goldens.images import Figure, Image
+
+Pictures = dict[str, Callable[[], Image]]
 
 #: The image of most cases with people: four sizes, four colours.
 STREET = partial(
@@ -67,7 +69,7 @@ def gradients() -> Iterator[Case]:
     for width in (1, 2, 3, 7, 15, 16, 17, 33):
         image = partial(images.noise, width, 9, width, 3, values=5)
         yield Case(f"grad-width-{width}", "colours tie around the ends of vectors", image, "computeGradient")
-    for name, image in {
+    pictures: Pictures = {
         "one-pixel": partial(images.noise, 1, 1, 1),
         "one-row": partial(images.noise, 2, 1, 40),
         "ramp": partial(images.ramp, 60, 90),
@@ -76,8 +78,9 @@ def gradients() -> Iterator[Case]:
         "4k-strip": partial(images.noise, 21, 6, 3840, 3),
         "tall": partial(images.noise, 22, 1500, 5, 3),
         "people": STREET,
-    }.items():
-        yield Case(f"grad-{name}", f"a picture of its own: {name}", image, "computeGradient")
+    }
+    for name, picture in pictures.items():
+        yield Case(f"grad-{name}", f"a picture of its own: {name}", picture, "computeGradient")
     crop = {"paddingTL": (-7, -3), "paddingBR": (-2, 9)}
     yield Case("grad-crop", "a negative padding crops", CROWD, "computeGradient", crop)
     around = {"paddingTL": (50, 40), "paddingBR": (31, 77)}
@@ -121,7 +124,7 @@ def descriptors() -> Iterator[Case]:
         arguments = {"winStride": (19, 16), "padding": (3, 6)}
         image = partial(images.noise, 32, 262, 140, 3)
         yield Case(f"compute-{name}", "a geometry of its own", image, "compute", arguments, geometry)
-    for name, image in {
+    pictures: Pictures = {
         "exact-fit": partial(images.noise, 33, 128, 64),
         "one-pixel-more": partial(images.noise, 33, 129, 65),
         "ramp": partial(images.ramp, 140, 80),
@@ -129,9 +132,11 @@ def descriptors() -> Iterator[Case]:
         "fortran-order": fortran,
         "flipped": flipped,
         "read-only": read_only,
-        "empty-window-grid": partial(images.flat, 0, 128, 56),
-    }.items():
-        yield Case(f"compute-{name}", f"an image of its own: {name}", image, "compute", {"winStride": (32, 32)})
+    }
+    for name, picture in pictures.items():
+        yield Case(f"compute-{name}", f"an image of its own: {name}", picture, "compute", {"winStride": (32, 32)})
+    # Narrower by a stride: with one more pixel OpenCV would read beyond the image.
+    yield Case("compute-no-window", "a grid of no windows", partial(images.noise, 34, 128, 56), "compute")
 
 
 def single_scale() -> Iterator[Case]:
@@ -141,25 +146,45 @@ def single_scale() -> Iterator[Case]:
         yield Case(
             f"detect-{name}", "random coefficients", image, "detect", everything | {"padding": (0, 0)}, geometry, 6
         )
-    for name, image in {
+    pictures: Pictures = {
         "street": STREET,
         "street-gray": of_street,
         "crowd": CROWD,
         "flat": partial(images.flat, 9, 200, 90),
-    }.items():
+    }
+    for name, picture in pictures.items():
         arguments = everything | {"hitThreshold": -0.8, "winStride": (8, 8)}
         yield Case(
             f"detect-{name}",
             "persons of 96 px and what looks like them",
-            image,
+            picture,
             "detect",
             arguments,
             detector="default",
         )
         arguments = everything | {"winStride": (72, 64)}
-        yield Case(f"detect-scores-{name}", "every score", image, "detect", arguments, detector="default")
+        yield Case(f"detect-scores-{name}", "every score", picture, "detect", arguments, detector="default")
     yield Case("detect-lonely", "one window, one person", LONELY, "detect", detector="default")
     yield Case("detect-no-detector", "without a detector nothing is found", LONELY, "detect")
+
+
+#: Images searched without grouping, and the threshold of their hits.
+RAW: dict[str, tuple[Callable[[], Image], float]] = {
+    "blocks": (partial(images.blocks, 52, 300, 260, 3, size=5), -2.2),
+    "blocks-large": (partial(images.blocks, 53, 480, 640, size=16), -1.75),
+    "exact-fit": (LONELY, 0.0),
+    "flipped": (flipped, -1.0),
+    "noise": (partial(images.noise, 54, 210, 170, 3), -2.5),
+    "4k-strip": (
+        partial(images.people, 55, 150, 3840, [Figure(x, 10, 130, (30, 40, 50)) for x in (50, 1900, 3790)]),
+        0.3,
+    ),
+    "tall": (partial(images.people, 56, 1300, 70, [Figure(35, y, 110, (40, 30, 30)) for y in (10, 600, 1180)]), 0.0),
+    "hd": (
+        partial(images.people, 57, 720, 1280, [Figure(300, 60, 600, (90, 80, 20)), Figure(900, 200, 300, (9, 9, 9))]),
+        0.5,
+    ),
+}
 
 
 def multi_scale() -> Iterator[Case]:
@@ -187,7 +212,7 @@ def multi_scale() -> Iterator[Case]:
     for group in (0.0, 0.5, 5.0):
         arguments = usual | {"scale": 1.2, "hitThreshold": 0.2, "groupThreshold": group, "useMeanshiftGrouping": True}
         yield default(f"dms-meanshift-{group}", "modes of the hits' density", STREET, arguments=arguments)
-    for name, image in {
+    pictures: Pictures = {
         "defaults-street": STREET,
         "defaults-street-gray": of_street,
         "defaults-one-channel": one_channel,
@@ -197,34 +222,12 @@ def multi_scale() -> Iterator[Case]:
         "defaults-flat": partial(images.flat, 128, 300, 300, 3),
         "defaults-noise": partial(images.noise, 51, 240, 320, 3),
         "defaults-checkers": partial(images.checkers, 240, 200, 20),
-    }.items():
-        yield default(f"dms-{name}", "no argument but the image", image)
-    for name, image, threshold in (
-        ("blocks", partial(images.blocks, 52, 300, 260, 3, size=5), -2.2),
-        ("blocks-large", partial(images.blocks, 53, 480, 640, size=16), -1.75),
-        ("exact-fit", LONELY, 0.0),
-        ("flipped", flipped, -1.0),
-        ("noise", partial(images.noise, 54, 210, 170, 3), -2.5),
-        (
-            "4k-strip",
-            partial(images.people, 55, 150, 3840, [Figure(x, 10, 130, (30, 40, 50)) for x in (50, 1900, 3790)]),
-            0.3,
-        ),
-        (
-            "tall",
-            partial(images.people, 56, 1300, 70, [Figure(35, y, 110, (40, 30, 30)) for y in (10, 600, 1180)]),
-            0.0,
-        ),
-        (
-            "hd",
-            partial(
-                images.people, 57, 720, 1280, [Figure(300, 60, 600, (90, 80, 20)), Figure(900, 200, 300, (9, 9, 9))]
-            ),
-            0.5,
-        ),
-    ):
+    }
+    for name, picture in pictures.items():
+        yield default(f"dms-{name}", "no argument but the image", picture)
+    for name, (picture, threshold) in RAW.items():
         arguments = usual | {"hitThreshold": threshold, "scale": 1.15, "groupThreshold": 0}
-        yield default(f"dms-raw-{name}", "hits before grouping, in level order", image, arguments=arguments)
+        yield default(f"dms-raw-{name}", "hits before grouping, in level order", picture, arguments=arguments)
     for levels, gamma in product((1, 3), (False, True)):
         geometry = (*PEOPLE, 1, -1.0, 0, 0.2, gamma, levels)
         name = f"dms-levels-{levels}{'-gamma' * gamma}"
@@ -236,10 +239,11 @@ def multi_scale() -> Iterator[Case]:
             geometry=geometry,
         )
     daimler = partial(Case, method="detectMultiScale", detector="daimler", geometry=DAIMLER)
-    for name, image in {"street": STREET, "street-gray": of_street, "crowd": CROWD}.items():
-        yield daimler(f"dms-daimler-{name}", "the other people model", image, arguments=usual | {"padding": (16, 16)})
+    pictures = {"street": STREET, "street-gray": of_street, "crowd": CROWD}
+    for name, picture in pictures.items():
+        yield daimler(f"dms-daimler-{name}", "the other people model", picture, arguments=usual | {"padding": (16, 16)})
         arguments = usual | {"scale": 1.3, "groupThreshold": 0.4, "useMeanshiftGrouping": True}
-        yield daimler(f"dms-daimler-meanshift-{name}", "modes of its hits' density", image, arguments=arguments)
+        yield daimler(f"dms-daimler-meanshift-{name}", "modes of its hits' density", picture, arguments=arguments)
     for name, geometry in ODD.items():
         arguments = {"hitThreshold": 0.0, "winStride": (30, 28), "padding": (0, 0), "scale": 1.25, "groupThreshold": 0}
         image = partial(images.noise, 58, 300, 150, 3)

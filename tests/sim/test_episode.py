@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.detector import Detections
 from limo_hog.follow import Decision, Mode, Observation, ProxemicController, TrackingController, Twist, controller_named
 from limo_hog.follow.control.tracking import TrackingState
+from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.episode import Episode, run_episode
 from limo_sim.run.score import score
 from limo_sim.world.scenario import Scenario
@@ -24,7 +25,7 @@ class Failing:
 
     def __init__(self) -> None:
         self.calls = 0
-        self.works = PeopleDetector()
+        self.works = detector_named("hog")
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
         self.calls += 1
@@ -35,7 +36,7 @@ class Failing:
 
 def run(scenario: str, seconds: float, controller: Any = None, detector: Any = None, seed: int = 0) -> Episode:
     return run_episode(
-        Scenario.load(scenario), controller or TrackingController(), detector or PeopleDetector(), seconds, seed
+        Scenario.load(scenario), controller or TrackingController(), detector or detector_named("hog"), seconds, seed
     )
 
 

@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import TypeVar
@@ -36,7 +36,6 @@ from limo_hog.imaging.reading import (
     read_image,
     standard_input,
 )
-from limo_hog.imaging.search import Search
 from limo_hog.imaging.writing import video_writer, write_image
 
 Image = NDArray[np.uint8]
@@ -75,12 +74,8 @@ class Found:
 class Run:
     """One `detect` run: its options, and what came of it so far."""
 
-    def __init__(self, args: argparse.Namespace, results: Results, bar: Progress) -> None:
-        self._args, self._results, self._bar = args, results, bar
-        detector = PeopleDetector(threshold=args.threshold)
-        if args.nms is not None:
-            detector = replace(detector, nms="iou", overlap=args.nms)
-        self._search = Search(detector, args.min_height, args.max_height)
+    def __init__(self, args: argparse.Namespace, detector: PeopleDetector, results: Results, bar: Progress) -> None:
+        self._args, self._detector, self._results, self._bar = args, detector, results, bar
         self._copies: dict[Source, Path] = {}
         self._workers = 1
         self._task = bar.add_task("looking", total=0)
@@ -191,7 +186,7 @@ class Run:
 
     def _find(self, source: Source, frame: int, image: Image) -> tuple[Found, Image | None]:
         start = time.perf_counter()
-        detections = self._search.detect(image)
+        detections = self._detector.detect(image)
         ms = 1e3 * (time.perf_counter() - start)
         height, width = image.shape[:2]
         boxes = detections.person_boxes if self._args.person_box else detections.boxes

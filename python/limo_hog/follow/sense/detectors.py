@@ -15,7 +15,7 @@ from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.follow.sense.region import Region
-from limo_hog.suppression import suppress
+from limo_hog.suppression import nms
 
 if TYPE_CHECKING:
     import cv2
@@ -56,10 +56,10 @@ def detector_named(name: str) -> Detector:
         raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}, onnx:FILE")
     from limo_hog.detector import PeopleDetector
 
-    if name == "hog-half":
-        return HalfSize(PeopleDetector())
     kinds: dict[str, Literal["group", "iou", "soft"]] = {"hog-iou": "iou", "hog-soft": "soft"}
-    return PeopleDetector(nms=kinds.get(name, "group"))
+    # Without enlarging, grouped: the rectangles of `cv2.HOGDescriptor`.
+    hog = PeopleDetector(min_height=None, nms=kinds.get(name, "group"))
+    return HalfSize(hog) if name == "hog-half" else hog
 
 
 def detect_in(detector: Detector, image: Image, region: Region | None) -> Detections:
@@ -162,7 +162,7 @@ class OnnxDetector:
         x, y, w, h, score = output[0, :5]
         likely = score >= self.threshold
         boxes = np.stack([x - w / 2, y - h / 2, w, h], axis=1)[likely] / shrink
-        kept = suppress(boxes, score[likely], self.overlap)
+        kept = nms(boxes, score[likely], self.overlap)
         # As an SVM's margin: 0 at the threshold, and without an upper end.
         sure = np.clip(score[likely][kept], 1e-6, 1 - 1e-6).astype(np.float64)
         margin = np.log(sure / (1 - sure)) - math.log(self.threshold / (1 - self.threshold))

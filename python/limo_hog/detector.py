@@ -55,11 +55,6 @@ class Detections:
 
     @classmethod
     def none(cls) -> Detections:
-        """Nobody."""
-        return cls(np.empty((0, 4), np.int32), np.empty(0))
-
-    @classmethod
-    def none(cls) -> Detections:
         """No people at all."""
         return cls(np.empty((0, 4), np.int32), np.empty(0))
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+import limo_hog
 
 
 def modules_after(statement: str) -> set[str]:
@@ -29,3 +33,15 @@ def test_importing_the_detector_does_not_import(module: str, imported: set[str])
 def test_importing_the_detector_imports_neither_commands_nor_follower(imported: set[str]) -> None:
     unwanted = ("limo_hog.cli", "limo_hog.follow", "limo_hog.imaging", "limo_hog.ros2", "limo_hog.cv2_api.model_files")
     assert not [name for name in imported if name.startswith(unwanted)]
+
+
+def test_the_package_imports_nothing_but_its_extension_through_its_own_front_door() -> None:
+    package = Path(limo_hog.__file__).parent
+    rooms = [path for path in package.rglob("*.py") if "cli" not in path.parts]
+    through = {
+        f"{path.relative_to(package)}: {name}"
+        for path in rooms
+        for name in re.findall(r"^\s*(?:from limo_hog import|import limo_hog$) *(.*)", path.read_text(), re.MULTILINE)
+        if name != "_core"
+    }
+    assert not through

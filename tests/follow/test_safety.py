@@ -10,7 +10,7 @@ from tests.follow.views import boxes, flat, look, scan, scan_of
 
 from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Twist
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.clearance import Margin, depth_points, room_ahead, scan_points
+from limo_hog.follow.sense.clearance import DepthGrid, Margin, room_ahead, scan_points
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def test_depth_sees_what_the_lidar_misses() -> None:
 def test_the_floor_is_no_obstacle() -> None:
     rows = np.arange(480, dtype=np.float32)[:, None] + 0.5 - 240
     floor = np.where(rows > 0, 0.175 * 448.6 / np.maximum(rows, 0.5), np.inf).astype(np.float32)
-    assert len(depth_points(np.broadcast_to(floor, (480, 640)), 448.6, 1.8, LIMO)) == 0
+    assert len(DepthGrid().points(np.broadcast_to(floor, (480, 640)), 448.6, 1.8, LIMO)) == 0
 
 
 def test_what_was_seen_before_a_turn_stops_the_way_back() -> None:
@@ -84,7 +84,7 @@ def test_what_was_seen_before_a_turn_stops_the_way_back() -> None:
 def test_backwards_it_goes_slowly_for_it_does_not_look_there() -> None:
     guard = Guard(Headstrong(Twist(-0.7, 0.2)))
     decision = guard.step(replace(look(), scan=scan()), guard.start())
-    assert decision.twist == Twist(-guard.backwards, 0.2)
+    assert decision.twist == Twist(-guard.max_backward, 0.2)
     assert decision.reason == "because"
 
 

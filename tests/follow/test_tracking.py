@@ -186,6 +186,39 @@ def test_without_a_colour_image_anybody_will_do_at_once() -> None:
     assert CONTROLLER.step(world.observe(), state).target == 0
 
 
+def test_the_search_keeps_its_side_though_the_predicted_bearing_changes_sign() -> None:
+    # The robot faces where the person should be; odometry noise of 1 degree moves that to and fro.
+    world = World(person=(3.0, -0.3), velocity=(0.0, 0.1))
+    state = run(world, 4.0).state
+    rates = []
+    x, y, yaw = world.robot
+    for frame in range(75):
+        noise = 0.02 if frame % 4 < 2 else -0.02
+        view = replace(world.observe(visible=False), odometry=Odometry(world.time, x, y, yaw + noise))
+        decision = CONTROLLER.step(view, state)
+        state = decision.state
+        world.time += world.period
+        if "searching" in decision.reason:
+            rates.append(decision.twist.angular)
+    assert len(rates) > 40
+    assert set(rates) == {CONTROLLER.search.rate}
+
+
+def test_legs_alone_are_followed_for_four_seconds() -> None:
+    world = World(person=(1.6, 0.0))
+    state = run(world, 4.0).state
+    modes = {}
+    for frame in range(1, 66):
+        legs = scan_of([(world.distance, 0.06), (world.distance, -0.06)], world.time)
+        decision = CONTROLLER.step(replace(world.observe(visible=False), scan=legs), state)
+        state = decision.state
+        modes[frame] = decision.mode
+        world.time += world.period
+    assert all(modes[frame] is Mode.HOLD for frame in range(1, 40))
+    assert modes[51] is Mode.LOST
+    assert decision.reason == "searching for the lost person"
+
+
 def test_it_asks_for_the_part_of_the_image_where_the_person_will_be() -> None:
     world = World(person=(3.0, -0.5), velocity=(0.0, 0.3))
     decision = run(world, 4.05)

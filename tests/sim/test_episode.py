@@ -119,3 +119,19 @@ def test_nobody_is_found_where_nobody_is() -> None:
     assert result.in_view is None
     assert result.path_m < 0.05
     assert result.modes["search"] == 1.0
+
+
+def test_between_two_frames_of_a_slow_camera_a_command_goes_out_every_period_until_the_frame_is_too_old() -> None:
+    standing = Scenario.load("standing")
+    slow = dataclasses.replace(standing, camera=dataclasses.replace(standing.camera, rate_hz=1.0))
+    episode = run_episode(slow, controller_named("approach"), PeopleDetector(), 3.0, 0)
+    ages: dict[float, Any] = {}
+    last = 0.0
+    for step in episode.steps:
+        last = step.frame.truth.stamp if step.frame else last
+        ages.setdefault(round(step.time - last, 1), []).append(step.decision)
+    assert sorted(ages) == pytest.approx([0.1 * k for k in range(10)])
+    assert all(decision.mode is Mode.FOLLOW for age in (0.0, 0.1, 0.4) for decision in ages[age])
+    for age in (0.6, 0.7, 0.8, 0.9):
+        assert all(decision.twist == Twist() for decision in ages[age])
+        assert all(decision.reason == f"no camera frame for {age} s" for decision in ages[age])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.ranging import Zone, zone_of
+from limo_hog.follow.zones import Zone, zone_of
 from limo_sim.run.episode import Episode, Step
 from limo_sim.sensing.camera import WIDTH, PersonTruth, Truth
 

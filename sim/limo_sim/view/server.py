@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.sense.observation import Scan
-from limo_hog.follow.sense.ranging import ZONE_ENDS
+from limo_hog.follow.zones import ZONE_ENDS
 from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FIELD
 from limo_sim.sensing.lidar import MOUNT_AHEAD

@@ -13,6 +13,10 @@ from limo_hog.follow.sense.observation import Observation
 S = TypeVar("S")
 
 
+#: Parts of a controller whose numbers are offered with its own; the rest of `TrackingController` needs measurements.
+_PARTS = ("steering", "search", "selection")
+
+
 class ParameterError(LimoHogError):
     """A controller has no such parameter, or it cannot have that value."""
 
@@ -33,13 +37,15 @@ class Tunable(Generic[S]):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The numbers that can be set."""
-        if not dataclasses.is_dataclass(self._controller):
-            return {}
-        values: dict[str, Any] = {
-            field.name: getattr(self._controller, field.name) for field in dataclasses.fields(self._controller)
+        """The numbers that can be set, those of a part as "part.name"."""
+        own = _fields(self._controller)
+        parts = {
+            f"{part}.{name}": number
+            for part, value in own.items()
+            for name, number in _fields(value).items()
+            if part in _PARTS
         }
-        return {name: value for name, value in values.items() if type(value) in (int, float)}
+        return {name: value for name, value in (own | parts).items() if type(value) in (int, float)}
 
     def set(self, name: str, value: float) -> None:
         """Give a parameter a value; a whole number stays one.
@@ -55,4 +61,15 @@ class Tunable(Generic[S]):
         if not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
             raise ParameterError(f"{name}: got {value!r}, want a number from 0 on")
         controller: Any = self._controller
-        self._controller = dataclasses.replace(controller, **{name: type(parameters[name])(value)})
+        part, _, field = name.rpartition(".")
+        change = {field: type(parameters[name])(value)}
+        if part:
+            change = {part: dataclasses.replace(getattr(controller, part), **change)}
+        self._controller = dataclasses.replace(controller, **change)
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    """Return the fields of a frozen dataclass by name; none of anything else."""
+    if not dataclasses.is_dataclass(value):
+        return {}
+    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}

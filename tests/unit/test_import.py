@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 import limo_hog
+
+ROOT = Path(__file__).parents[2]
 
 
 def modules_after(statement: str) -> set[str]:
@@ -45,3 +48,17 @@ def test_the_package_imports_nothing_but_its_extension_through_its_own_front_doo
         if name != "_core"
     }
     assert not through
+
+
+def test_the_version_is_that_of_the_crate_for_both_distributions() -> None:
+    stated = [
+        re.search(r'^version = "(.+)"$', (ROOT / file).read_text(), re.MULTILINE)
+        for file in ("Cargo.toml", "sim/pyproject.toml")
+    ]
+    assert [found and found[1] for found in stated] == [limo_hog.__version__] * 2
+    assert version("limo-hog") == version("limo-sim") == limo_hog.__version__
+
+
+def test_what_the_package_has_not_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match=r"'limo_hog' has no attribute 'nothing'"):
+        getattr(limo_hog, "nothing")  # noqa: B009

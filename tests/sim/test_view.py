@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
-import json
 import socket
 import threading
 import time
 from typing import Any
 
-import aiohttp
 import pytest
 
 from limo_hog.follow.control.naming import controller_named
@@ -59,8 +56,8 @@ def test_a_knob_changes_the_controller_and_keeps_its_kind() -> None:
     tunable: Tunable[Any] = Tunable(controller_named("tracking", None))
     tunable.set("target_distance", 2)
     tunable.set("full_every", 5.0)
-    assert tunable.parameters["target_distance"] == 2.0
-    assert type(tunable.parameters["full_every"]) is int
+    assert tunable.parameters["target_distance"].value == 2.0
+    assert type(tunable.parameters["full_every"].value) is int
 
 
 @pytest.mark.parametrize(
@@ -86,31 +83,3 @@ def test_the_page_is_served_on_loopback_alone() -> None:
         if not own.startswith("127."):
             with pytest.raises(OSError, match=r"refused"):
                 socket.create_connection((own, port), timeout=2)
-
-
-@pytest.mark.parametrize("host", [None, "elsewhere.example"])
-def test_another_sites_page_may_not_steer(host: str | None) -> None:
-    headers = {"Origin": "http://elsewhere.example"} | ({"Host": host} if host else {})
-
-    async def ask(view: View) -> int:
-        async with aiohttp.ClientSession() as session, session.get(view.url + "live", headers=headers) as answer:
-            return answer.status
-
-    with View(WORKSHOP) as view:
-        assert asyncio.run(ask(view)) == 403
-
-
-@pytest.mark.parametrize(
-    "wish", ["", "[]", "{}", '{"do": "fly"}', '{"do": "speed", "value": -1}', '{"set": "x", "value": 1}']
-)
-def test_a_wish_that_makes_no_sense_is_answered_and_changes_nothing(wish: str) -> None:
-    async def ask(view: View) -> dict[str, Any]:
-        async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live") as page:
-            assert json.loads((await page.receive()).data)["scenario"] == "workshop"
-            await page.send_str(wish)
-            answer: dict[str, Any] = await page.receive_json()
-            return answer
-
-    with View(WORKSHOP, pace=Pace(2)) as view:
-        assert "complaint" in asyncio.run(ask(view))
-        assert (view.pace.speed, view.pace.paused) == (2, False)

@@ -112,8 +112,8 @@ async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
     set_field = "Object.assign(document.querySelector('[name=target_distance]'), {value: %s}).onchange()"
     await tab.value(set_field % "2.5")
     await tab.value(set_field % "-1")
-    await tab.until("document.querySelector('#complaint').textContent.includes('want a number from 0 on')")
-    assert controller.parameters["target_distance"] == 2.5
+    await tab.until("document.querySelector('#complaint').textContent.includes('want a number from')")
+    assert controller.parameters["target_distance"].value == 2.5
     view.pace.set_speed(0)
     await tab.value("document.querySelector('#pause').click()")
 

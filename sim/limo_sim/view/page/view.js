@@ -104,8 +104,10 @@ function notice(text) {
   $("notice").hidden = !text;
 }
 
+const element = (kind, properties) => Object.assign(document.createElement(kind), properties);
+
 function put(id, value, digits, unit) {
-  const small = Object.assign(document.createElement("small"), { textContent: unit });
+  const small = element("small", { textContent: unit });
   $(id).replaceChildren(...(value === null ? ["–"] : [`${number(value, digits)} `, small]));
 }
 
@@ -131,17 +133,18 @@ document.onkeydown = (event) => {
 };
 $("parameters").onsubmit = (event) => event.preventDefault();
 
-function parameters(values) {
-  $("parameters").hidden = !Object.keys(values).length;
+function parameters(all) {
+  $("parameters").hidden = !all.length;
   $("fields").replaceChildren(
-    ...Object.entries(values).map(([name, value]) => {
-      const input = Object.assign(document.createElement("input"), { type: "number", step: "any", min: 0, name, value });
+    ...all.map(({ name, value, low, high, unit, tooltip, whole }) => {
+      const bounds = `${low} to ${high}${unit && ` ${unit}`}`;
+      const input = element("input", { type: "number", step: whole ? 1 : "any", min: low, max: high, name, value });
       input.onchange = () => {
         $("complaint").textContent = "";
         wish({ set: name, value: input.valueAsNumber });
       };
-      const label = document.createElement("label");
-      label.append(name.replaceAll("_", " "), input);
+      const label = element("label", { title: `${tooltip} ${bounds}`.trim() });
+      label.append(element("span", { textContent: name.replaceAll(/[_.]/g, " ") }), input, element("small", { textContent: unit }));
       return label;
     }),
   );

@@ -7,6 +7,7 @@ and only while somebody looks.
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import logging
 import math
@@ -25,6 +26,7 @@ from aiohttp import WSMsgType, web
 from numpy.typing import NDArray
 
 from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.sense.ranging import ZONE_ENDS
 from limo_sim.run.episode import Moment
@@ -32,7 +34,7 @@ from limo_sim.sensing.camera import FIELD
 from limo_sim.sensing.lidar import MOUNT_AHEAD
 from limo_sim.view.door import HEADERS, Door, QuietLogger
 from limo_sim.view.pace import Pace
-from limo_sim.view.reading import annotated, depth_picture, reading
+from limo_sim.view.reading import annotated, depth_colours, depth_picture, followed_person, measured_m, reading
 from limo_sim.view.tuning import Tunable
 from limo_sim.view.wishes import MAX_BYTES, obey
 from limo_sim.world.furniture import Disc
@@ -131,6 +133,8 @@ class View:
         self._pictured: Moment | None = None
         self._rows: deque[list[float | None]] = deque(maxlen=_REMEMBERED)
         self._written = 0
+        # Index of the person followed last; None before, and during a search.
+        self._followed: int | None = None
         # Time and pose of the last control periods: a scan is as old as it is.
         self._poses: deque[tuple[float, float, float, float]] = deque(maxlen=32)
         self._ended: Mapping[str, Any] | None = None
@@ -154,8 +158,13 @@ class View:
         if moment.frame is not None:
             self._pictured = moment
         now, (x, y, _) = reading(moment.step), moment.step.truth.robot
-        people = [(p.x, p.y) for p in moment.step.truth.people if p is not None]
-        self._rows.append([*asdict(now).values(), x, y, *(people[0] if people else (None, None))])
+        people = [(None, None) if p is None else (p.x, p.y) for p in moment.step.truth.people]
+        measured = measured_m(moment.frame, moment.step)
+        self._rows.append([*asdict(now).values(), measured, x, y, *itertools.chain(*people)])
+        if moment.step.mode is Mode.SEARCH:
+            self._followed = None
+        elif (followed := followed_person(moment.step)) is not None:
+            self._followed = followed
         self._poses.append((moment.step.time, *moment.step.truth.robot))
         self._written += 1
         self._newest = moment
@@ -266,6 +275,7 @@ class View:
                 for f in (piece.footprint for piece in self._scenario.furniture)
             ],
             "zones": list(ZONE_ENDS.values()),
+            "depth": {"far": self._scenario.depth.far_m, "colours": depth_colours(self._scenario.depth.far_m)},
             "parameters": [
                 {**asdict(one), "whole": one.whole}
                 for one in (self._controller.parameters.values() if self._controller else ())
@@ -315,7 +325,9 @@ class View:
             "mode": step.mode.value,
             "reason": step.reason,
             "robot": step.truth.robot,
-            "people": [(p.x, p.y) for p in step.truth.people if p is not None],
+            "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
+            "followed": self._followed,
+            "measured_m": measured_m(moment.frame, step),
             "scan": _hits(moment.scan, list(self._poses)),
             "detect_ms": step.detect_ms or None,
             "boxes": len(step.detections),
@@ -329,7 +341,7 @@ class View:
         if moment.frame is None:
             return []
         depth = depth_picture(moment.frame.depth[::2, ::2], self._scenario.depth.far_m)
-        pictures = {b"c": annotated(moment.frame, moment.step), b"d": depth}
+        pictures = {b"c": annotated(moment.frame, moment.step, caption=False), b"d": depth}
         encoded = [letter + cv2.imencode(".jpg", p, _JPEG)[1].tobytes() for letter, p in pictures.items()]
         # A window's name stands between its letter and its picture, ended by a line feed.
         return encoded + [

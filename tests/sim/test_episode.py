@@ -124,7 +124,7 @@ def test_nobody_is_found_where_nobody_is() -> None:
 def test_between_two_frames_of_a_slow_camera_a_command_goes_out_every_period_until_the_frame_is_too_old() -> None:
     standing = Scenario.load("standing")
     slow = dataclasses.replace(standing, camera=dataclasses.replace(standing.camera, rate_hz=1.0))
-    episode = run_episode(slow, controller_named("approach"), PeopleDetector(), 3.0, 0)
+    episode = run_episode(slow, controller_named("approach"), detector_named("hog"), 3.0, 0)
     ages: dict[float, Any] = {}
     last = 0.0
     for step in episode.steps:

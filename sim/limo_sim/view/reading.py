@@ -76,7 +76,9 @@ def annotated(frame: Frame, step: Step, caption: bool = True) -> NDArray[np.uint
     if distance is not None:
         words += [f"depth {distance:.2f} m", zone_of(distance).value]
     labels = [f"{score:.1f}" for score in step.detections.scores]
-    return annotate(frame.image, step.detections.boxes, labels, step.decision.target, "  ".join(words) if caption else "")
+    return annotate(
+        frame.image, step.detections.boxes, labels, step.decision.target, "  ".join(words) if caption else ""
+    )
 
 
 def depth_picture(depth: NDArray[np.float32], far: float) -> NDArray[np.uint8]:

@@ -161,7 +161,7 @@ class View:
         people = [(None, None) if p is None else (p.x, p.y) for p in moment.step.truth.people]
         measured = measured_m(moment.frame, moment.step)
         self._rows.append([*asdict(now).values(), measured, x, y, *itertools.chain(*people)])
-        if moment.step.mode is Mode.SEARCH:
+        if moment.step.decision.mode is Mode.SEARCH:
             self._followed = None
         elif (followed := followed_person(moment.step)) is not None:
             self._followed = followed

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
+from limo_sim.run.catalogue import load
 from limo_sim.sensing import lidar
-from limo_sim.sensing.camera import HEIGHT, WIDTH, Contacts, Truth
+from limo_sim.sensing.camera import HEIGHT, WIDTH
+from limo_sim.world.truth import Contacts, Truth
 from limo_sim.world.robot import WHEEL_SEPARATION
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.variants import made_up
@@ -39,7 +41,7 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
     Parameters
     ----------
     scenario
-        A `Scenario`, a name or a file that `Scenario.load` knows, or "random": a new one at every reset.
+        A `Scenario`, a name or a file that `catalogue.load` knows, or "random": a new one at every reset.
     render_mode
         "rgb_array": `render` returns the image of the last observation.
     """
@@ -50,7 +52,7 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self._scenario: Scenario | None = None
         if scenario != "random":
-            self._scenario = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
+            self._scenario = scenario if isinstance(scenario, Scenario) else load(scenario)
         known = self._scenario or Scenario()
         speed = known.robot.wheel_speed
         limits = np.array([speed, 2 * speed / WHEEL_SEPARATION], np.float32)

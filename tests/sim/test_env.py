@@ -11,7 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from limo_sim.env import LimoFollow, reward_parts
-from limo_sim.sensing.camera import Contacts, PersonTruth, Truth
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
 from limo_sim.world.scenario import Person, Scenario
 
 STRAIGHT = np.array([0.2, 0.0], np.float32)

@@ -58,6 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Play all runs, show the table, and write what was asked for."""
+    from limo_sim.run.catalogue import load
     from limo_sim.run.sweep import Run, play_all, summarise
     from limo_sim.world.scenario import Scenario
 
@@ -66,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         from limo_sim.view.sweep_plot import plot
     scenarios = args.scenario or Scenario.names()
     for name in scenarios:
-        Scenario.load(name)
+        load(name)
     runs = [
         Run(scenario, controller, args.detector, seed, args.seconds, args.target)
         for scenario in scenarios

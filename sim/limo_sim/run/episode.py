@@ -18,7 +18,8 @@ from limo_hog.follow.sense.observation import Observation, Odometry, Scan, obser
 from limo_hog.follow.sense.region import Region
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
-from limo_sim.sensing.camera import FOCAL_PX, Contacts, Frame, Truth
+from limo_sim.sensing.camera import FOCAL_PX, Frame
+from limo_sim.world.truth import Contacts, Truth
 from limo_sim.world.scenario import Scenario
 
 S = TypeVar("S")

@@ -21,7 +21,8 @@ from limo_hog.follow.decision import Mode
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.ranging import Zone, zone_of
 from limo_sim.run.episode import Episode, Step
-from limo_sim.sensing.camera import WIDTH, PersonTruth, Truth
+from limo_sim.sensing.camera import WIDTH
+from limo_sim.world.truth import PersonTruth, Truth
 
 #: Share of a person's silhouette from which they count as in view.
 IN_VIEW = 0.5

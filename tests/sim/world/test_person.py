@@ -8,17 +8,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from limo_sim.world.person import Body, Pose, Walk, body
+from limo_sim.world.person import BodyMesh, Pose, Walk, body
 from limo_sim.world.scenario import Person, Scenario
 
 PATROL = Scenario.load("workshop").people[0]
 
 
-def lowest(figure: Body) -> float:
+def lowest(figure: BodyMesh) -> float:
     return float(min((figure.start[:, 2] - figure.start_radius).min(), (figure.end[:, 2] - figure.end_radius).min()))
 
 
-def highest(figure: Body) -> float:
+def highest(figure: BodyMesh) -> float:
     reach = np.sqrt((figure.axes**2).sum(axis=2))[:, 2]
     return float((figure.centre[:, 2] + reach).max())
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, CameraPose
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Box
-from limo_sim.world.person import Body, Pose, body
+from limo_sim.world.person import BodyMesh, Pose, body
 from limo_sim.world.scenario import Camera, Depth, Furniture, Person, Scenario
 
 HERE = CameraPose(0.0, 0.0, 0.0)
@@ -37,7 +37,7 @@ def rays(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.floa
     return np.stack([np.ones(len(columns)), -(columns - CENTRE_X) / FOCAL_PX, -(rows - CENTRE_Y) / FOCAL_PX], axis=1)
 
 
-def first_hit(figure: Body, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+def first_hit(figure: BodyMesh, directions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Depth [m] at which rays from the camera meet a body: capsules as rows of balls, ellipsoids as they are."""
     share = np.linspace(0, 1, 80)[:, None, None]
     balls = (figure.start + share * (figure.end - figure.start)).reshape(-1, 3)
@@ -253,7 +253,7 @@ def test_the_gait_sheet_shows_a_person_from_four_sides() -> None:
         ]
         rows.append(np.hstack(tiles))
     sheet = np.vstack(rows)
-    out = Path(__file__).parents[2] / "out"
+    out = Path(__file__).parents[3] / "out"
     out.mkdir(exist_ok=True)
     cv2.imwrite(str(out / "gait.png"), sheet)
     assert sheet.shape == (1200, 960, 3)

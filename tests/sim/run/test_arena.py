@@ -14,6 +14,7 @@ import pytest
 
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
+from limo_sim.run.catalogue import load
 from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Scenario, Wheels
 from limo_sim.world.variants import made_up
 
@@ -22,7 +23,7 @@ FOLLOWABLE = Scenario.load("followable")
 
 def fingerprint(name: str, seed: int, steps: int = 60) -> str:
     """Hash everything a run shows."""
-    arena, digest = Arena(Scenario.load(name), seed), hashlib.sha256()
+    arena, digest = Arena(load(name), seed), hashlib.sha256()
     for step in range(steps):
         if step % 5 == 0:
             frame = arena.frame()

@@ -15,7 +15,7 @@ from limo_hog.follow.twist import Twist
 from limo_sim.run.episode import NOTHING, Episode, Step
 from limo_sim.run.score import ScoreCard, on_person, score
 from limo_sim.run.sweep import estimate, summarise
-from limo_sim.sensing.camera import Contacts, PersonTruth, Truth
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
 from limo_sim.world.scenario import Scenario
 
 BOX = (300, 100, 60, 120)

@@ -65,7 +65,12 @@ class Drive:
     @property
     def twist(self) -> Twist:
         """How fast the wheels move the robot when they do not slip."""
-        return Twist((self.left + self.right) / 2, (self.right - self.left) / WHEEL_SEPARATION)
+        return twist_of(self.left, self.right)
+
+
+def twist_of(left: float, right: float) -> Twist:
+    """Return the motion of the robot from that of its wheels' rims, as speeds [m/s] or as distances [m]."""
+    return Twist((left + right) / 2, (right - left) / WHEEL_SEPARATION)
 
 
 def integrate(x: float, y: float, yaw: float, forward: float, turn: float) -> tuple[float, float, float]:

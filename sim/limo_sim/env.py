@@ -17,9 +17,9 @@ from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.run.catalogue import load
 from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import HEIGHT, WIDTH
-from limo_sim.world.truth import Contacts, Truth
 from limo_sim.world.robot import WHEEL_SEPARATION
 from limo_sim.world.scenario import Scenario
+from limo_sim.world.truth import Contacts, Truth
 from limo_sim.world.variants import made_up
 
 ACTIONS_PER_SECOND = 10

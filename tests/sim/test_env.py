@@ -11,14 +11,14 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from limo_sim.env import LimoFollow, reward_parts
-from limo_sim.world.truth import Contacts, PersonTruth, Truth
 from limo_sim.world.scenario import Person, Scenario
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
 STRAIGHT = np.array([0.2, 0.0], np.float32)
 
 
 def seen_at(distance: float, visible: float, person: int = 0, wall: int = 0) -> Truth:
-    somebody = PersonTruth(distance, 0.0, 0.0, distance, 0.0, visible, None)
+    somebody = PersonTruth(distance, 0.0, 0.0, distance, 0.0, distance, visible, None)
     return Truth(1.0, (0.0, 0.0, 0.0), (somebody,), Contacts(person, wall))
 
 

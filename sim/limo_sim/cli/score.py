@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 #: Columns of the table: a figure of the score card, its heading, its unit, how it is written.
 _COLUMNS = (
+    ("success", "suc-\ncess", "%", ".0f"),
     ("in_view", "in\nview", "%", ".1f"),
     ("pixel_error_mean", "off\ncentre", "px", ".1f"),
-    ("distance_rms_error_m", "error\nto 1.5", "m", ".2f"),
-    ("zone_social", "social\nzone", "%", ".1f"),
+    ("distance_rms_error_m", "dist.\nerror", "m", ".2f"),
     ("found_again", "found\nagain", "%", ".1f"),
     ("follows_first", "same\nperson", "%", ".1f"),
     ("clearance_min_m", "least\nclear", "m", ".2f"),

@@ -16,13 +16,13 @@ from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.twist import Twist
 from limo_sim.sensing import imu, lidar
 from limo_sim.sensing.camera import CameraPose, Frame
-from limo_sim.world.truth import Contacts, PersonTruth, Truth
 from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
 from limo_sim.world.person import Pose, Walk, legs_at, trunk_radius
 from limo_sim.world.robot import HALF_LENGTH, HALF_WIDTH, Drive, integrate, twist_of
 from limo_sim.world.scenario import ROOM_HALF, Scenario
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
 STEPS_PER_SECOND = 50
 STEP_S = 1 / STEPS_PER_SECOND

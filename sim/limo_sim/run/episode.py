@@ -19,8 +19,8 @@ from limo_hog.follow.sense.region import Region
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.sensing.camera import FOCAL_PX, Frame
-from limo_sim.world.truth import Contacts, Truth
 from limo_sim.world.scenario import Scenario
+from limo_sim.world.truth import Contacts, Truth
 
 S = TypeVar("S")
 
@@ -95,6 +95,9 @@ class Episode:
         How often the robot touched a person, and a wall or furniture.
     wall_seconds
         How long the run took [s].
+    target_distance
+        Distance that the controller held at the end, from the camera to the person's surface [m]; None where it holds
+        none.
     """
 
     scenario: Scenario
@@ -105,6 +108,7 @@ class Episode:
     steps: tuple[Step, ...]
     contacts: Contacts
     wall_seconds: float
+    target_distance: float | None = None
 
 
 def run_episode(
@@ -186,6 +190,7 @@ def run_episode(
         tuple(steps),
         arena.contacts,
         time.perf_counter() - began,
+        getattr(controller, "target_distance", None),
     )
 
 

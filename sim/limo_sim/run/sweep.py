@@ -20,6 +20,7 @@ from limo_sim.run.score import ScoreCard, score
 
 #: Figures of a score card that are summed up, in the order they are shown.
 MEASURES = (
+    "success",
     "in_view",
     "detected",
     "best_box_wrong",
@@ -28,11 +29,13 @@ MEASURES = (
     "zone_social",
     "found_again",
     "follows_first",
+    "identity_switches",
     "clearance_min_m",
     "contacts_person",
     "contacts_wall",
     "path_wrong_m",
     "mean_abs_domega",
+    "jerk_mean",
     "first_detection_s",
     "detect_ms_mean",
 )

@@ -32,6 +32,11 @@ class Tunable(Generic[S]):
         return self._controller.step(observation, state)
 
     @property
+    def target_distance(self) -> float | None:
+        """Distance that the controller holds now [m]; None where it holds none."""
+        return self.parameters.get("target_distance")
+
+    @property
     def parameters(self) -> dict[str, float]:
         """The numbers that can be set."""
         if not dataclasses.is_dataclass(self._controller):

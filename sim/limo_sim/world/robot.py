@@ -73,6 +73,11 @@ def twist_of(left: float, right: float) -> Twist:
     return Twist((left + right) / 2, (right - left) / WHEEL_SEPARATION)
 
 
+def max_turn_rate(wheel_speed: float) -> float:
+    """Return how fast wheels of a top speed [m/s], one forward and one backward, turn the robot [rad/s]."""
+    return twist_of(-wheel_speed, wheel_speed).angular
+
+
 def integrate(x: float, y: float, yaw: float, forward: float, turn: float) -> tuple[float, float, float]:
     """Move a pose along the arc of `forward` metres that turns by `turn` [rad]."""
     chord = forward * (math.sin(turn / 2) / (turn / 2) if turn else 1.0)

@@ -42,7 +42,9 @@ def test_scenarios_drawn_from_seeds_are_valid_and_differ() -> None:
     assert made[7] == load("random:7")
 
 
-@pytest.mark.parametrize("name", ["wrokshop", "wrokshop:3", "workshop:", "workshop:-1", "workshop:1.5", "random", "", ":"])
+@pytest.mark.parametrize(
+    "name", ["wrokshop", "wrokshop:3", "workshop:", "workshop:-1", "workshop:1.5", "random", "", ":"]
+)
 def test_an_unknown_name_is_refused_with_what_there_is(name: str) -> None:
     with pytest.raises(ScenarioError, match=f"unknown scenario {name}: want one of .*workshop.*random:SEED"):
         load(name)

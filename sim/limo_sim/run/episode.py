@@ -17,8 +17,9 @@ from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.sense.region import Region
 from limo_sim.run.arena import Arena
-from limo_sim.sensing.camera import FOCAL_PX, Contacts, Frame, Truth
+from limo_sim.sensing.camera import FOCAL_PX, Frame
 from limo_sim.world.scenario import Scenario
+from limo_sim.world.truth import Contacts, Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +107,9 @@ class Episode:
         How often the robot touched a person, and a wall or furniture.
     wall_seconds
         How long the run took [s].
+    target_distance
+        Distance that the controller held at the end, from the camera to the person's surface [m]; None where it holds
+        none.
     """
 
     scenario: Scenario
@@ -116,6 +120,7 @@ class Episode:
     steps: tuple[Step, ...]
     contacts: Contacts
     wall_seconds: float
+    target_distance: float | None = None
 
 
 def run_episode(
@@ -181,4 +186,5 @@ def run_episode(
         tuple(steps),
         arena.contacts,
         time.perf_counter() - began,
+        getattr(controller, "target_distance", None),
     )

@@ -94,6 +94,12 @@ class Tunable(Generic[S]):
         return self._controller.step(observation, state)
 
     @property
+    def target_distance(self) -> float | None:
+        """Distance that the controller holds now [m]; None where it holds none."""
+        target = self.parameters.get("target_distance")
+        return None if target is None else target.value
+
+    @property
     def parameters(self) -> dict[str, Parameter]:
         """The numbers that can be set, by name."""
         return {parameter.name: parameter for parameter in _parameters_of(self._controller)}

@@ -62,7 +62,17 @@ class Drive:
     @property
     def twist(self) -> Twist:
         """How fast the wheels move the robot when they do not slip."""
-        return Twist((self.left + self.right) / 2, (self.right - self.left) / LIMO.wheel_separation)
+        return twist_of(self.left, self.right)
+
+
+def twist_of(left: float, right: float) -> Twist:
+    """Return the motion of the robot from that of its wheels' rims, as speeds [m/s] or as distances [m]."""
+    return Twist((left + right) / 2, (right - left) / LIMO.wheel_separation)
+
+
+def max_turn_rate(wheel_speed: float) -> float:
+    """Return how fast wheels of a top speed [m/s], one forward and one backward, turn the robot [rad/s]."""
+    return twist_of(-wheel_speed, wheel_speed).angular
 
 
 def integrate(x: float, y: float, yaw: float, forward: float, turn: float) -> tuple[float, float, float]:

@@ -92,6 +92,8 @@ class World:
         What the detector was asked to look at in the run, as "uint8 (480, 640, 3)", each once.
     callbacks
         How long each callback took.
+    parameters
+        The newest values of the nodes' parameters, by name.
     fault
         What went wrong first in the script, even if the script hid it.
     """
@@ -121,6 +123,7 @@ class World:
         self.fault: BaseException | None = None
         self.callbacks: list[Callback] = []
         self.asked: list[str] = []
+        self.parameters: dict[str, Any] = {}
         self._outlet = Outlet(self.arena)
         self._steps: list[Step] = []
         self._frame: Frame | None = None
@@ -210,7 +213,13 @@ class World:
             steps=tuple(self._steps),
             contacts=self.arena.contacts,
             wall_seconds=time.perf_counter() - self._began,
+            target_distance=self._target_distance(),
         )
+
+    def _target_distance(self) -> float | None:
+        """Return the node's parameter `target_distance` [m], None where no node has one that is a distance."""
+        value = self.parameters.get("target_distance")
+        return value if isinstance(value, float) and math.isfinite(value) and value > 0 else None
 
     def _drive(self, message: Any) -> None:
         parts = {

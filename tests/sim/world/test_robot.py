@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 from limo_hog.follow.twist import Twist
@@ -167,3 +168,29 @@ def test_a_drive_that_was_never_told_anything_stands_still() -> None:
         idle.advance(step / 50, 0.02)
     assert idle.twist == Twist()
     assert idle.watchdog_stops == 0
+
+
+@pytest.mark.parametrize(("speed", "turn"), [(0.3, 0.0), (0.3, 0.5), (0.0, 1.0)])
+def test_the_yaw_of_slipping_wheels_strays_as_independent_noise_on_each_wheel_does(speed: float, turn: float) -> None:
+    slip, seconds, runs = 0.5, 2.0, 150
+    scenario = dataclasses.replace(EMPTY, odometry=Wheels(slip=slip), robot=Robot(wheel_acceleration=10.0))
+    errors = []
+    for seed in range(runs):
+        arena, exact = Arena(scenario, seed), Arena(dataclasses.replace(scenario, odometry=Wheels(slip=0.0)), seed)
+        for one in (arena, exact):
+            drive(one, Twist(speed, turn), seconds)
+        errors.append(arena.odometry().yaw - exact.odometry().yaw)
+    # Each step a wheel that rolled d [m] is read as d (1 + slip n), n standard normal: the variances of the steps add
+    # up, and yaw is the difference of the wheels over their separation.
+    left, right = speed - turn * 0.172 / 2, speed + turn * 0.172 / 2
+    variance = seconds * 50 * (slip / 50) ** 2 * (left**2 + right**2) / 0.172**2
+    # 99.9 % of a chi-squared variable of 150 degrees of freedom lie within 0.66 … 1.43 of its mean; the wheels reach
+    # full speed within 0.04 s.
+    assert 0.66 < np.mean(np.square(errors)) / variance < 1.43
+
+
+def test_driving_straight_on_slipping_wheels_strays_in_yaw() -> None:
+    arena = Arena(dataclasses.replace(EMPTY, odometry=Wheels(slip=0.5)))
+    drive(arena, Twist(0.3, 0.0), 2.0)
+    assert abs(arena.odometry().yaw) > 0.01
+    assert arena.truth().robot[2] == 0.0

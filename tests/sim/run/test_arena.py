@@ -12,9 +12,14 @@ import sys
 import numpy as np
 import pytest
 
+from limo_hog.detector import PeopleDetector
+from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Scenario, Wheels
+from limo_sim.run.catalogue import load
+from limo_sim.sensing.camera import CENTRE_X, FOCAL_PX
+from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Person, Scenario, Wheels
+from limo_sim.world.truth import Contacts
 from limo_sim.world.variants import made_up
 
 FOLLOWABLE = Scenario.load("followable")
@@ -22,7 +27,7 @@ FOLLOWABLE = Scenario.load("followable")
 
 def fingerprint(name: str, seed: int, steps: int = 60) -> str:
     """Hash everything a run shows."""
-    arena, digest = Arena(Scenario.load(name), seed), hashlib.sha256()
+    arena, digest = Arena(load(name), seed), hashlib.sha256()
     for step in range(steps):
         if step % 5 == 0:
             frame = arena.frame()
@@ -213,3 +218,42 @@ def test_the_products_names_are_in_one_place() -> None:
 
     for name in ("Arena", "Episode", "Scenario", "ScoreCard", "run_episode", "score"):
         assert callable(getattr(limo_sim, name))
+
+
+@pytest.mark.parametrize("facing", [0.0, 0.8, math.pi / 2, 2.4, math.pi])
+@pytest.mark.parametrize("distance", [1.7, 2.5])
+def test_the_surface_distance_is_what_the_depth_image_shows_in_the_middle_of_a_person(
+    facing: float, distance: float
+) -> None:
+    # 0.3 m/s: the gait goes through its phases, the direction stays
+    away = distance + 0.6 * math.cos(facing), 0.6 * math.sin(facing)
+    scenario = Scenario(people=(Person(route=((distance, 0.0, 0.0), (*away, 0.0)), speed=0.3),))
+    arena, detector, errors = Arena(scenario, 0), PeopleDetector(), []
+    while arena.time < 1.8:
+        frame = arena.frame()
+        person = frame.truth.people[0]
+        found = detector.detect(frame.image)
+        if len(found) and person is not None:
+            depth = person_depth(frame.depth, found.boxes[0])
+            if depth is not None:
+                # depth is along the optical axis, the distance along the ray
+                aside = (found.boxes[0][0] + found.boxes[0][2] / 2 - CENTRE_X) / FOCAL_PX
+                errors.append(person.surface_distance - depth * math.hypot(1.0, aside))
+        for _ in range(5):
+            arena.step()
+    assert len(errors) > 12
+    assert abs(np.median(errors)) < 0.02
+
+
+def test_the_contacts_of_a_frame_are_those_at_its_stamp() -> None:
+    standing = Scenario(people=(Person(route=((0.6, 0.0, 0.0),)),), camera=Camera(latency_s=0.4))
+    arena = Arena(standing, 0)
+    while arena.contacts.person == 0 and arena.time < 5.0:
+        arena.command(Twist(0.3, 0.0))
+        arena.step()
+    for _ in range(10):
+        arena.step()
+    frame = arena.frame()
+    assert frame.stamp < arena.time - 0.3
+    assert frame.truth.contacts == Contacts(0, 0)
+    assert arena.truth().contacts == Contacts(1, 0)

@@ -253,7 +253,7 @@ def test_the_gait_sheet_shows_a_person_from_four_sides() -> None:
         ]
         rows.append(np.hstack(tiles))
     sheet = np.vstack(rows)
-    out = Path(__file__).parents[2] / "out"
+    out = Path(__file__).parents[3] / "out"
     out.mkdir(exist_ok=True)
     cv2.imwrite(str(out / "gait.png"), sheet)
     assert sheet.shape == (1200, 960, 3)

@@ -216,7 +216,7 @@ impl Hog {
         let error = plan.score_error_bound();
         let rescore_margin = if exact_weights || error > SCORE_ERROR_MAX { f64::INFINITY } else { error };
         PLANES.with(|planes| {
-            fast::split(*backend, planes, image);
+            fast::fill_planes(*backend, planes, image);
             work(&Scorer { fast: Some(Fast { backend: *backend, plan, planes, rescore_margin }), ..exact })
         })
     }

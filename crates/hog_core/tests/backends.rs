@@ -97,6 +97,20 @@ fn a_window_as_large_as_the_kernels_serve_is_scored_alike() {
     }
 }
 
+#[test]
+fn a_detector_that_is_a_windows_own_descriptor_is_scored_alike() {
+    // The largest sums that the prefilter can meet: weights in the direction of the features.
+    for (seed, scale) in [(1, 0.1), (2, 1.0)] {
+        let picture = Picture::new(150, 200, 3, seed);
+        let params = HogParams::default();
+        let hog = Hog::new(&params, None).unwrap();
+        let mut own = vec![0.0; 3780];
+        hog.compute(picture.view(), &STEPS, Some(&[(16, 24)]), &mut own).unwrap();
+        let coefficients = own.iter().map(|x| scale * x).collect();
+        compare(&Detector { params, coefficients }, (150, 200), 3, STEPS, seed);
+    }
+}
+
 /// All hits of a pyramid, by the exact path alone.
 fn candidates(detector: &Detector, image: ImageView, search: &Search, scale: f64) -> Vec<Candidate> {
     let (spec, mut found) = (detector.spec(), Vec::new());

@@ -7,6 +7,7 @@ use crate::params::HogSpec;
 use crate::pyramid::Grid;
 
 use super::backend::Backend;
+#[cfg(target_arch = "x86_64")]
 use super::lane::Lane;
 #[cfg(target_arch = "aarch64")]
 use super::lane::neon::Neon;
@@ -19,40 +20,41 @@ use super::rows::Planes;
 
 /// The plan of the fast path for this geometry and SVM, if the kernels can serve them.
 pub(crate) fn plan(backend: Backend, spec: &HogSpec, svm: &Svm) -> Option<Plan> {
-    Plan::new(spec, svm, gamma_is_exact(backend), backend != Backend::Avx2)
+    Plan::new(spec, svm, sqrt_of_byte_is_exact(backend), backend != Backend::Avx2)
 }
 
 /// Whether the backend's estimated square root is right for every pixel value; CPUs differ in their estimates.
-fn gamma_is_exact(backend: Backend) -> bool {
+fn sqrt_of_byte_is_exact(backend: Backend) -> bool {
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => unsafe { avx512_gamma_is_exact() },
+        Backend::Avx512 => unsafe { avx512_sqrt_of_byte_is_exact() },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => unsafe { avx2_gamma_is_exact() },
+        Backend::Avx2 => unsafe { avx2_sqrt_of_byte_is_exact() },
         _ => false,
     }
 }
 
+#[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn is_exact<L: Lane>(l: L) -> bool {
     (0..=255u8).all(|value| {
         let value = f32::from(value);
-        l.first(l.gamma(l.splat(value))) == value.sqrt()
+        l.first(l.sqrt_of_byte(l.splat(value))) == value.sqrt()
     })
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
-fn avx512_gamma_is_exact() -> bool {
+fn avx512_sqrt_of_byte_is_exact() -> bool {
     // SAFETY: this function's features are the tokens'; a level's last strip is AVX2's.
     unsafe { is_exact(Avx512::new()) && is_exact(Avx2::new()) }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2_gamma_is_exact() -> bool {
+fn avx2_sqrt_of_byte_is_exact() -> bool {
     // SAFETY: this function's features are the token's.
     unsafe { is_exact(Avx2::new()) }
 }
@@ -93,11 +95,11 @@ pub(crate) fn detect(
 }
 
 /// Fills `planes` with the pixels of `image`.
-pub(crate) fn split(backend: Backend, planes: &mut Planes, image: ImageView) {
+pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageView) {
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available; who has AVX-512 has AVX2.
-        Backend::Avx512 | Backend::Avx2 => unsafe { avx2_split(planes, image) },
+        Backend::Avx512 | Backend::Avx2 => unsafe { avx2_fill_planes(planes, image) },
         #[cfg(target_arch = "aarch64")]
         // SAFETY: as in `neon`.
         Backend::Neon => planes.fill(unsafe { Neon::new() }, image),
@@ -107,7 +109,7 @@ pub(crate) fn split(backend: Backend, planes: &mut Planes, image: ImageView) {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2_split(planes: &mut Planes, image: ImageView) {
+fn avx2_fill_planes(planes: &mut Planes, image: ImageView) {
     // SAFETY: this function's features are the token's.
     planes.fill(unsafe { Avx2::new() }, image);
 }

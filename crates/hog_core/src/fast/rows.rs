@@ -35,7 +35,7 @@ impl Planes {
                 let (second, third) = rest.split_at_mut(plane);
                 let to = [first, second, third].map(|plane| plane[y * width..][..width].as_mut_ptr());
                 // SAFETY: a row of the image and of each plane has `width` pixels.
-                unsafe { l.split(row.as_ptr(), to, width) };
+                unsafe { l.deinterleave(row.as_ptr(), to, width) };
             }
         }
     }
@@ -102,7 +102,7 @@ impl Band {
                     to: all[channel * self.plane + self.left..][..width.next_multiple_of(STEP)].as_mut_ptr(),
                 });
                 // SAFETY: every tap lies in its row, behind which are SLACK bytes; there is room for all groups.
-                unsafe { l.mix::<C>(rows, tap.weight as i16, &self.columns) };
+                unsafe { l.resize_row::<C>(rows, tap.weight as i16, &self.columns) };
             } else {
                 for channel in 0..C {
                     let to = &mut all[channel * self.plane + self.left..][..width];

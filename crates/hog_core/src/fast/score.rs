@@ -1,4 +1,4 @@
-//! The SVM over a level's blocks: a first look in bytes at every window, exact sums for those it lets through.
+//! The SVM over a level's blocks: a prefilter in bytes at every window, exact sums for those it lets through.
 
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
@@ -6,7 +6,7 @@ use super::lane::Lane;
 use super::layout::{ACROSS, BLOCK, WORDS};
 use super::plan::Plan;
 
-/// Rows of windows that the first look takes at a time.
+/// Rows of windows that the prefilter takes at a time.
 const ROWS: usize = 8;
 
 /// The windows of a level's lattice and the blocks they are made of.
@@ -41,20 +41,20 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
     let groups = windows.width.div_ceil(L::LANES);
     masks.clear();
     masks.resize(groups * windows.height, u32::MAX);
-    let least = (threshold - plan.bias - plan.score_error_bound - plan.coarse.bound) / plan.coarse.unit;
+    let least = (threshold - plan.bias - plan.score_error_bound - plan.prefilter.bound) / plan.prefilter.unit;
     let least = least.floor().clamp(f64::from(i32::MIN), f64::from(i32::MAX)) as i32;
     let mut top = 0;
-    while L::COARSE_VECTORS > 0 && top < windows.height {
+    while L::PREFILTER_VECTORS > 0 && top < windows.height {
         let rows = (windows.height - top).min(ROWS);
         let mut group = 0;
         while group < groups {
             // SAFETY: the windows of these rows and lanes are the caller's promise.
             unsafe {
-                if L::COARSE_VECTORS == 2 && group + 1 < groups {
-                    coarse::<L, 2>(l, windows, least, top, rows, group, groups, masks);
+                if L::PREFILTER_VECTORS == 2 && group + 1 < groups {
+                    prefilter::<L, 2>(l, windows, least, top, rows, group, groups, masks);
                     group += 2;
                 } else {
-                    coarse::<L, 1>(l, windows, least, top, rows, group, groups, masks);
+                    prefilter::<L, 1>(l, windows, least, top, rows, group, groups, masks);
                     group += 1;
                 }
             }
@@ -107,10 +107,10 @@ unsafe fn exact<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) -> f64 
     score
 }
 
-/// The first look at `rows` rows of `V` vectors of windows.
+/// The prefilter at `rows` rows of `V` vectors of windows.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "a tile is named by all of them")]
-unsafe fn coarse<L: Lane, const V: usize>(
+unsafe fn prefilter<L: Lane, const V: usize>(
     l: L,
     windows: &WindowGrid,
     least: i32,
@@ -158,7 +158,7 @@ unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>
     totals: &mut [[L::Sum; V]; ROWS],
 ) {
     let size = windows.plan.blocks;
-    let coarse = &windows.plan.coarse;
+    let prefilter = &windows.plan.prefilter;
     let mut total = *totals;
     for block_x in 0..size.width {
         let mut sum = total;
@@ -173,7 +173,7 @@ unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>
                 // SAFETY: promised by the caller of `score`.
                 *value = unsafe { l.load_words(bytes.add(word * windows.lanes + block_x + v * L::LANES)) };
             }
-            let weights = &coarse.words[(block_x * WORDS + word) * size.height..][..size.height];
+            let weights = &prefilter.words[(block_x * WORDS + word) * size.height..][..size.height];
             for row in FROM..TO {
                 // SAFETY: y - row is a block row of the window: the caller chose FROM and TO so. A check for each of
                 // these would cost as much as the sum.
@@ -184,7 +184,7 @@ unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>
             }
         }
         for row in FROM..TO {
-            let multiple = coarse.multiples[block_x * size.height + y - row];
+            let multiple = prefilter.multiples[block_x * size.height + y - row];
             for v in 0..V {
                 total[row][v] = l.end_block(total[row][v], sum[row][v], multiple);
             }

@@ -140,7 +140,7 @@ unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL 
         Gamma::Off => {}
         Gamma::Estimated => {
             for value in &mut columns {
-                *value = l.gamma(*value);
+                *value = l.sqrt_of_byte(*value);
             }
         }
         Gamma::Exact => {
@@ -201,9 +201,9 @@ fn square<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> L::F {
 pub(super) fn vote<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> LaneVotes<L> {
     let (xx, yy) = (l.mul(dx, dx), l.mul(dy, dy));
     let squared = l.add(xx, yy);
-    let magnitude = l.root(squared);
+    let magnitude = l.sqrt_approx(squared);
     // OpenCV's polynomial for the arctangent of 0..=1, in units of two bins.
-    let c = l.ratio(l.min_abs(dx, dy), l.max_abs(dx, dy));
+    let c = l.div_approx(l.min_abs(dx, dy), l.max_abs(dx, dy));
     let cc = l.mul(c, c);
     let p = l.mul_add(cc, l.splat(ARC[3]), l.splat(ARC[2]));
     let p = l.mul_add(p, cc, l.splat(ARC[1]));
@@ -286,7 +286,7 @@ fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
                     acc[i][k] = if bin.is_multiple_of(8) || (bin == 1 && k == 2) {
                         l.mul_add_masked(kept, w[k], acc[i][k])
                     } else {
-                        l.weigh(kept, products[k], w[k], acc[i][k])
+                        l.add_product(kept, products[k], w[k], acc[i][k])
                     };
                 }
             }

@@ -87,8 +87,8 @@ impl Detector {
         steps.grid(Size::new(image.width(), image.height()), &spec)
     }
 
-    /// The largest distance between a score of the fast path and the exact one that is taken for rounding: a tenth of
-    /// the margin within which windows are scored again, Σ‖w‖ over the blocks being the score's largest possible value.
+    /// The largest rounding error of a fast score that a test lets pass: half the bound that the crate relies on, which
+    /// is a share of Σ‖w‖ over the SVM's blocks.
     pub fn rounding(&self) -> f64 {
         let spec = self.spec();
         let blocks = self.coefficients[..spec.descriptor_len()].chunks_exact(spec.block_len);

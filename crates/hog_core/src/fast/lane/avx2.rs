@@ -4,33 +4,14 @@ use std::arch::x86_64::*;
 
 use super::{Columns, Lane, ODD, RowPointers};
 
-/// Proof that the CPU has AVX2 and FMA.
-#[derive(Clone, Copy)]
-pub(in crate::fast) struct Avx2(());
-
-impl Avx2 {
-    /// # Safety
-    /// The CPU has AVX2 and FMA.
-    #[inline(always)]
-    pub(in crate::fast) unsafe fn new() -> Self {
-        Self(())
-    }
-}
-
-/// Runs intrinsics that the token allows.
-macro_rules! isa {
-    ($e:expr) => {{
-        // SAFETY: `self` proves that the CPU has the instruction set; pointers are the caller's promise.
-        unsafe { $e }
-    }};
-}
+token!(Avx2, "AVX2 and FMA");
 
 impl Lane for Avx2 {
     const LANES: usize = 8;
     const WIDE: bool = false;
     const GROUP: usize = 8;
     const REACH: usize = 32;
-    const COARSE_VECTORS: usize = 1;
+    const PREFILTER_VECTORS: usize = 1;
     type F = __m256;
     type I = __m256i;
     type Sum = __m256i;
@@ -39,10 +20,21 @@ impl Lane for Avx2 {
     /// The integer below the position, and the nearest one.
     type Slots = [__m256; 2];
 
-    #[inline(always)]
-    fn splat(self, x: f32) -> __m256 {
-        isa!(_mm256_set1_ps(x))
+    instructions! {
+        splat(x: f32) -> __m256 = _mm256_set1_ps;
+        add(a: __m256, b: __m256) -> __m256 = _mm256_add_ps;
+        sub(a: __m256, b: __m256) -> __m256 = _mm256_sub_ps;
+        mul(a: __m256, b: __m256) -> __m256 = _mm256_mul_ps;
+        min(a: __m256, b: __m256) -> __m256 = _mm256_min_ps;
+        max(a: __m256, b: __m256) -> __m256 = _mm256_max_ps;
+        mul_add(a: __m256, b: __m256, c: __m256) -> __m256 = _mm256_fmadd_ps;
+        mul_sub(a: __m256, b: __m256, c: __m256) -> __m256 = _mm256_fmsub_ps;
+        sqrt(x: __m256) -> __m256 = _mm256_sqrt_ps;
+        div(a: __m256, b: __m256) -> __m256 = _mm256_div_ps;
+        zero_where(mask: __m256, x: __m256) -> __m256 = _mm256_andnot_ps;
+        first(x: __m256) -> f32 = _mm256_cvtss_f32;
     }
+
     #[inline(always)]
     unsafe fn load(self, from: *const f32) -> __m256 {
         isa!(_mm256_loadu_ps(from))
@@ -52,68 +44,8 @@ impl Lane for Avx2 {
         isa!(_mm256_storeu_ps(to, x));
     }
     #[inline(always)]
-    fn add(self, a: __m256, b: __m256) -> __m256 {
-        isa!(_mm256_add_ps(a, b))
-    }
-    #[inline(always)]
-    fn sub(self, a: __m256, b: __m256) -> __m256 {
-        isa!(_mm256_sub_ps(a, b))
-    }
-    #[inline(always)]
-    fn mul(self, a: __m256, b: __m256) -> __m256 {
-        isa!(_mm256_mul_ps(a, b))
-    }
-    #[inline(always)]
-    fn min(self, a: __m256, b: __m256) -> __m256 {
-        isa!(_mm256_min_ps(a, b))
-    }
-    #[inline(always)]
-    fn max(self, a: __m256, b: __m256) -> __m256 {
-        isa!(_mm256_max_ps(a, b))
-    }
-    #[inline(always)]
-    fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
-        isa!(_mm256_fmadd_ps(a, b, c))
-    }
-    #[inline(always)]
-    fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
-        isa!(_mm256_fmsub_ps(a, b, c))
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
-        isa!(_mm256_fnmadd_ps(a, b, c))
-    }
-    #[inline(always)]
     fn abs(self, x: __m256) -> __m256 {
         isa!(_mm256_andnot_ps(_mm256_set1_ps(-0.0), x))
-    }
-    #[inline(always)]
-    fn min_abs(self, a: __m256, b: __m256) -> __m256 {
-        self.min(self.abs(a), self.abs(b))
-    }
-    #[inline(always)]
-    fn max_abs(self, a: __m256, b: __m256) -> __m256 {
-        isa!(_mm256_max_ps(self.abs(a), self.abs(b)))
-    }
-    #[inline(always)]
-    fn sqrt(self, x: __m256) -> __m256 {
-        isa!(_mm256_sqrt_ps(x))
-    }
-    #[inline(always)]
-    fn gamma(self, x: __m256) -> __m256 {
-        self.sqrt(x) // as fast as two Newton steps from an estimate of 12 bits
-    }
-    #[inline(always)]
-    fn root(self, x: __m256) -> __m256 {
-        isa!(_mm256_sqrt_ps(x))
-    }
-    #[inline(always)]
-    fn ratio(self, a: __m256, b: __m256) -> __m256 {
-        isa!(_mm256_div_ps(a, _mm256_max_ps(b, _mm256_set1_ps(1e-20))))
-    }
-    #[inline(always)]
-    fn div(self, a: __m256, b: __m256) -> __m256 {
-        isa!(_mm256_div_ps(a, b))
     }
     #[inline(always)]
     fn less(self, a: __m256, b: __m256) -> __m256 {
@@ -122,10 +54,6 @@ impl Lane for Avx2 {
     #[inline(always)]
     fn negate_where(self, mask: __m256, x: __m256) -> __m256 {
         isa!(_mm256_xor_ps(x, _mm256_and_ps(mask, _mm256_set1_ps(-0.0))))
-    }
-    #[inline(always)]
-    fn zero_where(self, mask: __m256, x: __m256) -> __m256 {
-        isa!(_mm256_andnot_ps(mask, x))
     }
     #[inline(always)]
     fn select(self, mask: __m256, yes: __m256, no: __m256) -> __m256 {
@@ -160,10 +88,6 @@ impl Lane for Avx2 {
         self.mul_add(x, weight, sum)
     }
     #[inline(always)]
-    fn weigh(self, x: __m256, _product: __m256, weight: __m256, sum: __m256) -> __m256 {
-        self.mul_add(x, weight, sum)
-    }
-    #[inline(always)]
     fn shift_in(self, x: __m256, next: f32) -> __m256 {
         isa!({
             let rotated = _mm256_permutevar8x32_ps(x, _mm256_set_epi32(0, 7, 6, 5, 4, 3, 2, 1));
@@ -176,10 +100,6 @@ impl Lane for Avx2 {
             let rotated = _mm256_permutevar8x32_ps(x, _mm256_set_epi32(6, 5, 4, 3, 2, 1, 0, 7));
             _mm256_blend_ps::<0x01>(rotated, _mm256_set1_ps(before))
         })
-    }
-    #[inline(always)]
-    fn first(self, x: __m256) -> f32 {
-        isa!(_mm256_cvtss_f32(x))
     }
     #[inline(always)]
     unsafe fn low_words(self, from: *const u8) -> __m256i {
@@ -252,7 +172,7 @@ impl Lane for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
+    unsafe fn resize_row<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
         // Two groups at a time, one in each half of a vector.
         isa!({
             let (index, weights) = (columns.index.as_ptr(), columns.weight.as_ptr());
@@ -290,7 +210,7 @@ impl Lane for Avx2 {
         });
     }
     #[inline(always)]
-    unsafe fn split(self, from: *const u8, to: [*mut u8; 3], len: usize) {
+    unsafe fn deinterleave(self, from: *const u8, to: [*mut u8; 3], len: usize) {
         // 16 pixels are three vectors; each plane takes its bytes from all three.
         isa!({
             let whole = len - len % 16;
@@ -319,7 +239,11 @@ impl Lane for Avx2 {
                     _mm_storeu_si128(to.add(at).cast(), plane);
                 }
             }
-            super::portable::Portable.split(from.add(3 * whole), to.map(|to| to.add(whole)), len - whole);
+            super::portable::Portable.deinterleave(
+                from.add(3 * whole),
+                to.map(|to| to.add(whole)),
+                len - whole,
+            );
         });
     }
 }

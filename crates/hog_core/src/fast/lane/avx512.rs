@@ -4,33 +4,14 @@ use std::arch::x86_64::*;
 
 use super::{Columns, Lane, ODD, RowPointers};
 
-/// Proof that the CPU has AVX-512 F, BW, VL, DQ, VBMI and VNNI.
-#[derive(Clone, Copy)]
-pub(in crate::fast) struct Avx512(());
-
-impl Avx512 {
-    /// # Safety
-    /// The CPU has AVX-512 F, BW, VL, DQ, VBMI and VNNI.
-    #[inline(always)]
-    pub(in crate::fast) unsafe fn new() -> Self {
-        Self(())
-    }
-}
-
-/// Runs intrinsics that the token allows.
-macro_rules! isa {
-    ($e:expr) => {{
-        // SAFETY: `self` proves that the CPU has the instruction set; pointers are the caller's promise.
-        unsafe { $e }
-    }};
-}
+token!(Avx512, "AVX-512 F, BW, VL, DQ, VBMI and VNNI");
 
 impl Lane for Avx512 {
     const LANES: usize = 16;
     const WIDE: bool = true;
     const GROUP: usize = 32;
     const REACH: usize = 128;
-    const COARSE_VECTORS: usize = 2;
+    const PREFILTER_VECTORS: usize = 2;
     type F = __m512;
     type I = __m512i;
     type Sum = __m512i;
@@ -39,10 +20,22 @@ impl Lane for Avx512 {
     /// The integer below the position, and the nearest one.
     type Slots = [__m512; 2];
 
-    #[inline(always)]
-    fn splat(self, x: f32) -> __m512 {
-        isa!(_mm512_set1_ps(x))
+    instructions! {
+        splat(x: f32) -> __m512 = _mm512_set1_ps;
+        add(a: __m512, b: __m512) -> __m512 = _mm512_add_ps;
+        sub(a: __m512, b: __m512) -> __m512 = _mm512_sub_ps;
+        mul(a: __m512, b: __m512) -> __m512 = _mm512_mul_ps;
+        min(a: __m512, b: __m512) -> __m512 = _mm512_min_ps;
+        max(a: __m512, b: __m512) -> __m512 = _mm512_max_ps;
+        mul_add(a: __m512, b: __m512, c: __m512) -> __m512 = _mm512_fmadd_ps;
+        mul_sub(a: __m512, b: __m512, c: __m512) -> __m512 = _mm512_fmsub_ps;
+        abs(x: __m512) -> __m512 = _mm512_abs_ps;
+        sqrt(x: __m512) -> __m512 = _mm512_sqrt_ps;
+        div(a: __m512, b: __m512) -> __m512 = _mm512_div_ps;
+        first(x: __m512) -> f32 = _mm512_cvtss_f32;
+        dot_bytes(sum: __m512i, bytes: __m512i, weights: __m512i) -> __m512i = _mm512_dpbusd_epi32;
     }
+
     #[inline(always)]
     unsafe fn load(self, from: *const f32) -> __m512 {
         isa!(_mm512_loadu_ps(from))
@@ -50,42 +43,6 @@ impl Lane for Avx512 {
     #[inline(always)]
     unsafe fn store(self, to: *mut f32, x: __m512) {
         isa!(_mm512_storeu_ps(to, x));
-    }
-    #[inline(always)]
-    fn add(self, a: __m512, b: __m512) -> __m512 {
-        isa!(_mm512_add_ps(a, b))
-    }
-    #[inline(always)]
-    fn sub(self, a: __m512, b: __m512) -> __m512 {
-        isa!(_mm512_sub_ps(a, b))
-    }
-    #[inline(always)]
-    fn mul(self, a: __m512, b: __m512) -> __m512 {
-        isa!(_mm512_mul_ps(a, b))
-    }
-    #[inline(always)]
-    fn min(self, a: __m512, b: __m512) -> __m512 {
-        isa!(_mm512_min_ps(a, b))
-    }
-    #[inline(always)]
-    fn max(self, a: __m512, b: __m512) -> __m512 {
-        isa!(_mm512_max_ps(a, b))
-    }
-    #[inline(always)]
-    fn mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
-        isa!(_mm512_fmadd_ps(a, b, c))
-    }
-    #[inline(always)]
-    fn mul_sub(self, a: __m512, b: __m512, c: __m512) -> __m512 {
-        isa!(_mm512_fmsub_ps(a, b, c))
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
-        isa!(_mm512_fnmadd_ps(a, b, c))
-    }
-    #[inline(always)]
-    fn abs(self, x: __m512) -> __m512 {
-        isa!(_mm512_abs_ps(x))
     }
     #[inline(always)]
     fn min_abs(self, a: __m512, b: __m512) -> __m512 {
@@ -96,28 +53,12 @@ impl Lane for Avx512 {
         isa!(_mm512_range_ps::<0b1011>(a, b))
     }
     #[inline(always)]
-    fn sqrt(self, x: __m512) -> __m512 {
-        isa!(_mm512_sqrt_ps(x))
-    }
-    #[inline(always)]
-    fn gamma(self, x: __m512) -> __m512 {
+    fn sqrt_of_byte(self, x: __m512) -> __m512 {
         // Clamped to a normal number: a subnormal one would make every step slow.
         let r = isa!(_mm512_rsqrt14_ps(_mm512_max_ps(x, _mm512_set1_ps(1e-30))));
         let s = self.mul(x, r);
-        let rest = self.neg_mul_add(s, s, x);
+        let rest = isa!(_mm512_fnmadd_ps(s, s, x));
         self.mul_add(rest, self.mul(r, self.splat(0.5)), s)
-    }
-    #[inline(always)]
-    fn root(self, x: __m512) -> __m512 {
-        self.sqrt(x)
-    }
-    #[inline(always)]
-    fn ratio(self, a: __m512, b: __m512) -> __m512 {
-        isa!(_mm512_div_ps(a, _mm512_max_ps(b, _mm512_set1_ps(1e-20))))
-    }
-    #[inline(always)]
-    fn div(self, a: __m512, b: __m512) -> __m512 {
-        isa!(_mm512_div_ps(a, b))
     }
     #[inline(always)]
     fn less(self, a: __m512, b: __m512) -> __mmask16 {
@@ -176,7 +117,13 @@ impl Lane for Avx512 {
         isa!(_mm512_mask3_fmadd_ps(x, weight, sum, mask))
     }
     #[inline(always)]
-    fn weigh(self, (_, mask): (__m512, __mmask16), product: __m512, _weight: __m512, sum: __m512) -> __m512 {
+    fn add_product(
+        self,
+        (_, mask): (__m512, __mmask16),
+        product: __m512,
+        _weight: __m512,
+        sum: __m512,
+    ) -> __m512 {
         isa!(_mm512_mask_add_ps(sum, mask, sum, product))
     }
     #[inline(always)]
@@ -192,10 +139,6 @@ impl Lane for Avx512 {
             let before = _mm512_castps_si512(_mm512_set1_ps(before));
             _mm512_castsi512_ps(_mm512_alignr_epi32::<15>(_mm512_castps_si512(x), before))
         })
-    }
-    #[inline(always)]
-    fn first(self, x: __m512) -> f32 {
-        isa!(_mm512_cvtss_f32(x))
     }
     #[inline(always)]
     unsafe fn low_words(self, from: *const u8) -> __m512i {
@@ -254,10 +197,6 @@ impl Lane for Avx512 {
         total
     }
     #[inline(always)]
-    fn dot_bytes(self, sum: __m512i, bytes: __m512i, weights: __m512i) -> __m512i {
-        isa!(_mm512_dpbusd_epi32(sum, bytes, weights))
-    }
-    #[inline(always)]
     fn end_block(self, _total: __m512i, sum: __m512i, _multiple: i32) -> __m512i {
         sum // every multiple is 1
     }
@@ -267,7 +206,7 @@ impl Lane for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
+    unsafe fn resize_row<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
         isa!({
             let (index, weights) = (columns.index.as_ptr(), columns.weight.as_ptr());
             let (base, parts, one_vector) = (columns.base.as_ptr(), columns.parts, columns.span <= 64);
@@ -313,7 +252,7 @@ unsafe fn pairs(from: *const u8, index: __m512i, weight: __m512i, one_vector: bo
     })
 }
 
-/// Where `mix` finds its pixels: the third bytes of words that lie as `unpacklo` and `unpackhi` leave them.
+/// Where `resize_row` finds its pixels: the third bytes of words that lie as `unpacklo` and `unpackhi` leave them.
 const THIRD_BYTES: [u8; 64] = {
     let mut index = [0; 64];
     let mut i = 0;

@@ -1,15 +1,50 @@
-//! The vector a kernel is written for: one trait, an implementation per instruction set.
+//! The vector that kernels are written for: one trait, one implementation per instruction set.
+
+/// Runs intrinsics that the token `self` allows.
+macro_rules! isa {
+    ($e:expr) => {{
+        // SAFETY: the token proves that the CPU has the instruction set; pointers are the caller's promise.
+        unsafe { $e }
+    }};
+}
+
+/// A type whose value proves that the CPU has the instruction set `$features`.
+macro_rules! token {
+    ($name:ident, $features:literal) => {
+        #[doc = concat!("Proof that the CPU has ", $features, ".")]
+        #[derive(Clone, Copy)]
+        pub(in crate::fast) struct $name(());
+
+        impl $name {
+            #[doc = concat!("# Safety\nThe CPU has ", $features, ".")]
+            #[inline(always)]
+            pub(in crate::fast) unsafe fn new() -> Self {
+                Self(())
+            }
+        }
+    };
+}
+
+/// Methods of [`Lane`] that are one instruction each, with the operands in the same order.
+macro_rules! instructions {
+    ($($name:ident($($operand:ident: $kind:ty),*) -> $out:ty = $intrinsic:ident;)*) => {$(
+        #[inline(always)]
+        fn $name(self, $($operand: $kind),*) -> $out {
+            isa!($intrinsic($($operand),*))
+        }
+    )*};
+}
 
 #[cfg(target_arch = "x86_64")]
 pub(super) mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub(super) mod avx512;
-mod mix;
+mod columns;
 #[cfg(target_arch = "aarch64")]
 pub(super) mod neon;
 pub(super) mod portable;
 
-pub(super) use mix::{Columns, RowPointers};
+pub(super) use columns::{Columns, RowPointers};
 
 /// The first of the slots for odd bins.
 pub(super) const ODD: usize = 8;
@@ -22,13 +57,13 @@ pub(super) const ODD: usize = 8;
 pub(super) trait Lane: Copy {
     /// Numbers in a vector.
     const LANES: usize;
-    /// Whether there are registers for all 27 sums of a cell (32 registers), or only for a third of them (16).
+    /// Whether the registers (32) hold all 27 sums of a cell at once, or only a third of them (16 registers).
     const WIDE: bool;
     /// Single precision numbers.
     type F: Copy;
     /// 32-bit words.
     type I: Copy;
-    /// Totals of the first look at the SVM.
+    /// Totals of the quantised prefilter.
     type Sum: Copy;
     /// One truth value per lane.
     type M: Copy;
@@ -36,13 +71,14 @@ pub(super) trait Lane: Copy {
     type Masked: Copy;
     /// The slots of the two bins that each lane votes for.
     type Slots: Copy;
-    /// Output pixels that `mix` makes at a time ...
+    /// Output pixels that `resize_row` makes at a time.
     const GROUP: usize;
-    /// ... and the source pixels that a part of them may span.
+    /// Source pixels that a part of such a group may span.
     const REACH: usize;
 
-    /// Vectors of windows that the first look takes at a time; 0: there is none, all windows are summed exactly.
-    const COARSE_VECTORS: usize;
+    /// Vectors of windows that the quantised prefilter takes at a time; 0: no prefilter, all windows are scored in
+    /// single precision.
+    const PREFILTER_VECTORS: usize;
 
     fn splat(self, x: f32) -> Self::F;
     /// # Safety
@@ -60,23 +96,37 @@ pub(super) trait Lane: Copy {
     fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// a·b − c.
     fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
-    /// c − a·b.
-    fn neg_mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     fn abs(self, x: Self::F) -> Self::F;
     /// min(|a|, |b|).
-    fn min_abs(self, a: Self::F, b: Self::F) -> Self::F;
+    #[inline(always)]
+    fn min_abs(self, a: Self::F, b: Self::F) -> Self::F {
+        self.min(self.abs(a), self.abs(b))
+    }
     /// max(|a|, |b|).
-    fn max_abs(self, a: Self::F, b: Self::F) -> Self::F;
+    #[inline(always)]
+    fn max_abs(self, a: Self::F, b: Self::F) -> Self::F {
+        self.max(self.abs(a), self.abs(b))
+    }
     /// The square root, correctly rounded.
     fn sqrt(self, x: Self::F) -> Self::F;
-    /// The square root of a whole number of 0..=255, correctly rounded if the CPU's estimate is good enough.
-    fn gamma(self, x: Self::F) -> Self::F;
+    /// The square root of a whole number of 0..=255: correctly rounded, or from an estimate that
+    /// [`dispatch`](super::dispatch) checks for all 256 values.
+    #[inline(always)]
+    fn sqrt_of_byte(self, x: Self::F) -> Self::F {
+        self.sqrt(x)
+    }
     /// The square root within 2 ulp; 0 of 0.
-    fn root(self, x: Self::F) -> Self::F;
-    /// a / b within 2 ulp for 0 ≤ a ≤ b; 0 where both are 0.
-    fn ratio(self, a: Self::F, b: Self::F) -> Self::F;
+    #[inline(always)]
+    fn sqrt_approx(self, x: Self::F) -> Self::F {
+        self.sqrt(x)
+    }
     /// a / b, correctly rounded.
     fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a / b within 2 ulp for 0 ≤ a ≤ b; 0 where both are 0.
+    #[inline(always)]
+    fn div_approx(self, a: Self::F, b: Self::F) -> Self::F {
+        self.div(a, self.max(b, self.splat(1e-20)))
+    }
     fn less(self, a: Self::F, b: Self::F) -> Self::M;
     /// −x where `mask`, else x.
     fn negate_where(self, mask: Self::M, x: Self::F) -> Self::F;
@@ -91,13 +141,17 @@ pub(super) trait Lane: Copy {
     fn slots(self, position: Self::F) -> (Self::F, Self::Slots);
     /// `x` in those lanes that have `slot` among their slots.
     fn keep(self, x: Self::F, slots: Self::Slots, slot: usize) -> Self::Masked;
-    /// `one.0` in the lanes that have slot `one.1`, `other.0` in those that have `other.1`; never both.
+    /// `one.0` in the lanes that have slot `one.1`, `other.0` in those that have `other.1`; no lane has both.
     fn keep_either(self, slots: Self::Slots, one: (Self::F, usize), other: (Self::F, usize)) -> Self::Masked;
     /// sum + x·weight.
     fn mul_add_masked(self, x: Self::Masked, weight: Self::F, sum: Self::F) -> Self::F;
     /// The same, given `product` = vote·weight of the vote that `x` was kept from: addition and multiplication may run
     /// on different units.
-    fn weigh(self, x: Self::Masked, product: Self::F, weight: Self::F, sum: Self::F) -> Self::F;
+    #[inline(always)]
+    fn add_product(self, x: Self::Masked, product: Self::F, weight: Self::F, sum: Self::F) -> Self::F {
+        let _ = product;
+        self.mul_add_masked(x, weight, sum)
+    }
     /// Lanes 1.. of `x`, then `next`.
     fn shift_in(self, x: Self::F, next: f32) -> Self::F;
     /// `before`, then all lanes of `x` but the last.
@@ -124,7 +178,7 @@ pub(super) trait Lane: Copy {
     fn splat_word(self, word: u32) -> Self::I;
     /// Totals of nothing.
     fn no_sum(self) -> Self::Sum;
-    /// What a block's sum of `dot_bytes` begins with, if it is to be added to `total`.
+    /// The value that a block's sum of `dot_bytes` starts from, if the sum is to be added to `total`.
     fn begin_block(self, total: Self::Sum) -> Self::Sum;
     /// sum + the products of the four unsigned bytes with the four signed weights of each word.
     fn dot_bytes(self, sum: Self::Sum, bytes: Self::I, weights: Self::I) -> Self::Sum;
@@ -136,15 +190,15 @@ pub(super) trait Lane: Copy {
     /// One row of a level in `C` channels: neighbouring pixels of two rows (each byte flipped by 0x80) mixed as
     /// `columns` tells, then (upper·(256 − weight) + lower·weight) / 2¹⁶, rounded half up.
     /// # Safety
-    /// The taps of `columns` and [`SLACK`](super::layout::SLACK) bytes after them are readable in all rows; `to`
-    /// has room for all groups.
-    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns);
+    /// The taps of `columns` and [`SLACK`](super::layout::SLACK) bytes after them are readable in all rows; `to` has
+    /// room for all groups.
+    unsafe fn resize_row<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns);
 
-    /// Splits `len` interleaved pixels of three channels, flipping every byte by 0x80.
+    /// Splits `len` interleaved pixels of three channels into planes, flipping every byte by 0x80.
     /// # Safety
     /// `from` has 3 · `len` bytes, each of `to` has `len`.
     #[inline(always)]
-    unsafe fn split(self, from: *const u8, to: [*mut u8; 3], len: usize) {
+    unsafe fn deinterleave(self, from: *const u8, to: [*mut u8; 3], len: usize) {
         for i in 0..len {
             for (channel, to) in to.iter().enumerate() {
                 // SAFETY: the caller's promise.

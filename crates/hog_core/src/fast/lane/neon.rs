@@ -1,42 +1,18 @@
 //! NEON: 4 lanes, 32 registers.
+#![allow(unused_unsafe, reason = "NEON is a baseline feature, so that most of its intrinsics are safe here")]
 
 use std::arch::aarch64::*;
 
 use super::{Columns, Lane, ODD, RowPointers};
 
-/// Proof that the CPU has NEON.
-#[derive(Clone, Copy)]
-pub(in crate::fast) struct Neon(());
-
-impl Neon {
-    /// # Safety
-    /// The CPU has NEON.
-    #[inline(always)]
-    pub(in crate::fast) unsafe fn new() -> Self {
-        Self(())
-    }
-}
-
-/// Runs intrinsics that the token allows.
-macro_rules! isa {
-    ($e:expr) => {{
-        // SAFETY: `self` proves that the CPU has the instruction set; pointers are the caller's promise.
-        #[allow(
-            unused_unsafe,
-            reason = "NEON is a baseline feature, so that most of its intrinsics are safe here"
-        )]
-        unsafe {
-            $e
-        }
-    }};
-}
+token!(Neon, "NEON");
 
 impl Lane for Neon {
     const LANES: usize = 4;
     const WIDE: bool = true;
     const GROUP: usize = 8;
     const REACH: usize = 32;
-    const COARSE_VECTORS: usize = 1;
+    const PREFILTER_VECTORS: usize = 1;
     type F = float32x4_t;
     type I = uint32x4_t;
     /// The sums of words 0 and 1, two halves each, and of words 2 and 3.
@@ -46,10 +22,21 @@ impl Lane for Neon {
     /// The integer below the position, and the nearest one.
     type Slots = [float32x4_t; 2];
 
-    #[inline(always)]
-    fn splat(self, x: f32) -> float32x4_t {
-        isa!(vdupq_n_f32(x))
+    instructions! {
+        splat(x: f32) -> float32x4_t = vdupq_n_f32;
+        add(a: float32x4_t, b: float32x4_t) -> float32x4_t = vaddq_f32;
+        sub(a: float32x4_t, b: float32x4_t) -> float32x4_t = vsubq_f32;
+        mul(a: float32x4_t, b: float32x4_t) -> float32x4_t = vmulq_f32;
+        min(a: float32x4_t, b: float32x4_t) -> float32x4_t = vminq_f32;
+        max(a: float32x4_t, b: float32x4_t) -> float32x4_t = vmaxq_f32;
+        abs(x: float32x4_t) -> float32x4_t = vabsq_f32;
+        sqrt(x: float32x4_t) -> float32x4_t = vsqrtq_f32;
+        div(a: float32x4_t, b: float32x4_t) -> float32x4_t = vdivq_f32;
+        less(a: float32x4_t, b: float32x4_t) -> uint32x4_t = vcltq_f32;
+        select(mask: uint32x4_t, yes: float32x4_t, no: float32x4_t) -> float32x4_t = vbslq_f32;
+        splat_word(word: u32) -> uint32x4_t = vdupq_n_u32;
     }
+
     #[inline(always)]
     unsafe fn load(self, from: *const f32) -> float32x4_t {
         isa!(vld1q_f32(from))
@@ -57,26 +44,6 @@ impl Lane for Neon {
     #[inline(always)]
     unsafe fn store(self, to: *mut f32, x: float32x4_t) {
         isa!(vst1q_f32(to, x));
-    }
-    #[inline(always)]
-    fn add(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        isa!(vaddq_f32(a, b))
-    }
-    #[inline(always)]
-    fn sub(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        isa!(vsubq_f32(a, b))
-    }
-    #[inline(always)]
-    fn mul(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        isa!(vmulq_f32(a, b))
-    }
-    #[inline(always)]
-    fn min(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        isa!(vminq_f32(a, b))
-    }
-    #[inline(always)]
-    fn max(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        isa!(vmaxq_f32(a, b))
     }
     #[inline(always)]
     fn mul_add(self, a: float32x4_t, b: float32x4_t, c: float32x4_t) -> float32x4_t {
@@ -87,56 +54,12 @@ impl Lane for Neon {
         isa!(vnegq_f32(vfmsq_f32(c, a, b)))
     }
     #[inline(always)]
-    fn neg_mul_add(self, a: float32x4_t, b: float32x4_t, c: float32x4_t) -> float32x4_t {
-        isa!(vfmsq_f32(c, a, b))
-    }
-    #[inline(always)]
-    fn abs(self, x: float32x4_t) -> float32x4_t {
-        isa!(vabsq_f32(x))
-    }
-    #[inline(always)]
-    fn min_abs(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        self.min(self.abs(a), self.abs(b))
-    }
-    #[inline(always)]
-    fn max_abs(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        isa!(vmaxq_f32(vabsq_f32(a), vabsq_f32(b)))
-    }
-    #[inline(always)]
-    fn sqrt(self, x: float32x4_t) -> float32x4_t {
-        isa!(vsqrtq_f32(x))
-    }
-    #[inline(always)]
-    fn gamma(self, x: float32x4_t) -> float32x4_t {
-        self.sqrt(x)
-    }
-    #[inline(always)]
-    fn root(self, x: float32x4_t) -> float32x4_t {
-        self.sqrt(x)
-    }
-    #[inline(always)]
-    fn ratio(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        isa!(vdivq_f32(a, vmaxq_f32(b, vdupq_n_f32(1e-20))))
-    }
-    #[inline(always)]
-    fn div(self, a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        isa!(vdivq_f32(a, b))
-    }
-    #[inline(always)]
-    fn less(self, a: float32x4_t, b: float32x4_t) -> uint32x4_t {
-        isa!(vcltq_f32(a, b))
-    }
-    #[inline(always)]
     fn negate_where(self, mask: uint32x4_t, x: float32x4_t) -> float32x4_t {
         isa!(vbslq_f32(mask, vnegq_f32(x), x))
     }
     #[inline(always)]
     fn zero_where(self, mask: uint32x4_t, x: float32x4_t) -> float32x4_t {
         isa!(vreinterpretq_f32_u32(vbicq_u32(vreinterpretq_u32_f32(x), mask)))
-    }
-    #[inline(always)]
-    fn select(self, mask: uint32x4_t, yes: float32x4_t, no: float32x4_t) -> float32x4_t {
-        isa!(vbslq_f32(mask, yes, no))
     }
     #[inline(always)]
     fn flip_by_signs(self, x: float32x4_t, a: float32x4_t, b: float32x4_t) -> float32x4_t {
@@ -171,16 +94,6 @@ impl Lane for Neon {
     }
     #[inline(always)]
     fn mul_add_masked(self, x: float32x4_t, weight: float32x4_t, sum: float32x4_t) -> float32x4_t {
-        self.mul_add(x, weight, sum)
-    }
-    #[inline(always)]
-    fn weigh(
-        self,
-        x: float32x4_t,
-        _product: float32x4_t,
-        weight: float32x4_t,
-        sum: float32x4_t,
-    ) -> float32x4_t {
         self.mul_add(x, weight, sum)
     }
     #[inline(always)]
@@ -235,10 +148,6 @@ impl Lane for Neon {
         isa!(vld1q_u32(from))
     }
     #[inline(always)]
-    fn splat_word(self, word: u32) -> uint32x4_t {
-        isa!(vdupq_n_u32(word))
-    }
-    #[inline(always)]
     fn no_sum(self) -> [int32x4_t; 2] {
         isa!([vdupq_n_s32(0); 2])
     }
@@ -271,7 +180,7 @@ impl Lane for Neon {
     }
 
     #[inline(always)]
-    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
+    unsafe fn resize_row<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
         isa!({
             let bias = vdupq_n_s32((1 << 23) + (1 << 15)); // undoes −2¹⁵ of both rows, rounds half up
             let parts = columns.parts;
@@ -301,7 +210,7 @@ impl Lane for Neon {
     }
 
     #[inline(always)]
-    unsafe fn split(self, from: *const u8, to: [*mut u8; 3], len: usize) {
+    unsafe fn deinterleave(self, from: *const u8, to: [*mut u8; 3], len: usize) {
         isa!({
             let whole = len - len % 16;
             let flip = vdupq_n_u8(0x80);
@@ -311,7 +220,11 @@ impl Lane for Neon {
                 vst1q_u8(to[1].add(at), veorq_u8(planes.1, flip));
                 vst1q_u8(to[2].add(at), veorq_u8(planes.2, flip));
             }
-            super::portable::Portable.split(from.add(3 * whole), to.map(|to| to.add(whole)), len - whole);
+            super::portable::Portable.deinterleave(
+                from.add(3 * whole),
+                to.map(|to| to.add(whole)),
+                len - whole,
+            );
         });
     }
 }

@@ -40,7 +40,7 @@ impl Lane for Portable {
     const WIDE: bool = false;
     const GROUP: usize = 8;
     const REACH: usize = 16;
-    const COARSE_VECTORS: usize = 0;
+    const PREFILTER_VECTORS: usize = 0;
     type F = Four<f32>;
     type I = Four<u32>;
     type Sum = ();
@@ -92,37 +92,12 @@ impl Lane for Portable {
         lanes!(I => a.0[I] * b.0[I] - c.0[I])
     }
     #[inline(always)]
-    fn neg_mul_add(self, a: Four<f32>, b: Four<f32>, c: Four<f32>) -> Four<f32> {
-        lanes!(I => c.0[I] - a.0[I] * b.0[I])
-    }
-    #[inline(always)]
     fn abs(self, x: Four<f32>) -> Four<f32> {
         lanes!(I => x.0[I].abs())
     }
     #[inline(always)]
-    fn min_abs(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
-        self.min(self.abs(a), self.abs(b))
-    }
-    #[inline(always)]
-    fn max_abs(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
-        let (a, b) = (self.abs(a), self.abs(b));
-        lanes!(I => if a.0[I] > b.0[I] { a.0[I] } else { b.0[I] })
-    }
-    #[inline(always)]
     fn sqrt(self, x: Four<f32>) -> Four<f32> {
         lanes!(I => x.0[I].sqrt())
-    }
-    #[inline(always)]
-    fn gamma(self, x: Four<f32>) -> Four<f32> {
-        self.sqrt(x)
-    }
-    #[inline(always)]
-    fn root(self, x: Four<f32>) -> Four<f32> {
-        self.sqrt(x)
-    }
-    #[inline(always)]
-    fn ratio(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
-        lanes!(I => a.0[I] / if b.0[I] > 1e-20 { b.0[I] } else { 1e-20 })
     }
     #[inline(always)]
     fn div(self, a: Four<f32>, b: Four<f32>) -> Four<f32> {
@@ -172,10 +147,6 @@ impl Lane for Portable {
     }
     #[inline(always)]
     fn mul_add_masked(self, x: Four<f32>, weight: Four<f32>, sum: Four<f32>) -> Four<f32> {
-        self.mul_add(x, weight, sum)
-    }
-    #[inline(always)]
-    fn weigh(self, x: Four<f32>, _product: Four<f32>, weight: Four<f32>, sum: Four<f32>) -> Four<f32> {
         self.mul_add(x, weight, sum)
     }
     #[inline(always)]
@@ -237,7 +208,7 @@ impl Lane for Portable {
     }
 
     #[inline(always)]
-    unsafe fn mix<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
+    unsafe fn resize_row<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns) {
         let shares = [256 - weight.cast_unsigned(), weight.cast_unsigned()];
         let pairs = columns.index.as_chunks::<16>().0.iter().zip(columns.weight.as_chunks::<16>().0);
         for (part, ((index, weight), &base)) in pairs.zip(&columns.base).enumerate() {

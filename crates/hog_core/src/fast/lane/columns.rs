@@ -1,4 +1,4 @@
-//! What [`mix`](super::Lane::mix) reads and writes: rows of the image, and how a level's row is made of them.
+//! What [`resize_row`](super::Lane::resize_row) reads and writes: rows of the image, and how a level's row is made of them.
 
 use crate::fast::layout::STEP;
 use crate::pyramid::{Tap, taps};

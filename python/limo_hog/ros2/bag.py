@@ -14,11 +14,12 @@ from limo_hog.atomic import about, whole_file
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.ros2.mcap_reading import mcap_messages
 from limo_hog.ros2.messages import default_message, serialize, to_time, typestore
 
 with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
     from mcap.writer import CompressionType, Writer
-    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.highlevel import AnyReader
     from rosbags.typesys import get_types_from_msg
 
 DETECTIONS = "vision_msgs/msg/Detection2DArray"
@@ -78,7 +79,15 @@ def detections_message(stamp: float, found: Detections, frame: str) -> Any:
 
 
 def to_detections(message: Any) -> Detections:
-    """Read a Detection2DArray."""
+    """Read a Detection2DArray.
+
+    Raises
+    ------
+    BagError
+        If a box has no score.
+    """
+    if not all(one.results for one in message.detections):
+        raise BagError(f"a {DETECTIONS} has a box without a hypothesis: its score is missing")
     boxes = [
         (
             one.bbox.center.position.x - one.bbox.size_x / 2,
@@ -124,14 +133,36 @@ def read_bag(path: Path) -> Iterator[Record]:
     Raises
     ------
     BagError
-        If it is none, or cut off.
+        If it is none, or damaged or cut off: what was whole before that has been given by then.
+    OSError
+        If it cannot be read.
     """
-    _with_vision()
     if not path.exists():
         raise BagError(f"{path}: no such recording")
-    try:
-        with AnyReader([path], default_typestore=typestore()) as reader:
-            for connection, nanoseconds, data in reader.messages():
-                yield Record(connection.topic, nanoseconds * 1e-9, reader.deserialize(data, connection.msgtype))
-    except (AnyReaderError, ValueError, KeyError, IndexError, AssertionError) as error:
-        raise BagError(f"{path}: no ROS 2 recording that can be read, or cut off: {error}") from error
+    messages = _messages(path)
+    while True:
+        try:
+            topic, nanoseconds, message = next(messages)
+        except StopIteration:
+            return
+        except OSError as error:
+            error.filename = error.filename or str(path)
+            raise
+        # Foreign bytes in other libraries' parsers: whatever they raise, the file is why.
+        except Exception as error:
+            why = " ".join(str(error).split()) or type(error).__name__
+            raise BagError(f"{path}: no ROS 2 recording that can be read, or cut off: {why[:200]}") from error
+        yield Record(topic, nanoseconds * 1e-9, message)
+
+
+def _messages(path: Path) -> Iterator[tuple[str, int, Any]]:
+    _with_vision()
+    # The parts of a rosbag2 folder are numbered: _9 comes before _10.
+    parts = sorted(path.glob("*.mcap"), key=lambda part: (len(part.name), part.name)) if path.is_dir() else [path]
+    if parts and all(part.suffix == ".mcap" for part in parts):
+        for part in parts:
+            yield from mcap_messages(part)
+        return
+    with AnyReader([path], default_typestore=typestore()) as reader:
+        for connection, nanoseconds, data in reader.messages():
+            yield connection.topic, nanoseconds, reader.deserialize(data, connection.msgtype)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -108,7 +108,15 @@ def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
     The file has its name only when it is whole.
     """
     _with_vision()
-    with whole_file(path) as part, part.open("wb") as file:
+    with whole_file(path) as part, ExitStack() as stack:
+        with about(path):
+            file = part.open("wb")
+
+        @stack.callback
+        def close() -> None:
+            with about(path):
+                file.close()
+
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="limo-hog")
         channels: dict[str, int] = {}
@@ -124,7 +132,8 @@ def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
                 writer.add_message(channels[topic], nanoseconds, serialize(message), nanoseconds)
 
         yield write
-        writer.finish()  # type: ignore[no-untyped-call]
+        with about(path):
+            writer.finish()  # type: ignore[no-untyped-call]
 
 
 def read_bag(path: Path) -> Iterator[Record]:

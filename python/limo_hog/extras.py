@@ -12,6 +12,33 @@ class MissingExtraError(LimoHogError):
     """A library that only some commands need is not installed; the message says how to get it."""
 
 
+#: Libraries of the extras, by the name they are imported by: what they are called, and the extra.
+_LIBRARIES = {
+    "av": ("PyAV", "video"),
+    "cv2": ("OpenCV", "cv"),
+    "cyclonedds": ("Cyclone DDS", "ros2"),
+    "matplotlib": ("matplotlib", "plot"),
+    "mcap": ("mcap", "record"),
+    "rerun": ("Rerun", "viz"),
+    "rosbags": ("rosbags", "record"),
+    "sklearn": ("scikit-learn", "train"),
+}
+
+
+def missing_extra(by: str, error: ModuleNotFoundError) -> MissingExtraError:
+    """Turn a failed import into the line that says what to install.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        `error` itself, where it is about no library of an extra.
+    """
+    library, extra = _LIBRARIES.get((error.name or "").partition(".")[0], (None, None))
+    if library is None:
+        raise error
+    return MissingExtraError(f"{by} needs {library}: pip install 'limo-hog[{extra}]'")
+
+
 @contextmanager
 def needed(by: str, what: str, install: str) -> Iterator[None]:
     """Say what to install when an import inside fails.

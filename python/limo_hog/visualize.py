@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limo_hog.cv2_api.arguments import coefficients
+from limo_hog.cv2_api.arguments import coefficients, integer
 from limo_hog.cv2_api.hog import HOGDescriptor
 from limo_hog.exceptions import DetectorSizeError, ParameterError
 
@@ -44,7 +44,7 @@ def visualize(hog: HOGDescriptor, values: ArrayLike, *, zoom: int = 4) -> NDArra
         raise DetectorSizeError(
             f"there are {came} values; a window of this geometry has {size}, or {size + 1} with bias"
         )
-    if not 1 <= zoom <= 64:
+    if not 1 <= integer("zoom", zoom, 4) <= 64:
         raise ParameterError(f"zoom is {zoom}; 1 to 64 is wanted")
     histograms = _histograms(hog, numbers[:size])
     strokes = _strokes(hog, zoom)

@@ -33,7 +33,7 @@ def running() -> Iterator[tuple[View, Tunable[Any]]]:
 
         def episode() -> None:
             # A coarse search: this is about the page.
-            detector = PeopleDetector(scale=1.2)
+            detector = PeopleDetector(scale=1.2, min_height=None, nms="group")
             view.end(score(run_episode(SCENARIO, controller, detector, SECONDS, 0, watch=view.watch)).to_json())
 
         run = threading.Thread(target=episode)

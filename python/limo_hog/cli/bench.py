@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import gc
-import statistics
-import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,31 +15,24 @@ from rich.console import Console
 from rich.table import Table
 
 import limo_hog
-from limo_hog.cli.support.arguments import size, threads
+from limo_hog.cli.support.arguments import output_file, size, threads
 from limo_hog.cli.support.environment import cores, environment
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
+from limo_hog.cli.support.race import Rounds, Timing, race
 from limo_hog.cli.support.scene import street
 from limo_hog.exceptions import LimoHogError
 
 #: The workshop's parameters.
 PARAMETERS: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
 SIZES = [(640, 480), (1280, 720), (1920, 1080)]
-SECONDS_A_ROW, LEAST_ROUNDS, MOST_ROUNDS = 3.0, 5, 200
+ROUNDS = Rounds(seconds=3.0)
 
 Image = NDArray[np.uint8]
 
 
 class ParityError(LimoHogError):
     """The two detectors do not agree."""
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Milliseconds of a call: the least, and the median."""
-
-    min: float
-    p50: float
 
 
 @dataclass(frozen=True)
@@ -71,7 +61,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--channels", choices=["gray", "bgr"], help="only this kind of image (both)")
     parser.add_argument("--threads", type=threads, nargs="+", metavar="N", help="thread counts, 0 for all cores (1 0)")
     parser.add_argument("--image", type=Path, metavar="FILE", help="a picture instead of the drawn street")
-    parser.add_argument("--json", metavar="FILE", help="write the result as JSON; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write the result as JSON; - is standard output"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -132,7 +124,7 @@ def _row(image: Image, threads: int, backend: str, rival: Any) -> Row:
     height, width = image.shape[:2]
     size, channels = (width, height), 1 if image.ndim == 2 else 3
     if rival is None:
-        (ours,) = _race([lambda: hog.detectMultiScale(image, **PARAMETERS)])
+        (ours,) = race([partial(hog.detectMultiScale, image, **PARAMETERS)], ROUNDS)
         return Row(size, channels, threads, backend, ours, None, None, None, None)
     import cv2
 
@@ -140,33 +132,8 @@ def _row(image: Image, threads: int, backend: str, rival: Any) -> Row:
     cv2.setNumThreads(1)
     equal, difference = _parity(hog, rival, image)
     cv2.setNumThreads(threads)
-    ours, theirs = _race(
-        [
-            lambda: hog.detectMultiScale(image, **PARAMETERS),
-            lambda: rival.detectMultiScale(image, **PARAMETERS),
-        ]
-    )
+    ours, theirs = race([partial(each.detectMultiScale, image, **PARAMETERS) for each in (hog, rival)], ROUNDS)
     return Row(size, channels, threads, backend, ours, theirs, theirs.min / ours.min, equal, difference)
-
-
-def _race(calls: list[Callable[[], object]]) -> list[Timing]:
-    """Time calls in turn, so that whatever slows the machine down slows them all."""
-    times: list[list[float]] = [[] for _ in calls]
-    for call in calls:
-        call()
-    gc.disable()
-    start = time.perf_counter()
-    try:
-        while len(times[0]) < LEAST_ROUNDS or (
-            len(times[0]) < MOST_ROUNDS and time.perf_counter() - start < SECONDS_A_ROW
-        ):
-            for call, spent in zip(calls, times, strict=True):
-                before = time.perf_counter()
-                call()
-                spent.append(1e3 * (time.perf_counter() - before))
-    finally:
-        gc.enable()
-    return [Timing(min(spent), statistics.median(spent)) for spent in times]
 
 
 def _parity(hog: Any, rival: Any, image: Image) -> tuple[bool, float | None]:

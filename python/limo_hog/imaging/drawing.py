@@ -29,7 +29,7 @@ def annotate(
     Parameters
     ----------
     image
-        uint8 (height, width, 3) BGR, or (height, width) gray.
+        uint8 (height, width, 3) BGR, or (height, width) or (height, width, 1) gray.
     boxes
         int32 (N, 4): x, y, w, h [px].
     labels
@@ -43,7 +43,8 @@ def annotate(
     -------
     uint8 (height, width, 3) BGR.
     """
-    canvas = np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image.copy()
+    colours = image.reshape(*image.shape[:2], -1)
+    canvas = np.repeat(colours, 3, axis=2) if colours.shape[2] == 1 else colours.copy()
     # Strokes and letters grow with the picture, but slower, from a thumbnail to a wall.
     unit = (max(canvas.shape[:2]) / 640) ** 0.7
     thick = max(1, round(2 * unit))

@@ -61,7 +61,7 @@ def find_sources(name: str) -> list[Source]:
     if name == STDIN:
         return [Source(name, path, Kind.IMAGE)]
     if path.is_dir():
-        found = sorted(p for p in path.rglob("*") if _kind_by_suffix(p) is not None and p.is_file())
+        found = sorted(p for p in path.rglob("*") if _kind_by_suffix(p) is not None and not p.is_dir())
         if not found:
             raise ReadError(f"{name}: no image or video in this folder")
     elif path.exists():

@@ -32,9 +32,9 @@ def run(args: argparse.Namespace) -> int:
     if not args.ros2 and not any((args.view, args.video, args.record)):
         raise UsageError("an arena that nobody sees: give --ros2, --view, --video or --record")
     from limo_sim.ros.live import run_live
-    from limo_sim.world.scenario import Scenario
+    from limo_sim.run.catalogue import load
 
-    scenario = Scenario.load(args.scenario)
+    scenario = load(args.scenario)
     bus: Bus | None = None
     if args.ros2:
         from limo_hog.ros2.dds import Bus

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.observation import Scan
-from limo_hog.follow.sense.ranging import ZONE_ENDS
+from limo_hog.follow.zones import ZONE_ENDS
 from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FIELD
 from limo_sim.sensing.lidar import MOUNT_AHEAD
@@ -161,7 +161,7 @@ class View:
         people = [(None, None) if p is None else (p.x, p.y) for p in moment.step.truth.people]
         measured = measured_m(moment.frame, moment.step)
         self._rows.append([*asdict(now).values(), measured, x, y, *itertools.chain(*people)])
-        if moment.step.mode is Mode.SEARCH:
+        if moment.step.decision.mode is Mode.SEARCH:
             self._followed = None
         elif (followed := followed_person(moment.step)) is not None:
             self._followed = followed
@@ -322,14 +322,14 @@ class View:
         step = moment.step
         return {
             **asdict(reading(step)),
-            "mode": step.mode.value,
-            "reason": step.reason,
+            "mode": step.decision.mode.value,
+            "reason": step.decision.reason,
             "robot": step.truth.robot,
             "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
             "followed": self._followed,
             "measured_m": measured_m(moment.frame, step),
             "scan": _hits(moment.scan, list(self._poses)),
-            "detect_ms": step.detect_ms or None,
+            "detect_ms": step.frame.detect_ms or None if step.frame else None,
             "boxes": len(step.detections),
             "contacts": asdict(step.truth.contacts),
             "paused": self.pace.paused,

@@ -17,6 +17,8 @@ S = TypeVar("S")
 
 #: Where a field gives no bounds: from 0 to so many times its default.
 _SPAN = 10.0
+#: Parts of a controller whose numbers are offered with its own; the rest of `TrackingController` needs measurements.
+_PARTS = ("steering", "search", "selection")
 
 
 class ParameterError(LimoHogError):
@@ -76,7 +78,8 @@ class Tunable(Generic[S]):
 
     Parameters are the numeric fields of a dataclass. A field's `metadata` may give `low`, `high`, `unit` and
     `tooltip`; unit and tooltip are otherwise those of the class's docstring, and bounds from 0 to ten times the
-    default. Numbers of a field that is a dataclass itself are parameters where their metadata give bounds.
+    default. Numbers of a field that is a dataclass itself are parameters where it is one of `_PARTS`, or where their
+    metadata give bounds.
     """
 
     def __init__(self, controller: Controller[S]) -> None:
@@ -89,6 +92,12 @@ class Tunable(Generic[S]):
     def step(self, observation: Observation, state: S) -> Decision[S]:
         """Decide as the controller with today's parameters does."""
         return self._controller.step(observation, state)
+
+    @property
+    def target_distance(self) -> float | None:
+        """Distance that the controller holds now [m]; None where it holds none."""
+        target = self.parameters.get("target_distance")
+        return None if target is None else target.value
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -115,7 +124,7 @@ def _parameters_of(owner: Any, prefix: str = "") -> Iterator[Parameter]:
     for field in dataclasses.fields(owner):
         value, about = getattr(owner, field.name), field.metadata
         default: Any = field.default if type(field.default) in (int, float) else 0
-        if type(value) in (int, float) and ("high" in about or not prefix):
+        if type(value) in (int, float) and ("high" in about or prefix.rstrip(".") in ("", *_PARTS)):
             unit, tooltip = _documented(type(owner)).get(field.name, ("", ""))
             yield Parameter(
                 prefix + field.name,

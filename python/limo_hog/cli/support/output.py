@@ -31,4 +31,6 @@ def one_line(error: Exception) -> str:
     """Tell an error in one line, with the file it is about."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
+    if isinstance(error, MemoryError):
+        return f"out of memory: {error}"
     return " ".join(str(error).split())

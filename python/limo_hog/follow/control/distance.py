@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from limo_hog.follow.control.approach import nobody_seen, surest
+from limo_hog.follow.control.approach import best_box, no_detection
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.sense.observation import Observation
-from limo_hog.follow.sense.ranging import person_depth, zone_of
+from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.twist import Twist
+from limo_hog.follow.zones import zone_of
 
 
 @dataclass(frozen=True, slots=True)
 class ProxemicController:
     """Two proportional controllers: the box to the middle of the image, the person to a distance.
 
-    The state is whether anybody was seen before.
+    The state is whether a person was detected before. The numbers are the workshop's.
 
     Attributes
     ----------
@@ -36,14 +37,14 @@ class ProxemicController:
     max_angular: float = 0.8
 
     def start(self) -> bool:
-        """Nobody has been seen yet."""
+        """Return the state before the first observation: no person detected yet."""
         return False
 
     def step(self, observation: Observation, state: bool) -> Decision[bool]:
-        """Turn towards the surest box and mind its distance; stop without a box or a distance."""
+        """Turn towards the best box and hold its distance; stop without a box or a distance."""
         if len(observation.detections) == 0:
-            return nobody_seen(state)
-        target, error = surest(observation)
+            return no_detection(state)
+        target, error = best_box(observation)
         box = observation.detections.boxes[target]
         distance = None if observation.depth is None else person_depth(observation.depth, box)
         if distance is None:

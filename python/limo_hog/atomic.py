@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,9 +19,9 @@ def about(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.filename is None or str(error.filename) == str(part_of(path)):
-            error.filename = str(path)
-        raise
+        if error.filename is not None and str(error.filename) != str(part_of(path)):
+            raise
+        raise _named(error, path) from error
 
 
 @contextmanager
@@ -38,5 +39,10 @@ def whole_file(path: Path) -> Iterator[Path]:
     except BaseException as error:
         part.unlink(missing_ok=True)
         if isinstance(error, OSError) and str(error.filename) == str(part):
-            error.filename = str(path)
+            raise _named(error, path) from error
         raise
+
+
+def _named(error: OSError, path: Path) -> OSError:
+    """Return the error with another file name: a new one, since a library's own kind may not let its name be set."""
+    return OSError(error.errno or errno.EIO, error.strerror or str(error), str(path))

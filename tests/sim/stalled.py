@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from urllib.parse import urlsplit
 
-from limo_sim.view.server import View
-
 HANDSHAKE = (
     "GET /live HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
@@ -16,9 +14,9 @@ HANDSHAKE = (
 
 
 @contextmanager
-def stalled(view: View, count: int, request: str = HANDSHAKE) -> Iterator[list[socket.socket]]:
+def stalled(url: str, count: int, request: str = HANDSHAKE) -> Iterator[list[socket.socket]]:
     """Open connections that send a request, read the first bytes of an answer to it and then nothing more."""
-    where = urlsplit(view.url)
+    where = urlsplit(url)
     assert where.hostname
     assert where.port
     with ExitStack() as stack:

@@ -68,7 +68,7 @@ def showing(view: View, moments: list[Moment]) -> Iterator[None]:
 def test_a_run_ends_within_2_s_with_50_stalled_clients(request_: str, moments: list[Moment]) -> None:
     with ExitStack() as served:
         view = served.enter_context(View(WORKSHOP, pace=Pace(0)))
-        with stalled(view, 50, request_):
+        with stalled(view.url, 50, request_):
             with showing(view, moments):
                 time.sleep(3)
             began = time.monotonic()
@@ -89,7 +89,7 @@ def test_a_client_that_does_not_read_is_dropped_and_one_that_does_is_served(
                 count += (await page.receive(timeout=5)).type is aiohttp.WSMsgType.BINARY
             return count
 
-    with View(WORKSHOP, pace=Pace(0)) as view, stalled(view, 5) as clients, showing(view, moments):
+    with View(WORKSHOP, pace=Pace(0)) as view, stalled(view.url, 5) as clients, showing(view, moments):
         assert asyncio.run(pictures(view, 4)) > 10
         for client in clients:
             # What was under way when it was dropped, then the end.

@@ -108,6 +108,24 @@ def test_an_obstacle_on_either_side_behind_the_field_of_view_is_remembered() -> 
             assert len(later.state.scan_points) == len(state.scan_points)
 
 
+def test_an_obstacle_just_behind_the_lidars_field_of_view_is_remembered_though_the_base_would_see_it() -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    state = guard.step(replace(look(), scan=scan_of([(0.6, 0.0)]), odometry=Odometry()), guard.start()).state
+    # Drive to where the obstacle is at 109 degrees from the base, and at 121 from the lidar, which sees 115.
+    yaw, x, y = -1.9, 0.4 * np.cos(1.9), 0.4 * np.sin(1.9)
+    pose = Odometry(1.0, 0.6 - (np.cos(yaw) * x - np.sin(yaw) * y), -(np.sin(yaw) * x + np.cos(yaw) * y), yaw)
+    later = guard.step(replace(look(stamp=1.0), scan=scan(stamp=1.0), odometry=pose), state)
+    assert len(later.state.scan_points) == len(state.scan_points) > 0
+
+
+def test_returns_of_a_clock_that_was_set_back_are_forgotten() -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    state = guard.step(replace(look(), scan=scan_of([(0.6, 0.0)], 100.0), odometry=Odometry()), guard.start()).state
+    back = Odometry(3.0, yaw=np.pi)
+    later = guard.step(replace(look(stamp=3.0), scan=scan(stamp=3.0), odometry=back), state)
+    assert len(later.state.scan_points) == 0
+
+
 def test_points_further_than_the_robot_backs_off_are_not_remembered() -> None:
     guard = Guard(Headstrong(Twist(-0.3, 0.0)))
     view = replace(look(), scan=scan_of([(1.6, 0.0)]), odometry=Odometry())

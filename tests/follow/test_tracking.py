@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.views import GREEN, NOBODY, RED, World, scan_of
+from tests.follow.views import GREEN, NOBODY, RED, World, flat, scan_of
 
 from limo_hog.detector import Detections
 from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingController
@@ -78,15 +78,16 @@ def test_it_coasts_over_missing_frames_and_says_where_it_looks() -> None:
     assert decision.target is None
 
 
-def test_somebody_gone_is_lost_and_searched_for_the_way_they_went() -> None:
-    world = World(person=(3.0, -1.0), velocity=(0.0, 0.4))
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_somebody_gone_is_lost_and_searched_for_the_way_they_went(side: float) -> None:
+    world = World(person=(3.0, side * -1.0), velocity=(0.0, side * 0.4))
     state = run(world, 4.0).state
     decision = run(world, 1.5, state, visible=False)
     assert decision.mode is Mode.LOST
     assert decision.twist.linear == 0
     decision = run(world, 2.0, decision.state, visible=False)
     assert decision.reason == "searching for the lost person"
-    assert decision.twist.angular > 0
+    assert decision.twist.angular == side * CONTROLLER.search.rate
 
 
 def test_legs_in_the_scan_keep_somebody_too_near_for_the_camera() -> None:
@@ -187,21 +188,23 @@ def test_without_a_colour_image_anybody_will_do_at_once() -> None:
 
 
 def test_the_search_keeps_its_side_though_the_predicted_bearing_changes_sign() -> None:
-    # The robot faces where the person should be; odometry noise of 1 degree moves that to and fro.
-    world = World(person=(3.0, -0.3), velocity=(0.0, 0.1))
+    # The depth image says that a wall hides the person, so they are remembered. The robot faces where they should be;
+    # odometry noise of 1 degree moves that to and fro.
+    world = World(person=(3.0, 0.0))
     state = run(world, 4.0).state
     rates = []
     x, y, yaw = world.robot
     for frame in range(75):
         noise = 0.02 if frame % 4 < 2 else -0.02
-        view = replace(world.observe(visible=False), odometry=Odometry(world.time, x, y, yaw + noise))
+        odometry = Odometry(world.time, x, y, yaw + noise)
+        view = replace(world.observe(visible=False), odometry=odometry, depth=flat(1.2))
         decision = CONTROLLER.step(view, state)
         state = decision.state
         world.time += world.period
         if "searching" in decision.reason:
             rates.append(decision.twist.angular)
     assert len(rates) > 40
-    assert set(rates) == {CONTROLLER.search.rate}
+    assert set(rates) in ({CONTROLLER.search.rate}, {-CONTROLLER.search.rate})
 
 
 def test_legs_alone_are_followed_for_four_seconds() -> None:

@@ -28,14 +28,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add `replay`."""
     parser = subparsers.add_parser(
         "replay",
-        description="Let the detector and a follower look at a recording (an MCAP file of --record, or any ROS 2 bag), "
-        "and compare what they find and decide with what was recorded.",
+        description="Run the detector and a follower over a recording (an MCAP file of --record, or any ROS 2 bag), "
+        "and compare detections and commands with those recorded.",
     )
     parser.add_argument("file", type=Path, metavar="FILE")
-    parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="who decides (%(default)s)")
-    parser.add_argument("--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="who finds (hog)")
+    parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="controller (%(default)s)")
+    parser.add_argument("--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="detector (hog)")
     parser.add_argument("--image", metavar="TOPIC", help="topic of the camera (/limo_camera/image)")
-    parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="film what is found (H.264)")
+    parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="video of the detections (H.264)")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - is standard output")
 
 

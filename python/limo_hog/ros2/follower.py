@@ -1,4 +1,4 @@
-"""The follower on a ROS 2 robot: whatever publishes the workshop's topics is driven, behind the safety layer."""
+"""The follower on a ROS 2 robot: it drives the robot that publishes the workshop's topics, behind the safety layer."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SILENT_AFTER = 10.0
 
 
 class SilentRobotError(LimoHogError):
-    """Nobody publishes a camera image."""
+    """No camera image arrives."""
 
 
 @dataclass
@@ -38,13 +38,13 @@ class Report:
     Attributes
     ----------
     frames, found
-        Pictures worked on, and those with somebody in them.
+        Camera images worked on, and those with a person detected.
     dropped
         Messages that could not be read.
     answer_ms
-        From a picture's arrival to its command, for each [ms].
+        From the arrival of each image to its command [ms].
     modes
-        How many commands were given in each mode.
+        Number of commands in each mode.
     """
 
     frames: int = 0
@@ -55,12 +55,12 @@ class Report:
 
 
 def camera_topic(bus: Bus) -> str:
-    """Wait for a camera; returns its raw images' topic or, where there are none, its compressed ones'.
+    """Wait for a camera; returns the topic of its raw images or, without these, of its compressed ones.
 
     Raises
     ------
     SilentRobotError
-        If no camera turns up within 10 s.
+        If no camera is found within 10 s.
     """
 
     def offered(topic: str, found: dict[str, Endpoints]) -> bool:
@@ -70,16 +70,14 @@ def camera_topic(bus: Bus) -> str:
         return offered(names.IMAGE, found) or offered(names.IMAGE_COMPRESSED, found)
 
     if not either(bus.topics(SILENT_AFTER, enough=either)):
-        raise SilentRobotError(
-            f"nobody publishes {names.IMAGE} in ROS domain {bus.domain}: no camera in {SILENT_AFTER:g} s"
-        )
-    # Of a camera that offers both, either may be heard of first.
+        raise SilentRobotError(f"no publisher of {names.IMAGE} in ROS domain {bus.domain} within {SILENT_AFTER:g} s")
+    # Of a camera that offers both, either topic may be discovered first.
     found = bus.topics(0.5, enough=lambda found: offered(names.IMAGE, found))
     return names.IMAGE if offered(names.IMAGE, found) else names.IMAGE_COMPRESSED
 
 
 class Inputs:
-    """The subscriptions the follower lives on; images come from the `camera` topic.
+    """The follower's subscriptions; images come from the `camera` topic.
 
     Attributes
     ----------
@@ -156,12 +154,12 @@ def drive(
                 report.frames += 1
                 report.found += len(sighting.detections) > 0
             elif report.frames and came - commanded > CONTROL_PERIOD:
-                # Without a new scan or odometry to tell the time, the robot's clock is taken to run as ours does.
+                # The robot's clock, by the last image's stamp and the time since on this machine's clock.
                 decision = follower.recheck(stamp + came - heard, senses.scan, senses.odometry)
             else:
                 if came - heard > SILENT_AFTER:
                     raise SilentRobotError(
-                        f"nobody publishes {names.IMAGE} in ROS domain {bus.domain}: no picture for {SILENT_AFTER:g} s"
+                        f"no image on {names.IMAGE} in ROS domain {bus.domain} for {SILENT_AFTER:g} s"
                     )
                 continue
             commands.publish(messages.twist(decision.twist))

@@ -24,7 +24,7 @@ WINDOWS = {"people": (64, 128), "Daimler": (48, 96), "random": (64, 128)}
 COEFFICIENTS = {
     "people": cv2.HOGDescriptor_getDefaultPeopleDetector(),
     "Daimler": cv2.HOGDescriptor_getDaimlerPeopleDetector(),
-    # Half of all windows are hits, and too loud for the kernels' sums: all are weighed exactly.
+    # Half of all windows are hits, with sums too large for the kernels' error bound: all take the exact path.
     "random": np.random.default_rng(0).normal(size=3781).astype(np.float32),
 }
 METHODS = ("compute", "computeGradient", "detect")

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import errno
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 
 def part_of(path: Path) -> Path:
-    """Return the name a file has while it is written: hidden, beside it, with the same suffix."""
+    """Return the name a file has while it is written: hidden, beside it, with the same suffix.
+
+    Raises
+    ------
+    IsADirectoryError
+        `path` is a folder.
+    """
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return path.with_name(f".{path.stem}.part{path.suffix}")
 
 
@@ -29,6 +38,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     """Give a name to write to, and rename it to `path` when all went well; else nothing is left behind.
 
     Folders are made as needed.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; it names `path`.
     """
     part = part_of(path)
     with about(path):

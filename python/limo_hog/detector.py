@@ -19,7 +19,7 @@ from limo_hog.exceptions import HogError, ImageError, ParameterError, ParameterT
 from limo_hog.models import PERSON_BOX, Calibration, Model, PersonBox, load_model
 from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
 
-#: Ways to make one box of a person's many hits, and the `overlap` each has unless told otherwise.
+#: Ways to make one box of a person's many hits, and the default `overlap` of each.
 #: 0.65 and 0.3: chosen on street photographs, where 0.5 to 0.75 and 0.2 to 0.4 hardly differ.
 _NMS = {"overlap": 0.65, "iou": 0.3, "soft": 0.3, "group": None}
 #: Hits that OpenCV's sample asks a group to have more than.
@@ -55,7 +55,7 @@ class Detections:
 
     @classmethod
     def none(cls) -> Detections:
-        """No people at all."""
+        """Return no detections: arrays of length 0."""
         return cls(np.empty((0, 4), np.int32), np.empty(0))
 
     def __len__(self) -> int:
@@ -87,7 +87,7 @@ class Detections:
 
     @property
     def probabilities(self) -> NDArray[np.float64]:
-        """float64 (N,): how likely each box holds a person, 0..1, by the model's calibration.
+        """float64 (N,): probability that each box holds a person, by the model's calibration.
 
         Raises
         ------
@@ -266,7 +266,7 @@ class PeopleDetector:
         width, height = (max(1, round(side * zoom)) for side in image.shape[1::-1])
         if (height, width) == image.shape[:2]:
             return image
-        if zoom > 1 and width * height > _MOST_PIXELS:
+        if width * height > _MOST_PIXELS:
             raise ImageError(
                 f"the image, {image.shape[1]} x {image.shape[0]} px, would be {width} x {height} px to find people of "
                 f"{self.min_height:g} px; at most {_MOST_PIXELS} pixels are allowed: raise min_height"

@@ -1,4 +1,4 @@
-"""Libraries that only some parts need: what is said where one is missing."""
+"""Optional libraries: the error where one is missing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from limo_hog.exceptions import LimoHogError
 
 
 class MissingExtraError(LimoHogError):
-    """A library that only some commands need is not installed; the message says how to get it."""
+    """An optional library is not installed; the message names the line that installs it."""
 
 
 #: Libraries of the extras, by the name they are imported by: what they are called, and the extra.
@@ -26,7 +26,7 @@ _LIBRARIES = {
 
 
 def missing_extra(by: str, error: ModuleNotFoundError) -> MissingExtraError:
-    """Turn a failed import into the line that says what to install.
+    """Return the error that names what to install after a failed import.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def missing_extra(by: str, error: ModuleNotFoundError) -> MissingExtraError:
 
 @contextmanager
 def needed(by: str, what: str, install: str) -> Iterator[None]:
-    """Say what to install when an import inside fails.
+    """Raise an error that names what to install when an import inside fails.
 
     >>> with needed(by="limo-hog follow", what="the simulator", install="limo-sim"):
     ...     import limo_sim

@@ -50,7 +50,7 @@ class Model:
     person_box
         The person inside a window.
     threshold
-        SVM margin from which on a window counts as a person, unless the caller says otherwise.
+        Default of the least SVM margin of a person's window.
     calibration
         From margins to probabilities; None where it was never measured.
     """
@@ -63,7 +63,7 @@ class Model:
 
     @property
     def person_height(self) -> float:
-        """Height of the person who fits the window [px]: the smallest found in an image at its own size."""
+        """Height of a person in the window [px]: the smallest that is found in an image at its own size."""
         return self.person_box.height * self.geometry.winSize[1]
 
 
@@ -126,7 +126,7 @@ def _from_file(path: str) -> Model:
 
 
 def _card(path: str) -> dict[str, Any]:
-    """Read what the card of a model says about its windows and margins."""
+    """Read person box, threshold and calibration from a model's card."""
     import json
     from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`limo-hog bench` times in turn, checks parity, and works without a rival."""
+"""`limo-hog bench` times in turn, checks parity, and works without an OpenCV that has HOG."""
 
 from __future__ import annotations
 

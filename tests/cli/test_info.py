@@ -1,4 +1,4 @@
-"""`limo-hog info` tells what is here."""
+"""`limo-hog info` shows versions, hardware and extras."""
 
 from __future__ import annotations
 

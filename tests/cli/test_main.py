@@ -1,4 +1,4 @@
-"""`limo-hog` routes to commands, answers errors in one line, and says so by its exit code."""
+"""`limo-hog` routes to commands, answers errors in one line and with an exit code."""
 
 from __future__ import annotations
 

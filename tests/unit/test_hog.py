@@ -1,4 +1,4 @@
-"""What HOGDescriptor offers beyond OpenCV's, and what it says to wrong arguments."""
+"""What HOGDescriptor offers beyond OpenCV's, and its errors for wrong arguments."""
 
 from __future__ import annotations
 

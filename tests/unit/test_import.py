@@ -1,4 +1,4 @@
-"""What `import limo_hog` brings along, and what it leaves for those who need it."""
+"""What `import limo_hog` brings along, and what it leaves to later imports."""
 
 from __future__ import annotations
 

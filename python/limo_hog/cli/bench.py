@@ -37,7 +37,7 @@ class ParityError(LimoHogError):
 
 @dataclass(frozen=True)
 class Row:
-    """One size, channel count and thread count; what concerns cv2 is None where there is no cv2 with HOG."""
+    """The result for one size, channel count and thread count; without an OpenCV that has HOG, its fields are None."""
 
     size: tuple[int, int]
     channels: int
@@ -69,7 +69,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Bench every combination, print a table and, if asked, JSON."""
     facts = environment()
-    rival = _rival() if facts["opencv_has_hog"] else None
+    opencv = _opencv() if facts["opencv_has_hog"] else None
     images = [
         (_picture(size, channels, args.image))
         for size in (args.size or ([None] if args.image else SIZES))
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         task = bar.add_task("timing", total=len(images) * len(counts))
         for image in images:
             for count in counts:
-                rows.append(_row(image, count, str(facts["backend"]), rival))
+                rows.append(_row(image, count, str(facts["backend"]), opencv))
                 bar.advance(task)
     if args.json:
         write_json(args.json, {"environment": facts, "rows": [asdict(row) for row in rows]})
@@ -109,7 +109,7 @@ def _picture(size: tuple[int, int] | None, channels: int, path: Path | None) -> 
     return image if channels == 3 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
 
 
-def _rival() -> Any:
+def _opencv() -> Any:
     import cv2
 
     hog = cv2.HOGDescriptor()
@@ -117,30 +117,30 @@ def _rival() -> Any:
     return hog
 
 
-def _row(image: Image, threads: int, backend: str, rival: Any) -> Row:
+def _row(image: Image, threads: int, backend: str, opencv: Any) -> Row:
     hog = limo_hog.HOGDescriptor()
     hog.setSVMDetector(limo_hog.HOGDescriptor_getDefaultPeopleDetector())
     limo_hog.set_num_threads(threads)
     height, width = image.shape[:2]
     size, channels = (width, height), 1 if image.ndim == 2 else 3
-    if rival is None:
+    if opencv is None:
         (ours,) = race([partial(hog.detectMultiScale, image, **PARAMETERS)], ROUNDS)
         return Row(size, channels, threads, backend, ours, None, None, None, None)
     import cv2
 
-    # With several threads cv2 now and then pairs a rectangle with another's weight: it is judged with one.
+    # With several threads cv2 now and then pairs a rectangle with another's weight: parity is checked with one.
     cv2.setNumThreads(1)
-    equal, difference = _parity(hog, rival, image)
+    equal, difference = _parity(hog, opencv, image)
     cv2.setNumThreads(threads)
-    ours, theirs = race([partial(each.detectMultiScale, image, **PARAMETERS) for each in (hog, rival)], ROUNDS)
+    ours, theirs = race([partial(each.detectMultiScale, image, **PARAMETERS) for each in (hog, opencv)], ROUNDS)
     return Row(size, channels, threads, backend, ours, theirs, theirs.min / ours.min, equal, difference)
 
 
-def _parity(hog: Any, rival: Any, image: Image) -> tuple[bool, float | None]:
+def _parity(hog: Any, opencv: Any, image: Image) -> tuple[bool, float | None]:
     """Compare rectangles, grouped and raw, and the weights of equal ones."""
     worst = 0.0
     for group in (2, 0):
-        ours, theirs = (_found(h.detectMultiScale(image, **PARAMETERS, groupThreshold=group)) for h in (hog, rival))
+        ours, theirs = (_found(h.detectMultiScale(image, **PARAMETERS, groupThreshold=group)) for h in (hog, opencv))
         if [rect for rect, _ in ours] != [rect for rect, _ in theirs]:
             return False, None
         for (_, a), (_, b) in zip(ours, theirs, strict=True):
@@ -156,8 +156,8 @@ def _found(result: tuple[Any, Any]) -> list[tuple[tuple[int, ...], float]]:
 
 def _print(facts: dict[str, Any], rows: list[Row]) -> None:
     console = Console(highlight=False)
-    rival = f"OpenCV {facts['opencv']}" if facts["opencv_has_hog"] else "nothing"
-    console.print(f"[bold]limo-hog {facts['limo_hog']} ({facts['backend']}) against {rival}[/]")
+    opponent = f"OpenCV {facts['opencv']}" if facts["opencv_has_hog"] else "nothing"
+    console.print(f"[bold]limo-hog {facts['limo_hog']} ({facts['backend']}) against {opponent}[/]")
     console.print(f"{facts['cpu']}, {facts['cores']} cores, Python {facts['python']}")
     if (facts["load"] or 0) > 0.5 * facts["cores"]:
         console.print(f"[yellow]The machine is busy (load {facts['load']}): do not trust these times.[/]")

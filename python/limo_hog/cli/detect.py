@@ -89,7 +89,7 @@ def _score(text: str) -> float:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look at all inputs and return 1 if some could not be read, else 0."""
+    """Search all inputs and return 1 if some could not be read, else 0."""
     if args.resume and args.json in (None, STDOUT) and args.out is None:
         raise UsageError("--resume goes on from what --json FILE or --out DIR holds: give one of them")
     try:
@@ -111,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.resume and not args.overwrite:
         refuse_to_overwrite(tables)
     parameters = {name: getattr(args, name) for name in PARAMETERS}
-    # One line of ours says what is wrong with a file; its decoders shall not add theirs.
+    # The error names a broken file in one line; the decoders' own lines are switched off.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     from limo_hog.cli.support.pictures import Run

@@ -1,4 +1,4 @@
-"""`limo-hog info`: what is installed here, and what the detector makes of it."""
+"""`limo-hog info`: versions, CPU features, backend, OpenCV and extras."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:  # noqa: ARG001
         "limo-hog": facts["limo_hog"],
         "backend": f"{facts['backend']} (LIMO_HOG_BACKEND={forced})" if forced else facts["backend"],
         "CPU": facts["cpu"],
-        "CPU features": ", ".join(features) if isinstance(features, list) and features else "none that count",
+        "CPU features": ", ".join(features) if isinstance(features, list) and features else "none with kernels",
         "threads": f"{facts['threads']} of {facts['cores']} cores",
         "OpenCV": opencv if facts["opencv"] else "not installed",
         "numpy": facts["numpy"],

@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             print("limo-hog: stopped", file=sys.stderr)
         return 128 + getattr(error, "signal", signal.SIGINT)
     except BrokenPipeError:
-        # The reader has seen enough; Python must not complain again when it closes standard output.
+        # The reader has closed the pipe; Python must not complain again when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (LimoHogError, OSError, MemoryError, ModuleNotFoundError) as error:
@@ -112,7 +112,7 @@ def _run(arguments: list[str]) -> int:
 
 def _likely(word: str, known: Iterable[str]) -> str:
     """Return the question whether another word was meant; nothing where none is like it."""
-    # Imported here: only who mistypes needs it.
+    # Imported here: only a mistyped word needs it.
     from difflib import get_close_matches
 
     found = get_close_matches(word, list(known), 1)
@@ -128,7 +128,7 @@ def _module_of(command: str, arguments: list[str]) -> ModuleType | None:
         A command of the arena, which is not installed.
     """
     if command == "follow" and "--ros2" in arguments:
-        # A robot has no arena installed.
+        # The robot has no simulator.
         return importlib.import_module("limo_hog.cli.follow_robot")
     if command in BUILT_IN:
         return importlib.import_module(f"limo_hog.cli.{command}")

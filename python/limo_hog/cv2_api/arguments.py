@@ -1,4 +1,4 @@
-"""What callers pass in, as OpenCV's bindings would take it, or a named error that says what came instead."""
+"""Checks of arguments: what OpenCV's bindings take is taken, anything else is a named error."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from limo_hog.exceptions import ImageError, ImageTypeError, ParameterError, Para
 Pair = Sequence[int] | NDArray[np.integer[Any]]
 #: Many of them: (n, 2) integers.
 Pairs = Sequence[Pair] | NDArray[np.integer[Any]]
-#: OpenCV's way to say "nothing": an empty tuple where an array would stand.
+#: The empty tuple that OpenCV returns in place of an empty array.
 Nothing = tuple[()]
 
 _INT_MAX = 2**31 - 1

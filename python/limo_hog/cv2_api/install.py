@@ -1,4 +1,4 @@
-"""OpenCV 5 without what it dropped: limo-hog's names where `cv2` lacks them."""
+"""limo-hog's names put into `cv2` where it lacks them, as OpenCV 5 does."""
 
 from __future__ import annotations
 

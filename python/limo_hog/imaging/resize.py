@@ -1,4 +1,4 @@
-"""Pictures at another size, without OpenCV."""
+"""Resizing without OpenCV."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-#: Values resized at a time: few enough to stay in a cache, many enough to be worth a call.
+#: Values resized at a time: of 2¹³ to 2¹⁷ the fastest for 640×480 and 1920×1080, gray and colour.
 _STRIP = 2**17
 
 
@@ -37,7 +37,7 @@ def resize(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint
 
 
 class _Taps(NamedTuple):
-    """Where each new value reads along an axis: two neighbours, and the weight of the second [1/256]."""
+    """The two source values of each new value along an axis, and the weight of the second [1/256]."""
 
     first: NDArray[np.intp]
     second: NDArray[np.intp]

@@ -1,4 +1,4 @@
-"""Images and videos that appear under their name only when they are whole."""
+"""Writing images and videos; a file appears under its name only when it is whole."""
 
 from __future__ import annotations
 
@@ -27,13 +27,18 @@ def write_image(path: Path, image: NDArray[np.uint8]) -> None:
 
     Raises
     ------
+    WriteError
+        OpenCV knows no such format, or cannot hold the picture in it.
     OSError
-        If the file cannot be written; nothing is left under `path` then.
+        The file cannot be written; nothing is left under `path` then.
     """
-    # Level 1 is three times as fast as the default and a tenth larger.
-    ok, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    try:
+        # Level 1 is three times as fast as the default and a tenth larger.
+        ok, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    except cv2.error:
+        ok = False
     if not ok:
-        raise WriteError(f"{path}: OpenCV cannot encode {image.shape} {image.dtype} as {path.suffix}")
+        raise WriteError(f"{path}: OpenCV cannot encode {image.shape} {image.dtype} as {path.suffix or 'no format'}")
     with whole_file(path) as part, about(path):
         part.write_bytes(data.tobytes())
 

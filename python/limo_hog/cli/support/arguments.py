@@ -1,4 +1,4 @@
-"""Arguments that several commands take, and their types; argparse names them in its complaints."""
+"""Options that several commands share, and the types that check them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What this machine is made of, as far as it bears on speed and results."""
+"""Facts about this machine and its libraries that affect speed and results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The work of `limo-hog detect`: read, look, draw and write, on all cores, results in the order of the inputs."""
+"""The work of `limo-hog detect`: read, detect, draw and write on all cores; results in the order of the inputs."""
 
 from __future__ import annotations
 
@@ -44,23 +44,23 @@ Answer = TypeVar("Answer")
 
 
 def in_order(work: Callable[[Item], Answer], items: Iterable[Item], workers: int) -> Iterator[Answer]:
-    """Map like `map`, on several threads, with few items in flight however many there are."""
+    """Map like `map`, on several threads, with at most 2 × `workers` items in flight."""
     with ThreadPoolExecutor(workers) as pool:
-        flying: deque[Future[Answer]] = deque()
+        pending: deque[Future[Answer]] = deque()
         try:
             for item in items:
-                flying.append(pool.submit(work, item))
-                if len(flying) > 2 * workers:
-                    yield flying.popleft().result()
-            while flying:
-                yield flying.popleft().result()
+                pending.append(pool.submit(work, item))
+                if len(pending) > 2 * workers:
+                    yield pending.popleft().result()
+            while pending:
+                yield pending.popleft().result()
         finally:
             pool.shutdown(cancel_futures=True)
 
 
 @dataclass(frozen=True)
 class Found:
-    """What was found in one picture."""
+    """The people found in one picture."""
 
     source: str
     frame: int
@@ -72,7 +72,7 @@ class Found:
 
 
 class Run:
-    """One `detect` run: its options, and what came of it so far."""
+    """One `detect` run: its options and its results so far."""
 
     def __init__(self, args: argparse.Namespace, detector: PeopleDetector, bar: Progress) -> None:
         self._args, self._detector, self._bar = args, detector, bar
@@ -81,21 +81,21 @@ class Run:
         self._workers = 1
         self._write: Callable[[Result], None]
         self._done: dict[str, set[int]] | None = None
-        #: What was found in each picture, where somebody wants it at the end.
+        #: The result of each picture, kept if a table is written at the end.
         self.results: list[Result] | None = [] if args.csv or args.coco else None
         self._task = bar.add_task("looking", total=0)
         self.pictures = self.peopled = self.people = self.failed = self.known = 0
         self._ms = 0.0
 
     def find(self, stack: ExitStack) -> None:
-        """Find what every input stands for, and where its annotated copy goes.
+        """Expand every input, and name each annotated copy.
 
         Raises
         ------
         UsageError
             Copies would overwrite files.
         """
-        # What two inputs stand for is looked at once.
+        # A picture that two inputs name is searched once.
         named = dict.fromkeys(source for name in self._args.inputs for source in self._expand(name, stack))
         self._sources = list(named)
         if self._args.out is not None:
@@ -108,7 +108,7 @@ class Run:
                 refuse_to_overwrite(self._copies.values(), ", --resume makes only what is missing")
 
     def look(self, results: Results) -> None:
-        """Look at every input."""
+        """Search every input."""
         self._write = results.write
         self._done = None if results.earlier is None else results.done()
         if self.results is not None:
@@ -123,7 +123,7 @@ class Run:
                     self._look_at_video(source)
 
     def summary(self, seconds: float) -> str:
-        """Say what came of it in one line."""
+        """Return counts and times in one line."""
         pictures = "picture" if self.pictures == 1 else "pictures"
         words = [f"{self.pictures} {pictures}, {self.people} people in {self.peopled} of them"]
         if self.pictures:
@@ -142,7 +142,7 @@ class Run:
             return []
 
     def _share_cores(self, sources: list[Source]) -> None:
-        """Give each picture a core of its own where there are many, and one picture all cores."""
+        """Use a core for each of many pictures, and all cores for a single one."""
         threads = self._args.threads or cores()
         many = len(sources) > 1 or any(source.kind is Kind.VIDEO for source in sources)
         self._workers = threads if many else 1
@@ -181,7 +181,7 @@ class Run:
                 return
             every, done = self._args.every, (self._done or {}).get(source.name, set())
             write = copy and stack.enter_context(video_writer(copy, video.fps / every))
-            # An annotated copy is made anew from its first frame.
+            # An annotated copy always starts at the first frame.
             skip = set() if write else done
             self.known += len(skip)
             self._expect(max(0, -(-video.frame_count // every) - len(skip)))
@@ -203,7 +203,7 @@ class Run:
                         self._keep(found)
                     self._bar.advance(self._task)
             except KeyboardInterrupt:
-                # A camera has no other end: what was seen until now is whole.
+                # Ctrl-C is how a camera's run ends: its copy is complete.
                 if source.kind is not Kind.CAMERA:
                     raise
 

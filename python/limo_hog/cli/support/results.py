@@ -20,11 +20,11 @@ Result = dict[str, Any]
 
 
 class ResumeError(LimoHogError):
-    """The results of an earlier run cannot be gone on from."""
+    """The results of an earlier run cannot be continued."""
 
 
 class Results(NamedTuple):
-    """Where results go, and what an earlier run wrote: None where nothing is kept."""
+    """A function that writes a result, and the results of an earlier run (None if no file is kept)."""
 
     write: Callable[[Result], None]
     earlier: list[Result] | None
@@ -38,12 +38,12 @@ class Results(NamedTuple):
 
 
 def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
-    """Stop before files of the user are lost.
+    """Refuse to replace files that exist.
 
     Raises
     ------
     UsageError
-        One of them is there; `resume` says what else than overwriting may be meant.
+        One of them exists; `resume` is the hint to the alternative of overwriting.
     """
     there = [path for path in paths if path.exists()]
     if there:
@@ -55,8 +55,8 @@ def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
 def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, overwrite: bool) -> Iterator[Results]:
     """Open a file (or "-", or nothing) for one JSON object a line; each gets the run's `parameters`.
 
-    The file gets its name at the end, or when the run is stopped: with every line written so far, and no half one.
-    A run that was killed leaves it beside, and is gone on from all the same.
+    The file gets its name at the end, or when the run is stopped: with every line written so far, and no half line.
+    A killed run leaves the unfinished file beside it, which can be resumed, too.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
     part = part_of(path)
     if not resume and not overwrite:
         refuse_to_overwrite([path, part], ", --resume goes on from it")
-    earlier = _take_up(path, part, parameters) if resume else []
+    earlier = _continue(path, part, parameters) if resume else []
     with about(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         opened = part.open("ab" if resume else "wb", buffering=0)
@@ -101,8 +101,8 @@ def _drop(_: Result) -> None:
     """Keep no result."""
 
 
-def _take_up(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result]:
-    """Make `part` what an earlier run has done, without half a line at its end, and return its results."""
+def _continue(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result]:
+    """Rename an earlier run's file to `part`, cut half a line off its end, and return its results."""
     found = part if part.exists() else path
     if not found.exists():
         return []

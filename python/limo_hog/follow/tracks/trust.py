@@ -17,9 +17,11 @@ class Trust:
         Share by which one frame moves the trust [1]. Chosen: a time constant of ten frames, 1 s.
     certain_score
         A box with this score [SVM margin] is full evidence. Measured in the arena: a pillar is found in 55 % of the
-        frames and a cone in 50 %, rarely with this score.
+        frames and a cone in 50 %, rarely with this score. From .5 to 2 the error of distance in `two_people` changes by
+        .013 m (seed 3).
     confirmed_evidence
-        Least evidence of a box on a confirmed person [1]. Chosen: near by HOG's scores are low for people too.
+        Least evidence of a box on a confirmed person [1]. Chosen: near by HOG's scores are low for people
+        too. From .3 to .9 `crossing`, `two_people` and `dropouts` give the same figures (seed 3).
     confirm, drop
         Trust from which a track is confirmed, and below which it is not any more [1]. Chosen: 12 frames of full
         evidence confirm a new track, 12 misses drop a fully trusted one.

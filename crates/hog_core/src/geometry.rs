@@ -1,4 +1,4 @@
-//! Sizes, rectangles, parts of an image: what every other module speaks in.
+//! Sizes, rectangles and parts of an image.
 
 /// Width and height [px] (or a stride or padding along x and y).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

@@ -27,7 +27,7 @@ pub(super) fn block_histograms(
     }
 }
 
-/// The plain form for one block, of any number of cells: what the faster form equals to the last bit.
+/// The plain form, for one block of any number of cells; the faster form equals it to the last bit.
 fn block_histogram(votes: &Votes, first: usize, spec: &HogSpec, tables: &Tables, block: &mut [f32]) {
     block.fill(0.0);
     add_votes(votes, first, spec.nbins, &tables.weights.one, block);
@@ -56,7 +56,7 @@ fn add_votes<const CELLS: usize>(
     }
 }
 
-/// Blocks whose sums are made in turns, so that none waits for its own last store.
+/// Blocks that are summed in turns, so that no sum waits for the store before it.
 const TOGETHER: usize = 6;
 /// Bins that blocks summed in turns may have.
 const BINS: usize = 32;

@@ -275,7 +275,7 @@ fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut Row) {
     }
 }
 
-/// A whole number of 0..=255 as a byte. (A cast would also mind other numbers, one by one.)
+/// A whole number of 0..=255 as a byte. (A cast checks for other numbers and is not vectorised.)
 #[inline(always)]
 fn byte(whole: f32) -> u8 {
     const LAST_BIT_IS_ONE: f32 = (1 << 23) as f32;

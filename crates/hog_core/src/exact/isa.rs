@@ -7,7 +7,7 @@
     reason = "a function that enables an instruction set may only be called where the CPU has it"
 )]
 
-/// a·b + c with one rounding or two: OpenCV fuses where the CPU can, and so must whoever wants its bits.
+/// a·b + c with one rounding or two: OpenCV fuses where the CPU can, so equal bits need the same.
 pub(super) trait MulAdd {
     fn mul_add(a: f32, b: f32, c: f32) -> f32;
 }

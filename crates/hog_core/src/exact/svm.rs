@@ -27,7 +27,7 @@ impl Svm {
         &self.weights
     }
 
-    /// What is added to every score.
+    /// The bias, added to every score.
     pub fn bias(&self) -> f32 {
         self.bias
     }

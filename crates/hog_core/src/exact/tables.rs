@@ -1,4 +1,4 @@
-//! What a geometry's sums look up: the value of each pixel, and its weight in each cell of a block.
+//! Tables of a geometry: the value of each pixel after gamma correction, and its weight in each cell of a block.
 
 use crate::geometry::Size;
 use crate::params::HogSpec;
@@ -6,7 +6,7 @@ use crate::params::HogSpec;
 /// The tables of one geometry.
 #[derive(Debug, Clone)]
 pub struct Tables {
-    /// What each pixel value stands for before the gradient.
+    /// The value of each pixel after gamma correction.
     pub(super) gamma: [f32; 256],
     /// Which pixel of a block adds how much to which cell.
     pub(super) weights: BlockWeights,
@@ -22,12 +22,12 @@ impl Tables {
     }
 }
 
-/// What each pixel value stands for: its square root, or itself.
+/// The value of each pixel after gamma correction: its square root, or itself.
 pub fn gamma_table(gamma_correction: bool) -> [f32; 256] {
     std::array::from_fn(|value| if gamma_correction { (value as f32).sqrt() } else { value as f32 })
 }
 
-/// What a block's pixels add to its cells: Gaussian times bilinear share, precomputed.
+/// Weights of a block's pixels in its cells: Gaussian times bilinear share.
 ///
 /// Pixels that reach one cell come first, then those of two, then those of four; each group column by column.
 /// Single precision sums depend on that order, and descriptors are to equal OpenCV's to the last bit.

@@ -1,6 +1,6 @@
-//! The exact scalar pipeline of one image: gradient → blocks → windows, every sum in OpenCV's order.
+//! Descriptors and scores of an image's windows: gradient → blocks → windows, every sum in OpenCV's order.
 //!
-//! It is the specification of the fast path, and the judge of windows whose score is too close to the threshold.
+//! This specifies the fast path, and decides windows whose score is too close to the threshold.
 
 use std::collections::BTreeMap;
 

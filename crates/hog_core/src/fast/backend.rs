@@ -7,7 +7,7 @@ use crate::error::{BackendError, Result};
 /// An instruction set that the kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
-    /// What every CPU of the architecture has.
+    /// The architecture's baseline.
     Scalar,
     /// AVX2 and FMA.
     Avx2,
@@ -59,7 +59,7 @@ impl Backend {
 
     /// The backend in force: the one `LIMO_HOG_BACKEND` names, else the fastest this CPU has. Read once.
     ///
-    /// An unknown name, or one this CPU has not got, is an error.
+    /// An unknown name, or one that this CPU does not have, is an error.
     pub fn current() -> Result<Self> {
         static CHOSEN: OnceLock<Result<Backend>> = OnceLock::new();
         let choose = || {

@@ -64,8 +64,8 @@ pub(crate) fn serves(grid: &Grid) -> bool {
     grid.stride.width.is_multiple_of(4) && grid.stride.height.is_multiple_of(4)
 }
 
-/// Puts into `scratch.found` every window of `grid` whose score is at least `threshold`, up to the plan's noise: x, y
-/// in padded pixels, row by row.
+/// Puts into `scratch.found` every window of `grid` whose exact score may be at least `threshold`, row by row: x, y in
+/// padded pixels.
 pub(crate) fn detect(
     backend: Backend,
     plan: &Plan,
@@ -98,7 +98,7 @@ pub(crate) fn detect(
 pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageView) {
     match backend {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: a backend is only chosen where it is available; who has AVX-512 has AVX2.
+        // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2.
         Backend::Avx512 | Backend::Avx2 => unsafe { avx2_fill_planes(planes, image) },
         #[cfg(target_arch = "aarch64")]
         // SAFETY: as in `neon`.

@@ -42,7 +42,7 @@ impl Lines {
     }
 }
 
-/// What to look at.
+/// The search of one level.
 #[derive(Clone, Copy)]
 pub(super) struct Task<'a> {
     pub plan: &'a Plan,
@@ -52,7 +52,7 @@ pub(super) struct Task<'a> {
     pub threshold: f64,
 }
 
-/// `tail` serves what is narrow: single windows, and a level's last strip if that is at most half a vector of `l`.
+/// `tail` is the narrower vector: for single windows, and for a level's last strip where its lanes are enough.
 #[inline(always)]
 pub(super) fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) {
     scratch.band.begin(task.source, task.size, task.grid.pad.width, L::GROUP, L::REACH);

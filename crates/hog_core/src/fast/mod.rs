@@ -1,8 +1,8 @@
 //! The kernels: the exact path's pipeline on vectors of cells, for one instruction set each, and the crate's `unsafe`.
 //!
-//! `layout` and `lane` are what every kernel is written in; `plan` is what a detector means to them; `rows`, `strip`
+//! `layout` and `lane` hold the constants and the vector that every kernel uses; `plan` holds a detector's constants; `rows`, `strip`
 //! and `score` are the stages of a level, which `level` composes; `dispatch` chooses the instruction set.
-//! How it works is told in docs/simd.md.
+//! docs/simd.md explains how they work.
 #![allow(unsafe_code, reason = "intrinsics, and pointers into rows that overlap")]
 
 mod backend;

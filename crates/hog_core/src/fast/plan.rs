@@ -1,4 +1,4 @@
-//! What a detector's geometry and SVM mean to the kernels, computed once.
+//! The constants that the kernels need of a detector, computed once from its geometry and SVM.
 
 use crate::exact::{Svm, gamma_table};
 use crate::geometry::Size;
@@ -37,7 +37,7 @@ const SCORE_ERROR: f64 = 4e-7;
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     pub(super) gamma: Gamma,
-    /// What each pixel value stands for.
+    /// The value of each pixel after gamma correction.
     pub(super) table: [f32; 256],
     pub(super) l2_hys_threshold: f32,
     /// Blocks of a window.
@@ -141,7 +141,7 @@ fn by_rows(weights: &[f32], blocks: Size) -> Vec<f32> {
     rows
 }
 
-/// A block's weights along one axis: a Gaussian around 8 times a linear share.
+/// A block's weights along one axis: a Gaussian centred on pixel 8, times the bilinear share.
 fn profile(sigma: f32) -> [[f32; 3]; 8] {
     let gauss = |at: f64| (-(at - 8.0).powi(2) / (2.0 * f64::from(sigma).powi(2))).exp();
     std::array::from_fn(|pixel| {
@@ -149,7 +149,7 @@ fn profile(sigma: f32) -> [[f32; 3]; 8] {
         let up = (at + 0.5) / 8.0; // 0..1 across the cell
         let begin = gauss(at);
         let end = gauss(at + 8.0);
-        // At the block's outer half cell only one cell is reached, with the share it would have anyway.
+        // Pixels in the block's outer half cells vote in one cell only, with their bilinear share.
         let first_begin = begin * if pixel < 4 { up + 0.5 } else { 1.5 - up };
         let second_begin = begin * (up - 0.5);
         let first_end = end * (0.5 - up);

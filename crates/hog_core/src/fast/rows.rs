@@ -16,7 +16,7 @@ pub(crate) struct Planes {
 }
 
 impl Planes {
-    /// Takes over the pixels of `image`.
+    /// Copies the pixels of `image`.
     #[inline(always)]
     pub(super) fn fill<L: Lane>(&mut self, l: L, image: ImageView) {
         let (width, height, channels) = (image.width(), image.height(), image.channels());
@@ -145,7 +145,7 @@ mod tests {
     use super::*;
     use crate::pyramid::resize;
 
-    /// Rows of a level, mirrored by `pad` pixels on all sides, against the reference's resize.
+    /// Rows of a level, mirrored by `pad` pixels on all sides, against the exact resize.
     fn assert_rows<L: Lane, const C: usize>(l: L, from: Size, to: Size, pad: usize) {
         let data: Vec<u8> = (0..from.width * from.height * C).map(|i| (i * i / 7 + 13 * i) as u8).collect();
         let image = ImageView::new(&data, from.width, from.height, C, from.width * C).unwrap();

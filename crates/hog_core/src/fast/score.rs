@@ -1,4 +1,4 @@
-//! The SVM over a level's blocks: a prefilter in bytes at every window, exact sums for those it lets through.
+//! The SVM over a level's blocks: a quantised prefilter for every window, single precision for those that pass it.
 
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
@@ -6,7 +6,7 @@ use super::lane::Lane;
 use super::layout::{ACROSS, BLOCK, WORDS};
 use super::plan::Plan;
 
-/// Rows of windows that the prefilter takes at a time.
+/// Rows of windows that the prefilter scores at a time.
 const ROWS: usize = 8;
 
 /// The windows of a level's lattice and the blocks they are made of.
@@ -21,7 +21,8 @@ pub(super) struct WindowGrid<'a> {
     pub height: usize,
 }
 
-/// Calls `found(x, y, score)` for every window whose score may be at least `threshold`, row by row; lets others through too.
+/// Adds (x, y, score) to `found` for every window whose exact score may be at least `threshold`, row by row, and for
+/// some others.
 ///
 /// `narrow` has at most [`ACROSS`] lanes.
 ///
@@ -72,14 +73,14 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
             let x = x + mask.trailing_zeros() as usize;
             mask &= mask - 1;
             // SAFETY: as above.
-            found.push((x, y, unsafe { exact(narrow, windows, x, y) }));
+            found.push((x, y, unsafe { score_window(narrow, windows, x, y) }));
         }
     }
 }
 
-/// The score of one window. Lanes are the blocks of a row, so that one window costs no more than it must.
+/// The score of one window in single precision. Lanes are neighbouring blocks of the window.
 #[inline(always)]
-unsafe fn exact<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) -> f64 {
+unsafe fn score_window<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) -> f64 {
     let plan = windows.plan;
     let padded = plan.blocks.width.next_multiple_of(ACROSS);
     let mut score = plan.bias;
@@ -107,7 +108,7 @@ unsafe fn exact<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) -> f64 
     score
 }
 
-/// The prefilter at `rows` rows of `V` vectors of windows.
+/// Prefilters `rows` rows of `V` vectors of windows.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "a tile is named by all of them")]
 unsafe fn prefilter<L: Lane, const V: usize>(

@@ -26,14 +26,14 @@ pub(super) struct Job<'a> {
     pub stride: usize,
     /// Rows of cells to be added to the blocks; those above them have been.
     pub cells: Range<usize>,
-    /// What the cells above give to the blocks they begin: [`CARRY`] numbers for each lane.
+    /// Sums of the cells above, for the blocks that begin there: [`CARRY`] numbers for each lane.
     pub carry: *mut f32,
     /// Normalised blocks: `[block row][element][lane]`, and the same as bytes (1 stands for 255).
     pub blocks: *mut f32,
     pub bytes: *mut u32,
     /// Lanes of a row of blocks.
     pub lanes: usize,
-    /// For each row of blocks, what the first cells of the strip to the right add to the blocks left of them.
+    /// For each row of blocks, the sums that the first cells of the strip to the right add to the blocks left of them.
     pub edge: &'a mut [[f32; BLOCK]],
 }
 
@@ -155,7 +155,8 @@ unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL 
     to[CELL + 1] = l.shift_in(columns[0], plan.table[usize::from(after)]);
 }
 
-/// The gradient (dx, dy) of pixel column `phase` of every cell, from the rows above, of, and below the pixel, in the channel where it is strongest.
+/// The gradient (dx, dy) of pixel column `phase` of every cell in its strongest channel, from the rows above, of and
+/// below the pixel.
 #[inline(always)]
 fn strongest<L: Lane, const CHANNELS: usize>(
     l: L,
@@ -189,8 +190,7 @@ fn derive<L: Lane, const CHANNELS: usize>(
     [dx, dy]
 }
 
-/// dx² + dy²: two products and a sum, never fused, as a fused step would make another channel the strongest than
-/// OpenCV's.
+/// dx² + dy², never fused: a fused step could choose another channel than OpenCV.
 #[inline(always)]
 fn square<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> L::F {
     l.add(l.mul(dx, dx), l.mul(dy, dy))
@@ -253,8 +253,8 @@ pub(super) fn spread_all<L: Lane>(
 
 /// Sums the votes of `COUNT` bins, `STEP` apart, of one pixel column down a cell's rows, weighted.
 ///
-/// `carry` holds what the row of cells above gave to the row of blocks it begins; with this row of cells that is whole
-/// and goes to `sums`. What this row of cells begins goes to `carry`.
+/// `carry` holds the sums of the row of cells above for the row of blocks that begins there. This row of cells completes
+/// them: they go to `sums`, and the sums for the row of blocks that begins here go to `carry`.
 #[inline(always)]
 fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
     l: L,
@@ -304,7 +304,7 @@ fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
     }
 }
 
-/// What the votes give to `bin`.
+/// The votes for `bin`.
 #[inline(always)]
 fn of_bin<L: Lane>(l: L, votes: &LaneVotes<L>, bin: usize) -> L::Masked {
     match bin {

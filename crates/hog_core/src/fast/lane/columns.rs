@@ -1,4 +1,4 @@
-//! What [`resize_row`](super::Lane::resize_row) reads and writes: rows of the image, and how a level's row is made of them.
+//! The rows that [`resize_row`](super::Lane::resize_row) reads and writes, and which pixels it mixes.
 
 use crate::fast::layout::STEP;
 use crate::pyramid::{Tap, taps};

@@ -1,4 +1,4 @@
-//! Four lanes in plain Rust, which the compiler turns into what the architecture has for certain (SSE2 on x86-64).
+//! Four lanes in plain Rust, which the compiler vectorises for the architecture's baseline (SSE2 on x86-64).
 
 use super::{Columns, Lane, ODD, RowPointers};
 

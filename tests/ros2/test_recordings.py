@@ -131,7 +131,7 @@ def _mutated(data: bytes, seed: int) -> bytes:
     for _ in range(rng.choice((1, 1, 1, 4, 16))):
         # Half of the damage where the structure is: at the beginning and at the end.
         reach = rng.choice((60, 3000, len(changed), len(changed)))
-        at = rng.randrange(min(reach, max(len(changed), 1)))
+        at = rng.randrange(min(reach, len(changed)) or 1)
         at = at if rng.random() < 0.7 else max(len(changed) - 1 - at, 0)
         kind = rng.randrange(6)
         if not changed:

@@ -192,3 +192,15 @@ def test_every_parameter_of_ours_says_what_it_does(name: str) -> None:
     for one in Tunable(controller_named(name, None)).parameters.values():
         assert len(one.tooltip) > 10, one.name
         assert one.low <= one.value <= one.high, one.name
+
+
+@pytest.mark.parametrize("bound", ["low", "high"])
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_run_goes_on_with_every_parameter_at_its_bound(name: str, bound: str) -> None:
+    controller: Tunable[Any] = Tunable(controller_named(name, None))
+    for one in controller.parameters.values():
+        controller.set(one.name, getattr(one, bound))
+    reasons = [
+        step.decision.reason for step in run_episode(WORKSHOP, controller, PeopleDetector(scale=1.2), 6, 0).steps
+    ]
+    assert not any("failed" in reason or "finite" in reason for reason in reasons), set(reasons)

@@ -17,8 +17,6 @@ S = TypeVar("S")
 
 #: Where a field gives no bounds: from 0 to so many times its default.
 _SPAN = 10.0
-#: Parts of a controller whose numbers are offered with its own; the rest of `TrackingController` needs measurements.
-_PARTS = ("steering", "search", "selection")
 
 
 class ParameterError(LimoHogError):
@@ -78,8 +76,7 @@ class Tunable(Generic[S]):
 
     Parameters are the numeric fields of a dataclass. A field's `metadata` may give `low`, `high`, `unit` and
     `tooltip`; unit and tooltip are otherwise those of the class's docstring, and bounds from 0 to ten times the
-    default. Numbers of a field that is a dataclass itself are parameters where it is one of `_PARTS`, or where their
-    metadata give bounds.
+    default. Numbers of a field that is a dataclass itself are parameters where their metadata give bounds.
     """
 
     def __init__(self, controller: Controller[S]) -> None:
@@ -124,7 +121,7 @@ def _parameters_of(owner: Any, prefix: str = "") -> Iterator[Parameter]:
     for field in dataclasses.fields(owner):
         value, about = getattr(owner, field.name), field.metadata
         default: Any = field.default if type(field.default) in (int, float) else 0
-        if type(value) in (int, float) and ("high" in about or prefix.rstrip(".") in ("", *_PARTS)):
+        if type(value) in (int, float) and ("high" in about or not prefix):
             unit, tooltip = _documented(type(owner)).get(field.name, ("", ""))
             yield Parameter(
                 prefix + field.name,
@@ -147,18 +144,19 @@ def _replaced(owner: Any, path: list[str], value: float) -> Any:
 def _documented(kind: type) -> dict[str, tuple[str, str]]:
     """Read unit and meaning of each attribute from a class's docstring, in numpydoc's form.
 
-    The unit is what stands in brackets at the end; an entry of several names may have as many units, or one for all.
+    The unit is what first stands in brackets, [1] for none; an entry of several names may have as many units, or one
+    for all.
     """
     _, _, section = (inspect.getdoc(kind) or "").partition("\nAttributes\n----------\n")
     found = {}
     for entry in re.finditer(r"^(\w[\w, ]*)\n((?:[ ]+.*\n?)+)", section, re.MULTILINE):
         names = [name.strip() for name in entry[1].split(",")]
         text = " ".join(entry[2].split())
-        unit = re.search(r" \[([^\]]*)\]\.?$", text)
-        units = [one.strip() for one in unit[1].split(",")] if unit else [""]
-        meaning = f"{text[: unit.start()]}." if unit else text
+        bracket = re.search(r" \[([^\]]*)\]", text)
+        units = [one.strip() for one in bracket[1].split(",")] if bracket else ["1"]
         for i, name in enumerate(names):
-            found[name] = (units[i] if len(units) == len(names) else units[0], meaning)
+            unit = units[i] if len(units) == len(names) else units[0]
+            found[name] = ("" if unit == "1" else unit, text.replace(bracket[0], "", 1) if bracket else text)
     return found
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.sense.observation import Observation
 from limo_hog.follow.sense.ranging import box_centre
 from limo_hog.follow.twist import Twist
@@ -28,9 +29,9 @@ class ApproachController:
         Speed towards a person [m/s].
     """
 
-    angular_gain: float = 0.005
-    dead_band_px: float = 20.0
-    linear_speed: float = 0.2
+    angular_gain: float = bounded(0.005, 0, 0.05)
+    dead_band_px: float = bounded(20.0, 0, 320)
+    linear_speed: float = bounded(0.2, 0, 1)
 
     def start(self) -> bool:
         """Return the state before the first observation: no person detected yet."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from limo_hog.follow.control.approach import best_box, no_detection
 from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.sense.observation import Observation
 from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.twist import Twist
@@ -30,11 +31,11 @@ class ProxemicController:
         Limits of the command, either way [m/s, rad/s].
     """
 
-    target_distance: float = 1.5
-    linear_gain: float = 0.5
-    angular_gain: float = 0.005
-    max_linear: float = 0.3
-    max_angular: float = 0.8
+    target_distance: float = bounded(1.5, 0.1, 8)
+    linear_gain: float = bounded(0.5, 0, 5)
+    angular_gain: float = bounded(0.005, 0, 0.05)
+    max_linear: float = bounded(0.3, 0, 1)
+    max_angular: float = bounded(0.8, 0, 3)
 
     def start(self) -> bool:
         """Return the state before the first observation: no person detected yet."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from limo_hog.follow.decision import Mode
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.twist import Twist
 
 
@@ -22,8 +23,8 @@ class Search:
         behind a pillar within 2 s. Behind something wider than that, `Detour.hides` extends the wait.
     """
 
-    rate: float = 0.7
-    after_s: float = 2.0
+    rate: float = bounded(0.7, 0, 3)
+    after_s: float = bounded(2.0, 0, 30)
 
     def command(self, side: float, *, lost: bool, other_in_view: bool) -> tuple[Twist, Mode, str]:
         """Return the command, the mode and the reason.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.sense.appearance import Appearance, Clothes
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
@@ -50,12 +51,12 @@ class Selection:
         Trust by which another must exceed the track that is faced already [1]. Chosen: one frame of evidence.
     """
 
-    min_trust: float = 0.4
-    max_unconfirmed_frames: int = 30
-    reidentify_s: float = 20.0
-    same_place: float = 0.5
-    speed: float = 1.0
-    lead: float = 0.1
+    min_trust: float = bounded(0.4, 0, 1)
+    max_unconfirmed_frames: int = bounded(30, 1, 1000)
+    reidentify_s: float = bounded(20.0, 0, 600)
+    same_place: float = bounded(0.5, 0, 5)
+    speed: float = bounded(1.0, 0, 5)
+    lead: float = bounded(0.1, 0, 1)
 
     def choose(self, tracks: Tracks, choice: Choice, wait_s: float, appearance: Appearance) -> Choice:
         """Stay with a confirmed person while they are tracked; else take the most trusted track in view.

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from limo_hog.follow.decision import Mode
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.twist import Twist
 
@@ -58,17 +59,17 @@ class Steering:
         Speed backwards where no direction is free [m/s]. Chosen: a fifth of the full speed.
     """
 
-    linear_gain: float = 0.8
-    angular_gain: float = 2.5
-    max_linear: float = 0.7
-    max_angular: float = 1.5
-    distance_tolerance: float = 0.08
-    bearing_tolerance: float = 0.02
-    steady_bearing_rate: float = 0.05
-    steady_range_rate: float = 0.1
-    coast_s: float = 0.8
-    doubt_speed: float = 0.5
-    back_off: float = 0.15
+    linear_gain: float = bounded(0.8, 0, 5)
+    angular_gain: float = bounded(2.5, 0, 10)
+    max_linear: float = bounded(0.7, 0, 1)
+    max_angular: float = bounded(1.5, 0, 3)
+    distance_tolerance: float = bounded(0.08, 0, 1)
+    bearing_tolerance: float = bounded(0.02, 0, 0.5)
+    steady_bearing_rate: float = bounded(0.05, 0, 1)
+    steady_range_rate: float = bounded(0.1, 0, 1)
+    coast_s: float = bounded(0.8, 0, 5)
+    doubt_speed: float = bounded(0.5, 0, 1)
+    back_off: float = bounded(0.15, 0, 0.5)
 
     def command(
         self,

@@ -9,6 +9,7 @@ from limo_hog.follow.control.search import Search
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.control.steer import Aim, Steering
 from limo_hog.follow.decision import Decision
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import scan_points
 from limo_hog.follow.sense.observation import Observation
@@ -70,8 +71,8 @@ class TrackingController:
         Where camera and lidar sit.
     """
 
-    target_distance: float = 1.5
-    full_every: int = 15
+    target_distance: float = bounded(1.5, 0.1, 8)
+    full_every: int = bounded(15, 1, 1000)
     steering: Steering = field(default_factory=Steering)
     search: Search = field(default_factory=Search)
     selection: Selection = field(default_factory=Selection)

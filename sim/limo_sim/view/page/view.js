@@ -143,20 +143,22 @@ $("parameters").onsubmit = (event) => event.preventDefault();
 
 function parameters(all) {
   $("parameters").hidden = !all.length;
-  $("fields").replaceChildren(
-    ...all.map(({ name, value, low, high, unit, tooltip, whole }) => {
-      const bounds = `${low} to ${high}${unit && ` ${unit}`}`;
-      const input = element("input", { type: "number", step: whole ? 1 : "any", min: low, max: high, name, value });
-      input.onchange = () => {
-        $("complaint").textContent = "";
-        wish({ set: name, value: input.valueAsNumber });
-      };
-      const label = element("label", { title: `${tooltip} ${bounds}`.trim() });
-      input.onfocus = () => ($("about").textContent = label.title);
-      label.append(element("span", { textContent: name.replaceAll(/[_.]/g, " ") }), input, element("small", { textContent: unit }));
-      return label;
-    }),
-  );
+  $("fields").replaceChildren();
+  let group = "";
+  for (const { name, value, low, high, unit, tooltip, whole } of all) {
+    const [own, part = ""] = name.split(".").reverse();
+    if (part !== group) $("fields").append(element("h3", { textContent: part }));
+    group = part;
+    const input = element("input", { type: "number", step: whole ? 1 : "any", min: low, max: high, name, value });
+    const label = element("label", { title: `${tooltip} From ${low} to ${high}${unit && ` ${unit}`}.` });
+    label.append(element("span", { textContent: own.replaceAll("_", " ") }), input, element("small", { textContent: unit }));
+    input.onfocus = () => ($("about").textContent = label.title);
+    input.onchange = () => {
+      $("complaint").textContent = "";
+      wish({ set: name, value: input.valueAsNumber });
+    };
+    $("fields").append(label);
+  }
 }
 
 // Drawing

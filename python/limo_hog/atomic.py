@@ -30,7 +30,7 @@ def about(path: Path) -> Iterator[None]:
     except OSError as error:
         if error.filename is not None and str(error.filename) != str(part_of(path)):
             raise
-        raise _naming(path, error) from error
+        raise _named(error, path) from error
 
 
 @contextmanager
@@ -53,10 +53,10 @@ def whole_file(path: Path) -> Iterator[Path]:
     except BaseException as error:
         part.unlink(missing_ok=True)
         if isinstance(error, OSError) and str(error.filename) == str(part):
-            raise _naming(path, error) from error
+            raise _named(error, path) from error
         raise
 
 
-def _naming(path: Path, error: OSError) -> OSError:
-    """Return the same error of another file; libraries' own errors may not let theirs be changed."""
-    return OSError(error.errno, error.strerror or str(error), str(path))
+def _named(error: OSError, path: Path) -> OSError:
+    """Return the error with another file name: a new one, since a library's own kind may not let its name be set."""
+    return OSError(error.errno or errno.EIO, error.strerror or str(error), str(path))

@@ -264,7 +264,7 @@ class PeopleDetector:
         width, height = (max(1, round(side * zoom)) for side in image.shape[1::-1])
         if (height, width) == image.shape[:2]:
             return image
-        if zoom > 1 and width * height > _MOST_PIXELS:
+        if width * height > _MOST_PIXELS:
             raise ImageError(
                 f"the image, {image.shape[1]} x {image.shape[0]} px, would be {width} x {height} px to find people of "
                 f"{self.min_height:g} px; at most {_MOST_PIXELS} pixels are allowed: raise min_height"

@@ -16,7 +16,7 @@ from limo_hog.follow.sense.detectors import (
     DetectorError,
     HalfSize,
     OnnxDetector,
-    best_first,
+    by_score,
     detect_in,
     detector_named,
 )
@@ -90,7 +90,7 @@ def test_half_size_is_the_mean_of_four_pixels() -> None:
 
 
 def test_the_surest_comes_first() -> None:
-    found = best_first(np.array([[0, 0, 1, 2], [3, 3, 1, 2]]), np.array([0.1, 0.9]))
+    found = by_score(np.array([[0, 0, 1, 2], [3, 3, 1, 2]]), np.array([0.1, 0.9]))
     assert found.scores.tolist() == [0.9, 0.1]
     assert found.boxes[0].tolist() == [3, 3, 1, 2]
 

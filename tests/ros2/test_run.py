@@ -83,7 +83,7 @@ def test_a_nodes_windows_are_on_the_live_page_under_their_names(run: Run) -> Non
 def test_the_same_node_gives_the_same_run(run: Run) -> None:
     def log() -> list[tuple[object, ...]]:
         steps = run(node(FOLLOW), STANDING, 1.0).episode.steps
-        return [(step.time, step.truth.robot, step.twist, step.detections.boxes.tolist()) for step in steps]
+        return [(step.time, step.truth.robot, step.decision.twist, step.detections.boxes.tolist()) for step in steps]
 
     assert log() == log()
 
@@ -97,7 +97,32 @@ def test_a_half_size_image_is_scored_in_the_cameras_pixels(run: Run) -> None:
 def test_a_node_without_a_watched_detector_has_no_figures_of_detection(run: Run) -> None:
     card = score_of(run(node(DRIVE), STANDING))
     assert (card.detected, card.first_detection_s, card.detect_ms_p50) == (None, None, None)
+    assert (card.follows_first, card.identity_switches) == (None, None)
     assert card.in_view == 1.0
+    assert card.success is True
+
+
+@pytest.mark.parametrize(
+    ("make", "target"),
+    [
+        ("", None),
+        ("self.declare_parameter('target_distance', 1.8)", 1.8),
+        ("self.declare_parameter('target_distance', 'near')", None),
+        ("self.declare_parameter('target_distance', float('nan'))", None),
+        (
+            "from rclpy.parameter import Parameter\n"
+            "self.declare_parameter('target_distance', 1.8)\n"
+            "self.set_parameters([Parameter('target_distance', value=2.2)])",
+            2.2,
+        ),
+    ],
+)
+def test_a_nodes_parameter_target_distance_is_what_the_card_measures_against(
+    run: Run, make: str, target: float | None
+) -> None:
+    card = score_of(run(node(DRIVE, make), STANDING, 0.5))
+    assert card.target_m == target
+    assert (card.distance_rms_error_m is None) == (target is None)
 
 
 @pytest.mark.parametrize(

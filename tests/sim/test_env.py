@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from numpy.typing import NDArray
 
+from limo_hog.follow import ApproachController, TrackingController, detector_named
+from limo_hog.follow.sense.observation import Odometry, Scan, observed
 from limo_sim.env import LimoFollow, reward_parts
-from limo_sim.sensing.camera import Contacts, PersonTruth, Truth
-from limo_sim.world.scenario import Person, Scenario
+from limo_sim.sensing.camera import FOCAL_PX
+from limo_sim.sensing.renderer import Renderer
+from limo_sim.world.scenario import Person, Robot, Scenario
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
 STRAIGHT = np.array([0.2, 0.0], np.float32)
 
 
 def seen_at(distance: float, visible: float, person: int = 0, wall: int = 0) -> Truth:
-    somebody = PersonTruth(distance, 0.0, 0.0, distance, 0.0, visible, None)
-    return Truth(1.0, (0.0, 0.0, 0.0), (somebody,), Contacts(person, wall))
+    standing = PersonTruth(distance + 0.2, 0.0, 0.0, distance + 0.2, 0.0, distance, visible, None)
+    return Truth(1.0, (0.0, 0.0, 0.0), (standing,), Contacts(person, wall))
+
+
+def total(truth: Truth, before: Contacts = Contacts()) -> float:  # noqa: B008 — frozen
+    return sum(reward_parts(truth, before, STRAIGHT).values())
 
 
 def test_gymnasiums_checker_accepts_it() -> None:
@@ -77,13 +88,101 @@ def test_touching_the_person_ends_the_episode() -> None:
 
 
 def test_the_reward_is_best_at_the_target_distance_in_view() -> None:
-    def total(truth: Truth) -> float:
-        return sum(reward_parts(truth, Contacts(), STRAIGHT).values())
-
     assert total(seen_at(1.5, 1.0)) > total(seen_at(2.0, 1.0)) > total(seen_at(2.4, 1.0))
+    assert total(seen_at(1.5, 1.0)) > total(seen_at(1.0, 1.0)) > total(seen_at(0.5, 1.0))
     assert total(seen_at(1.5, 1.0)) > total(seen_at(1.5, 0.5))
     assert total(seen_at(1.5, 1.0)) - total(seen_at(1.5, 1.0, person=1)) == pytest.approx(10)
     assert total(seen_at(1.5, 1.0)) - total(seen_at(1.5, 1.0, wall=2)) == pytest.approx(2)
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.3, 2.5, 4.0, 8.0])
+def test_a_person_in_view_earns_more_than_looking_away_at_every_distance(distance: float) -> None:
+    assert total(seen_at(distance, 1.0)) > total(seen_at(distance, 0.3)) > total(seen_at(distance, 0.0))
+    nobody = Truth(1.0, (0.0, 0.0, 0.0), (), Contacts())
+    assert total(seen_at(distance, 0.0)) == total(nobody) == pytest.approx(-0.002)
+
+
+def test_only_new_contacts_cost() -> None:
+    assert total(seen_at(1.5, 1.0, person=2, wall=3), Contacts(2, 3)) == total(seen_at(1.5, 1.0))
+    assert total(seen_at(1.5, 1.0, wall=3), Contacts(0, 2)) == pytest.approx(total(seen_at(1.5, 1.0)) - 1)
+
+
+def test_a_contact_with_the_wall_costs_once_and_the_episode_goes_on() -> None:
+    env = LimoFollow(Scenario(robot=Robot(x=4.5)))
+    env.reset(seed=0)
+    steps = [env.step(np.array([0.3, 0.0], np.float32)) for _ in range(15)]
+    costs = [info["reward"]["contact"] for *_, info in steps]
+    assert sum(costs) == min(costs) == -1.0
+    assert not any(terminated for _, _, terminated, _, _ in steps)
+
+
+@pytest.mark.parametrize("action", [[math.nan, 0.0], [0.0, math.inf], [0.1], [0.1, 0.0, 0.0], 0.3])
+def test_an_action_that_is_not_two_finite_numbers_is_refused_by_name(action: Any) -> None:
+    env = LimoFollow("empty")
+    env.reset(seed=0)
+    with pytest.raises(gymnasium.error.InvalidAction, match=r"action: got .*, want two finite numbers"):
+        env.step(np.array(action, np.float32))
+
+
+def test_an_action_draws_one_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = LimoFollow("standing")
+    env.reset(seed=0)
+    drawn = 0
+    draw = Renderer._draw
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal drawn
+        drawn += 1
+        return draw(*arguments)
+
+    monkeypatch.setattr(Renderer, "_draw", counted)
+    for _ in range(5):
+        env.step(STRAIGHT)
+    assert drawn == 5
+
+
+class Policy:
+    """A controller of `limo_hog.follow` as a policy of the environment."""
+
+    def __init__(self, controller: Any) -> None:
+        self.controller, self.state, self.detector = controller, controller.start(), detector_named("hog")
+
+    def __call__(self, observation: Any, time: float) -> NDArray[np.float32]:
+        image = np.ascontiguousarray(observation["image"][:, :, ::-1])
+        scan = Scan(time, observation["scan"], -2.0, 2.0, 0.12, 8.0)
+        odometry = Odometry(time, *observation["odometry"].tolist())
+        found = self.detector.detect(image)
+        seen = observed(time, image, FOCAL_PX, found, None, observation["depth"], scan, odometry)
+        decision = self.controller.step(seen, self.state)
+        self.state = decision.state
+        return np.array([decision.twist.linear, decision.twist.angular], np.float32)
+
+
+def earned(scenario: str, policy: Callable[[Any, float], NDArray[np.float32]], steps: int, seed: int = 0) -> float:
+    """Return the reward of an episode of at most `steps` actions."""
+    env = LimoFollow(scenario)
+    observation, info = env.reset(seed=seed)
+    sum_ = 0.0
+    for _ in range(steps):
+        observation, reward, terminated, _, info = env.step(policy(observation, info["time"]))
+        sum_ += reward
+        if terminated:
+            break
+    return sum_
+
+
+def test_holding_the_distance_earns_most_approaching_less_and_chance_least() -> None:
+    random = np.random.default_rng(0)
+    limits = np.array([1.0, 2 / 0.172])
+    policies: dict[str, Callable[[Any, float], NDArray[np.float32]]] = {
+        "tracking": Policy(TrackingController()),
+        "approach": Policy(ApproachController()),
+        "still": lambda *_: np.zeros(2, np.float32),
+        "random": lambda *_: random.uniform(-limits, limits).astype(np.float32),
+    }
+    rewards = {name: earned("standing", policy, 150) for name, policy in policies.items()}
+    assert rewards["tracking"] > rewards["approach"] > rewards["random"]
+    assert rewards["tracking"] > rewards["still"] > rewards["random"]
 
 
 def test_stepping_before_reset_is_an_error_that_says_so() -> None:

@@ -20,7 +20,7 @@ import limo_hog
 from limo_hog import Detections, HOGDescriptor, PeopleDetector
 from limo_hog.cli.support.scene import street
 from limo_hog.models import Calibration, PersonBox
-from limo_hog.suppression import intersection_over_smaller, intersection_over_union, nms
+from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
 Image = NDArray[np.uint8]
@@ -89,14 +89,32 @@ def test_the_height_of_a_window_without_enlarging_is_the_models_own() -> None:
     np.testing.assert_array_equal(own.detect(picture()).boxes, asked.detect(picture()).boxes)
 
 
+def test_boxes_of_an_enlarged_image_are_in_pixels_of_the_image_itself() -> None:
+    larger = np.asarray(cv2.resize(picture(), (998, 749), interpolation=cv2.INTER_LINEAR_EXACT), np.uint8)
+    expected = PeopleDetector(min_height=None).detect(larger)
+    found = PeopleDetector(min_height=64).detect(picture())
+    zoom = np.array([998 / 640, 749 / 480] * 2)
+    np.testing.assert_array_equal(found.boxes, np.rint(expected.boxes / zoom))
+    np.testing.assert_array_equal(found.scores, expected.scores)
+
+
 def test_people_taller_than_asked_for_are_left_out() -> None:
     all_of_them = PeopleDetector().detect(picture())
-    heights = np.sort(all_of_them.person_boxes[:, 3])
-    limit = float(heights[:-1].mean())
-    found = PeopleDetector(max_height=limit).detect(picture())
-    assert 0 < len(found) < len(all_of_them)
-    assert found.person_boxes[:, 3].max() <= limit + 1
-    assert PeopleDetector(min_height=64, max_height=64).max_height == 64
+    heights = np.unique(all_of_them.person_boxes[:, 3])
+    limits = (heights[:-1] + heights[1:])[np.diff(heights) > 4] / 2
+    assert len(limits) > 1
+    for limit in limits.tolist():
+        found = PeopleDetector(max_height=limit).detect(picture())
+        low = all_of_them[all_of_them.person_boxes[:, 3] < limit]
+        np.testing.assert_array_equal(found.boxes, low.boxes)
+        np.testing.assert_array_equal(found.scores, low.scores)
+
+
+def test_people_of_exactly_the_greatest_height_are_reported() -> None:
+    every_window = PeopleDetector(threshold=-9.0, nms="iou", overlap=1)
+    for max_height, window_height in ((64, 82), (66, 82), (67, 86)):  # 64 / 0.78, and 1.05 times that
+        found = replace(every_window, max_height=max_height).detect(picture()[200:360, 300:400])
+        assert found.boxes[:, 3].max() == window_height
 
 
 def test_more_than_64_levels_are_searched_where_the_scale_is_fine() -> None:
@@ -121,24 +139,34 @@ def test_an_image_that_would_be_enlarged_beyond_memory_is_refused() -> None:
 # One box a person.
 
 
-def test_every_way_to_suppress_leaves_few_boxes_of_many_hits() -> None:
-    hits = PeopleDetector(nms="group", group_threshold=0).detect(picture())
-    for way in ("overlap", "iou", "soft"):
-        found = PeopleDetector(nms=way).detect(picture())
-        assert 0 < len(found) < len(hits) / 3
-        assert (np.diff(found.scores) <= 0).all()
-    assert found.scores[0] == hits.scores[0]
-
-
-@pytest.mark.parametrize(("way", "overlap"), [("overlap", intersection_over_smaller), ("iou", intersection_over_union)])
-def test_people_are_compared_not_windows_which_share_margins(way: Any, overlap: Any) -> None:
-    limit = 0.4
-    hits = PeopleDetector(nms="group", group_threshold=0, threshold=-1, min_height=None).detect(picture())
-    found = PeopleDetector(nms=way, overlap=limit, threshold=-1, min_height=None).detect(picture())
+def test_every_way_to_suppress_is_applied_to_all_hits_with_its_own_limit() -> None:
+    detector = PeopleDetector(min_height=None, threshold=-0.7, nms="group", group_threshold=0)
+    hits = detector.detect(picture())
     x, y, w, h = hits.boxes.T
+    # People are compared, not windows: those of two people side by side share their margins.
     people = np.stack([x + 0.2 * w, y + 0.1 * h, 0.6 * w, 0.78 * h], axis=1)
-    np.testing.assert_array_equal(found.boxes, hits.boxes[nms(people, hits.scores, limit, overlap)])
-    assert len(found) > len(nms(hits.boxes, hits.scores, limit, overlap))
+    by_overlap = nms(people, hits.scores, 0.65, intersection_over_smaller)
+    by_iou = nms(people, hits.scores, 0.3)
+    softly, lowered = soft_nms(people, hits.scores, 0.3**2, -0.7)
+    assert len(by_overlap) > len(nms(hits.boxes, hits.scores, 0.65, intersection_over_smaller))
+    ways: list[tuple[Any, Any, Any]] = [
+        ("overlap", by_overlap, hits.scores[by_overlap]),
+        ("iou", by_iou, hits.scores[by_iou]),
+        ("soft", softly, lowered),
+    ]
+    assert len({len(kept) for _, kept, _ in ways}) == 3, "the picture does not tell the ways apart"
+    for way, kept, scores in ways:
+        found = replace(detector, nms=way, group_threshold=None).detect(picture())
+        assert sorted(map(tuple, found.boxes.tolist())) == sorted(map(tuple, hits.boxes[kept].tolist()))
+        np.testing.assert_allclose(found.scores, scores)
+        assert (np.diff(found.scores) <= 0).all()
+
+
+def test_the_limit_of_overlap_can_be_chosen() -> None:
+    hits = PeopleDetector(nms="group", group_threshold=0).detect(picture())
+    assert len(PeopleDetector(nms="iou", overlap=1).detect(picture())) == len(hits)
+    counts = [len(PeopleDetector(threshold=-0.7, overlap=limit).detect(picture())) for limit in (0.1, 0.65, 0.95)]
+    assert 0 < counts[0] < counts[1] < counts[2]
 
 
 def test_a_threshold_below_minus_one_gives_more_and_surest_first() -> None:

@@ -38,6 +38,18 @@ def test_importing_the_detector_imports_neither_commands_nor_follower(imported: 
     assert not [name for name in imported if name.startswith(unwanted)]
 
 
+def test_the_package_imports_nothing_but_its_extension_through_its_own_front_door() -> None:
+    package = Path(limo_hog.__file__).parent
+    rooms = [path for path in package.rglob("*.py") if "cli" not in path.parts]
+    through = {
+        f"{path.relative_to(package)}: {name}"
+        for path in rooms
+        for name in re.findall(r"^\s*(?:from limo_hog import|import limo_hog$) *(.*)", path.read_text(), re.MULTILINE)
+        if name != "_core"
+    }
+    assert not through
+
+
 def test_the_version_is_that_of_the_crate_for_both_distributions() -> None:
     stated = [
         re.search(r'^version = "(.+)"$', (ROOT / file).read_text(), re.MULTILINE)

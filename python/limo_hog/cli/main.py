@@ -10,11 +10,14 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import signal
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from types import ModuleType
 
 from limo_hog.cli.support.output import UsageError, one_line
+from limo_hog.cli.support.signals import stopping
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import MissingExtraError, missing_extra
 
@@ -40,15 +43,17 @@ ARENA = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line and return 0 done, 1 a named error, 2 wrong arguments, 130 Ctrl-C."""
+    """Run the command line and return 0 done, 1 a named error, 2 wrong arguments, 128 + n stopped by signal n."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        code = _run(arguments)
+        with stopping():
+            code = _run(arguments)
         # What is still buffered is written here, where a closed pipe or a full disk can be answered.
         sys.stdout.flush()
-    except KeyboardInterrupt:
-        print("limo-hog: stopped", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as error:
+        with suppress(OSError):  # the terminal may be gone
+            print("limo-hog: stopped", file=sys.stderr)
+        return 128 + getattr(error, "signal", signal.SIGINT)
     except BrokenPipeError:
         # The reader has closed the pipe; Python must not complain again when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

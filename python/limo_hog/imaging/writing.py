@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from fractions import Fraction
 from pathlib import Path
 
@@ -57,7 +57,15 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[[NDArray[np.uint8]
     """
     with needed(by="writing H.264 video", what="PyAV", install="'limo-hog[video]'"):
         import av
-    with whole_file(path) as part, av.open(part, "w", format="mp4") as container:
+    with whole_file(path) as part, ExitStack() as stack:
+        with about(path):
+            container = av.open(part, "w", format="mp4")
+
+        @stack.callback
+        def close() -> None:
+            with about(path):
+                container.close()
+
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         stream.pix_fmt = "yuv420p"
         stream.options = {"preset": "veryfast", "crf": "20"}
@@ -70,10 +78,12 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[[NDArray[np.uint8]
                 image = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
             if not written:
                 stream.height, stream.width = image.shape[:2]
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
+            with about(path):
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
             written += 1
 
         yield write
         if not written:
             raise WriteError(f"{path}: no frame to write")
-        container.mux(stream.encode(None))
+        with about(path):
+            container.mux(stream.encode(None))

@@ -32,9 +32,9 @@ def run(args: argparse.Namespace) -> int:
     if not args.ros2 and not any((args.view, args.video, args.record)):
         raise UsageError("an arena that nobody sees: give --ros2, --view, --video or --record")
     from limo_sim.ros.live import run_live
-    from limo_sim.world.scenario import Scenario
+    from limo_sim.run.catalogue import load
 
-    scenario = Scenario.load(args.scenario)
+    scenario = load(args.scenario)
     bus: Bus | None = None
     if args.ros2:
         from limo_hog.ros2.dds import Bus
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
         bus = Bus()
         print(f"arena {scenario.name!r} is on ROS domain {bus.domain}; Ctrl-C ends it", file=sys.stderr)
     with watching(args, scenario) as audience:
-        arena = run_live(scenario, args.seed, args.seconds, bus, audience.watch if audience.watchers else None)
+        arena = run_live(scenario, args.seed, args.seconds, bus, audience.watch if audience else None)
     contacts = arena.contacts
     print(
         f"{arena.time:.1f} s; contacts: person {contacts.person}, wall {contacts.wall}; "

@@ -1,4 +1,4 @@
-"""The score card, as a terminal shows it."""
+"""The score card in a terminal."""
 
 from __future__ import annotations
 
@@ -24,26 +24,24 @@ def show(card: ScoreCard) -> None:
 
 
 def picture(card: ScoreCard) -> Panel:
-    """Lay a score card out: figures on the left, shares of time as bars below."""
+    """Lay a score card out: figures in two columns, below them shares of time as bars."""
     figures = Table.grid(padding=(0, 2))
     figures.add_column(style="dim", no_wrap=True)
     figures.add_column(no_wrap=True)
     figures.add_column(style="dim", no_wrap=True)
     figures.add_column(no_wrap=True)
     contacts = card.contacts_person + card.contacts_wall
+    error = "error to target" if card.target_m is None else f"error to {card.target_m:g} m"
     for row in (
-        ("first found", _unit(card.first_detection_s, "s"), "distance", _unit(card.distance_mean_m, "m", 2)),
-        ("in view", _share(card.in_view, 0.95, 1), "nearest", _unit(card.distance_min_m, "m", 2)),
-        (
-            "found when in view",
-            _share(card.detected, 0.95, 1),
-            "error to 1.5 m",
-            _unit(card.distance_rms_error_m, "m", 2),
-        ),
-        ("longest gap", _unit(card.longest_gap_s, "s"), "least clearance", _unit(card.clearance_min_m, "m", 2)),
-        ("best box wrong", _share(card.best_box_wrong, 0, 0.05), "contacts", _good(str(contacts), contacts == 0)),
-        ("pixel error", _pixels(card), "path", _unit(card.path_m, "m")),
-        ("lost", _losses(card), "turn-rate change", _unit(card.mean_abs_domega, "rad/s", 3)),
+        ("success", _success(card), "distance, mean", _unit(card.distance_mean_m, "m", 2)),
+        ("first detected", _unit(card.first_detection_s, "s"), "distance, least", _unit(card.distance_min_m, "m", 2)),
+        ("in view", _share(card.in_view, 0.95, 1), error, _unit(card.distance_rms_error_m, "m", 2)),
+        ("detected in view", _share(card.detected, 0.95, 1), "clearance, least", _unit(card.clearance_min_m, "m", 2)),
+        ("longest gap", _unit(card.longest_gap_s, "s"), "contacts", _good(str(contacts), contacts == 0)),
+        ("best box wrong", _share(card.best_box_wrong, 0, 0.05), "path", _unit(card.path_m, "m")),
+        ("pixel error", _pixels(card), "turn-rate change", _unit(card.mean_abs_domega, "rad/s", 3)),
+        ("lost", _losses(card), "jerk", _unit(card.jerk_mean, "m/s³")),
+        ("target switches", "–" if card.identity_switches is None else str(card.identity_switches), "", ""),
     ):
         figures.add_row(*row)
     bars = Table.grid(padding=(0, 2))
@@ -53,7 +51,7 @@ def picture(card: ScoreCard) -> Panel:
     bars.add_row(Text("distance zones", style="bold"), "", "")
     for zone, style in _ZONE_STYLES.items():
         bars.add_row(*_bar(zone, getattr(card, f"zone_{zone}"), style))
-    bars.add_row(Text("what it did", style="bold"), "", "")
+    bars.add_row(Text("mode", style="bold"), "", "")
     for mode, share in card.modes.items():
         bars.add_row(*_bar(mode, share, _MODE_STYLES[mode]))
     reasons = Table.grid(padding=(0, 2))
@@ -63,7 +61,7 @@ def picture(card: ScoreCard) -> Panel:
         reasons.add_row(_percent(share), reason)
     detection = f"{card.detect_ms_p50:.1f} ms a frame" if card.detect_ms_p50 is not None else "no frame"
     return Panel(
-        Group(figures, "", bars, "", Text("and why", style="bold"), reasons),
+        Group(figures, "", bars, "", Text("most frequent reasons", style="bold"), reasons),
         title=f"[bold]{card.scenario}[/] · {card.controller} · {card.detector} · seed {card.seed}",
         subtitle=f"{card.seconds:g} s, {card.real_time_factor:.1f}× real time · detection {detection}",
         box=box.ROUNDED,
@@ -74,7 +72,7 @@ def picture(card: ScoreCard) -> Panel:
 
 def _bar(name: str, share: float | None, style: str) -> tuple[str, Text, str]:
     full = round(_BAR * (share or 0.0))
-    # However short, what happened at all is to be seen.
+    # A share above 0 has a bar, however small it is.
     full = max(full, 1) if share else 0
     return f"  {name}", Text("━" * full, style=style) + Text("─" * (_BAR - full), style="dim"), _percent(share)
 
@@ -93,6 +91,10 @@ def _good(text: str, good: bool) -> Text:
 
 def _unit(value: float | None, unit: str, digits: int = 1) -> str:
     return "–" if value is None else f"{value:.{digits}f} {unit}"
+
+
+def _success(card: ScoreCard) -> Text | str:
+    return "–" if card.success is None else _good("yes" if card.success else "no", card.success)
 
 
 def _pixels(card: ScoreCard) -> str:

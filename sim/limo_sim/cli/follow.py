@@ -37,12 +37,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Run one episode and show how it went."""
+    from limo_sim.run.catalogue import load
     from limo_sim.run.episode import run_episode
     from limo_sim.run.score import score
     from limo_sim.view.tuning import Tunable
-    from limo_sim.world.scenario import Scenario
 
-    scenario = Scenario.load(args.scenario)
+    scenario = load(args.scenario)
     controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
     with watching(args, scenario, controller) as audience:
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             task = bar.add_task("search", total=args.seconds)
 
             def watch(moment: Moment) -> None:
-                bar.update(task, completed=round(moment.step.time, 1), description=moment.step.mode.value)
+                bar.update(task, completed=round(moment.step.time, 1), description=moment.step.decision.mode.value)
                 audience.watch(moment)
 
             episode = run_episode(

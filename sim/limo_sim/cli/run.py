@@ -51,11 +51,11 @@ def run(args: argparse.Namespace) -> int:
         from limo_sim.cli.real import run_real
 
         return run_real(args)
-    from limo_sim.world.scenario import Scenario
+    from limo_sim.run.catalogue import load
 
     with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
         from limo_sim.ros.script import run_script, score_of
-    scenario = Scenario.load(args.scenario)
+    scenario = load(args.scenario)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
             # What the node prints must not mix with the JSON.
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         task = bar.add_task("search", total=args.seconds)
 
         def watch(moment: Moment) -> None:
-            bar.update(task, completed=round(moment.step.time, 1), description=moment.step.mode.value)
+            bar.update(task, completed=round(moment.step.time, 1), description=moment.step.decision.mode.value)
             audience.watch(moment)
 
         def log(time: float, level: str, name: str, message: str) -> None:

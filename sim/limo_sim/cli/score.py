@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 #: Columns of the table: a figure of the score card, its heading, its unit, how it is written.
 _COLUMNS = (
+    ("success", "suc-\ncess", "%", ".0f"),
     ("in_view", "in\nview", "%", ".1f"),
     ("pixel_error_mean", "off\ncentre", "px", ".1f"),
-    ("distance_rms_error_m", "error\nto 1.5", "m", ".2f"),
-    ("zone_social", "social\nzone", "%", ".1f"),
+    ("distance_rms_error_m", "dist.\nerror", "m", ".2f"),
     ("found_again", "found\nagain", "%", ".1f"),
     ("follows_first", "same\nperson", "%", ".1f"),
     ("clearance_min_m", "least\nclear", "m", ".2f"),
@@ -58,6 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Play all runs, show the table, and write what was asked for."""
+    from limo_sim.run.catalogue import load
     from limo_sim.run.sweep import Run, play_all, summarise
     from limo_sim.world.scenario import Scenario
 
@@ -66,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         from limo_sim.view.sweep_plot import plot
     scenarios = args.scenario or Scenario.names()
     for name in scenarios:
-        Scenario.load(name)
+        load(name)
     runs = [
         Run(scenario, controller, args.detector, seed, args.seconds, args.target)
         for scenario in scenarios

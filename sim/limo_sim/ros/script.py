@@ -135,6 +135,7 @@ def score_of(outcome: Outcome) -> ScoreCard:
         lost=0,
         found_again=None,
         follows_first=None,
+        identity_switches=None,
         detect_ms_p50=None,
         detect_ms_p95=None,
         detect_ms_mean=None,

@@ -12,16 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 import pymunk
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.twist import Twist
 from limo_sim.sensing import imu, lidar
-from limo_sim.sensing.camera import CameraPose, Contacts, Frame, PersonTruth, Truth
+from limo_sim.sensing.camera import CameraPose, Frame
 from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
-from limo_sim.world.person import Pose, Walk, legs_at
-from limo_sim.world.robot import HALF_LENGTH, HALF_WIDTH, Drive, integrate
+from limo_sim.world.person import Pose, Walk, legs_at, trunk_radius
+from limo_sim.world.robot import Drive, integrate, twist_of
 from limo_sim.world.scenario import ROOM_HALF, Scenario
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
 STEPS_PER_SECOND = 50
 STEP_S = 1 / STEPS_PER_SECOND
@@ -43,6 +45,7 @@ class _State:
     velocity: tuple[float, float]
     turn_rate: float
     odometry: Odometry
+    contacts: Contacts
 
     @property
     def time(self) -> float:
@@ -76,7 +79,7 @@ class Arena:
         self._place_people(0.0)
         for other in (_OBSTACLE, _PERSON):
             self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
-        self._state = self._before = _State(0, robot.x, robot.y, robot.yaw, (0.0, 0.0), 0.0, Odometry())
+        self._state = self._before = _State(0, robot.x, robot.y, robot.yaw, (0.0, 0.0), 0.0, Odometry(), Contacts())
         camera = scenario.camera
         self._camera = Channel(
             camera.rate_hz,
@@ -131,11 +134,10 @@ class Arena:
         self._place_people(step / STEPS_PER_SECOND)
         self._space.step(STEP_S)
         robot = self._robot
-        rolled = STEP_S * (1.0 + self.scenario.odometry.slip * self._slip.standard_normal(2))
-        twist = self._drive.twist
-        measured = Twist(twist.linear * rolled[0], twist.angular * rolled[1])
-        wheels = before.odometry
-        x, y, yaw = integrate(wheels.x, wheels.y, wheels.yaw, float(measured.linear), float(measured.angular))
+        twist, wheels = self._drive.twist, before.odometry
+        left, right = STEP_S * (1.0 + self.scenario.odometry.slip * self._slip.standard_normal(2))
+        rolled = twist_of(float(left) * self._drive.left, float(right) * self._drive.right)
+        x, y, yaw = integrate(wheels.x, wheels.y, wheels.yaw, rolled.linear, rolled.angular)
         self._before = before
         self._state = _State(
             step=step,
@@ -145,6 +147,7 @@ class Arena:
             velocity=(robot.velocity.x, robot.velocity.y),
             turn_rate=robot.angular_velocity,
             odometry=Odometry(step / STEPS_PER_SECOND, x, y, yaw, twist.linear, twist.angular),
+            contacts=self.contacts,
         )
         for channel in (self._camera, self._lidar, self._wheels):
             channel.advance(step, self._state)
@@ -216,19 +219,22 @@ class Arena:
         return [walk.pose(time) for walk in self._walks]
 
     def _tell(self, state: _State, seen: list[Seen]) -> Truth:
+        camera = _camera_at(state)
         people: list[PersonTruth | None] = []
-        for pose, (visible, box) in zip(self._poses(state.time), seen, strict=True):
+        for person, pose, (visible, box) in zip(self.scenario.people, self._poses(state.time), seen, strict=True):
             if pose is None:
                 people.append(None)
                 continue
             dx, dy = pose.x - state.x, pose.y - state.y
             bearing = (math.atan2(dy, dx) - state.yaw + math.pi) % math.tau - math.pi
-            people.append(PersonTruth(pose.x, pose.y, pose.yaw, math.hypot(dx, dy), bearing, visible, box))
-        return Truth(state.time, (state.x, state.y, state.yaw), tuple(people), self.contacts)
+            from_x, from_y = pose.x - camera.x, pose.y - camera.y
+            surface = math.hypot(from_x, from_y) - trunk_radius(person, pose, math.atan2(from_y, from_x))
+            people.append(PersonTruth(pose.x, pose.y, pose.yaw, math.hypot(dx, dy), bearing, surface, visible, box))
+        return Truth(state.time, (state.x, state.y, state.yaw), tuple(people), state.contacts)
 
     def _add_robot(self) -> pymunk.Body:
         settings = self.scenario.robot
-        size = (2 * HALF_LENGTH, 2 * HALF_WIDTH)
+        size = (2 * LIMO.half_length, 2 * LIMO.half_width)
         robot = pymunk.Body(mass=4.2, moment=pymunk.moment_for_box(4.2, size))
         robot.position = settings.x, settings.y
         robot.angle = settings.yaw

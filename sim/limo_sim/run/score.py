@@ -1,7 +1,8 @@
 """How well a robot followed: pure functions of an episode's log.
 
-The person who counts is the first one the follower rightly took for a person; the scenario's first where it took
-nobody. They are in view where the camera sees at least half of them.
+The card is about one person, the subject: the first person in the scenario whom the follower chose as its target, or
+the scenario's first person where it never chose one. The indices of people are those of the scenario; `NO_PERSON`
+stands for a box on none of them.
 """
 
 from __future__ import annotations
@@ -19,55 +20,103 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.ranging import Zone, zone_of
+from limo_hog.follow.zones import Zone, zone_of
 from limo_sim.run.episode import Episode, Step
-from limo_sim.sensing.camera import WIDTH, PersonTruth, Truth
+from limo_sim.sensing.camera import WIDTH
+from limo_sim.world.robot import max_turn_rate
+from limo_sim.world.truth import PersonTruth, Truth
 
-#: Share of a person's silhouette from which they count as in view.
-IN_VIEW = 0.5
-#: Distance that following is measured against [m]: the middle of Hall's social zone, near.
-TARGET = 1.5
-#: A person not found for longer than this was lost [s]; found again means within the second [s].
-LOST_AFTER, FOUND_WITHIN = 0.5, 3.0
+NO_PERSON = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Criteria:
+    """Thresholds of the score card; only cards of equal criteria can be compared.
+
+    Attributes
+    ----------
+    in_view
+        Share of the silhouette from which a person is in view. Chosen: half.
+    lost_after_s
+        A subject who was not the target for longer than this was lost [s]. Chosen: five camera frames, more than a
+        detector's single misses.
+    found_within_s
+        A lost subject counts as found again within this time [s]. Chosen: a person who walks at 0.75 m/s crosses the
+        camera's field, 71° at 1.5 m, in 3 s.
+    unseen_s
+        A run in which the subject is out of view for longer than this fails [s]. Follow-Bench (arXiv 2509.10796): 100
+        frames of a camera of 10 Hz.
+    box_margin
+        How far beside a silhouette the middle of a box on it may lie [widths of the silhouette]. Chosen: the middle of
+        a box strays by up to 16 px (arena measurements, 1.75 … 4 m), a silhouette 4 m away is 35 … 50 px wide.
+    box_height_min, box_height_max
+        How high a box on a person may be [heights of the silhouette]. HOG's window is 1.33 times as high; chosen: half
+        of that, for silhouettes cut off by the image's edge, to twice.
+    """
+
+    in_view: float = 0.5
+    lost_after_s: float = 0.5
+    found_within_s: float = 3.0
+    unseen_s: float = 10.0
+    box_margin: float = 0.25
+    box_height_min: float = 0.6
+    box_height_max: float = 2.5
+
+
+CRITERIA = Criteria()
 
 
 @dataclass(frozen=True, slots=True)
 class ScoreCard:
     """The figures of one run.
 
-    Fractions are 0..1 of the frames after the person was first in view; None where there is nothing to measure.
+    Fractions are 0..1 of the frames after the subject was first in view; None where there is nothing to measure. Times,
+    shares and sizes that decide what counts are those of `Criteria`.
 
     Attributes
     ----------
+    target_m
+        Distance that the controller holds [m]; None for one that holds none, such as `approach`.
+    success
+        Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
+        view for more than 10 s after being first in view; None where nobody ever was in the arena.
     frames
         Camera frames worked on.
     first_detection_s
-        When the person was first found [s].
+        When the subject was first detected [s].
     in_view, detected
-        Share of frames with the person in view; of those, share in which they were found.
+        Share of frames with at least half of the subject in view; of those, share in which the subject was detected.
     best_box_wrong
-        Share of frames with boxes whose best box is on nobody.
+        Share of frames with boxes whose best box is on no person.
     longest_gap_s
-        Longest time between two frames in which the person was found [s].
+        Longest time between two frames in which the subject was detected [s].
     pixel_error_mean, pixel_error_p95
-        Horizontal distance of the person from the middle of the image, where in view [px].
-    distance_min_m, distance_mean_m, distance_rms_error_m
-        From the robot's centre to the person's axis [m]; the error is to 1.5 m.
+        Horizontal distance of the subject from the middle of the image, where in view [px].
+    distance_min_m, distance_mean_m
+        From the robot's centre to the subject's axis [m].
+    distance_rms_error_m
+        Of the distance that controllers hold, from the camera to the subject's surface, to `target_m` [m]; None without
+        a target distance.
     zone_intimate, zone_personal, zone_social, zone_public
-        Share of time in each of Hall's zones, by the same distance.
+        Share of time in each of Hall's zones, by the distance from the robot's centre to the subject's axis.
     clearance_min_m
-        Smallest gap between the robot's outline and any person's [m].
+        Smallest gap between the robot's outline and the cylinder around any person [m].
     contacts_person, contacts_wall
         How often the robot touched a person; a wall or furniture.
     lost, found_again
-        How often the person was lost for more than 0.5 s; share of these found again within 3 s, not counting
-        the time they were hidden behind something.
+        How often the subject was not the target for more than 0.5 s; share of these in which the subject was the target
+        again within 3 s, not counting the time hidden behind something.
     follows_first
-        Share of frames with a target in which it is the person followed first.
+        Share of frames with a target in which the target is the subject.
+    identity_switches
+        How often the target changed from one person to another.
     path_wrong_m
-        Distance driven while what was followed is nobody [m].
+        Distance driven while the target is no person [m].
     mean_abs_domega
-        Mean change of the turn rate from one command to the next [rad/s].
+        Mean change of the commanded turn rate from one command to the next [rad/s]; a command beyond the wheels' limits
+        counts as the limit, and one that is no number as 0.
+    jerk_mean
+        Mean size of the third derivative of the distance driven, forward positive [m/s³].
     path_m
         Distance the robot's centre travelled [m].
     modes, reasons
@@ -81,6 +130,8 @@ class ScoreCard:
     detector: str
     seed: int
     seconds: float
+    target_m: float | None
+    success: bool | None
     frames: int
     first_detection_s: float | None
     in_view: float | None
@@ -102,8 +153,10 @@ class ScoreCard:
     lost: int
     found_again: float | None
     follows_first: float | None
+    identity_switches: int | None
     path_wrong_m: float
     mean_abs_domega: float
+    jerk_mean: float | None
     path_m: float
     modes: dict[str, float]
     reasons: dict[str, float]
@@ -114,30 +167,35 @@ class ScoreCard:
     real_time_factor: float
 
     def to_json(self) -> dict[str, Any]:
-        """Return the figures as JSON's types."""
+        """Return the figures as JSON's types; all numbers are finite."""
         return dataclasses.asdict(self)
 
 
-def score(episode: Episode) -> ScoreCard:
+def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
     """Measure an episode."""
     steps = episode.steps
     frames = [step for step in steps if step.seen is not None]
-    hits = [_hits(step) for step in frames]
+    hits = [_hits(step, criteria) for step in frames]
     targets = [_target(step, hit) for step, hit in zip(frames, hits, strict=True)]
-    subject = next((who for who in targets if who is not None and who >= 0), 0)
+    chosen = [person for person in targets if person is not None and person != NO_PERSON]
+    subject = chosen[0] if chosen else 0
     found = [subject in hit for hit in hits]
     views = [_person(step.seen, subject) for step in frames]
-    visible = np.array([view is not None and view.visible >= IN_VIEW for view in views], bool)
+    visible = np.array([view is not None and view.visible >= criteria.in_view for view in views], bool)
     first = int(np.argmax(visible)) if visible.any() else len(frames)
     counted = [step for step in steps if first < len(frames) and step.time >= frames[first].time]
-    distances = [person.distance for step in counted if (person := _person(step.truth, subject))]
+    people = [person for step in counted if (person := _person(step.truth, subject))]
+    distances = [person.distance for person in people]
+    held = np.array([person.surface_distance for person in people])
+    target = episode.target_distance
     after = slice(first, None)
     boxed = [hit for step, hit in zip(frames, hits, strict=True) if len(step.detections)]
     errors = [_pixel_error(view) for view, ok in zip(views[after], visible[after], strict=True) if ok and view]
-    gaps = _gaps(frames, targets, subject)
-    detect_ms = [step.detect_ms for step in frames]
+    gaps = _gaps(frames, targets, subject, criteria)
+    detect_ms = [step.frame.detect_ms for step in frames if step.frame]
+    render_ms = [step.frame.render_ms for step in frames if step.frame]
     stamps = [step.seen.stamp for step, ok in zip(frames, found, strict=True) if ok and step.seen]
-    known = [who for who in targets if who is not None]
+    known = [person for person in targets if person is not None]
     zones = Counter(zone_of(distance) for distance in distances)
     return ScoreCard(
         scenario=episode.scenario.name,
@@ -145,17 +203,19 @@ def score(episode: Episode) -> ScoreCard:
         detector=episode.detector,
         seed=episode.seed,
         seconds=round(episode.seconds, 6),
+        target_m=target,
+        success=_success(episode, [step.time for step in frames[first:]], visible[after], criteria),
         frames=len(frames),
         first_detection_s=stamps[0] if stamps else None,
         in_view=_mean(visible[after]),
         detected=_mean(np.array(found, bool)[after][visible[after]]),
-        best_box_wrong=_mean([hit[0] < 0 for hit in boxed]),
+        best_box_wrong=_mean([hit[0] == NO_PERSON for hit in boxed]),
         longest_gap_s=max(np.diff(stamps).tolist(), default=None),
         pixel_error_mean=_mean(errors),
         pixel_error_p95=float(np.percentile(errors, 95)) if errors else None,
         distance_min_m=min(distances, default=None),
         distance_mean_m=_mean(distances),
-        distance_rms_error_m=_rms(np.array(distances) - TARGET),
+        distance_rms_error_m=None if target is None else _rms(held - target),
         zone_intimate=_share(zones, Zone.INTIMATE),
         zone_personal=_share(zones, Zone.PERSONAL),
         zone_social=_share(zones, Zone.SOCIAL),
@@ -164,60 +224,62 @@ def score(episode: Episode) -> ScoreCard:
         contacts_person=episode.contacts.person,
         contacts_wall=episode.contacts.wall,
         lost=len(gaps),
-        found_again=_mean([gap <= FOUND_WITHIN for gap in gaps]),
-        follows_first=_mean([who == subject for who in known]),
-        path_wrong_m=_path_wrong(steps),
-        mean_abs_domega=_mean(np.abs(np.diff([step.twist.angular for step in steps]))) or 0.0,
+        found_again=_mean([gap <= criteria.found_within_s for gap in gaps]),
+        follows_first=_mean([person == subject for person in known]),
+        identity_switches=sum(one != other for one, other in itertools.pairwise(chosen)),
+        path_wrong_m=_path_wrong(steps, criteria),
+        mean_abs_domega=_mean(np.abs(np.diff(_turn_rates(episode)))) or 0.0,
+        jerk_mean=_jerk_mean(steps),
         path_m=_path(steps),
-        modes=_shares([step.mode.value for step in steps], [mode.value for mode in Mode]),
-        reasons=_shares([step.reason for step in steps], []),
+        modes=_shares([step.decision.mode.value for step in steps], [mode.value for mode in Mode]),
+        reasons=_shares([step.decision.reason for step in steps], []),
         detect_ms_p50=float(np.percentile(detect_ms, 50)) if detect_ms else None,
         detect_ms_p95=float(np.percentile(detect_ms, 95)) if detect_ms else None,
         detect_ms_mean=_mean(detect_ms),
-        render_ms_p50=float(np.percentile([step.render_ms for step in frames], 50)) if frames else None,
+        render_ms_p50=float(np.percentile(render_ms, 50)) if render_ms else None,
         real_time_factor=episode.seconds / episode.wall_seconds if episode.wall_seconds > 0 else 0.0,
     )
 
 
-def on_person(box: NDArray[np.int32], truth: PersonTruth) -> bool:
-    """Whether a detection window (x, y, w, h) [px] is on a person: its middle within theirs, of about their size."""
+def on_person(box: NDArray[np.int32], truth: PersonTruth, criteria: Criteria = CRITERIA) -> bool:
+    """Whether a detection window (x, y, w, h) [px] is on a person: its middle on the silhouette, of about its size."""
     if truth.box is None:
         return False
     x, y, w, h = truth.box
     column, row = box[0] + box[2] / 2, box[1] + box[3] / 2
-    inside = x - 0.25 * w <= column <= x + 1.25 * w and y <= row <= y + h
-    # The window is about 1.33 times the person; people cut off by the image's edge are less of it.
-    return bool(inside and 0.6 <= box[3] / h <= 2.5)
+    margin = criteria.box_margin * w
+    inside = x - margin <= column <= x + w + margin and y <= row <= y + h
+    return bool(inside and criteria.box_height_min <= box[3] / h <= criteria.box_height_max)
 
 
-def _hits(step: Step) -> list[int]:
-    """Whom each box is on, in the boxes' order; -1 nobody."""
-    return [_hit(box, _people(step.seen)) for box in step.detections.boxes]
+def _hits(step: Step, criteria: Criteria) -> list[int]:
+    """Return the person that each box is on, in the boxes' order."""
+    return [_hit(box, _people(step.seen), criteria) for box in step.detections.boxes]
 
 
-def _hit(box: NDArray[np.int32], people: Sequence[PersonTruth | None]) -> int:
-    """Whom a box is on: of several, of those in view before those hidden, the one whose middle is nearest."""
+def _hit(box: NDArray[np.int32], people: Sequence[PersonTruth | None], criteria: Criteria) -> int:
+    """Return the person a box is on: of several, those in view first, then the one whose middle is nearest."""
     middle = box[0] + box[2] / 2
     ranks = [
-        (person.visible < IN_VIEW, abs(person.box[0] + person.box[2] / 2 - middle), who)
-        for who, person in enumerate(people)
-        if person and person.box and on_person(box, person)
+        (person.visible < criteria.in_view, abs(person.box[0] + person.box[2] / 2 - middle), index)
+        for index, person in enumerate(people)
+        if person and person.box and on_person(box, person, criteria)
     ]
-    return min(ranks)[2] if ranks else -1
+    return min(ranks)[2] if ranks else NO_PERSON
 
 
 def _target(step: Step, hits: Sequence[int]) -> int | None:
-    """Who is followed: -1 nobody, None without a target."""
-    return None if step.target is None else hits[step.target]
+    """Return the person that the target is; None without a target."""
+    return None if step.decision.target is None else hits[step.decision.target]
 
 
 def _people(truth: Truth | None) -> tuple[PersonTruth | None, ...]:
     return () if truth is None else truth.people
 
 
-def _person(truth: Truth | None, who: int) -> PersonTruth | None:
+def _person(truth: Truth | None, index: int) -> PersonTruth | None:
     people = _people(truth)
-    return people[who] if who < len(people) else None
+    return people[index] if index < len(people) else None
 
 
 def _pixel_error(person: PersonTruth) -> float:
@@ -225,8 +287,18 @@ def _pixel_error(person: PersonTruth) -> float:
     return 0.0 if person.box is None else abs(person.box[0] + person.box[2] / 2 - WIDTH / 2)
 
 
-def _gaps(frames: Sequence[Step], targets: Sequence[int | None], subject: int) -> list[float]:
-    """Return the time [s] it took to find the subject again after each loss, without the time they were hidden."""
+def _success(episode: Episode, times: Sequence[float], visible: NDArray[np.bool_], criteria: Criteria) -> bool | None:
+    """Judge a run by whether the subject was in view [s, bool], frame by frame from the first time on."""
+    if not any(person for step in episode.steps for person in step.truth.people):
+        return None
+    if not visible.any() or not visible[-1] or episode.contacts.person > 0:
+        return False
+    in_view = [time for time, seen in zip(times, visible, strict=True) if seen]
+    return bool(max(np.diff(in_view), default=0.0) <= criteria.unseen_s)
+
+
+def _gaps(frames: Sequence[Step], targets: Sequence[int | None], subject: int, criteria: Criteria) -> list[float]:
+    """Return how long the search after each loss of the subject took [s], without the time the subject was hidden."""
     gaps = []
     length = searched = 0.0
     last: float | None = None
@@ -235,15 +307,15 @@ def _gaps(frames: Sequence[Step], targets: Sequence[int | None], subject: int) -
             dt = step.time - last
             length += dt
             person = _person(step.seen, subject)
-            hidden = person is not None and person.box is not None and person.visible < IN_VIEW
+            hidden = person is not None and person.box is not None and person.visible < criteria.in_view
             searched += 0.0 if hidden else dt
         if target == subject:
-            if length > LOST_AFTER:
+            if length > criteria.lost_after_s:
                 gaps.append(searched)
             length = searched = 0.0
         if target == subject or last is not None:
             last = step.time
-    if searched > FOUND_WITHIN:
+    if searched > criteria.found_within_s:
         gaps.append(searched)
     return gaps
 
@@ -253,13 +325,13 @@ def _clearance(episode: Episode) -> float | None:
     gaps = []
     for step in episode.steps:
         x, y, yaw = step.truth.robot
-        for who, person in enumerate(step.truth.people):
+        for person, settings in zip(step.truth.people, episode.scenario.people, strict=False):
             if person is None:
                 continue
             dx, dy = person.x - x, person.y - y
             ahead = abs(dx * math.cos(yaw) + dy * math.sin(yaw)) - LIMO.half_length
             beside = abs(dy * math.cos(yaw) - dx * math.sin(yaw)) - LIMO.half_width
-            gaps.append(math.hypot(max(ahead, 0), max(beside, 0)) - episode.scenario.people[who].radius)
+            gaps.append(math.hypot(max(ahead, 0), max(beside, 0)) - settings.radius)
     return min(gaps, default=None)
 
 
@@ -268,15 +340,37 @@ def _path(steps: Sequence[Step]) -> float:
     return float(np.hypot(*np.diff(places, axis=0).T).sum())
 
 
-def _path_wrong(steps: Sequence[Step]) -> float:
-    """Return the distance driven while the last target is nobody [m]."""
+def _path_wrong(steps: Sequence[Step], criteria: Criteria) -> float:
+    """Return the distance driven while the last target is no person [m]."""
     total, wrong = 0.0, False
     for step, after in itertools.pairwise(steps):
-        if step.target is not None:
-            wrong = _hits(step)[step.target] < 0
+        if step.decision.target is not None:
+            wrong = _hits(step, criteria)[step.decision.target] == NO_PERSON
         if wrong:
             total += math.dist(step.truth.robot[:2], after.truth.robot[:2])
     return total
+
+
+def _turn_rates(episode: Episode) -> NDArray[np.float64]:
+    """Return the commanded turn rates [rad/s], as far as the wheels can turn the robot."""
+    rates = np.array([step.decision.twist.angular for step in episode.steps], np.float64)
+    limit = max_turn_rate(episode.scenario.robot.wheel_speed)
+    return np.clip(np.where(np.isfinite(rates), rates, 0.0), -limit, limit)
+
+
+def _jerk_mean(steps: Sequence[Step]) -> float | None:
+    """Return the mean size of the change of acceleration along the robot's heading [m/s³], by differences."""
+    poses = np.array([step.truth.robot for step in steps]).reshape(-1, 3)
+    times = np.array([step.time for step in steps])
+    across, along = np.diff(poses[:, :2], axis=0).T[::-1] if len(poses) else np.empty((2, 0))
+    heading = (poses[1:, 2] + poses[:-1, 2]) / 2
+    values = along * np.cos(heading) + across * np.sin(heading)
+    # Speed, acceleration, jerk: each difference belongs to the middle between its two times.
+    values = values / np.diff(times)
+    for _ in range(2):
+        times = (times[1:] + times[:-1]) / 2
+        values = np.diff(values) / np.diff(times)
+    return _mean(np.abs(values))
 
 
 def _mean(values: Sequence[float] | NDArray[Any]) -> float | None:

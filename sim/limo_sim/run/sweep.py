@@ -14,12 +14,13 @@ import cv2
 import limo_hog
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.run.catalogue import load
 from limo_sim.run.episode import run_episode
 from limo_sim.run.score import ScoreCard, score
-from limo_sim.world.scenario import Scenario
 
 #: Figures of a score card that are summed up, in the order they are shown.
 MEASURES = (
+    "success",
     "in_view",
     "detected",
     "best_box_wrong",
@@ -28,11 +29,13 @@ MEASURES = (
     "zone_social",
     "found_again",
     "follows_first",
+    "identity_switches",
     "clearance_min_m",
     "contacts_person",
     "contacts_wall",
     "path_wrong_m",
     "mean_abs_domega",
+    "jerk_mean",
     "first_detection_s",
     "detect_ms_mean",
 )
@@ -76,7 +79,7 @@ def play(run: Run) -> ScoreCard:
     cv2.setNumThreads(1)
     controller = controller_named(run.controller, run.target)
     names = (run.controller, run.detector)
-    scenario, detector = Scenario.load(run.scenario), detector_named(run.detector)
+    scenario, detector = load(run.scenario), detector_named(run.detector)
     return score(run_episode(scenario, controller, detector, run.seconds, run.seed, names=names))
 
 

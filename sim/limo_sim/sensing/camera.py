@@ -12,12 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.robot import LIMO
+from limo_sim.world.truth import Truth
+
 WIDTH, HEIGHT = 640, 480
-FIELD = 1.23918
+FIELD = LIMO.field_of_view
 """Horizontal field of view [rad]."""
-FOCAL_PX = WIDTH / 2 / math.tan(FIELD / 2)
+FOCAL_PX = LIMO.focal_px(WIDTH)
 CENTRE_X, CENTRE_Y = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
-MOUNT_AHEAD, MOUNT_HEIGHT = 0.084, 0.175
+MOUNT_AHEAD, MOUNT_HEIGHT = LIMO.camera_x, LIMO.camera_z
 """Where the camera sits: ahead of the base centre and above the floor [m]; it looks level, straight ahead."""
 
 
@@ -44,63 +47,6 @@ class CameraPose:
         """Take points (N, 3) from the arena's frame to the camera's [m]."""
         offset: NDArray[np.float64] = (points - np.array([self.x, self.y, MOUNT_HEIGHT])) @ self.rotation.T
         return offset
-
-
-@dataclass(frozen=True, slots=True)
-class PersonTruth:
-    """One person as the arena knows them.
-
-    Attributes
-    ----------
-    x, y, yaw
-        In the arena's frame [m, m, rad].
-    distance, bearing
-        From the robot's base centre to the person's axis [m], and its direction from straight ahead,
-        left positive [rad].
-    visible
-        Share of the person's silhouette that the camera sees: 0 hidden or out of the image … 1.
-    box
-        x, y, w, h [px] around the silhouette as if nothing stood in front of it, cut at the image's edge;
-        None when all of it is outside.
-    """
-
-    x: float
-    y: float
-    yaw: float
-    distance: float
-    bearing: float
-    visible: float
-    box: tuple[int, int, int, int] | None
-
-
-@dataclass(frozen=True, slots=True)
-class Contacts:
-    """How often the robot has touched a person, and a wall or furniture, since the start."""
-
-    person: int = 0
-    wall: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Truth:
-    """How things really are at one instant.
-
-    Attributes
-    ----------
-    stamp
-        The instant [s].
-    robot
-        x, y, yaw of the base centre in the arena's frame [m, m, rad].
-    people
-        In the scenario's order; None for somebody who has not arrived.
-    contacts
-        Of the robot so far.
-    """
-
-    stamp: float
-    robot: tuple[float, float, float]
-    people: tuple[PersonTruth | None, ...]
-    contacts: Contacts
 
 
 @dataclass(frozen=True, slots=True)

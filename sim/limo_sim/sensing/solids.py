@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, MOUNT_HEIGHT, CameraPose
 from limo_sim.world.furniture import Box, Frustum
-from limo_sim.world.person import Body
+from limo_sim.world.person import BodyMesh
 from limo_sim.world.scenario import Light
 
 F32 = NDArray[np.float32]
@@ -128,7 +128,7 @@ class Outline:
     bounds: Bounds
 
 
-def outline(body: Body, camera: CameraPose) -> Outline | None:
+def outline(body: BodyMesh, camera: CameraPose) -> Outline | None:
     """Project a body's parts; those that reach behind the near plane are left out, None if all do."""
     start, end = camera.to_camera(body.start), camera.to_camera(body.end)
     centre = camera.to_camera(body.centre)

@@ -26,6 +26,10 @@ _EASE_S = 0.25
 
 _THIGH = _SHIN = 0.245
 _UPPER_ARM, _FOREARM = 0.165, 0.145
+# Half axes of the ellipse that a trunk is to the depth camera. Measured: median depth at the middle of HOG's box, 8
+# directions, 6 phases of the gait, 1.5 … 3 m, statures 0.82 … 1 m. From the front .052, diagonally .077, from the side
+# .09 of the stature, standard deviation .02.
+_TRUNK_HALF_DEPTH, _TRUNK_HALF_BREADTH = 0.052, 0.090
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +137,7 @@ def _blend(start: float, end: float, share: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class BodyMesh:
     """The solids a person is made of, in the arena's frame.
 
     Attributes
@@ -246,7 +250,7 @@ def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
     return capsules, ellipsoids
 
 
-def body(person: Person, pose: Pose) -> Body:
+def body(person: Person, pose: Pose) -> BodyMesh:
     """Build somebody's body in a pose; the lowest foot touches the floor."""
     capsules, ellipsoids = _skeleton(pose)
     palette = {
@@ -270,7 +274,7 @@ def body(person: Person, pose: Pose) -> Body:
         ]
     )
     colours = [capsule[4] for capsule in capsules] + [ellipsoid[3] for ellipsoid in ellipsoids]
-    return Body(
+    return BodyMesh(
         start=points[0::2],
         end=points[1::2],
         start_radius=radii[:, 0],
@@ -279,6 +283,19 @@ def body(person: Person, pose: Pose) -> Body:
         axes=turn @ axes,
         colours=np.array([palette[name] for name in colours], dtype=np.float64),
     )
+
+
+def trunk_radius(person: Person, pose: Pose, direction: float) -> float:
+    """Return the distance [m] from the person's axis to the surface of the trunk that faces a camera.
+
+    Parameters
+    ----------
+    direction
+        In which the camera looks at the person [rad], arena's frame.
+    """
+    turn = direction - pose.yaw
+    depth, breadth = _TRUNK_HALF_DEPTH * math.cos(turn), _TRUNK_HALF_BREADTH * math.sin(turn)
+    return person.height * person.girth * math.hypot(depth, breadth)
 
 
 def legs_at(person: Person, pose: Pose, height: float) -> list[Disc]:

@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.twist import Twist
-
-WHEEL_SEPARATION = 0.172
-HALF_LENGTH, HALF_WIDTH = 0.145, 0.11
-"""Of the body, about the base centre [m]."""
 
 
 @dataclass(slots=True)
@@ -52,7 +49,7 @@ class Drive:
             self._wanted = Twist()
             self._commanded_at = None
             self.watchdog_stops += 1
-        turn = self._wanted.angular * WHEEL_SEPARATION / 2
+        turn = self._wanted.angular * LIMO.wheel_separation / 2
         wanted_left, wanted_right = self._wanted.linear - turn, self._wanted.linear + turn
         # a command too fast for one wheel is slowed as a whole, so that the robot keeps to its curve
         excess = max(abs(wanted_left), abs(wanted_right)) / self.wheel_speed
@@ -65,7 +62,17 @@ class Drive:
     @property
     def twist(self) -> Twist:
         """How fast the wheels move the robot when they do not slip."""
-        return Twist((self.left + self.right) / 2, (self.right - self.left) / WHEEL_SEPARATION)
+        return twist_of(self.left, self.right)
+
+
+def twist_of(left: float, right: float) -> Twist:
+    """Return the motion of the robot from that of its wheels' rims, as speeds [m/s] or as distances [m]."""
+    return Twist((left + right) / 2, (right - left) / LIMO.wheel_separation)
+
+
+def max_turn_rate(wheel_speed: float) -> float:
+    """Return how fast wheels of a top speed [m/s], one forward and one backward, turn the robot [rad/s]."""
+    return twist_of(-wheel_speed, wheel_speed).angular
 
 
 def integrate(x: float, y: float, yaw: float, forward: float, turn: float) -> tuple[float, float, float]:

@@ -177,28 +177,21 @@ class Scenario:
 
     @staticmethod
     def load(name_or_path: str | Path) -> Scenario:
-        """Read one of `Scenario.names()`, or a TOML file of your own.
+        """Read one of `Scenario.names()`, or a TOML file.
 
-        "NAME:SEED" varies a scenario's clothes, light and sensors, "random:SEED" makes all of it up.
+        `limo_sim.run.catalogue.load` knows scenarios drawn from a seed as well.
 
         Raises
         ------
         ScenarioError
             With the file, the key and what is allowed there.
         """
-        name, _, seed = str(name_or_path).rpartition(":")
-        if name in ("random", *Scenario.names()) and seed.isdecimal():
-            from limo_sim.world.variants import made_up, varied  # they are built on this module
-
-            return made_up(int(seed)) if name == "random" else varied(Scenario.load(name), int(seed))
         path = Path(name_or_path)
         if path.suffix != ".toml":
             path = _FOLDER / f"{name_or_path}.toml"
             if str(name_or_path) not in Scenario.names():
                 known = ", ".join(Scenario.names())
-                raise ScenarioError(
-                    f"unknown scenario {name_or_path}: want one of {known}, random:SEED, or a .toml file"
-                )
+                raise ScenarioError(f"unknown scenario {name_or_path}: want one of {known}, or a .toml file")
         try:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError) as error:

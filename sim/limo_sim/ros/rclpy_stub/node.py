@@ -123,7 +123,7 @@ class Node:
         self._namespace = "/" + self._remaps.get("__ns", namespace or "").strip("/")
         overrides = arguments.parameters_of(self._name, self._namespace) if use_global_arguments else {}
         overrides = {p.name: p.value for p in parameter_overrides or ()} | overrides
-        self._parameters = Parameters(overrides)
+        self._parameters = Parameters(overrides, context.world.parameters)
         self._parameters.declare("use_sim_time", False)
         self._logger = Logger(self.get_fully_qualified_name().strip("/").replace("/", "."))
         self._clock = Clock(clock_type=ClockType.ROS_TIME)

@@ -85,10 +85,11 @@ class SetParametersResult:
 
 
 class Parameters:
-    """The parameters of one node."""
+    """The parameters of one node; their values are noted in `noted` as well."""
 
-    def __init__(self, overrides: dict[str, Any]) -> None:
+    def __init__(self, overrides: dict[str, Any], noted: dict[str, Any]) -> None:
         self._overrides = overrides
+        self._noted = noted
         self._values: dict[str, Parameter] = {}
         self.callbacks: list[Callable[[list[Parameter]], Any]] = []
 
@@ -113,6 +114,7 @@ class Parameters:
                     + (f": write {name}:={float(value)}" if (wanted.name, came.name) == ("DOUBLE", "INTEGER") else "")
                 )
         self._values[name] = Parameter(name, value=value)
+        self._noted[name] = value
         return self._values[name]
 
     def has(self, name: str) -> bool:
@@ -143,6 +145,7 @@ class Parameters:
             results.append(SetParametersResult() if refused is None else refused)
             if refused is None:
                 self._values[change.name] = change
+                self._noted[change.name] = change.value
         return results
 
 

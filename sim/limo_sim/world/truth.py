@@ -1,0 +1,66 @@
+"""What is true in the arena at one instant: the robot, the people and the contacts; no sensor's errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PersonTruth:
+    """One person at one instant.
+
+    Attributes
+    ----------
+    x, y, yaw
+        In the arena's frame [m, m, rad].
+    distance, bearing
+        From the robot's base centre to the person's axis [m], and its direction from straight ahead,
+        left positive [rad].
+    surface_distance
+        From the camera to the front of the person's trunk [m]: the distance that the depth image shows in the middle
+        of the person, and that a follower holds.
+    visible
+        Share of the person's silhouette in the image: 0 (hidden, or outside the image) … 1.
+    box
+        x, y, w, h [px] around the silhouette as if nothing stood in front of it, cut at the image's edge;
+        None when all of it is outside.
+    """
+
+    x: float
+    y: float
+    yaw: float
+    distance: float
+    bearing: float
+    surface_distance: float
+    visible: float
+    box: tuple[int, int, int, int] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """How often the robot has touched a person, and a wall or furniture, since the start."""
+
+    person: int = 0
+    wall: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The arena at one instant.
+
+    Attributes
+    ----------
+    stamp
+        The instant [s].
+    robot
+        x, y, yaw of the base centre in the arena's frame [m, m, rad].
+    people
+        In the scenario's order; None for a person who has not arrived.
+    contacts
+        Of the robot since the start.
+    """
+
+    stamp: float
+    robot: tuple[float, float, float]
+    people: tuple[PersonTruth | None, ...]
+    contacts: Contacts

@@ -1,0 +1,259 @@
+"""One seed, one world: whoever looks, whenever, in whichever process."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+import resource
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from limo_hog.follow import detector_named
+from limo_hog.follow.sense.ranging import person_depth
+from limo_hog.follow.twist import Twist
+from limo_sim.run.arena import Arena
+from limo_sim.run.catalogue import load
+from limo_sim.sensing.camera import CENTRE_X, FOCAL_PX
+from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Person, Scenario, Wheels
+from limo_sim.world.truth import Contacts
+from limo_sim.world.variants import made_up
+
+FOLLOWABLE = Scenario.load("followable")
+
+
+def fingerprint(name: str, seed: int, steps: int = 60) -> str:
+    """Hash everything a run shows."""
+    arena, digest = Arena(load(name), seed), hashlib.sha256()
+    for step in range(steps):
+        if step % 5 == 0:
+            frame = arena.frame()
+            for data in (frame.image, frame.depth, arena.scan().ranges):
+                digest.update(data.tobytes())
+            digest.update(repr((frame.truth, arena.odometry(), arena.imu(), arena.truth())).encode())
+            arena.command(Twist(0.2, 0.4 * math.sin(step)))
+        arena.step()
+    return digest.hexdigest()
+
+
+@pytest.mark.parametrize("name", ["occlusion", "random:5"])
+def test_the_same_seed_gives_the_same_run_in_another_process(name: str) -> None:
+    code = f"import sys; sys.path.insert(0, {__file__!r}.rpartition('/')[0]); "
+    code += f"from test_arena import fingerprint; print(fingerprint({name!r}, 3))"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == fingerprint(name, 3)
+
+
+def test_different_seeds_differ() -> None:
+    assert len({fingerprint("followable", seed, 30) for seed in range(4)}) == 4
+
+
+def test_reading_one_sensor_changes_no_other() -> None:
+    busy, idle = Arena(FOLLOWABLE, 1), Arena(FOLLOWABLE, 1)
+    for step in range(100):
+        for arena in (busy, idle):
+            arena.command(Twist(0.2, 0.1))
+            arena.step()
+        if step % 3 == 0:
+            busy.frame()
+            busy.truth()
+            busy.imu()
+            busy.scan()
+    np.testing.assert_array_equal(busy.frame().image, idle.frame().image)
+    np.testing.assert_array_equal(busy.frame().depth, idle.frame().depth)
+    np.testing.assert_array_equal(busy.scan().ranges, idle.scan().ranges)
+    assert busy.odometry() == idle.odometry()
+    assert busy.imu() == idle.imu()
+    assert busy.truth() == idle.truth()
+
+
+def test_each_sensor_keeps_its_own_rate() -> None:
+    arena = Arena(FOLLOWABLE, 0)
+    frames, scans, odometry = set(), set(), set()
+    for _ in range(50 * 4):
+        arena.step()
+        frames.add(arena.frame().stamp)
+        scans.add(arena.scan().stamp)
+        odometry.add(arena.odometry().stamp)
+    assert len(frames) == 40 + 1
+    assert len(scans) == 32 + 1
+    assert len(odometry) == 50 * 4
+    assert np.diff(sorted(frames)) == pytest.approx(0.1)
+    assert np.abs(np.diff(sorted(scans)) - 0.125).max() < 0.02
+
+
+def test_a_reading_arrives_as_late_as_the_scenario_says() -> None:
+    late = dataclasses.replace(
+        FOLLOWABLE, camera=Camera(latency_s=0.4), lidar=Lidar(latency_s=0.2), odometry=Wheels(latency_s=0.1)
+    )
+    arena, prompt = Arena(late, 0), Arena(FOLLOWABLE, 0)
+    shown = {}
+    for _ in range(100):
+        for world in (arena, prompt):
+            world.command(Twist(0.3, 0.3))
+            world.step()
+        frame = prompt.frame()
+        shown[frame.stamp] = frame
+        stamp = arena.frame().stamp
+        assert stamp == pytest.approx(max(0.0, math.floor((arena.time - 0.4) * 10 + 1e-6) / 10))
+        assert arena.scan().stamp <= max(0.0, arena.time - 0.2) + 1e-9
+        assert arena.odometry().stamp == pytest.approx(max(0.0, arena.time - 0.1))
+        if stamp > 0:
+            np.testing.assert_array_equal(arena.frame().image, shown[stamp].image)
+            assert arena.frame().truth == shown[stamp].truth
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_as_many_frames_are_lost_as_the_scenario_says(share: float) -> None:
+    arena = Arena(dataclasses.replace(FOLLOWABLE, camera=Camera(drop_probability=share)), 2)
+    stamps = set()
+    for _ in range(50 * 60):
+        arena.step()
+        stamps.add(arena._camera.newest.state.time)
+    assert (len(stamps) - 1) / 600 == pytest.approx(1 - share, abs=0.06)
+
+
+def test_truth_agrees_with_trigonometry() -> None:
+    arena = Arena(Scenario.load("two_people"), 0)
+    for _ in range(400):
+        arena.command(Twist(0.1, 0.2))
+        arena.step()
+    truth = arena.truth()
+    x, y, yaw = truth.robot
+    assert truth.stamp == arena.time == 8.0
+    for person in truth.people:
+        assert person is not None
+        assert person.distance == pytest.approx(math.hypot(person.x - x, person.y - y))
+        ahead, left = person.distance * math.cos(person.bearing), person.distance * math.sin(person.bearing)
+        assert x + ahead * math.cos(yaw) - left * math.sin(yaw) == pytest.approx(person.x)
+        assert y + ahead * math.sin(yaw) + left * math.cos(yaw) == pytest.approx(person.y)
+    assert arena.frame().truth == truth
+
+
+def test_truth_between_frames_is_of_now() -> None:
+    arena = Arena(FOLLOWABLE, 0)
+    for _ in range(7):
+        arena.step()
+    assert arena.truth().stamp == pytest.approx(0.14)
+    assert arena.frame().stamp == arena.frame().truth.stamp == pytest.approx(0.1)
+
+
+def test_somebody_late_is_unknown_to_the_truth_until_they_come() -> None:
+    arena = Arena(Scenario.load("late"), 0)
+    assert arena.truth().people == (None,)
+    for _ in range(50 * 20 + 1):
+        arena.step()
+    assert arena.truth().people[0] is not None
+
+
+def wander(seed: int, seconds: float) -> None:
+    """Drive a made-up scenario at random; whatever happens, everything stays inside and finite."""
+    arena, random = Arena(made_up(seed), seed), np.random.default_rng(seed)
+    for step in range(round(50 * seconds)):
+        if step % 25 == 0:
+            arena.command(Twist(*random.uniform((-1, -4), (1, 4)).tolist()))
+        arena.step()
+        robot = arena._state
+        assert math.isfinite(robot.x + robot.y + robot.yaw + robot.turn_rate)
+        assert max(abs(robot.x), abs(robot.y)) < ROOM_HALF - 0.1
+        assert math.hypot(*robot.velocity) < 3.0
+        if step % 6 == 0:
+            ranges = arena.scan().ranges
+            assert not np.isnan(ranges).any()
+            assert (ranges >= 0.12).all()
+            for pose in arena._poses(arena.time):
+                assert pose is None or max(abs(pose.x), abs(pose.y)) < 4.4
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_nothing_goes_through_a_wall(seed: int) -> None:
+    wander(1_000 + seed, 12.0)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("batch", range(10))
+def test_nothing_goes_through_a_wall_in_a_thousand_scenarios(batch: int) -> None:
+    for seed in range(100 * batch, 100 * batch + 100):
+        wander(seed, 30.0)
+
+
+def peak_mb() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def run_for(arena: Arena, seconds: float, frame_every: int) -> None:
+    for step in range(round(50 * seconds)):
+        arena.command(Twist(0.1, 0.2))
+        arena.step()
+        if step % frame_every == 0:
+            arena.frame()
+        if step % 6 == 0:
+            arena.scan()
+
+
+def test_memory_stays_flat() -> None:
+    arena = Arena(FOLLOWABLE, 0)
+    run_for(arena, 10, 5)
+    before = peak_mb()
+    run_for(arena, 40, 10)
+    assert peak_mb() - before < 4
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_memory_stays_flat_for_an_hour() -> None:
+    arena = Arena(FOLLOWABLE, 0)
+    run_for(arena, 60, 5)
+    before = peak_mb()
+    run_for(arena, 3600, 5)
+    assert peak_mb() - before < 8
+
+
+def test_the_products_names_are_in_one_place() -> None:
+    import limo_sim
+
+    for name in ("Arena", "Episode", "Scenario", "ScoreCard", "run_episode", "score"):
+        assert callable(getattr(limo_sim, name))
+
+
+@pytest.mark.parametrize("facing", [0.0, 0.8, math.pi / 2, 2.4, math.pi])
+@pytest.mark.parametrize("distance", [1.7, 2.5])
+def test_the_surface_distance_is_what_the_depth_image_shows_in_the_middle_of_a_person(
+    facing: float, distance: float
+) -> None:
+    # 0.3 m/s: the gait goes through its phases, the direction stays
+    away = distance + 0.6 * math.cos(facing), 0.6 * math.sin(facing)
+    scenario = Scenario(people=(Person(route=((distance, 0.0, 0.0), (*away, 0.0)), speed=0.3),))
+    arena, detector, errors = Arena(scenario, 0), detector_named("hog"), []
+    while arena.time < 1.8:
+        frame = arena.frame()
+        person = frame.truth.people[0]
+        found = detector.detect(frame.image)
+        if len(found) and person is not None:
+            depth = person_depth(frame.depth, found.boxes[0])
+            if depth is not None:
+                # depth is along the optical axis, the distance along the ray
+                aside = (found.boxes[0][0] + found.boxes[0][2] / 2 - CENTRE_X) / FOCAL_PX
+                errors.append(person.surface_distance - depth * math.hypot(1.0, aside))
+        for _ in range(5):
+            arena.step()
+    assert len(errors) > 12
+    assert abs(np.median(errors)) < 0.02
+
+
+def test_the_contacts_of_a_frame_are_those_at_its_stamp() -> None:
+    standing = Scenario(people=(Person(route=((0.6, 0.0, 0.0),)),), camera=Camera(latency_s=0.4))
+    arena = Arena(standing, 0)
+    while arena.contacts.person == 0 and arena.time < 5.0:
+        arena.command(Twist(0.3, 0.0))
+        arena.step()
+    for _ in range(10):
+        arena.step()
+    frame = arena.frame()
+    assert frame.stamp < arena.time - 0.3
+    assert frame.truth.contacts == Contacts(0, 0)
+    assert arena.truth().contacts == Contacts(1, 0)

@@ -1,0 +1,137 @@
+"""Runs in the arena: closed loop, the same for the same seed, and safe when the detector is not."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_hog.detector import Detections
+from limo_hog.follow import Decision, Mode, Observation, ProxemicController, TrackingController, Twist, controller_named
+from limo_hog.follow.control.tracking import TrackingState
+from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.run.episode import Episode, run_episode
+from limo_sim.run.score import score
+from limo_sim.world.scenario import Scenario
+
+WALL_CLOCK = {"detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor"}
+
+
+class Failing:
+    """Works, fails for a second, works again."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+        self.works = detector_named("hog")
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        self.calls += 1
+        if 30 <= self.calls < 40:
+            raise RuntimeError("the GPU fell off the bus")
+        return self.works.detect(image)
+
+
+def run(scenario: str, seconds: float, controller: Any = None, detector: Any = None, seed: int = 0) -> Episode:
+    return run_episode(
+        Scenario.load(scenario), controller or TrackingController(), detector or detector_named("hog"), seconds, seed
+    )
+
+
+def test_the_same_seed_gives_the_same_score_but_for_the_wall_clock() -> None:
+    one, two = (score(run("followable", 3.0)).to_json() for _ in range(2))
+    for name in WALL_CLOCK:
+        assert one.pop(name) is not None
+        two.pop(name)
+    assert one == two
+
+
+def test_the_tracking_controller_closes_in_on_somebody_who_stands() -> None:
+    result = score(run("standing", 9.0))
+    assert result.in_view == 1.0
+    assert result.detected == 1.0
+    assert result.contacts_person == 0
+    assert result.modes["hold"] > 0.1
+
+
+def test_somebody_who_walks_in_between_is_not_followed_instead() -> None:
+    result = score(run("crossing", 22.0, seed=1))
+    assert result.follows_first is not None
+    assert result.follows_first > 0.95
+    assert result.contacts_person == 0
+
+
+def test_the_follower_is_told_what_people_wear() -> None:
+    told = []
+
+    class Asking(TrackingController):
+        def step(self, observation: Observation, state: TrackingState) -> Decision[TrackingState]:
+            told.append((len(observation.detections), observation.clothes))
+            return super().step(observation, state)
+
+    run("standing", 1.0, Asking())
+    assert any(count for count, _ in told)
+    for count, clothes in told:
+        assert clothes is not None
+        assert clothes.shape == (count, 2, 3)
+
+
+@pytest.mark.parametrize("name", ["approach", "proxemic"])
+def test_the_workshops_controllers_follow_behind_the_safety_layer(name: str) -> None:
+    result = score(run("standing", 5.0, controller_named(name)))
+    assert result.in_view == 1.0
+    assert result.path_m > 0.5
+    assert result.contacts_person == 0
+
+
+def test_nobody_is_approached_nearer_than_the_safety_layer_allows() -> None:
+    class Blind:
+        """Sees somebody straight ahead whatever there is."""
+
+        def detect(self, image: NDArray[np.uint8]) -> Detections:
+            del image
+            return Detections(np.array([[288, 150, 64, 128]], np.int32), np.array([2.0]))
+
+    scenario = Scenario.load("standing")
+    near = dataclasses.replace(scenario.people[0], route=((2.0, 0.0, 0.0),))
+    episode = run_episode(
+        dataclasses.replace(scenario, people=(near,)), ProxemicController(target_distance=0.3), Blind(), 15.0, 0
+    )
+    result = score(episode)
+    assert result.clearance_min_m is not None
+    assert 0.45 <= result.clearance_min_m < 0.7
+    assert result.modes["blocked"] > 0.1
+
+
+def test_a_detector_that_raises_stops_the_robot_until_it_works_again() -> None:
+    episode = run("standing", 6.0, detector=Failing())
+    failed = [step for step in episode.steps if "GPU fell off" in step.decision.reason]
+    assert len(failed) == 10
+    assert all(step.decision.mode is Mode.BLOCKED and step.decision.twist == Twist() for step in failed)
+    after = [step for step in episode.steps if step.time > failed[-1].time]
+    assert after[-1].decision.mode in (Mode.FOLLOW, Mode.HOLD)
+
+
+def test_nobody_is_found_where_nobody_is() -> None:
+    result = score(run("empty", 4.0))
+    assert result.in_view is None
+    assert result.path_m < 0.05
+    assert result.modes["search"] == 1.0
+
+
+def test_between_two_frames_of_a_slow_camera_a_command_goes_out_every_period_until_the_frame_is_too_old() -> None:
+    standing = Scenario.load("standing")
+    slow = dataclasses.replace(standing, camera=dataclasses.replace(standing.camera, rate_hz=1.0))
+    episode = run_episode(slow, controller_named("approach"), detector_named("hog"), 3.0, 0)
+    ages: dict[float, Any] = {}
+    last = 0.0
+    for step in episode.steps:
+        last = step.frame.truth.stamp if step.frame else last
+        ages.setdefault(round(step.time - last, 1), []).append(step.decision)
+    assert sorted(ages) == pytest.approx([0.1 * k for k in range(10)])
+    assert all(decision.mode is Mode.FOLLOW for age in (0.0, 0.1, 0.4) for decision in ages[age])
+    for age in (0.6, 0.7, 0.8, 0.9):
+        assert all(decision.twist == Twist() for decision in ages[age])
+        assert all(decision.reason == f"no camera frame for {age} s" for decision in ages[age])

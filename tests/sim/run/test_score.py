@@ -1,0 +1,356 @@
+"""A score card says of a made-up log what anybody can count."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import t as student  # type: ignore[import-untyped]
+
+from limo_hog.detector import Detections
+from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.twist import Twist
+from limo_sim.run.episode import Episode, FrameRecord, Step
+from limo_sim.run.score import ScoreCard, on_person, score
+from limo_sim.run.sweep import estimate, summarise
+from limo_sim.world.scenario import Scenario
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
+
+BOX = (300, 100, 60, 120)
+ON, OFF = [285, 90, 80, 160], [20, 90, 80, 160]
+#: From the robot's centre to the camera, and from a person's surface to the axis [m].
+CAMERA, TRUNK = 0.084, 0.08
+TOUCHED = Contacts(person=1, wall=2)
+
+
+def person(distance: float = 2.0, visible: float = 1.0, box: tuple[int, int, int, int] | None = BOX) -> PersonTruth:
+    return PersonTruth(distance, 0.0, math.pi, distance, 0.0, distance - CAMERA - TRUNK, visible, box)
+
+
+def other_person(box: tuple[int, int, int, int] = (20, 100, 60, 120)) -> PersonTruth:
+    return replace(person(), box=box)
+
+
+def step(
+    number: int,
+    *people: PersonTruth | None,
+    boxes: list[list[int]] | None = None,
+    target: int | None = None,
+    at: float = 0.0,
+    robot: tuple[float, float, float] | None = None,
+    turn: float | None = None,
+    detect_ms: float = 2.0,
+    render_ms: float = 1.0,
+) -> Step:
+    truth = Truth(0.1 * number, robot or (at, 0.0, 0.0), people, Contacts(0, 0))
+    found = Detections.none() if not boxes else Detections(np.array(boxes, np.int32), np.arange(len(boxes), 0.0, -1.0))
+    twist = Twist(0.0, 0.1 * number if turn is None else turn)
+    decision = Decision(twist, None, Mode.FOLLOW, "because", target)
+    return Step(0.1 * number, truth, decision, FrameRecord(truth, found, None, detect_ms, render_ms))
+
+
+def card(*steps: Step, target: float | None = 1.5, contacts: Contacts = TOUCHED) -> ScoreCard:
+    scenario = Scenario.load("two_people")
+    episode = Episode(scenario, "c", "d", 0, 0.1 * len(steps), steps, contacts, 0.5, target)
+    return score(episode)
+
+
+def test_fractions_begin_when_the_person_is_first_in_view() -> None:
+    unseen = [step(k, person(visible=0.0, box=None)) for k in range(5)]
+    seen = [step(k, person(), boxes=[ON], target=0) for k in range(5, 8)]
+    gone = [step(8, person(visible=0.1))]
+    result = card(*unseen, *seen, *gone)
+    assert result.in_view == 0.75
+    assert result.detected == 1.0
+    assert result.first_detection_s == pytest.approx(0.5)
+
+
+def test_nothing_to_measure_is_none() -> None:
+    result = card(*(step(k) for k in range(3)))
+    assert result.in_view is None
+    assert result.distance_mean_m is None
+    assert result.found_again is None
+    assert result.contacts_person == 1
+    assert result.contacts_wall == 2
+
+
+def test_pixel_error_is_from_the_middle_of_the_image() -> None:
+    result = card(step(0, person(box=(300, 100, 60, 120))), step(1, person(box=(250, 100, 60, 120))))
+    assert result.pixel_error_mean == 25.0
+
+
+def test_distances_and_zones() -> None:
+    result = card(*(step(k, person(distance)) for k, distance in enumerate((0.4, 1.0, 2.0, 4.0))))
+    assert result.distance_min_m == 0.4
+    assert result.distance_mean_m == pytest.approx(1.85)
+    zones = (result.zone_intimate, result.zone_personal, result.zone_social, result.zone_public)
+    assert zones == (0.25, 0.25, 0.25, 0.25)
+
+
+def test_the_distance_error_is_to_the_target_of_the_run() -> None:
+    steps = [step(k, person(distance)) for k, distance in enumerate((0.4, 1.0, 2.0, 4.0))]
+    for target in (0.8, 1.5, 3.0):
+        errors = [distance - CAMERA - TRUNK - target for distance in (0.4, 1.0, 2.0, 4.0)]
+        result = card(*steps, target=target)
+        assert result.target_m == target
+        assert result.distance_rms_error_m == pytest.approx(math.sqrt(sum(error**2 for error in errors) / 4))
+
+
+def test_a_follower_that_holds_its_target_exactly_is_charged_no_error() -> None:
+    result = card(*(step(k, person(1.5 + CAMERA + TRUNK)) for k in range(5)))
+    assert result.distance_rms_error_m == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_controller_that_holds_no_distance_has_no_distance_error() -> None:
+    result = card(*(step(k, person()) for k in range(5)), target=None)
+    assert result.target_m is None
+    assert result.distance_rms_error_m is None
+    assert result.distance_mean_m == 2.0
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5, math.pi / 2, 2.0, math.pi, -0.7, -math.pi / 2])
+@pytest.mark.parametrize("bearing", [0.0, 0.9, math.pi / 2, math.pi, -2.0])
+def test_clearance_is_from_outline_to_outline_wherever_the_person_is(yaw: float, bearing: float) -> None:
+    x, y, direction = 1.2, -0.7, yaw + bearing
+    standing = replace(person(), x=x + 0.8 * math.cos(direction), y=y + 0.8 * math.sin(direction))
+    radius = Scenario.load("two_people").people[0].radius
+    # The outline as its corners, sampled every millimetre: an independent way to the nearest point.
+    side, front = np.linspace(-0.11, 0.11, 221), np.linspace(-0.145, 0.145, 291)
+    outline = np.concatenate(
+        [np.stack(np.broadcast_arrays(end, side), 1) for end in (-0.145, 0.145)]
+        + [np.stack(np.broadcast_arrays(front, end), 1) for end in (-0.11, 0.11)]
+    )
+    ahead, beside = 0.8 * math.cos(bearing), 0.8 * math.sin(bearing)
+    nearest = np.hypot(*(outline - (ahead, beside)).T).min() - radius
+    found = card(step(0, standing, robot=(x, y, yaw))).clearance_min_m
+    assert found == pytest.approx(nearest, abs=1e-3)
+
+
+def test_clearance_is_the_smallest_over_people_and_time_each_with_their_own_radius() -> None:
+    radii = [settings.radius for settings in Scenario.load("two_people").people]
+    far, near = person(2.0), person(1.0)
+    assert card(step(0, far, near), step(1, far, far)).clearance_min_m == pytest.approx(1.0 - 0.145 - radii[1])
+    assert card(step(0, None, near)).clearance_min_m == pytest.approx(1.0 - 0.145 - radii[1])
+
+
+def test_the_best_box_on_no_person_is_wrong() -> None:
+    wrong = step(0, person(), boxes=[OFF, ON], target=1)
+    right = [step(k, person(), boxes=[ON, OFF], target=0) for k in range(1, 4)]
+    unboxed = step(4, person())
+    result = card(wrong, *right, unboxed)
+    assert result.best_box_wrong == 0.25
+    assert result.detected == 0.8
+    assert card(*right).best_box_wrong == 0.0
+    assert card(unboxed).best_box_wrong is None
+
+
+def test_following_the_other_person_is_told() -> None:
+    people = person(), other_person()
+    mine = [step(k, *people, boxes=[ON], target=0) for k in range(3)]
+    theirs = [step(3, *people, boxes=[OFF], target=0)]
+    assert card(*mine, *theirs).follows_first == 0.75
+
+
+def test_the_subject_is_the_first_person_chosen_not_the_scenarios_first() -> None:
+    people = person(3.0), replace(other_person(), distance=1.0)
+    wrong = step(0, *people, boxes=[[400, 10, 80, 160]], target=0)
+    theirs = [step(k, *people, boxes=[ON, OFF], target=1) for k in range(1, 4)]
+    result = card(wrong, *theirs)
+    assert result.distance_mean_m == 1.0
+    assert result.follows_first == 0.75
+    assert result.first_detection_s == pytest.approx(0.1)
+    assert card(step(0, *people)).distance_mean_m == 3.0
+
+
+@pytest.mark.parametrize(
+    ("targets", "switches"), [("aaaa", 0), ("aabb", 1), ("abab", 3), ("a-a-", 0), ("a-b-", 1), ("----", 0), ("axbx", 1)]
+)
+def test_a_switch_is_a_target_that_changes_from_one_person_to_another(targets: str, switches: int) -> None:
+    boxes = {"a": ON, "b": OFF, "x": [400, 10, 80, 160]}
+    steps = [
+        step(k, person(), other_person(), boxes=[boxes[of]] if of != "-" else None, target=None if of == "-" else 0)
+        for k, of in enumerate(targets)
+    ]
+    assert card(*steps).identity_switches == switches
+
+
+@pytest.mark.parametrize(
+    ("shown", "contacts", "success"),
+    [
+        ("1" * 300, 0, True),
+        ("1" * 300, 1, False),
+        ("0" * 150 + "1" * 150, 0, True),  # not yet found is not lost
+        ("1" * 100 + "0" * 98 + "1" * 102, 0, True),
+        ("1" * 100 + "0" * 100 + "1" * 100, 0, False),
+        ("1" * 299 + "0", 0, False),
+        ("0" * 300, 0, False),
+    ],
+)
+def test_success_is_a_person_in_view_at_the_end_untouched_and_never_lost_for_long(
+    shown: str, contacts: int, success: bool
+) -> None:
+    steps = [step(k, person(visible=float(seen))) for k, seen in enumerate(shown)]
+    assert card(*steps, contacts=Contacts(contacts, 3)).success is success
+
+
+def test_without_anybody_there_is_nothing_to_succeed_in() -> None:
+    assert card(step(0), step(1, None)).success is None
+
+
+def test_the_turn_rates_changes_are_averaged() -> None:
+    turns = (0.0, 0.5, 0.2, 0.2)
+    result = card(*(step(k, turn=turn) for k, turn in enumerate(turns)))
+    assert result.mean_abs_domega == pytest.approx(0.8 / 3)
+
+
+@pytest.mark.parametrize("turn", [1.7e308, math.inf, math.nan])
+def test_no_command_makes_a_figure_infinite(turn: float) -> None:
+    result = card(*(step(k, person(), turn=turn * (-1) ** k) for k in range(4)))
+    # the wheels, 1 m/s each and 0.172 m apart, turn the robot by no more than this
+    assert result.mean_abs_domega <= 2 * 2.0 / 0.172
+    json.dumps(result.to_json(), allow_nan=False)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_the_shortest_logs_have_finite_figures(count: int) -> None:
+    result = card(*(step(k, person()) for k in range(count)))
+    assert result.jerk_mean is None
+    json.dumps(result.to_json(), allow_nan=False)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.8, math.pi, -2.0])
+def test_jerk_is_the_third_derivative_of_the_distance_driven(yaw: float) -> None:
+    def placed(k: int, distance: float) -> Step:
+        return step(k, robot=(distance * math.cos(yaw), distance * math.sin(yaw), yaw))
+
+    steady = [placed(k, 0.3 * 0.1 * k) for k in range(20)]
+    speeding = [placed(k, 0.5 * 0.4 * (0.1 * k) ** 2) for k in range(20)]
+    jerked = [placed(k, 6.0 * (0.1 * k) ** 3 / 6) for k in range(20)]
+    assert card(*steady).jerk_mean == pytest.approx(0.0, abs=1e-9)
+    assert card(*speeding).jerk_mean == pytest.approx(0.0, abs=1e-9)
+    assert card(*jerked).jerk_mean == pytest.approx(6.0)
+    assert card(*(placed(k, -6.0 * (0.1 * k) ** 3 / 6) for k in range(20))).jerk_mean == pytest.approx(6.0)
+
+
+def test_percentiles_and_means_of_the_wall_clock() -> None:
+    times = [1.0, 2.0, 3.0, 4.0, 90.0]
+    result = card(*(step(k, person(), detect_ms=ms, render_ms=ms / 2) for k, ms in enumerate(times)))
+    assert result.detect_ms_p50 == 3.0
+    assert result.detect_ms_p95 == pytest.approx(np.percentile(times, 95))
+    assert result.detect_ms_mean == 20.0
+    assert result.render_ms_p50 == 1.5
+    # five steps of 0.1 s in half a second of the wall's time
+    assert result.real_time_factor == 1.0
+
+
+def test_the_pixel_error_reached_in_95_of_100_frames() -> None:
+    steps = [step(k, person(box=(290 + k, 100, 60, 120))) for k in range(101)]
+    result = card(*steps)
+    assert result.pixel_error_mean == 50.0
+    assert result.pixel_error_p95 == 95.0
+
+
+def test_the_longest_gap_is_between_two_detections_of_the_subject() -> None:
+    seen = {0, 1, 5, 7}
+    steps = [step(k, person(), boxes=[ON] if k in seen else [OFF], target=0 if k in seen else None) for k in range(9)]
+    assert card(*steps).longest_gap_s == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("missed", "lost"), [(4, 0), (6, 1)])
+def test_a_subject_who_is_missed_for_half_a_second_is_lost(missed: int, lost: int) -> None:
+    followed = [step(k, person(), boxes=[ON], target=0) for k in range(3)]
+    # one period passes anyway between two frames
+    gone = [step(k, person()) for k in range(3, 3 + missed - 1)]
+    again = [step(k, person(), boxes=[ON], target=0) for k in range(2 + missed, 6 + missed)]
+    assert card(*followed, *gone, *again).lost == lost
+
+
+def test_a_subject_who_is_never_found_again_is_lost_once() -> None:
+    followed = [step(k, person(), boxes=[ON], target=0) for k in range(3)]
+    result = card(*followed, *(step(k, person()) for k in range(3, 50)))
+    assert (result.lost, result.found_again) == (1, 0.0)
+
+
+def test_a_loss_is_counted_without_the_time_behind_a_pillar() -> None:
+    followed = [step(k, person(), boxes=[ON], target=0) for k in range(3)]
+    hidden = [step(k, person(visible=0.0)) for k in range(3, 50)]
+    again = [step(50, person(), boxes=[ON], target=0)]
+    result = card(*followed, *hidden, *again)
+    assert result.lost == 1
+    assert result.found_again == 1.0
+    away = [step(k, person(visible=0.0, box=None)) for k in range(3, 50)]
+    assert card(*followed, *away, *again).found_again == 0.0
+
+
+def test_driving_after_a_decoy_is_measured() -> None:
+    steps = [step(k, boxes=[OFF], target=0, at=0.1 * k) for k in range(4)]
+    assert card(*steps).path_wrong_m == pytest.approx(0.3)
+    assert card(*steps).path_m == pytest.approx(0.3)
+
+
+def test_a_box_is_on_a_person_of_its_size_and_place() -> None:
+    assert on_person(np.array(ON, np.int32), person())
+    assert not on_person(np.array(OFF, np.int32), person())
+    assert not on_person(np.array([0, 0, 320, 480], np.int32), person())
+    assert not on_person(np.array(ON, np.int32), person(box=None))
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "height", "on"),
+    [
+        (330, 160, 160, True),
+        # the silhouette is 60 px wide from 300 on: a quarter of it more on either side
+        (285, 160, 160, True),
+        (284, 160, 160, False),
+        (375, 160, 160, True),
+        (376, 160, 160, False),
+        # 120 px high from 100 on
+        (330, 100, 160, True),
+        (330, 99, 160, False),
+        (330, 220, 160, True),
+        (330, 221, 160, False),
+        (330, 160, 72, True),
+        (330, 160, 70, False),
+        (330, 160, 300, True),
+        (330, 160, 302, False),
+    ],
+)
+def test_the_middle_of_a_box_and_its_height_decide_whom_it_is_on(column: int, row: int, height: int, on: bool) -> None:
+    box = np.array([column - 40, row - height // 2, 80, height], np.int32)
+    assert on_person(box, person()) is on
+
+
+def test_a_box_on_two_people_is_on_the_one_in_view_then_on_the_nearer_one() -> None:
+    left, right = person(box=(300, 100, 60, 120)), person(box=(320, 100, 60, 120))
+    box = [[285 + 15, 90, 80, 160]]  # its middle, 340, is 10 px from the left one's and 10 from the right one's
+
+    def subject(one: PersonTruth, other: PersonTruth, shift: int) -> float | None:
+        moved = [[box[0][0] + shift, *box[0][1:]]]
+        return card(
+            step(0, replace(one, distance=1.0), replace(other, distance=2.0), boxes=moved, target=0)
+        ).distance_mean_m
+
+    assert subject(left, right, -4) == 1.0
+    assert subject(left, right, 4) == 2.0
+    assert subject(replace(left, visible=0.3), right, -4) == 2.0
+    assert subject(left, replace(right, visible=0.3), 4) == 1.0
+
+
+def test_the_interval_is_students() -> None:
+    values = [1.0, 2.0, 4.0, 4.5, 7.0, 2.5]
+    found = estimate(values)
+    half = student.ppf(0.975, 5) * np.std(values, ddof=1) / math.sqrt(6)
+    assert found.mean == pytest.approx(3.5)
+    assert found.interval == pytest.approx(half, rel=0.02)
+    assert (found.least, found.most) == (1.0, 7.0)
+    assert estimate([3.0]).interval is None
+
+
+def test_cards_are_summed_up_by_scenario_and_controller() -> None:
+    one = card(step(0, person()))
+    summaries = summarise([one, replace(one, seed=1), replace(one, controller="other")])
+    assert [(s.controller, s.runs) for s in summaries] == [("c", 2), ("other", 1)]
+    assert summaries[0].measures["found_again"] is None

@@ -1,0 +1,262 @@
+"""The camera sees what geometry says: compared with rays solved one by one in exact perspective."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, CameraPose
+from limo_sim.sensing.renderer import Renderer, Seen
+from limo_sim.world.furniture import KINDS, Box
+from limo_sim.world.person import BodyMesh, Pose, body
+from limo_sim.world.scenario import Camera, Depth, Furniture, Person, Scenario
+
+HERE = CameraPose(0.0, 0.0, 0.0)
+EYE = np.array([0.0, 0.0, 0.175])
+SOMEBODY = Person(route=((3, 0, 0),))
+EXACT = Scenario(camera=Camera(noise=0.0), depth=Depth(noise=0.0, invalid=0.0, far_m=20.0))
+
+Picture = tuple[NDArray[np.uint8], NDArray[np.float32], list[Seen]]
+
+
+def picture(
+    *poses: Pose | None, furniture: tuple[Furniture, ...] = (), camera: CameraPose = HERE, scenario: Scenario = EXACT
+) -> Picture:
+    scenario = dataclasses.replace(scenario, people=(SOMEBODY,) * len(poses), furniture=furniture)
+    return Renderer(scenario, np.random.default_rng(0)).render(camera, poses, np.random.default_rng(1))
+
+
+def rays(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Directions in the arena's frame of pixels seen by a camera at `HERE`, one metre deep."""
+    return np.stack([np.ones(len(columns)), -(columns - CENTRE_X) / FOCAL_PX, -(rows - CENTRE_Y) / FOCAL_PX], axis=1)
+
+
+def first_hit(figure: BodyMesh, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Depth [m] at which rays from the camera meet a body: capsules as rows of balls, ellipsoids as they are."""
+    share = np.linspace(0, 1, 80)[:, None, None]
+    balls = (figure.start + share * (figure.end - figure.start)).reshape(-1, 3)
+    radii = (figure.start_radius + share[..., 0] * (figure.end_radius - figure.start_radius)).reshape(-1)
+    nearest = np.full(len(directions), np.inf)
+    a = (directions**2).sum(axis=1)
+    for centre, radius in zip(balls, radii, strict=True):
+        b = directions @ (centre - EYE)
+        under = b * b - a * (((centre - EYE) ** 2).sum() - radius**2)
+        hit = np.where(under > 0, (b - np.sqrt(np.maximum(under, 0))) / a, np.inf)
+        nearest = np.minimum(nearest, hit)
+    for centre, axes in zip(figure.centre, figure.axes, strict=True):
+        shrink = np.linalg.inv(axes)
+        ahead, offset = directions @ shrink.T, shrink @ (centre - EYE)
+        a_in, b_in = (ahead**2).sum(axis=1), ahead @ offset
+        under = b_in * b_in - a_in * ((offset**2).sum() - 1)
+        hit = np.where(under > 0, (b_in - np.sqrt(np.maximum(under, 0))) / a_in, np.inf)
+        nearest = np.minimum(nearest, hit)
+    return nearest
+
+
+@pytest.mark.parametrize("distance", [1.6, 3.0])
+@pytest.mark.parametrize("yaw", [0.0, 2.3, math.pi / 2])
+def test_a_body_covers_the_pixels_and_has_the_depth_of_its_solids(distance: float, yaw: float) -> None:
+    pose = Pose(distance, 0.15, yaw, phase=1.1, swing=1.0)
+    _, depth, [(visible, box)] = picture(pose)
+    assert visible == 1.0
+    assert box is not None
+    left, top, width, height = box
+    rows, columns = (grid.reshape(-1) for grid in np.mgrid[top : top + height, left : left + width])
+    expected = first_hit(body(SOMEBODY, pose), rays(columns, rows))
+    drawn = depth[rows, columns]
+    there, seen = np.isfinite(expected), drawn < picture(None)[1][rows, columns] - 0.01
+    assert (there & seen).sum() / (there | seen).sum() > 0.97
+    both = there & seen
+    gaps = np.abs(drawn[both] - expected[both])
+    assert np.median(gaps) < 0.003
+    assert np.percentile(gaps, 95) < 0.015
+
+
+def test_the_box_is_as_tight_as_the_silhouette() -> None:
+    pose = Pose(2.5, -0.4, 2.0, phase=0.4, swing=1.0)
+    _, depth, [(_, box)] = picture(pose)
+    rows, columns = np.nonzero(depth < picture(None)[1] - 0.01)
+    assert box is not None
+    left, top, width, height = box
+    assert abs(columns.min() - left) <= 2
+    assert abs(rows.min() - top) <= 2
+    assert abs(columns.max() - (left + width - 1)) <= 2
+    assert abs(rows.max() - (top + height - 1)) <= 2
+
+
+def inside(piece: Furniture, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether points (..., 3) lie in any solid of a piece."""
+    cos, sin = math.cos(piece.yaw), math.sin(piece.yaw)
+    x, y, z = points[..., 0] - piece.x, points[..., 1] - piece.y, points[..., 2]
+    x, y = cos * x + sin * y, cos * y - sin * x
+    found = np.zeros(x.shape, bool)
+    for solid in KINDS[piece.kind].solids:
+        tall = (z >= solid.z0) & (z <= solid.z1)
+        if isinstance(solid, Box):
+            found |= tall & (np.abs(x - solid.x) <= solid.half_x) & (np.abs(y - solid.y) <= solid.half_y)
+        else:
+            radius = solid.r0 + (z - solid.z0) / (solid.z1 - solid.z0) * (solid.r1 - solid.r0)
+            found |= tall & (np.hypot(x - solid.x, y - solid.y) <= radius)
+    return found
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_furniture_has_the_depth_that_marching_along_the_rays_finds(kind: str) -> None:
+    piece = Furniture(kind, 2.0, 0.3, 0.7)
+    _, depth, _ = picture(furniture=(piece,))
+    rows, columns = (grid.reshape(-1) for grid in np.mgrid[30:320:4, 130:360:3])
+    depths = np.arange(1.6, 2.4, 0.002)
+    hits = inside(piece, EYE + depths[:, None, None] * rays(columns, rows))
+    expected = np.where(hits.any(axis=0), depths[hits.argmax(axis=0)], np.inf)
+    drawn = depth[rows, columns]
+    floor = picture()[1][rows, columns]
+    there, seen = np.isfinite(expected) & (expected < floor), drawn < floor - 1e-3
+    assert there.sum() > 100
+    assert (there & seen).sum() / (there | seen).sum() > 0.93
+    both = there & seen
+    gaps = np.abs(drawn[both] - expected[both])
+    assert np.median(gaps) < 0.003
+    assert np.percentile(gaps, 90) < 0.02
+
+
+@pytest.mark.parametrize("camera", [HERE, CameraPose(1.0, -2.0, 0.7), CameraPose(-3.0, 3.0, -2.5)])
+def test_the_room_has_the_depth_of_its_planes(camera: CameraPose) -> None:
+    _, depth, _ = picture(camera=camera)
+    for row, column in ((470, 10), (300, 320), (238, 5), (239, 600), (240, 320), (100, 320), (5, 5)):
+        right, down = (column - CENTRE_X) / FOCAL_PX, (row - CENTRE_Y) / FOCAL_PX
+        look = math.cos(camera.yaw), math.sin(camera.yaw)
+        ahead = look[0] + right * look[1], look[1] - right * look[0]
+        walls = [
+            (math.copysign(4.9, along) - start) / along
+            for start, along in zip((camera.x, camera.y), ahead, strict=True)
+        ]
+        expected = min(walls)
+        if down * expected > 0.175:
+            expected = 0.175 / down
+        elif -down * expected > 1.0 - 0.175:
+            expected = math.inf
+        assert depth[row, column] == pytest.approx(expected, rel=1e-4)
+
+
+def test_colour_changes_where_depth_does() -> None:
+    """The wall's upper edge lies at the same row in both images, in every column."""
+    image, depth, _ = picture(camera=CameraPose(1.0, -2.0, 0.7))
+    bright = np.abs(np.diff(image[:240, :, 0].astype(int), axis=0)).argmax(axis=0)
+    far = np.isinf(depth[:240]).sum(axis=0) - 1
+    assert np.abs(bright - far).max() <= 1
+
+
+def test_somebody_behind_a_pillar_is_hidden_and_in_front_of_it_is_not() -> None:
+    pillar = Furniture("pillar", 2.0, 0.0)
+    _, hidden_depth, [(hidden, box)] = picture(Pose(4.0, 0.0, 0.0), furniture=(pillar,))
+    assert hidden < 0.05
+    assert box is not None
+    _, _, [(part, _)] = picture(Pose(4.0, 0.3, 0.0), furniture=(pillar,))
+    assert 0.1 < part < 0.9
+    _, depth, [(front, _)] = picture(Pose(1.6, 0.0, 0.0), furniture=(pillar,))
+    assert front == 1.0
+    assert hidden_depth[200, 320] == pytest.approx(1.85, abs=0.02)
+    assert depth[110, 320] < 1.6
+
+
+def test_the_nearer_of_two_people_hides_the_other_whoever_comes_first() -> None:
+    near, far = Pose(2.0, 0.05, 0.0), Pose(3.0, 0.1, 0.0)
+    image, depth, [(first, _), (second, _)] = picture(near, far)
+    same, same_depth, [(second_now, _), (first_now, _)] = picture(far, near)
+    assert first == first_now == 1.0
+    assert second == second_now < 0.6
+    np.testing.assert_array_equal(image, same)
+    np.testing.assert_array_equal(depth, same_depth)
+
+
+def test_visible_share_falls_as_somebody_leaves_the_image() -> None:
+    shares = [picture(Pose(2.0, y, 0.0))[2][0] for y in (0.0, 1.2, 1.35, 1.42, 1.5, 1.9)]
+    assert [share for share, _ in shares] == sorted((share for share, _ in shares), reverse=True)
+    assert shares[0][0] == 1.0
+    assert 0.3 < shares[3][0] < 0.7
+    assert shares[-1] == (0.0, None)
+
+
+@pytest.mark.parametrize(("distance", "y"), [(0.5, 0.0), (0.8, 0.3), (1.1, -0.8), (1.6, 1.1)])
+def test_visible_share_is_that_of_the_silhouette_in_a_wider_image(distance: float, y: float) -> None:
+    """The whole silhouette from single rays: those within the image are the visible ones."""
+    pose = Pose(distance, y, 1.0, 2.0, 1.0)
+    rows, columns = (grid.reshape(-1) for grid in np.mgrid[-400:1300:6, -900:1500:6])
+    covered = np.isfinite(first_hit(body(SOMEBODY, pose), rays(columns, rows)))
+    within = (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
+    [(visible, _)] = picture(pose)[2]
+    assert visible == pytest.approx((covered & within).sum() / covered.sum(), abs=0.03)
+
+
+def test_somebody_behind_the_camera_is_not_seen() -> None:
+    image, depth, [seen] = picture(Pose(-2.0, 0.0, 0.0))
+    empty, empty_depth, _ = picture(None)
+    assert seen == (0.0, None)
+    np.testing.assert_array_equal(image, empty)
+    np.testing.assert_array_equal(depth, empty_depth)
+
+
+@pytest.mark.parametrize("distance", [0.05, 0.15, 0.25, 0.5])
+def test_somebody_who_touches_the_camera_does_no_harm(distance: float) -> None:
+    for y in (-0.2, 0.0, 0.2):
+        _, depth, [(visible, _)] = picture(Pose(distance, y, 1.0, 2.0, 1.0))
+        assert 0.0 <= visible <= 1.0
+        assert not np.isnan(depth).any()
+
+
+def test_colour_noise_is_grey_and_as_strong_as_asked_for() -> None:
+    clean = picture(None)[0].astype(int)
+    for sigma in (1.0, 3.0):
+        scenario = dataclasses.replace(EXACT, camera=Camera(noise=sigma))
+        noise = picture(None, scenario=scenario)[0].astype(int) - clean
+        assert (noise == noise[..., :1]).all()
+        assert noise[..., 0].std() == pytest.approx(math.hypot(sigma, 1 / math.sqrt(12)), rel=0.02)
+        assert abs(noise[..., 0].mean()) < 0.02
+
+
+def test_depth_has_limits_noise_and_unknown_pixels() -> None:
+    clean = picture(None)[1]
+    limited = dataclasses.replace(EXACT, depth=Depth(near_m=0.5, far_m=4.0, noise=0.0, invalid=0.0))
+    depth = picture(None, scenario=limited)[1]
+    assert (depth[clean < 0.499] == -np.inf).all()
+    assert (depth[clean > 4.001] == np.inf).all()
+    within = (clean > 0.501) & (clean < 3.999)
+    np.testing.assert_array_equal(depth[within], clean[within])
+
+    noisy = dataclasses.replace(EXACT, depth=Depth(near_m=0.01, far_m=20, noise=0.01, invalid=0.02))
+    depth = picture(None, scenario=noisy)[1]
+    assert np.isnan(depth).mean() == pytest.approx(0.02, rel=0.05)
+    known = np.isfinite(depth) & np.isfinite(clean)
+    assert (depth[known] / clean[known]).std() == pytest.approx(0.01, rel=0.05)
+
+
+def test_shadow_falls_on_the_floor_beneath() -> None:
+    lit, shaded = picture(None)[0], picture(Pose(2.0, 0.0, 0.0))[0]
+    row = round(CENTRE_Y + FOCAL_PX * 0.175 / 1.88)
+    assert shaded[row, 320, 0] < lit[row, 320, 0] - 10
+    assert shaded[470, 320, 0] == lit[470, 320, 0]
+
+
+def test_the_gait_sheet_shows_a_person_from_four_sides() -> None:
+    """Draws 4 directions × 6 phases for people to look at: out/gait.png."""
+    rows = []
+    for yaw in (0.0, math.pi / 2, math.pi, math.pi / 4):
+        tiles = [
+            picture(Pose(1.5, 0.0, yaw, phase, 1.0), scenario=Scenario())[0][10:310, 240:400]
+            for phase in np.arange(6) * math.tau / 6
+        ]
+        rows.append(np.hstack(tiles))
+    sheet = np.vstack(rows)
+    out = Path(__file__).parents[3] / "out"
+    out.mkdir(exist_ok=True)
+    cv2.imwrite(str(out / "gait.png"), sheet)
+    assert sheet.shape == (1200, 960, 3)
+    blue = sheet[..., 0].astype(int) - sheet[..., 2]
+    shirts = [(blue[300 * r : 300 * r + 300, 160 * c : 160 * c + 160] > 30).sum() for r in range(4) for c in range(6)]
+    assert min(shirts) > 1500

@@ -1,0 +1,134 @@
+"""People keep their timetable, and walk as people do."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from limo_sim.world.person import BodyMesh, Pose, Walk, body
+from limo_sim.world.scenario import Person, Scenario
+
+PATROL = Scenario.load("workshop").people[0]
+
+
+def lowest(figure: BodyMesh) -> float:
+    return float(min((figure.start[:, 2] - figure.start_radius).min(), (figure.end[:, 2] - figure.end_radius).min()))
+
+
+def highest(figure: BodyMesh) -> float:
+    reach = np.sqrt((figure.axes**2).sum(axis=2))[:, 2]
+    return float((figure.centre[:, 2] + reach).max())
+
+
+@pytest.mark.parametrize(
+    ("time", "x", "y"),
+    [
+        (0.0, -3, -3),
+        (4.0, -3, 0),
+        (8.0, -3, 3),
+        (8.5, -3, 3),
+        (12.5, 0, 3),
+        (16.5, 3, 3),
+        (17.0, 3, 3),
+        (25.0, 3, -3),
+        (33.5, -3, -3),
+        (34.0, -3, -3),
+        (38.0, -3, 0),
+        (34.0 * 100 + 21.0, 3, 0),
+    ],
+)
+def test_the_patrol_keeps_the_workshops_times(time: float, x: float, y: float) -> None:
+    pose = Walk(PATROL).pose(time)
+    assert pose is not None
+    assert (pose.x, pose.y) == pytest.approx((x, y), abs=1e-6)
+
+
+def test_nobody_moves_faster_than_they_walk() -> None:
+    for name in Scenario.names():
+        for person in Scenario.load(name).people:
+            walk = Walk(person)
+            poses = [walk.pose(step / 50) for step in range(50 * 120)]
+            steps = [
+                math.hypot(after.x - before.x, after.y - before.y)
+                for before, after in pairwise(poses)
+                if before and after
+            ]
+            assert max(steps) <= person.speed / 50 + 1e-9, name
+
+
+def test_headings_change_smoothly_and_follow_the_way() -> None:
+    walk = Walk(PATROL)
+    poses = [walk.pose(step / 50) for step in range(50 * 70)]
+    yaws = np.unwrap([pose.yaw for pose in poses if pose])
+    assert np.abs(np.diff(yaws)).max() < math.radians(6)
+    pose = walk.pose(20.0)
+    assert pose is not None
+    assert math.remainder(pose.yaw + math.pi / 2, math.tau) == pytest.approx(0, abs=1e-9)
+
+
+def test_the_gait_is_tied_to_the_distance_walked() -> None:
+    slow, fast = (
+        Walk(Person(route=((-3, 0, 0), (3, 0, 0)), speed=0.2)),
+        Walk(Person(route=((-3, 0, 0), (3, 0, 0)), speed=0.8)),
+    )
+    for metres in (0.1, 0.5, 1.3, 2.9):
+        one, other = slow.pose(metres / 0.2), fast.pose(metres / 0.8)
+        assert one is not None
+        assert other is not None
+        assert one.phase == pytest.approx(other.phase)
+        assert one.phase == pytest.approx(math.tau * metres / 0.75 % math.tau)
+
+
+def test_somebody_who_pauses_stands_with_limbs_at_rest() -> None:
+    walk = Walk(Scenario.load("followable").people[0])
+    pause = walk.pose(1.7 / 0.22 + 2.0)
+    assert pause is not None
+    assert pause.swing == 0
+    walking = walk.pose(4.0)
+    assert walking is not None
+    assert walking.swing == 1
+
+
+def test_somebody_late_is_not_there_before() -> None:
+    walk = Walk(Scenario.load("late").people[0])
+    assert walk.pose(19.98) is None
+    assert walk.pose(20.0) is not None
+
+
+def test_one_corner_means_standing() -> None:
+    walk = Walk(Person(route=((2, 1, 0),), facing=1.0))
+    assert walk.pose(0.0) == walk.pose(100.0) == Pose(2, 1, 1.0)
+
+
+@pytest.mark.parametrize("height", [0.8, 0.9, 1.1])
+def test_the_lowest_foot_touches_the_floor_and_the_head_is_at_full_height(height: float) -> None:
+    person = Person(route=((2, 0, 0),), height=height)
+    for phase in np.linspace(0, math.tau, 12, endpoint=False):
+        figure = body(person, Pose(2, 0, 0.4, float(phase), 1.0))
+        assert lowest(figure) == pytest.approx(0.0, abs=1e-9)
+        assert 0.93 * height < highest(figure) < 1.03 * height
+    assert highest(body(person, Pose(2, 0, 0.4))) == pytest.approx(height, rel=0.025)
+
+
+def test_the_standing_foot_does_not_slide() -> None:
+    """While a leg carries the body, its ankle stays where it is on the floor, to within a few centimetres."""
+    walk = Walk(Person(route=((-3, 0, 0), (3, 0, 0)), speed=0.5))
+    person = walk.person
+    held = []
+    for step in range(50, 150):
+        pose = walk.pose(step / 50)
+        assert pose is not None
+        ankles = body(person, pose).end[[1, 4]]
+        held.append(min(ankles.tolist(), key=lambda ankle: ankle[2]))
+    speeds = np.abs(np.diff(np.array(held)[:, 0])) * 50
+    assert np.median(speeds) < 0.5 * person.speed
+
+
+def test_a_turned_body_is_the_same_body_turned() -> None:
+    person = PATROL
+    straight, turned = body(person, Pose(0, 0, 0, 1.0, 1.0)), body(person, Pose(1, 2, math.pi / 2, 1.0, 1.0))
+    expected = np.stack([1 - straight.start[:, 1], 2 + straight.start[:, 0], straight.start[:, 2]], axis=1)
+    np.testing.assert_allclose(turned.start, expected, atol=1e-12)

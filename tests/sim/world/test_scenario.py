@@ -1,0 +1,126 @@
+"""Scenarios are data, and data that cannot be run is refused by name."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import pytest
+
+from limo_hog.exceptions import LimoHogError
+from limo_sim.run.arena import Arena
+from limo_sim.world.scenario import Camera, Furniture, Person, Scenario
+from limo_sim.world.schema import ScenarioError
+
+NAMES = ("crossing", "empty", "followable", "furniture", "late", "occlusion", "two_people", "workshop", "zigzag")
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_scenarios_of_the_product_are_there() -> None:
+    assert set(NAMES) <= set(Scenario.names())
+
+
+@pytest.mark.parametrize("name", Scenario.names())
+def test_every_scenario_loads_and_runs(name: str) -> None:
+    scenario = Scenario.load(name)
+    assert scenario.name == name
+    assert scenario.summary
+    arena = Arena(scenario, 0)
+    arena.step()
+    assert arena.frame().image.shape == (480, 640, 3)
+
+
+def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
+    path = written(tmp_path, "[[people]]\nroute = [[2, 0, 0]]\n[camera]\nlatency_s = 0.4\n")
+    scenario = Scenario.load(path)
+    assert scenario.name == "mine"
+    assert scenario.camera == Camera(latency_s=0.4)
+    assert scenario.people == (Person(route=((2.0, 0.0, 0.0),)),)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("colour = 1", "mine.toml: colour: unknown key, want one of name, summary, people"),
+        ("[camera]\nrate = 10", "mine.toml: camera.rate: unknown key, want one of rate_hz"),
+        ("[camera]\nrate_hz = -10", "mine.toml: camera.rate_hz: got -10.0, want a number in 0.5 … 50"),
+        ("[camera]\nrate_hz = nan", "mine.toml: camera.rate_hz: got nan, want a number in 0.5 … 50"),
+        ("[camera]\nrate_hz = 'fast'", "mine.toml: camera.rate_hz: got 'fast', want a number"),
+        ("[camera]\nrate_hz = true", "mine.toml: camera.rate_hz: got True, want a number"),
+        ("[camera]\ndrop_probability = 1.5", "mine.toml: camera.drop_probability: got 1.5, want a number in 0 … 1"),
+        ("camera = 3", "mine.toml: camera: got 3, want a table"),
+        ("people = 3", "mine.toml: people: got 3, want a list"),
+        ("[[people]]\nspeed = 0.5", "mine.toml: people[0].route: missing"),
+        ("[[people]]\nroute = []", "mine.toml: people[0].route: is empty"),
+        ("[[people]]\nroute = [[1, 2]]", "mine.toml: people[0].route[0]: got 2 values, want 3"),
+        ("[[people]]\nroute = [[1, 2, -1]]", "mine.toml: people[0].route[0]: pause -1 s, want 0 … 3600"),
+        (
+            "[[people]]\nroute = [[2, 0, 0], [6, 0, 0]]",
+            "mine.toml: people[0].route[1]: (6, 0) goes through a wall or too near one, want x and y in -4.3 … 4.3",
+        ),
+        (
+            "[[people]]\nroute = [[0.1, 0, 0], [3, 0, 0]]",
+            "mine.toml: people[0].route[0]: is 0.00 m from the robot's centre, want at least 0.19 m",
+        ),
+        (
+            "[[people]]\nroute = [[2, -2, 0], [2, 2, 0]]\n[[furniture]]\nkind = 'pillar'\nx = 2\ny = 0",
+            "mine.toml: people[0].route[0]: the way to the next corner passes 0.00 m from furniture[0] (pillar)",
+        ),
+        ("[[furniture]]\nkind = 'sofa'\nx = 2\ny = 0", "mine.toml: furniture[0].kind: got 'sofa', want one of pillar"),
+        ("[[furniture]]\nkind = 'chair'\nx = 0.1\ny = 0", "mine.toml: furniture[0]: is 0.00 m from the robot's centre"),
+        ("[light]\nsun = [0, 0, 0]", "mine.toml: light.sun: got (0.0, 0.0, 0.0), want a direction"),
+        ("[robot]\nx = 4.9", "mine.toml: robot.x: got 4.9, want a number in -4.6 … 4.6"),
+        ("[camera", "mine.toml: not TOML"),
+    ],
+)
+def test_bad_data_is_refused_with_file_key_and_range(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        Scenario.load(written(tmp_path, text))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, LimoHogError)
+
+
+def test_a_missing_file_and_an_unknown_name_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"nowhere\.toml: cannot be read"):
+        Scenario.load(tmp_path / "nowhere.toml")
+    with pytest.raises(ScenarioError, match=r"unknown scenario wrokshop: want one of .*workshop, "):
+        Scenario.load("wrokshop")
+    with pytest.raises(ScenarioError, match="unknown scenario wrokshop:3"):
+        Scenario.load("wrokshop:3")
+
+
+def test_a_replaced_scenario_is_checked_when_the_arena_is_built() -> None:
+    followable = Scenario.load("followable")
+    half = dataclasses.replace(followable, camera=dataclasses.replace(followable.camera, drop_probability=0.5))
+    Arena(half, 0)
+    inside = dataclasses.replace(followable, furniture=(Furniture("cone", 0.1, 0.0),))
+    with pytest.raises(ScenarioError, match="scenario 'followable': furniture"):
+        Arena(inside, 0)
+
+
+def test_the_page_about_the_arena_tells_the_truth(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "simulator.md").read_text(encoding="utf-8")
+    [example] = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    scenario = Scenario.load(written(tmp_path, example))
+    assert scenario.camera.drop_probability == 0.3
+    for name in Scenario.names():
+        assert f"| `{name}` |" in page
+    known = {"people[]": Person, "furniture[]": Furniture} | {
+        field.name: type(getattr(scenario, field.name)) for field in dataclasses.fields(scenario)
+    }
+    told = set()
+    for keys in re.findall(r"^\| `(\S+\..*?)` \|", page, re.MULTILINE):
+        table, names = keys.split(".")
+        told |= {(table, name) for name in names.replace("`", "").split(", ")}
+    for table, kind in known.items():
+        if dataclasses.is_dataclass(kind):
+            assert {name for owner, name in told if owner == table} == {
+                field.name for field in dataclasses.fields(kind)
+            }

@@ -20,7 +20,7 @@ Labelled = list[tuple[NDArray[np.float64], NDArray[np.bool_]]]
 
 
 def scene(seed: int, pictures: int = 30, equal_scores: bool = False) -> tuple[Found, Labelled]:
-    """Pictures with people, some to be ignored, and detections near them and elsewhere."""
+    """Pictures with objects, some to be ignored, and detections near them and elsewhere."""
     rng = np.random.default_rng(seed)
     found, labelled = [], []
     for _ in range(pictures):
@@ -65,7 +65,7 @@ def cocos_average_precision(found: Found, labelled: Labelled) -> float:
 
 def slow_lamr(found: Found, labelled: Labelled) -> float:
     """The definition: every threshold tried, every picture matched anew by loops."""
-    people = sum(int((~ignored).sum()) for _, ignored in labelled)
+    objects = sum(int((~ignored).sum()) for _, ignored in labelled)
     points = []
     for threshold in sorted({float(s) for _, scores in found for s in scores}):
         right = wrong = 0
@@ -83,7 +83,7 @@ def slow_lamr(found: Found, labelled: Labelled) -> float:
                     right += 1
                 elif not any(_within(hit, box) >= 0.5 for box, i in zip(boxes.tolist(), ignored, strict=True) if i):
                     wrong += 1
-        points.append((wrong / len(found), right / people))
+        points.append((wrong / len(found), right / objects))
     misses = []
     for i in range(9):
         reference = 10 ** (-2 + 0.25 * i)
@@ -137,7 +137,7 @@ def test_what_lies_in_an_ignored_box_is_neither_right_nor_wrong() -> None:
     pairs = match(hits, boxes, np.ones(1, np.bool_))
     assert pairs.detections.tolist() == [-2, -1]
     outcomes, _ = collect([(hits, np.array([2.0, 1.0]))], [(boxes, np.ones(1, np.bool_))])
-    assert outcomes.people.tolist() == [0]
+    assert outcomes.objects.tolist() == [0]
     assert outcomes.right.tolist() == [False]
 
 

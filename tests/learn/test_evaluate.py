@@ -42,17 +42,17 @@ def _figures(text: str) -> dict[str, Any]:
 
 
 def test_figures_come_as_json(streets: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    people = sum(map(len, json.loads((streets / "boxes.json").read_text()).values()))
+    objects = sum(map(len, json.loads((streets / "boxes.json").read_text()).values()))
     assert main(["evaluate", "opencv", str(streets), "--json", "-"]) == 0
     result = _figures(capsys.readouterr().out)
-    assert (result["pictures"], result["people"]) == (3, people)
+    assert (result["pictures"], result["objects"]) == (3, objects)
     (model,) = result["models"]
-    found = (people - 1) / people
+    found = (objects - 1) / objects
     assert model["recall_1"] == pytest.approx(found)
     low, high = model["intervals"]["recall_1"]
     assert low <= found <= high
     assert low < high
-    assert sum(row["people"] for row in model["by_height"]) == people
+    assert sum(row["objects"] for row in model["by_height"]) == objects
     assert model["ms"] > 0
     assert result["differences"] == []
 
@@ -126,5 +126,5 @@ def test_boxes_left_out_are_told_as_warnings(streets: Path, capsys: pytest.Captu
 def test_opencvs_model_finds_people_on_the_validation_photographs(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", "opencv", str(USC), "--json", "-"]) == 0
     result = _figures(capsys.readouterr().out)
-    assert (result["pictures"], result["people"]) == (100, 232)
+    assert (result["pictures"], result["objects"]) == (100, 232)
     assert result["models"][0]["lamr"] == pytest.approx(0.298, abs=0.01)

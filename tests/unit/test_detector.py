@@ -211,7 +211,7 @@ def test_threads_share_a_detector() -> None:
 untyped: Any = limo_hog
 
 WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
-    ({"model": "bogus"}, ValueError, "model is 'bogus'; opencv, default, daimler or the path"),
+    ({"model": "bogus"}, ValueError, "model is 'bogus'; opencv, default, daimler, limo or the path"),
     ({"model": 7}, TypeError, "model is 7"),
     ({"model": None}, TypeError, "model is None"),
     ({"min_height": 0}, ValueError, "min_height is 0; 8 or more is wanted"),

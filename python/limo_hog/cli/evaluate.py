@@ -20,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Measure a detector on labelled pictures: log-average miss rate, recall, average precision, time; "
         "with intervals, and against others on the same pictures.",
     )
-    parser.add_argument("model", metavar="MODEL", help="opencv, daimler, or the file of a trained detector")
+    parser.add_argument("model", metavar="MODEL", help="opencv, daimler, limo, or the file of a trained detector")
     parser.add_argument(
         "data",
         type=Path,
@@ -77,8 +77,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         write_json(args.json, as_json(used, evaluations, how))
     if args.json != STDOUT:
-        people = sum(not box.ignored for picture in used for box in picture.boxes)
-        _print(f"{len(used)} pictures with {people} people", evaluations, how)
+        objects = sum(not box.ignored for picture in used for box in picture.boxes)
+        _print(f"{len(used)} pictures with {objects} objects", evaluations, how)
     if args.report:
         page = write_report(args.report, used, evaluations, how)
         if args.json != STDOUT:

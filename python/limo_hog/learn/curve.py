@@ -82,7 +82,7 @@ class Outcomes:
     ----------
     scores, right, picture
         float64, bool and int (D,): each detection that counts, best first; whether it is right; its picture's index.
-    people
+    objects
         int (P,): how many boxes each picture has.
     found_at
         float64 (N,): the score at which each box was found, picture by picture; -inf where it was not.
@@ -93,7 +93,7 @@ class Outcomes:
     scores: NDArray[np.float64]
     right: NDArray[np.bool_]
     picture: NDArray[np.intp]
-    people: NDArray[np.intp]
+    objects: NDArray[np.intp]
     found_at: NDArray[np.float64]
     heights: NDArray[np.float64]
 
@@ -191,8 +191,8 @@ def curve(outcomes: Outcomes) -> Curve:
     wrong = np.cumsum(~outcomes.right)[ends]
     return Curve(
         outcomes.scores[ends],
-        right / max(1, int(outcomes.people.sum())),
-        wrong / max(1, len(outcomes.people)),
+        right / max(1, int(outcomes.objects.sum())),
+        wrong / max(1, len(outcomes.objects)),
         right / np.maximum(right + wrong, 1),
     )
 
@@ -205,7 +205,7 @@ def threshold_at(points: Curve, fppi: float) -> float:
 
 def figures(outcomes: Outcomes) -> Figures:
     """Return the figures of a set of pictures."""
-    weights = np.ones((1, len(outcomes.people)), np.int64)
+    weights = np.ones((1, len(outcomes.objects)), np.int64)
     return Figures(*_weighted_figures(outcomes, weights)[0].tolist())
 
 
@@ -214,7 +214,7 @@ def bootstrap(outcomes: Outcomes, draws: int, seed: int) -> NDArray[np.float64]:
 
     For one seed and number of pictures the sets are the same, so that two detectors can be compared draw by draw.
     """
-    pictures = len(outcomes.people)
+    pictures = len(outcomes.objects)
     weights = np.random.default_rng(seed).multinomial(pictures, np.full(pictures, 1 / pictures), size=draws)
     # A few draws at once bound the memory.
     parts = np.array_split(weights, max(1, draws * max(1, len(outcomes.scores)) // 2_000_000))
@@ -230,25 +230,25 @@ def _weighted_figures(outcomes: Outcomes, weights: NDArray[np.int64]) -> NDArray
     each = weights[:, outcomes.picture]
     right = np.cumsum(each * outcomes.right, axis=1)
     wrong = np.cumsum(each * ~outcomes.right, axis=1)
-    people, pictures = weights @ outcomes.people, weights.sum(axis=1)
+    objects, pictures = weights @ outcomes.objects, weights.sum(axis=1)
     ends = _last_of_equals(outcomes.scores)
     rows = []
     for i in range(len(weights)):
-        if not people[i]:
+        if not objects[i]:
             rows.append([np.nan] * 4)
             continue
-        recall = np.append(0.0, right[i, ends] / people[i])
+        recall = np.append(0.0, right[i, ends] / objects[i])
         # How many points of the curve have at most so many false positives.
         allowed = np.append(LAMR_FPPI, [0.1, 1.0]) * pictures[i] * (1 + _SLACK)
         at = recall[np.searchsorted(wrong[i, ends], allowed, side="right")]
         lamr = np.exp(np.log(np.maximum(1 - at[:9], _LEAST_MISS_RATE)).mean())
-        rows.append([lamr, at[9], at[10], _average_precision(right[i], wrong[i], int(people[i]))])
+        rows.append([lamr, at[9], at[10], _average_precision(right[i], wrong[i], int(objects[i]))])
     return np.array(rows, np.float64).reshape(-1, 4)
 
 
-def _average_precision(right: NDArray[np.int64], wrong: NDArray[np.int64], people: int) -> float:
+def _average_precision(right: NDArray[np.int64], wrong: NDArray[np.int64], objects: int) -> float:
     """Mean over 101 recalls of the best precision at that recall or a higher one (COCO)."""
-    recall, precision = right / people, right / np.maximum(right + wrong, 1)
+    recall, precision = right / objects, right / np.maximum(right + wrong, 1)
     best = np.maximum.accumulate(precision[::-1])[::-1]
     at = np.searchsorted(recall, np.linspace(0, 1, 101), side="left")
     return float(np.append(best, 0.0)[at].mean())

@@ -77,11 +77,11 @@ class Rival:
 
 @dataclass(frozen=True)
 class HeightRow:
-    """How many people from `low` to below `high` [px] there are, and the shares found at 0.1 and 1 FPPI."""
+    """How many objects from `low` to below `high` [px] there are, and the shares found at 0.1 and 1 FPPI."""
 
     low: float
     high: float
-    people: int
+    objects: int
     recall_01: float
     recall_1: float
 
@@ -225,7 +225,7 @@ def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation], how: Eva
     """Return all figures as plain values; null where there is no threshold."""
     return {
         "pictures": len(used),
-        "people": sum(not box.ignored for picture in used for box in picture.boxes),
+        "objects": sum(not box.ignored for picture in used for box in picture.boxes),
         "min_iou": how.min_iou,
         "confidence": how.confidence,
         "models": [_model_json(one) for one in evaluations],

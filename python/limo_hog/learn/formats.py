@@ -63,6 +63,17 @@ def read_labels(source: Path, pictures: Path | None = None) -> list[Picture]:
     raise LabelError(f"{source} holds no labels; wanted is {_WANTED}")
 
 
+def holds_labels(source: Path) -> bool:
+    """Say whether this looks like labels; a folder that does not is one of crops."""
+    if not source.is_dir():
+        return True
+    beside = (folder for folder in (source, source / "Annotations", source / "annotations") if folder.is_dir())
+    return (
+        any(path.suffix.lower() in (".json", ".xml", ".txt") for folder in beside for path in folder.iterdir())
+        or (source / "labels").is_dir()
+    )
+
+
 def _from_folder(folder: Path, pictures: Path | None) -> list[Picture]:
     if (folder / "boxes.json").is_file():
         return read_labels(folder / "boxes.json", pictures)

@@ -52,7 +52,7 @@ def write_report(
     ]
     _write(folder / "figures.json", json.dumps(figures, indent=2) + "\n")
     page = folder / "index.html"
-    _write(page, _page(figures["pictures"], figures["people"], evaluations, how, bool(mistakes)))
+    _write(page, _page(figures["pictures"], figures["objects"], evaluations, how, bool(mistakes)))
     return page
 
 
@@ -79,7 +79,7 @@ def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:
 
 
 def _page(
-    pictures: int, people: int, evaluations: Sequence[Evaluation], how: EvaluationParameters, mistakes: bool
+    pictures: int, objects: int, evaluations: Sequence[Evaluation], how: EvaluationParameters, mistakes: bool
 ) -> str:
     share = f"{how.confidence:.0%}"
     rows = [
@@ -92,7 +92,7 @@ def _page(
         for one in evaluations
     ]
     heights = [
-        (f"{one.name}, {_range(row.low, row.high)}", row.people, f"{row.recall_01:.2f}", f"{row.recall_1:.2f}")
+        (f"{one.name}, {_range(row.low, row.high)}", row.objects, f"{row.recall_01:.2f}", f"{row.recall_1:.2f}")
         for one in evaluations
         for row in one.by_height
     ]
@@ -101,7 +101,7 @@ def _page(
         for other in evaluations[1:]
         for d in compare(evaluations[0], other, how)
     ]
-    title = f"{evaluations[0].name} on {pictures} pictures with {people} people"
+    title = f"{evaluations[0].name} on {pictures} pictures with {objects} objects"
     recalls = ("recall at 0.1 FPPI", "at 1")
     parts = [
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>',
@@ -119,7 +119,7 @@ def _page(
             _table(("models", "figure", "difference", "interval"), differences),
             f"<p><small>{note}</small></p>",
         ]
-    parts += ["<h2>By height</h2>", _table(("people", "how many", *recalls), heights)]
+    parts += ["<h2>By height</h2>", _table(("objects", "how many", *recalls), heights)]
     if mistakes:
         alt = "False alarms in red with their score, missed people in green with their height"
         parts += [f"<h2>The worst mistakes of {html.escape(evaluations[0].name)}</h2>", f"<p><small>{alt}</small></p>"]

@@ -13,7 +13,7 @@ from limo_hog.imaging.writing import write_image
 from limo_hog.learn.card import calibrate, calibration_error
 from limo_hog.learn.formats import read_labels
 from limo_hog.learn.labels import LabelError, LabelWarning
-from limo_hog.learn.mining import MiningParameters
+from limo_hog.learn.mining import MiningParameters, hard_negatives
 from limo_hog.learn.sources import TrainingData, Wanted, gather
 from limo_hog.learn.training import ResumeError, Round, State, TrainingParameters, fingerprint, train
 from limo_hog.learn.windows import read_gray
@@ -102,12 +102,24 @@ def test_negatives_of_labelled_pictures_are_clear_of_the_objects(data: TrainingD
 
 
 def test_memory_is_bounded_by_the_least_hard_negatives(data: TrainingData) -> None:
-    free = _train(data)
+    free, state = [], State(fingerprint(data, SMALL))
+    for done in train(data, SMALL, state, 2):
+        free.append(done)
+        if done.number == 1:
+            break
+    every = hard_negatives(free[0].coefficients, data.negatives, {}, data.shape, SMALL.mining, 0, 2)
+    margins = {
+        (m.picture, *box): margin for m in every for box, margin in zip(m.boxes.tolist(), m.margins, strict=True)
+    }
     room = free[0].descriptor_bytes + 10 * 4 * (len(free[0].coefficients) - 1)
-    bounded = _train(data, replace(SMALL, most_bytes=room))
+    how = replace(SMALL, rounds=1, most_bytes=room)
+    state = State(fingerprint(data, how))
+    bounded = list(train(data, how, state, 2))
     assert bounded[1].new == 10
     assert bounded[1].left_out == free[1].new - 10
     assert bounded[-1].descriptor_bytes <= room
+    kept = [margins[(picture, *box)] for picture, boxes in state.mined[0].items() for box in boxes.tolist()]
+    assert sorted(kept) == sorted(margins.values())[-10:]
 
 
 @pytest.fixture
@@ -137,6 +149,7 @@ def test_crops_are_learnt_from_once_each(crops: Path) -> None:
     how = replace(SMALL, rounds=0, held_out=0.25)
     (done,) = train(data, how, State(fingerprint(data, how)), 2)
     count = len(data.regions) - 1
+    assert len(data.held_negatives) == 1 and data.held_negatives[0] not in data.negatives.paths
     assert done.objects + len(done.held_out_margins) == count
     assert len(done.held_out_margins) == round(0.25 * count)
     assert (done.held_out_margins > 0).mean() > 0.8

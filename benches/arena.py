@@ -1,6 +1,6 @@
 """What a frame and a scan of the arena cost, in every scenario: `uv run python benches/arena.py`.
 
-The robot keeps a metre from whoever is nearest, nearer than any follower does; every frame (colour, depth and truth)
+The robot keeps 1 m from the nearest person, closer than any follower; every frame (colour, depth and truth)
 and every scan on the way is made several times, and the least of its times counts. One thread, processor time.
 """
 
@@ -66,8 +66,8 @@ def drive(scenario: Scenario, seconds: float) -> Iterator[tuple[float, float]]:
 
 def around(distance: float, people: int) -> Iterator[float]:
     """Cost of a frame [ms] with people side by side at a distance [m], in the middle and at the edge, turned 8 ways."""
-    somebody = Scenario.load("standing").people
-    renderer = Renderer(Scenario(people=people * somebody), np.random.default_rng(0))
+    person = Scenario.load("standing").people
+    renderer = Renderer(Scenario(people=people * person), np.random.default_rng(0))
     for aside in (0.0, 0.25, 0.6):
         for turn in range(8):
             poses = [
@@ -77,7 +77,7 @@ def around(distance: float, people: int) -> Iterator[float]:
             yield least_ms(lambda poses=poses: renderer.render(CameraPose(0, 0, 0), poses, np.random.default_rng(1)))
 
 
-def told(times: list[float]) -> str:
+def summary(times: list[float]) -> str:
     """Median, 95th percentile and maximum."""
     return " ".join(f"{value:8.2f}" for value in (np.median(times), np.percentile(times, 95), max(times)))
 
@@ -92,10 +92,10 @@ def main() -> None:
     print(f"{'ms':20}{'frame: median p95 max':>27}{'scan: median p95 max':>27}")
     for name in args.scenarios:
         frames, scans = zip(*drive(Scenario.load(name), args.seconds), strict=True)
-        print(f"{name:20}{told(frames)} {told(scans)}", flush=True)
+        print(f"{name:20}{summary(frames)} {summary(scans)}", flush=True)
     for people, word in ((1, "person"), (2, "two")):
         for distance in (0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 3.0, 4.0, 6.0):
-            print(f"{f'{word} at {distance} m':20}{told(list(around(distance, people)))}", flush=True)
+            print(f"{f'{word} at {distance} m':20}{summary(list(around(distance, people)))}", flush=True)
 
 
 if __name__ == "__main__":

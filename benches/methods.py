@@ -5,26 +5,26 @@ Run on a quiet machine: `uv run python benches/methods.py [METHOD ...]`; the tab
 
 from __future__ import annotations
 
-import gc
 import itertools
 import sys
-import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import cv2
 import numpy as np
 
 import limo_hog
+from limo_hog.cli.support.race import Rounds, race
 from limo_hog.cli.support.scene import street
 
-SECONDS_A_LINE, LEAST_ROUNDS = 0.6, 5
+ROUNDS = Rounds(seconds=0.6, most=100_000)
 
 WINDOWS = {"people": (64, 128), "Daimler": (48, 96), "random": (64, 128)}
 COEFFICIENTS = {
     "people": cv2.HOGDescriptor_getDefaultPeopleDetector(),
     "Daimler": cv2.HOGDescriptor_getDaimlerPeopleDetector(),
-    # Half of all windows are hits, and too loud for the kernels' sums: all are weighed exactly.
+    # Half of all windows are hits, with sums too large for the kernels' error bound: all take the exact path.
     "random": np.random.default_rng(0).normal(size=3781).astype(np.float32),
 }
 METHODS = ("compute", "computeGradient", "detect")
@@ -64,23 +64,6 @@ def _detect(image: Any, step: tuple[int, int], edge: tuple[int, int]) -> Call:
     return lambda hog: hog.detect(image, 0.0, step, edge)
 
 
-def race(calls: list[Callable[[], object]]) -> list[float]:
-    """The least time of each [s], called in turn."""
-    for call in calls:
-        call()
-    least = [float("inf")] * len(calls)
-    gc.disable()
-    start, rounds = time.perf_counter(), 0
-    while rounds < LEAST_ROUNDS or time.perf_counter() - start < SECONDS_A_LINE:
-        for i, call in enumerate(calls):
-            before = time.perf_counter()
-            call()
-            least[i] = min(least[i], time.perf_counter() - before)
-        rounds += 1
-    gc.enable()
-    return least
-
-
 def agreement(text: str, ours: Any, theirs: Any) -> str:
     """Gradients must be equal, descriptors within 1.5e-8, places equal and their weights within 1e-5."""
     if text.startswith("compute "):
@@ -113,9 +96,9 @@ def main() -> None:
             continue
         limo, cv = hogs[name]
         answer = agreement(text, call(limo), call(cv))
-        ours, theirs = race([lambda call=call, hog=limo: call(hog), lambda call=call, hog=cv: call(hog)])  # type: ignore[misc]
+        ours, theirs = (timing.min for timing in race([partial(call, limo), partial(call, cv)], ROUNDS))
         ratios.append(theirs / ours)
-        print(f"| {text} | {1e3 * ours:.3f} | {1e3 * theirs:.3f} | {theirs / ours:.2f} | {answer} |", flush=True)
+        print(f"| {text} | {ours:.3f} | {theirs:.3f} | {theirs / ours:.2f} | {answer} |", flush=True)
     slower, thrice = sum(ratio < 1 for ratio in ratios), sum(ratio >= 3 for ratio in ratios)
     print(f"\n{len(ratios)} lines: {slower} slower, {thrice} at least 3 times as fast, least {min(ratios):.2f}")
 

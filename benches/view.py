@@ -1,7 +1,7 @@
 """What the live page costs the run it shows: `uv run python benches/view.py`.
 
-The same run as fast as it can: alone, with the page served and nobody there, and with the page open (a process that
-takes all it is sent, as a browser does). Rounds are interleaved, and the least of each counts.
+The same run, as fast as possible: alone, with the page served but not open, and with the page open (a process that
+receives all messages, as a browser does). Rounds are interleaved, and the least of each counts.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from contextlib import nullcontext
 from multiprocessing.synchronize import Event
 from typing import Any
 
-from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.episode import run_episode
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
@@ -51,7 +51,7 @@ def once(seconds: float, kind: str, messages: Any) -> tuple[float, float]:
         run_episode(
             SCENARIO,
             controller_named("tracking", None),
-            PeopleDetector(),
+            detector_named("hog"),
             seconds,
             0,
             watch=view.watch if view is not None else None,

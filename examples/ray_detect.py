@@ -1,10 +1,10 @@
-"""People in a folder of pictures, on as many machines as there are: a Ray Data job, the detector an actor.
+"""Find people in a folder of pictures on the machines of a Ray cluster: a Ray Data job with the detector in actors.
 
     pip install "ray[data]" "limo-hog[cv]"
     python ray_detect.py PICTURES OUT --workers 2
 
 OUT gets Parquet files with a row for each picture: path, boxes (x, y, w, h) and scores, best first, or the error.
-With RAY_ADDRESS set the job runs on that cluster, else on this machine. PICTURES may be a folder or a bucket.
+With RAY_ADDRESS set the job runs on that cluster, otherwise on this machine. PICTURES is a folder or a bucket.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import limo_hog
 
 
 class FindPeople:
-    """Looks at batches of encoded pictures; one of these lives on each core and keeps its detector."""
+    """Detects people in batches of encoded pictures; Ray keeps one on each core, with its detector."""
 
     def __init__(self) -> None:
         # Ray fills the machine with actors; each stays on its own core.
@@ -46,7 +46,7 @@ class FindPeople:
 
 
 def main() -> None:
-    """Run the job and say how fast it was."""
+    """Run the job and print its rate."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("pictures")
     parser.add_argument("out")
@@ -55,7 +55,7 @@ def main() -> None:
     if "RAY_ADDRESS" not in os.environ:
         # One more core than detectors, for reading.
         ray.init(num_cpus=args.workers + 1, include_dashboard=False, log_to_driver=False)
-    # Reading waits more than it computes: several readers share a core, or the detectors wait for the only one.
+    # Reading mostly waits: several readers share a core, so that they leave the others to the detectors.
     pictures = ray.data.read_binary_files(args.pictures, include_paths=True, ray_remote_args={"num_cpus": 0.2})
     people = pictures.map_batches(FindPeople, compute=ray.data.ActorPoolStrategy(size=args.workers), batch_size=16)
     start = time.perf_counter()

@@ -34,7 +34,8 @@ from limo_hog.exceptions import (
 from limo_hog.extras import MissingExtraError
 from limo_hog.visualize import visualize
 
-__version__ = "0.1.0"
+#: As Cargo.toml has it; looked up when first asked for.
+__version__: str
 
 __all__ = [
     "HOGDESCRIPTOR_DEFAULT_NLEVELS",
@@ -67,3 +68,12 @@ __all__ = [
     "set_num_threads",
     "visualize",
 ]
+
+
+def __getattr__(name: str) -> str:
+    if name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    # Imported here: it would double the time to import this package.
+    from importlib.metadata import version
+
+    return version("limo-hog")

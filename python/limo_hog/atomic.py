@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 
 def part_of(path: Path) -> Path:
-    """Return the name a file has while it is written: hidden, beside it, with the same suffix."""
+    """Return the name a file has while it is written: hidden, beside it, with the same suffix.
+
+    Raises
+    ------
+    IsADirectoryError
+        `path` is a folder.
+    """
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return path.with_name(f".{path.stem}.part{path.suffix}")
 
 
@@ -18,9 +28,9 @@ def about(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.filename is None or str(error.filename) == str(part_of(path)):
-            error.filename = str(path)
-        raise
+        if error.filename is not None and str(error.filename) != str(part_of(path)):
+            raise
+        raise _named(error, path) from error
 
 
 @contextmanager
@@ -28,6 +38,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     """Give a name to write to, and rename it to `path` when all went well; else nothing is left behind.
 
     Folders are made as needed.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; it names `path`.
     """
     part = part_of(path)
     with about(path):
@@ -38,5 +53,10 @@ def whole_file(path: Path) -> Iterator[Path]:
     except BaseException as error:
         part.unlink(missing_ok=True)
         if isinstance(error, OSError) and str(error.filename) == str(part):
-            error.filename = str(path)
+            raise _named(error, path) from error
         raise
+
+
+def _named(error: OSError, path: Path) -> OSError:
+    """Return the error with another file name: a new one, since a library's own kind may not let its name be set."""
+    return OSError(error.errno or errno.EIO, error.strerror or str(error), str(path))

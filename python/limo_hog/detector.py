@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
+import os
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog import _core
-from limo_hog.cv2_api.arguments import pixels
-from limo_hog.suppression import soften, suppress
+from limo_hog.cv2_api.arguments import integer, pair, pixels, real, shown
+from limo_hog.exceptions import HogError, ImageError, ParameterError, ParameterTypeError
+from limo_hog.models import PERSON_BOX, Calibration, Model, PersonBox, load_model
+from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
 
-#: The person inside a window: x + .1 w, y + .07 h, .8 w, .8 h. The rest is the margin it was trained with.
-_PERSON_IN_WINDOW = (0.1, 0.07, 0.8, 0.8)
+#: Ways to make one box of a person's many hits, and the default `overlap` of each.
+#: 0.65 and 0.3: chosen on street photographs, where 0.5 to 0.75 and 0.2 to 0.4 hardly differ.
+_NMS = {"overlap": 0.65, "iou": 0.3, "soft": 0.3, "group": None}
+#: Hits that OpenCV's sample asks a group to have more than.
+_GROUP_THRESHOLD = 2
+#: More levels than a pyramid of the finest `scale` and the largest image can have.
+_LEVELS = 2048
+#: Bounds of arguments, so that no image grows, and no pyramid is cut, beyond what memory and `_LEVELS` hold.
+_FINEST_SCALE, _LEAST_HEIGHT_PX, _MOST_PIXELS = 1.005, 8.0, 2**28
 
 
 @dataclass(frozen=True, slots=True)
 class Detections:
     """People found in one image, best first.
+
+    `len(d)` counts them, iterating and `d[i]` give (box, score), a slice, mask or array of indices gives `Detections`.
 
     Attributes
     ----------
@@ -28,10 +42,21 @@ class Detections:
         int32 (N, 4): x, y, w, h [px] of the detection windows, top left corner first.
     scores
         float64 (N,): SVM margin of each box, descending; larger is surer, 0 is the model's own threshold.
+    person_box
+        Where the person stands in a window, as shares of it.
+    calibration
+        How the model's margins become probabilities; None where that was never measured.
     """
 
     boxes: NDArray[np.int32]
     scores: NDArray[np.float64]
+    person_box: PersonBox = PERSON_BOX
+    calibration: Calibration | None = None
+
+    @classmethod
+    def none(cls) -> Detections:
+        """Return no detections: arrays of length 0."""
+        return cls(np.empty((0, 4), np.int32), np.empty(0))
 
     def __len__(self) -> int:
         return len(self.scores)
@@ -40,56 +65,164 @@ class Detections:
         for box, score in zip(self.boxes, self.scores, strict=True):
             yield box, float(score)
 
+    @overload
+    def __getitem__(self, index: int) -> tuple[NDArray[np.int32], float]: ...
+
+    @overload
+    def __getitem__(self, index: slice | NDArray[Any]) -> Detections: ...
+
+    def __getitem__(self, index: int | slice | NDArray[Any]) -> tuple[NDArray[np.int32], float] | Detections:
+        boxes, scores = self.boxes[index], self.scores[index]
+        if scores.ndim == 0:
+            return boxes, float(scores)
+        return dataclasses.replace(self, boxes=boxes, scores=scores)
+
     @property
     def person_boxes(self) -> NDArray[np.int32]:
         """int32 (N, 4): the boxes without the window's margin, tight around the person [px]."""
-        dx, dy, sw, sh = _PERSON_IN_WINDOW
         x, y, w, h = self.boxes.T.astype(np.float64)
-        person = np.stack([x + dx * w, y + dy * h, sw * w, sh * h], axis=1)
+        share = self.person_box
+        person = np.stack([x + share.x * w, y + share.y * h, share.width * w, share.height * h], axis=1)
         return np.asarray(np.rint(person), np.int32)
 
+    @property
+    def probabilities(self) -> NDArray[np.float64]:
+        """float64 (N,): probability that each box holds a person, by the model's calibration.
 
-#: Window and coefficients of each model.
-_MODELS = {
-    "default": ((64, 128), _core.default_people_detector),
-    "daimler": ((48, 96), _core.daimler_people_detector),
-}
+        Raises
+        ------
+        HogError
+            The model has no calibration.
+        """
+        if self.calibration is None:
+            raise HogError("the model has no calibration, so its margins stand for no probabilities: use scores")
+        slope, offset = self.calibration
+        probabilities: NDArray[np.float64] = 0.5 + 0.5 * np.tanh(0.5 * (slope * self.scores + offset))
+        return probabilities
+
+    def draw(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Draw the people's boxes and scores into a copy of the image.
+
+        Parameters
+        ----------
+        image
+            uint8 (H, W), (H, W, 1) or (H, W, 3) BGR.
+
+        Returns
+        -------
+        uint8 (H, W, 3) BGR.
+
+        Raises
+        ------
+        MissingExtraError
+            OpenCV, which draws, is not installed.
+        """
+        from limo_hog.imaging.drawing import annotate
+
+        return annotate(pixels(image), self.person_boxes, [f"{score:.1f}" for score in self.scores])
 
 
 @dataclass(frozen=True, kw_only=True)
 class PeopleDetector:
     """Finds standing and walking people in images; immutable, may be shared between threads.
 
+    All arguments are checked when it is made. `PeopleDetector(min_height=None, nms="group")` gives the rectangles of
+    `cv2.HOGDescriptor`'s `detectMultiScale` (winStride 8, padding 4, scale 1.05).
+
     Attributes
     ----------
     model
-        "default" (INRIA, window 64 × 128) or "daimler" (window 48 × 96).
+        "opencv" (INRIA people, window 64 × 128; also "default"), "daimler" (window 48 × 96), or the path of a file
+        that OpenCV or limo-hog wrote; see `limo_hog.models.load_model`.
+    min_height
+        Height of the smallest person to find [px], head to foot: the image is enlarged (or reduced) until they fill
+        the model's window. Half the height takes four times the time. None searches the image as it is: people from
+        100 px on, for "daimler" 75.
+    max_height
+        Height of the tallest person to report [px]; None reports all.
     threshold
-        Least SVM margin of a hit; raise it for fewer false alarms.
+        Least SVM margin of a hit; raise it for fewer false alarms, lower it (to -1 and below) for fewer misses. None
+        is the model's own: 0 for OpenCV's.
+    nms
+        How one box is made of a person's many hits. "overlap": the best hit stays and removes those that share more
+        than `overlap` of the smaller box's area; "iou": as that, by intersection over union; "soft": as "iou", but
+        others' scores are lowered instead, so that people half hidden by others may stay; "group": OpenCV's grouping.
+    overlap
+        0..1; for "soft", the overlap that lowers a score to 37 %. None: 0.65 for "overlap", 0.3 for "iou" and "soft".
+    group_threshold
+        For "group": similar hits must be more than this to make a detection (None: 2); 0 returns every hit.
     win_stride
         Distance of neighbouring windows (x, y) [px of each pyramid level].
     padding
-        Mirrored border around each level (x, y) [px].
+        Mirrored border around each level (x, y) [px], at most the window's size.
     scale
-        How much each level is smaller than the one before.
-    group_threshold
-        Similar hits must be more than this to make a detection; 0 returns every hit.
-    nms
-        How one box is made of many hits: "group", OpenCV's grouping; "iou", the best of those that overlap; "soft",
-        as that, but others are doubted, not dropped, so that somebody half hidden by somebody else may stay.
-    overlap
-        For "iou", the intersection over union beyond which two hits are one person; for "soft", the one at which
-        doubt is strong.
+        How much each level is smaller than the one before, 1.005 or more.
+
+    Raises
+    ------
+    ParameterError, ParameterTypeError
+        An argument is out of its range or of the wrong type.
+    ModelFormatError, GeometryError, DetectorSizeError, OSError
+        The model's file is damaged or cannot be read.
     """
 
-    model: Literal["default", "daimler"] = "default"
-    threshold: float = 0.0
+    model: str | os.PathLike[str] = "opencv"
+    min_height: float | None = 64.0
+    max_height: float | None = None
+    threshold: float | None = None
+    nms: Literal["overlap", "iou", "soft", "group"] = "overlap"
+    overlap: float | None = None
+    group_threshold: int | None = None
     win_stride: tuple[int, int] = (8, 8)
     padding: tuple[int, int] = (4, 4)
     scale: float = 1.05
-    group_threshold: int = 2
-    nms: Literal["group", "iou", "soft"] = "group"
-    overlap: float = 0.3
+    _model: Model = field(init=False, repr=False, compare=False)
+    _hog: _core.Hog = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        model = load_model(self.model)
+        hog = model.geometry._replace(nlevels=_LEVELS).compiled(model.coefficients)
+        self._set(_model=model, _hog=hog)
+        self._check_sizes()
+        self._check_nms()
+        self._set(
+            threshold=None if self.threshold is None else _number("threshold", self.threshold, -math.inf, math.inf),
+            scale=_number("scale", self.scale, _FINEST_SCALE, math.inf),
+            win_stride=_pair("win_stride", self.win_stride, 1, None),
+            padding=_pair("padding", self.padding, 0, model.geometry.winSize),
+        )
+
+    def _check_sizes(self) -> None:
+        if self.min_height is not None:
+            self._set(min_height=_number("min_height", self.min_height, _LEAST_HEIGHT_PX, math.inf))
+        if self.max_height is not None:
+            least = self._model.person_height if self.min_height is None else self.min_height
+            self._set(max_height=_number("max_height", self.max_height, 0, math.inf))
+            if self.max_height < least:
+                raise ParameterError(
+                    f"max_height is {self.max_height:g}; at least {least:g} is wanted, the height of the smallest "
+                    "person sought (min_height)"
+                )
+
+    def _check_nms(self) -> None:
+        if not isinstance(self.nms, str) or self.nms not in _NMS:
+            kind = ParameterError if isinstance(self.nms, str) else ParameterTypeError
+            raise kind(f"nms is {shown(self.nms)}; one of {', '.join(_NMS)} is wanted")
+        if self.overlap is not None:
+            if self.nms == "group":
+                raise ParameterError('overlap has no meaning for nms="group"; leave it out, or choose another nms')
+            self._set(overlap=_number("overlap", self.overlap, 0, 1))
+            if self.nms == "soft" and self.overlap == 0:
+                raise ParameterError('overlap is 0; above 0 is wanted for nms="soft"')
+        if self.group_threshold is not None:
+            if self.nms != "group":
+                raise ParameterError(f'group_threshold has no meaning for nms="{self.nms}"; it needs nms="group"')
+            if integer("group_threshold", self.group_threshold, 0) < 0:
+                raise ParameterError(f"group_threshold is {self.group_threshold}; 0 or more is wanted")
+
+    def _set(self, **checked: object) -> None:
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
         """People in `image`, best first.
@@ -102,27 +235,87 @@ class PeopleDetector:
         Raises
         ------
         ImageError
-            The array is not such an image.
+            The array is not such an image, or would be too large at the size that `min_height` asks for.
         """
+        image = pixels(image)
+        seen = self._at_search_size(image)
+        threshold = self._model.threshold if self.threshold is None else self.threshold
+        group_threshold = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
         boxes, scores = self._hog.detect_multi_scale(
-            pixels(image),
-            self.threshold,
+            seen,
+            threshold,
             self.win_stride,
             self.padding,
             self.scale,
-            self.group_threshold if self.nms == "group" else 0,
+            group_threshold if self.nms == "group" else 0,
             False,
         )
-        if self.nms == "iou":
-            kept = suppress(boxes, scores, self.overlap)
-            return Detections(boxes[kept], scores[kept])
-        if self.nms == "soft":
-            kept, scores = soften(boxes, scores, self.overlap**2, self.threshold)
-            return Detections(boxes[kept], scores)
-        best_first = np.argsort(-scores, kind="stable")
-        return Detections(boxes[best_first], scores[best_first])
+        kept, scores = self._one_of_many(boxes, scores, threshold)
+        zoom = np.array(seen.shape[1::-1]) / image.shape[1::-1]
+        found = boxes[kept] / np.tile(zoom, 2)
+        if self.max_height is not None:
+            # A level's window is rounded to whole pixels.
+            low = self._model.person_box.height * found[:, 3] <= self.max_height + 0.5
+            found, scores = found[low], scores[low]
+        boxes = np.rint(found).astype(np.int32)
+        return Detections(boxes, scores, self._model.person_box, self._model.calibration)
 
-    @cached_property
-    def _hog(self) -> _core.Hog:
-        win_size, coefficients = _MODELS[self.model]
-        return _core.Hog(win_size, (16, 16), (8, 8), (8, 8), 9, -1.0, 0.2, True, 64, False, coefficients())
+    def _at_search_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the image at the size at which the smallest person fills the model's window."""
+        zoom = 1.0 if self.min_height is None else self._model.person_height / self.min_height
+        width, height = (max(1, round(side * zoom)) for side in image.shape[1::-1])
+        if (height, width) == image.shape[:2]:
+            return image
+        if width * height > _MOST_PIXELS:
+            raise ImageError(
+                f"the image, {image.shape[1]} x {image.shape[0]} px, would be {width} x {height} px to find people of "
+                f"{self.min_height:g} px; at most {_MOST_PIXELS} pixels are allowed: raise min_height"
+            )
+        # Imported here: most programs that import this package need it later or never.
+        from limo_hog.imaging.resize import resize
+
+        return resize(image, width, height)
+
+    def _one_of_many(
+        self, boxes: NDArray[np.int32], scores: NDArray[np.float64], threshold: float
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return the indices of the hits that stay, best first, and their scores."""
+        overlap = _NMS[self.nms] if self.overlap is None else self.overlap
+        if overlap is None:
+            kept = np.argsort(-scores, kind="stable")
+        elif self.nms == "soft":
+            return soft_nms(boxes, scores, overlap**2, threshold)
+        elif self.nms == "overlap":
+            kept = nms(boxes, scores, overlap, intersection_over_smaller)
+        else:
+            kept = nms(boxes, scores, overlap)
+        return kept, scores[kept]
+
+    def __reduce__(self) -> tuple[Any, tuple[()]]:
+        # Copies and pickles are made anew of the arguments: the compiled detector cannot be pickled.
+        arguments = {name.name: getattr(self, name.name) for name in dataclasses.fields(self) if name.init}
+        return partial(type(self), **arguments), ()
+
+
+def _number(name: str, value: Any, low: float, high: float) -> float:
+    number = real(name, value, math.nan)
+    if value is None or isinstance(value, bool):
+        raise ParameterTypeError(f"{name} is {value}; a number is wanted")
+    if not (math.isfinite(number) and low <= number <= high):
+        bounds = (
+            "a finite number"
+            if low == -math.inf
+            else f"{low:g} or more"
+            if high == math.inf
+            else f"{low:g} to {high:g}"
+        )
+        raise ParameterError(f"{name} is {shown(value)}; {bounds} is wanted")
+    return number
+
+
+def _pair(name: str, value: Any, least: int, most: tuple[int, int] | None) -> tuple[int, int]:
+    x, y = pair(name, value, (-1, -1))
+    if min(x, y) < least or (most is not None and (x > most[0] or y > most[1])):
+        bounds = f"at least {least}" if most is None else f"from ({least}, {least}) to {most}"
+        raise ParameterError(f"{name} is {shown(value)}; two integers (x, y) {bounds} are wanted [px]")
+    return x, y

@@ -1,14 +1,14 @@
-"""The named errors of limo-hog; each message says what came and what is wanted."""
+"""The named errors of limo-hog. Each message names what came and what is wanted."""
 
 from __future__ import annotations
 
 
 class LimoHogError(Exception):
-    """Whatever limo-hog refuses to do, with one line that says why."""
+    """Base of all errors of limo-hog; the message is one line."""
 
 
 class HogError(LimoHogError, ValueError):
-    """What the detector refuses."""
+    """Base of the detector's errors."""
 
 
 class GeometryError(HogError):
@@ -40,4 +40,4 @@ class ModelFormatError(HogError):
 
 
 class BackendError(HogError):
-    """The instruction set asked for is unknown, or this CPU has not got it."""
+    """The instruction set asked for is unknown, or this CPU lacks it."""

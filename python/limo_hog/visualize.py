@@ -1,16 +1,16 @@
-"""A picture of what a descriptor holds, or of what a detector looks for."""
+"""Pictures of descriptors and of detectors' coefficients."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limo_hog.cv2_api.arguments import coefficients
+from limo_hog.cv2_api.arguments import coefficients, integer
 from limo_hog.cv2_api.hog import HOGDescriptor
 from limo_hog.exceptions import DetectorSizeError, ParameterError
 
-#: Colours (B, G, R) of what speaks for and against; descriptors have only the first.
-_FOR, _AGAINST = np.array([150.0, 215.0, 255.0]), np.array([255.0, 120.0, 20.0])
+#: Colours (B, G, R) of positive and negative numbers; descriptors have only positive ones.
+_POSITIVE, _NEGATIVE = np.array([150.0, 215.0, 255.0]), np.array([255.0, 120.0, 20.0])
 
 
 def visualize(hog: HOGDescriptor, values: ArrayLike, *, zoom: int = 4) -> NDArray[np.uint8]:
@@ -44,12 +44,12 @@ def visualize(hog: HOGDescriptor, values: ArrayLike, *, zoom: int = 4) -> NDArra
         raise DetectorSizeError(
             f"there are {came} values; a window of this geometry has {size}, or {size + 1} with bias"
         )
-    if not 1 <= zoom <= 64:
+    if not 1 <= integer("zoom", zoom, 4) <= 64:
         raise ParameterError(f"zoom is {zoom}; 1 to 64 is wanted")
     histograms = _histograms(hog, numbers[:size])
     strokes = _strokes(hog, zoom)
     (width, height), (cell_width, cell_height) = hog.winSize, hog.cellSize
-    light = np.zeros((2, height * zoom, width * zoom))  # for, against
+    light = np.zeros((2, height * zoom, width * zoom))  # positive, negative
     shared = np.zeros(light.shape[1:])
     for bx, by, cx, cy in np.ndindex(*histograms.shape[:4]):
         x = (bx * hog.blockStride[0] + cx * cell_width) * zoom
@@ -61,19 +61,19 @@ def visualize(hog: HOGDescriptor, values: ArrayLike, *, zoom: int = 4) -> NDArra
         shared[part] += 1
     light /= np.maximum(shared, 1)
     light /= max(np.percentile(light[light > 0], 99), np.finfo(float).tiny) if light.any() else 1.0
-    picture = light[0][..., None] * _FOR + light[1][..., None] * _AGAINST
+    picture = light[0][..., None] * _POSITIVE + light[1][..., None] * _NEGATIVE
     return np.asarray(np.rint(np.clip(picture, 0, 255)), np.uint8)
 
 
 def _histograms(hog: HOGDescriptor, numbers: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(blocks x, blocks y, cells x, cells y, bins), as a descriptor holds them: column by column."""
+    """Return a descriptor as (blocks x, blocks y, cells x, cells y, bins)."""
     blocks = [(hog.winSize[axis] - hog.blockSize[axis]) // hog.blockStride[axis] + 1 for axis in (0, 1)]
     cells = [hog.blockSize[axis] // hog.cellSize[axis] for axis in (0, 1)]
     return np.nan_to_num(numbers.astype(np.float64)).reshape(*blocks, *cells, hog.nbins)
 
 
 def _strokes(hog: HOGDescriptor, zoom: int) -> NDArray[np.float64]:
-    """(bins, h, w): for each bin a soft-edged stroke through the cell's middle, at right angles to its gradient."""
+    """Return (bins, h, w): for each bin a stroke through the cell's centre, at right angles to its gradient."""
     width, height = (side * zoom for side in hog.cellSize)
     x, y = np.meshgrid(np.arange(width) - (width - 1) / 2, np.arange(height) - (height - 1) / 2)
     turn = 2 * np.pi if hog.signedGradient else np.pi

@@ -14,12 +14,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.run.catalogue import load
 from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import HEIGHT, WIDTH
-from limo_sim.world.robot import WHEEL_SEPARATION
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, Truth
 from limo_sim.world.variants import made_up
@@ -84,7 +84,7 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._scenario = scenario if isinstance(scenario, Scenario) else load(scenario)
         known = self._scenario or Scenario()
         speed = known.robot.wheel_speed
-        limits = np.array([speed, 2 * speed / WHEEL_SEPARATION], np.float32)
+        limits = np.array([speed, 2 * speed / LIMO.wheel_separation], np.float32)
         self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
         self.observation_space = spaces.Dict(
             {

@@ -1,4 +1,4 @@
-"""`limo-hog bench` times in turn, checks parity, and works without a rival."""
+"""`limo-hog bench` times in turn, checks parity, and works without an OpenCV that has HOG."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ import pytest
 import limo_hog
 from limo_hog.cli import bench
 from limo_hog.cli.main import main
+from limo_hog.cli.support.race import Rounds, race
 from limo_hog.cli.support.scene import street
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench, "SECONDS_A_ROW", 0.05)
+    monkeypatch.setattr(bench, "ROUNDS", Rounds(seconds=0.05))
 
 
 def _bench(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
@@ -71,6 +72,13 @@ def test_a_picture_of_ones_own_is_benched_in_its_own_size_or_another(
     other = _bench(capsys, "--image", str(path), "--channels", "bgr", "--threads", "1", "--size", "96x128")
     assert own["rows"][0]["size"] == [144, 192]
     assert other["rows"][0]["size"] == [96, 128]
+
+
+def test_calls_are_timed_in_turn_and_no_more_often_than_asked() -> None:
+    called: list[str] = []
+    timings = race([lambda: called.append("a"), lambda: called.append("b")], Rounds(seconds=60, least=2, most=3))
+    assert "".join(called) == "ab" * 4  # the first call of each does not count
+    assert all(0 <= timing.min <= timing.p50 for timing in timings)
 
 
 def test_the_street_is_the_same_each_time_and_has_people_in_it() -> None:

@@ -56,7 +56,7 @@ def test_without_json_a_person_reads_the_card(capsys: pytest.CaptureFixture[str]
     assert main(["follow", "--scenario", "empty", "--seconds", "0.5", "--controller", "approach"]) == 0
     out = capsys.readouterr().out
     assert "empty · approach · hog · seed 0" in out
-    assert "nobody seen" in out
+    assert "no person detected" in out
 
 
 @pytest.mark.parametrize(

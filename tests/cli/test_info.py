@@ -1,11 +1,36 @@
-"""`limo-hog info` tells what is here."""
+"""`limo-hog info` shows versions, hardware and extras."""
 
 from __future__ import annotations
+
+import importlib.metadata
 
 import cv2
 import pytest
 
 from limo_hog.cli.main import main
+
+
+def test_info_names_every_extra_and_the_line_that_installs_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lacking(name: str) -> str:
+        if name in ("av", "limo-sim"):
+            raise importlib.metadata.PackageNotFoundError(name)
+        return real_version(name)
+
+    real_version = importlib.metadata.version
+    monkeypatch.setattr("limo_hog.cli.support.environment.version", lacking)
+    assert main(["info"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    for words in (
+        "video not installed: pip install 'limo-hog[video]'",
+        "simulator not installed: pip install limo-sim",
+        f"plot matplotlib {real_version('matplotlib')}",
+        f"cv cv2 {cv2.__version__}",
+    ):
+        assert words in shown
+    extras = importlib.metadata.metadata("limo-hog").get_all("Provides-Extra") or []
+    assert len(extras) >= 7 and all(f" {extra} " in shown for extra in extras)
 
 
 def test_info_names_versions_backend_and_opencv(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
+import os
+import random
 import signal
 import socket
 import subprocess
@@ -20,9 +23,11 @@ import cv2
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
+from tests.sim.stalled import stalled
 
 from limo_hog.cli.main import main
 from limo_hog.extras import MissingExtraError, needed
+from limo_hog.ros2.bag import read_bag
 
 LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 SECONDS = 6
@@ -145,17 +150,52 @@ def test_a_folder_that_may_not_be_written_is_one_line(tmp_path: Path, capsys: py
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_ctrl_c_leaves_whole_files(tmp_path: Path) -> None:
-    film, bag = tmp_path / "run.mp4", tmp_path / "run.mcap"
-    command = [str(LIMO_HOG), "follow", "--seconds", "3600", "--video", str(film), "--record", str(bag)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+#: Runs the command line with files that may not grow beyond so many bytes: a full disk, without one.
+FULL_DISK = """
+import resource, sys
+from limo_hog.cli.main import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("option", "file", "room"),
+    [
+        ("--video", "run.mp4", 0),
+        ("--video", "run.mp4", 40_000),
+        ("--record", "run.mcap", 0),
+        ("--record", "run.mcap", 40_000),
+        ("--plot", "run.png", 300),
+        ("--json", "run.json", 300),
+    ],
+)
+def test_a_full_disk_is_one_line_and_leaves_nothing(option: str, file: str, room: int, tmp_path: Path) -> None:
+    command = ["follow", "--seconds", "3", option, str(tmp_path / file)]
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(room), *command], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 1
+    assert done.stderr == f"limo-hog: {tmp_path / file}: {os.strerror(errno.EFBIG)}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def _started(folder: Path, *options: str) -> tuple[subprocess.Popen[str], Path, Path]:
+    film, bag = folder / "run.mp4", folder / "run.mcap"
+    command = [str(LIMO_HOG), "follow", "--seconds", "3600", "--video", str(film), "--record", str(bag), *options]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True), film, bag
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_run_that_is_stopped_leaves_whole_files(name: str, tmp_path: Path) -> None:
+    process, film, bag = _started(tmp_path)
     part = tmp_path / ".run.part.mcap"
     deadline = time.monotonic() + 60
     while not (part.exists() and part.stat().st_size > 1_000_000) and time.monotonic() < deadline:
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(getattr(signal, name))
     said = process.communicate(timeout=60)[1]
-    assert process.returncode == 130
+    assert process.returncode == 128 + getattr(signal, name)
     assert said == "limo-hog: stopped\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.mcap", "run.mp4"]
     with av.open(film) as container, AnyReader([bag]) as reader:
@@ -163,6 +203,55 @@ def test_ctrl_c_leaves_whole_files(tmp_path: Path) -> None:
         images = sum(connection.msgcount for connection in reader.connections if connection.topic.endswith("/image"))
         assert frames > 0
         assert abs(frames - images) <= 1
+
+
+def _stop_at_random(seed: int, folder: Path) -> None:
+    """Stop a run by one to three signals at moments of its first seconds; what is there afterwards is whole."""
+    rng = random.Random(seed)
+    process, film, bag = _started(folder)
+    time.sleep(rng.uniform(0.2, 5.0))
+    for _ in range(rng.randint(1, 3)):
+        process.send_signal(rng.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
+        time.sleep(rng.choice((0.0, 0.01, 0.1)))
+    said = process.communicate(timeout=60)[1]
+    assert {path.name for path in folder.iterdir()} <= {"run.mp4", "run.mcap"}, said
+    if film.exists():
+        with av.open(film) as container:
+            assert list(container.decode(video=0))
+    if bag.exists():
+        assert sum(1 for _ in read_bag(bag)) > 0
+
+
+def test_a_run_stopped_at_any_moment_leaves_whole_files_or_none(tmp_path: Path) -> None:
+    _stop_at_random(0, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("seed", range(1, 101))
+def test_a_hundred_runs_stopped_at_any_moment_leave_whole_files_or_none(seed: int, tmp_path: Path) -> None:
+    _stop_at_random(seed, tmp_path)
+
+
+def test_a_closed_terminal_does_not_stop_what_nohup_started(tmp_path: Path) -> None:
+    command = ["nohup", str(LIMO_HOG), "follow", "--seconds", "4", "--json", str(tmp_path / "card.json")]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    time.sleep(1.5)
+    process.send_signal(signal.SIGHUP)
+    assert process.wait(60) == 0
+    assert (tmp_path / "card.json").exists()
+
+
+def test_pages_that_do_not_read_hold_no_score_card_up(tmp_path: Path) -> None:
+    command = [str(LIMO_HOG), "follow", "--seconds", "4", "--view", "0", "--json", str(tmp_path / "card.json")]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    with stalled(process.stderr.readline().split()[-1], 10):
+        began = time.monotonic()
+        assert process.wait(60) == 0
+        assert time.monotonic() - began < 20
+    process.stderr.close()
+    assert json.loads((tmp_path / "card.json").read_text())["seconds"] == pytest.approx(4)
 
 
 async def _text(page: Any) -> str:

@@ -16,7 +16,7 @@ from limo_hog.follow.sense.detectors import (
     DetectorError,
     HalfSize,
     OnnxDetector,
-    best_first,
+    by_score,
     detect_in,
     detector_named,
 )
@@ -43,7 +43,7 @@ def frame() -> NDArray[np.uint8]:
 
 
 def test_our_hog_and_opencvs_find_the_same_person(frame: NDArray[np.uint8]) -> None:
-    ours, theirs = PeopleDetector().detect(frame), Cv2Detector().detect(frame)
+    ours, theirs = detector_named("hog").detect(frame), Cv2Detector().detect(frame)
     assert len(ours) == 1
     assert ours.boxes.tolist() == theirs.boxes.tolist()
 
@@ -63,7 +63,7 @@ def test_large_people_are_searched_in_a_smaller_picture() -> None:
 
 
 def test_a_region_around_a_person_finds_what_the_whole_image_does(frame: NDArray[np.uint8]) -> None:
-    detector = PeopleDetector()
+    detector = detector_named("hog")
     whole = detector.detect(frame).boxes[0]
     x, y, w, h = (int(value) for value in whole)
     region = Region(x - 48, max(y - 32, 0), w + 96, h + 64, float(h))
@@ -90,7 +90,7 @@ def test_half_size_is_the_mean_of_four_pixels() -> None:
 
 
 def test_the_surest_comes_first() -> None:
-    found = best_first(np.array([[0, 0, 1, 2], [3, 3, 1, 2]]), np.array([0.1, 0.9]))
+    found = by_score(np.array([[0, 0, 1, 2], [3, 3, 1, 2]]), np.array([0.1, 0.9]))
     assert found.scores.tolist() == [0.9, 0.1]
     assert found.boxes[0].tolist() == [3, 3, 1, 2]
 
@@ -125,7 +125,7 @@ def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) ->
 
 
 def test_one_person_is_one_box_by_each_way_to_suppress(frame: NDArray[np.uint8]) -> None:
-    every_hit = PeopleDetector(group_threshold=0).detect(frame)
+    every_hit = PeopleDetector(min_height=None, nms="group", group_threshold=0).detect(frame)
     assert len(every_hit) > 5
     for name in ("hog", "hog-iou", "hog-soft"):
         found = detector_named(name).detect(frame)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.tracks.kalman import Noise, bearing_range, found, innovation, predicted, rates, updated
+from limo_hog.follow.tracks.kalman import Noise, bearing_range, initiate, innovation, predict, rates, update
 
 NOISE = Noise()
 HERE = Odometry()
@@ -17,68 +17,68 @@ HERE = Odometry()
 
 def test_a_track_begins_where_the_person_was_seen() -> None:
     pose = Odometry(x=1.0, y=2.0, yaw=0.5)
-    track = found(0.0, 0.3, 2.0, pose, NOISE)
+    track = initiate(0.0, 0.3, 2.0, pose, NOISE)
     assert bearing_range(track, pose) == pytest.approx((0.3, 2.0))
 
 
 def test_its_first_uncertainty_is_the_measurements() -> None:
-    track = found(0.0, 0.0, 3.0, HERE, NOISE)
+    track = initiate(0.0, 0.0, 3.0, HERE, NOISE)
     expected = np.diag([NOISE.range**2, (3.0 * NOISE.bearing) ** 2])
     assert track.covariance[:2, :2] == pytest.approx(expected)
 
 
 def test_a_walker_is_learnt_and_foreseen() -> None:
-    track = found(0.0, 0.0, 3.0, HERE, NOISE)
+    track = initiate(0.0, 0.0, 3.0, HERE, NOISE)
     for step in range(1, 40):
         t = 0.1 * step
         x, y = 3.0, 0.5 * t
-        track = predicted(track, t, NOISE)
-        track = updated(track, innovation(track, math.atan2(y, x), math.hypot(x, y), HERE, NOISE))
+        track = predict(track, t, NOISE)
+        track = update(track, innovation(track, math.atan2(y, x), math.hypot(x, y), HERE, NOISE))
     assert track.mean[2:] == pytest.approx([0.0, 0.5], abs=0.06)
     bearing_rate, range_rate = rates(track, HERE)
     assert bearing_rate == pytest.approx(3.0 * 0.5 / (9 + 1.95**2), abs=0.02)
     assert range_rate == pytest.approx(0.5 * 1.95 / math.hypot(3.0, 1.95), abs=0.05)
-    soon = predicted(track, 4.4, NOISE)
+    soon = predict(track, 4.4, NOISE)
     assert soon.mean[1] == pytest.approx(2.2, abs=0.06)
 
 
 def test_the_robots_own_turn_is_no_motion_of_the_person() -> None:
-    track = found(0.0, 0.0, 3.0, HERE, NOISE)
+    track = initiate(0.0, 0.0, 3.0, HERE, NOISE)
     for step in range(1, 20):
         pose = Odometry(yaw=0.1 * step)
-        track = predicted(track, 0.1 * step, NOISE)
-        track = updated(track, innovation(track, -0.1 * step, 3.0, pose, NOISE))
+        track = predict(track, 0.1 * step, NOISE)
+        track = update(track, innovation(track, -0.1 * step, 3.0, pose, NOISE))
     assert np.hypot(*track.mean[2:]) < 0.01
 
 
 def test_an_update_equals_the_textbooks_information_form() -> None:
-    track = predicted(found(0.0, 0.2, 2.5, HERE, NOISE), 0.3, NOISE)
+    track = predict(initiate(0.0, 0.2, 2.5, HERE, NOISE), 0.3, NOISE)
     seen = innovation(track, 0.25, 2.6, HERE, NOISE)
     r = np.diag([NOISE.bearing**2, NOISE.range**2])
     information = np.linalg.inv(track.covariance) + seen.jacobian.T @ np.linalg.inv(r) @ seen.jacobian
-    after = updated(track, seen)
+    after = update(track, seen)
     assert after.covariance == pytest.approx(np.linalg.inv(information), abs=1e-9)
     gain = np.linalg.inv(information) @ seen.jacobian.T @ np.linalg.inv(r)
     assert after.mean == pytest.approx(track.mean + gain @ seen.difference)
 
 
 def test_a_bearing_alone_narrows_the_bearing_alone() -> None:
-    track = predicted(found(0.0, 0.0, 3.0, HERE, NOISE), 1.0, NOISE)
-    after = updated(track, innovation(track, 0.0, None, HERE, NOISE))
+    track = predict(initiate(0.0, 0.0, 3.0, HERE, NOISE), 1.0, NOISE)
+    after = update(track, innovation(track, 0.0, None, HERE, NOISE))
     assert after.covariance[0, 0] == pytest.approx(track.covariance[0, 0])
     assert after.covariance[1, 1] < 0.1 * track.covariance[1, 1]
 
 
 def test_unseen_people_come_to_a_stop_and_grow_uncertain() -> None:
-    track = found(0.0, 0.0, 3.0, HERE, NOISE)
-    later, much_later = (predicted(track, t, NOISE) for t in (1.0, 60.0))
+    track = initiate(0.0, 0.0, 3.0, HERE, NOISE)
+    later, much_later = (predict(track, t, NOISE) for t in (1.0, 60.0))
     assert later.covariance[0, 0] > track.covariance[0, 0]
     assert much_later.mean[2:] == pytest.approx([0.0, 0.0], abs=1e-6)
     assert np.linalg.eigvalsh(much_later.covariance).min() > 0
 
 
 def test_at_an_earlier_stamp_the_person_is_where_they_came_from() -> None:
-    track = replace(found(5.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.0, 0.5]))
-    before = predicted(track, 4.0, NOISE)
+    track = replace(initiate(5.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.0, 0.5]))
+    before = predict(track, 4.0, NOISE)
     assert before.mean == pytest.approx([3.0, 0.5, 0.0, 0.5])
     assert before.stamp == 4.0

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
+from tests.follow.views import boxes, flat, look
 
-from limo_hog.follow.sense.appearance import OTHER_CLOTHES, unlikeness
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.measurement import Measurement, measure
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.tracks.association import Measurement, Person, associate, moved_on, seen_again
-from limo_hog.follow.tracks.kalman import Noise, found
+from limo_hog.follow.sense.region import Region
+from limo_hog.follow.sense.visibility import Visibility
+from limo_hog.follow.tracks import kalman
+from limo_hog.follow.tracks.kalman import Noise
+from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to, initiate, predict
+from limo_hog.follow.tracks.tracker import Tracker
 
-NOISE, POSE, GATE = Noise(), Odometry(), 18.0
+NOISE, POSE, TRACKER = Noise(), Odometry(), Tracker()
+APPEARANCE = TRACKER.association.appearance
 WINDOW = 536.0
 IN_RED: NDArray[np.float64] = np.array([[10.0, 4.0, 10.0], [6.0, 6.0, 9.0]])
 IN_GREEN: NDArray[np.float64] = np.array([[5.0, 10.0, 10.0], [6.0, 6.0, 9.0]])
@@ -21,7 +30,7 @@ IN_GREEN: NDArray[np.float64] = np.array([[5.0, 10.0, 10.0], [6.0, 6.0, 9.0]])
 def somebody(number: int, distance: float, bearing: float = 0.0, clothes: NDArray[np.float64] | None = None) -> Person:
     """A person who is known well, last seen at time 0."""
     sharp = replace(NOISE, range=0.05, bearing=0.01, velocity=0.1)
-    track = found(0.0, bearing, distance, POSE, sharp)
+    track = kalman.initiate(0.0, bearing, distance, POSE, sharp)
     return Person(number, track, 0.0, 1.0, WINDOW, -120.0, confirmed=True, age=50, clothes=clothes)
 
 
@@ -31,18 +40,18 @@ def box(distance: float, bearing: float = 0.0, clothes: NDArray[np.float64] | No
 
 
 def pairs(people: tuple[Person, ...], *boxes: Measurement) -> dict[int, int]:
-    return associate(people, list(boxes), POSE, NOISE, GATE)
+    return TRACKER.association.pair(people, boxes, POSE, NOISE)
 
 
 def test_somebody_long_unseen_does_not_take_the_box_of_who_is_seen() -> None:
-    seen, gone = somebody(1, 1.6), moved_on(replace(somebody(2, 2.6), seen=-2.0), 2.0, NOISE)
+    seen, gone = somebody(1, 1.6), predict(replace(somebody(2, 2.6), seen=-2.0), 2.0, NOISE)
     # He may be anywhere by now, and so fits everywhere.
     assert pairs((gone,), box(1.7, 0.05)) == {0: 0}
     assert pairs((gone, seen), box(1.7, 0.05)) == {1: 0}
 
 
 def test_a_second_box_on_somebody_is_nobody_elses() -> None:
-    seen, gone = somebody(1, 1.6), moved_on(replace(somebody(2, 2.6), seen=-2.0), 2.0, NOISE)
+    seen, gone = somebody(1, 1.6), predict(replace(somebody(2, 2.6), seen=-2.0), 2.0, NOISE)
     assert pairs((seen, gone), box(1.6), box(1.65, 0.05)) == {0: 0}
 
 
@@ -62,7 +71,7 @@ def test_a_glimpse_of_wrong_colours_does_not_lose_who_is_certain() -> None:
 
 
 def test_somebody_unseen_does_not_become_somebody_in_other_clothes() -> None:
-    gone = moved_on(somebody(1, 2.0, 0.0, IN_RED), 2.0, NOISE)
+    gone = predict(somebody(1, 2.0, 0.0, IN_RED), 2.0, NOISE)
     assert pairs((gone,), box(2.5, 0.2, IN_RED)) == {0: 0}
     assert pairs((gone,), box(2.5, 0.2, IN_GREEN)) == {}
 
@@ -76,16 +85,107 @@ def test_a_box_behind_somebody_that_is_not_their_size_is_not_theirs() -> None:
 
 def test_a_person_grows_no_smaller_for_the_parts_of_them_seen_near_by() -> None:
     person, part = somebody(1, 1.5), replace(box(1.5), height=200)
-    assert seen_again(person, part, POSE, NOISE, GATE).window == WINDOW
-    assert seen_again(replace(person, confirmed=False), part, POSE, NOISE, GATE).window < WINDOW
+    assert TRACKER.correct(person, part, POSE).window == WINDOW
+    assert TRACKER.correct(replace(person, confirmed=False), part, POSE).window < WINDOW
 
 
 def test_clothes_are_averaged_until_somebody_is_known_and_then_kept() -> None:
     new = replace(somebody(1, 2.0, 0.0, IN_GREEN), confirmed=False, age=1)
     for _ in range(10):
-        new = seen_again(replace(new, confirmed=False), box(2.0, 0.0, IN_RED), POSE, NOISE, GATE)
-    assert unlikeness(new.clothes, IN_RED) < OTHER_CLOTHES / 2
+        new = TRACKER.correct(replace(new, confirmed=False), box(2.0, 0.0, IN_RED), POSE)
+    assert APPEARANCE.cost(new.clothes, IN_RED) < APPEARANCE.other / 2
     known = replace(new, confirmed=True, clothes=IN_RED)
     for _ in range(30):
-        known = seen_again(known, box(2.0, 0.0, IN_GREEN), POSE, NOISE, GATE)
-    assert unlikeness(known.clothes, IN_RED) == 0
+        known = TRACKER.correct(known, box(2.0, 0.0, IN_GREEN), POSE)
+    assert APPEARANCE.cost(known.clothes, IN_RED) == 0
+
+
+def test_a_box_is_measured_from_the_robots_centre_by_its_depth() -> None:
+    seen = look(boxes((68, 100, 64, 128)))
+    slope = (320 - 100) / 448.6
+    (bearing_only,) = measure(seen, LIMO)
+    assert bearing_only.range is None
+    assert bearing_only.bearing == pytest.approx(math.atan(slope))
+    (ranged,) = measure(replace(seen, depth=flat(2.0)), LIMO)
+    assert ranged.range == pytest.approx(math.hypot(2.084, slope * 2.0))
+    assert ranged.bearing == pytest.approx(math.atan2(slope * 2.0, 2.084))
+    assert (ranged.height, ranged.centre, ranged.score) == (128, 164 - 240, 2.0)
+
+
+def test_a_box_without_a_range_is_as_far_off_as_across_the_line_of_sight() -> None:
+    without = replace(box(2.0), range=None)
+    assert distance_to(somebody(1, 2.0), replace(without, bearing=0.3), POSE) == pytest.approx(2.0 * math.tan(0.3))
+    assert distance_to(somebody(1, 2.0), replace(without, bearing=-0.3), POSE) == pytest.approx(2.0 * math.tan(0.3))
+    assert distance_to(somebody(1, 2.0), replace(without, bearing=3.0), POSE) == math.inf
+    assert distance_to(somebody(1, 2.0), box(3.0, 0.3), POSE) == pytest.approx(
+        math.dist((2, 0), (3 * math.cos(0.3), 3 * math.sin(0.3)))
+    )
+
+
+def test_a_new_person_without_a_range_may_be_anywhere_along_the_line_of_sight() -> None:
+    person = initiate(1, replace(box(2.0), range=None), 0.0, POSE, NOISE, UnknownRange(3.0, 1.5))
+    assert person.track.mean[:2] == pytest.approx([3.0, 0.0])
+    assert person.track.covariance[0, 0] == pytest.approx(1.5**2)
+    assert person.track.covariance[1, 1] == pytest.approx((3.0 * NOISE.bearing) ** 2)
+
+
+def test_a_range_that_contradicts_the_size_of_the_box_moves_nobody() -> None:
+    person = somebody(1, 3.0)
+    hand_in_front = replace(box(3.0, 0.02), range=0.8)
+    after = TRACKER.correct(person, hand_in_front, POSE)
+    assert math.hypot(*after.track.mean[:2]) == pytest.approx(3.0, abs=0.02)
+    assert after.track.mean[1] > 0
+
+
+def test_a_person_who_turned_sharply_is_where_the_box_is() -> None:
+    aside = box(3.0, 0.15)
+    after = TRACKER.correct(somebody(1, 3.0), aside, POSE)
+    # By the gain of a certain track alone it would be a fifth of the way.
+    assert math.atan2(after.track.mean[1], after.track.mean[0]) > 0.8 * 0.15
+
+
+def expected(distance: float, bearing: float = 0.0, middle: float = 240.0, **other: object) -> bool:
+    """Whether a confirmed person is expected to be found, their window's middle at an image row."""
+    confirmed = bool(other.pop("confirmed", True))
+    view = replace(look(), **other)  # type: ignore[arg-type]
+    return Visibility().expected(bearing, distance, WINDOW, (middle - 240) * distance, view, confirmed=confirmed)
+
+
+def test_a_person_in_the_middle_of_the_image_is_expected_to_be_found() -> None:
+    assert expected(2.5)
+    assert expected(2.5, 0.4)
+
+
+def test_a_person_beside_or_behind_the_camera_is_not_expected() -> None:
+    assert not expected(2.5, 0.7)
+    assert not expected(2.5, math.pi)
+    assert not expected(2.5, -math.pi + 0.01)
+
+
+def test_a_window_lower_than_the_models_is_not_expected() -> None:
+    assert expected(4.1)
+    assert not expected(4.3)
+
+
+@pytest.mark.parametrize("middle", [0.4 * WINDOW / 2, 480 - 0.4 * WINDOW / 2])
+def test_a_window_cut_off_by_the_image_excuses_a_person_and_not_a_new_track(middle: float) -> None:
+    assert not expected(2.0, middle=middle)
+    assert expected(2.0, middle=middle, confirmed=False)
+    assert expected(2.0, middle=abs(middle - 0.1 * WINDOW) if middle > 240 else middle + 0.1 * WINDOW)
+
+
+def test_too_near_for_hog_excuses_a_person_and_not_a_new_track() -> None:
+    assert expected(1.75)
+    assert not expected(1.65)
+    assert expected(1.65, confirmed=False)
+
+
+def test_outside_the_region_searched_a_person_is_not_expected() -> None:
+    left = Region(0, 0, 320, 480, 200.0)
+    assert expected(2.5, 0.3, region=left)
+    assert not expected(2.5, -0.1, region=left)
+
+
+def test_a_person_behind_something_is_not_expected() -> None:
+    assert not expected(3.0, depth=flat(2.4))
+    assert expected(3.0, depth=flat(2.6))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tests.follow.views import boxes, flat, look, scan, scan_of
 
+from limo_hog.detector import Detections
 from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Twist
-from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.clearance import Margin, depth_points, room_ahead, scan_points
+from limo_hog.follow.sense.clearance import speed_within
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,6 @@ def test_depth_sees_what_the_lidar_misses() -> None:
     assert ahead().step(view, ahead().start()).twist.linear == 0
 
 
-def test_the_floor_is_no_obstacle() -> None:
-    rows = np.arange(480, dtype=np.float32)[:, None] + 0.5 - 240
-    floor = np.where(rows > 0, 0.175 * 448.6 / np.maximum(rows, 0.5), np.inf).astype(np.float32)
-    assert len(depth_points(np.broadcast_to(floor, (480, 640)), 448.6, 1.8, LIMO)) == 0
-
-
 def test_what_was_seen_before_a_turn_stops_the_way_back() -> None:
     guard = Guard(Headstrong(Twist(-0.3, 0.0)))
     there = replace(look(), scan=scan_of([(0.7, 0.0)]), odometry=Odometry())
@@ -81,22 +75,78 @@ def test_what_was_seen_before_a_turn_stops_the_way_back() -> None:
     assert guard.step(later, decision.state).twist.linear == -0.3
 
 
+@pytest.mark.parametrize(("age", "stopped"), [(9.9, True), (10.1, False)])
+def test_what_was_seen_behind_counts_for_ten_seconds(age: float, stopped: bool) -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    # On any clock, and not behind yet.
+    there = replace(look(stamp=700.0), scan=scan_of([(0.7, 0.0)], 700.0), odometry=Odometry(700.0))
+    state = guard.step(there, guard.start()).state
+    turned = Odometry(700.0 + age, yaw=np.pi)
+    later = replace(look(stamp=700.0 + age), scan=scan(stamp=700.0 + age), odometry=turned)
+    assert (guard.step(later, state).twist.linear == 0) is stopped
+
+
+def test_an_obstacle_that_has_left_the_lidars_view_empty_is_forgotten() -> None:
+    # It stood at 100 degrees to the left, near the end of the field of view, and walks off.
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    beside = (0.103 + 0.35 * np.cos(1.9), 0.35 * np.sin(1.9))
+    there = replace(look(), scan=scan_of([beside]), odometry=Odometry())
+    first = guard.step(there, guard.start())
+    assert len(first.state.scan_points) > 0
+    gone = guard.step(replace(look(stamp=0.1), scan=scan(stamp=0.1), odometry=Odometry(0.1)), first.state)
+    assert len(gone.state.scan_points) == 0
+
+
+def test_an_obstacle_on_either_side_behind_the_field_of_view_is_remembered() -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    for side in (1.0, -1.0):
+        there = replace(look(), scan=scan_of([(0.6, side * 0.1)]), odometry=Odometry())
+        state = guard.step(there, guard.start()).state
+        for turn in (2.3, -2.3):
+            pose = Odometry(1.0, yaw=turn)
+            later = guard.step(replace(look(stamp=1.0), scan=scan(stamp=1.0), odometry=pose), state)
+            assert len(later.state.scan_points) == len(state.scan_points)
+
+
+def test_an_obstacle_just_behind_the_lidars_field_of_view_is_remembered_though_the_base_would_see_it() -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    state = guard.step(replace(look(), scan=scan_of([(0.6, 0.0)]), odometry=Odometry()), guard.start()).state
+    # Drive to where the obstacle is at 109 degrees from the base, and at 121 from the lidar, which sees 115.
+    yaw, x, y = -1.9, 0.4 * np.cos(1.9), 0.4 * np.sin(1.9)
+    pose = Odometry(1.0, 0.6 - (np.cos(yaw) * x - np.sin(yaw) * y), -(np.sin(yaw) * x + np.cos(yaw) * y), yaw)
+    later = guard.step(replace(look(stamp=1.0), scan=scan(stamp=1.0), odometry=pose), state)
+    assert len(later.state.scan_points) == len(state.scan_points) > 0
+
+
+def test_returns_of_a_clock_that_was_set_back_are_forgotten() -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    state = guard.step(replace(look(), scan=scan_of([(0.6, 0.0)], 100.0), odometry=Odometry()), guard.start()).state
+    back = Odometry(3.0, yaw=np.pi)
+    later = guard.step(replace(look(stamp=3.0), scan=scan(stamp=3.0), odometry=back), state)
+    assert len(later.state.scan_points) == 0
+
+
+def test_points_further_than_the_robot_backs_off_are_not_remembered() -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    view = replace(look(), scan=scan_of([(1.6, 0.0)]), odometry=Odometry())
+    assert len(guard.step(view, guard.start()).state.scan_points) == 0
+
+
+@pytest.mark.parametrize("depth", [0.9, 1.5, 1.8])
+def test_the_depth_image_limits_the_speed_as_far_as_its_reach(depth: float) -> None:
+    guard = ahead(2.0)
+    room = 0.084 + depth - 0.145 - guard.margin.ahead
+    view = replace(look(), scan=scan(), depth=flat(depth))
+    linear = guard.step(view, guard.start()).twist.linear
+    # The nearest pixel column is 4 px beside the middle, under the ellipse's top.
+    assert linear == pytest.approx(speed_within(room, guard.braking, guard.reaction_s), abs=1e-3)
+
+
 def test_backwards_it_goes_slowly_for_it_does_not_look_there() -> None:
     guard = Guard(Headstrong(Twist(-0.7, 0.2)))
     decision = guard.step(replace(look(), scan=scan()), guard.start())
-    assert decision.twist == Twist(-guard.backwards, 0.2)
+    assert decision.twist == Twist(-guard.max_backward, 0.2)
     assert decision.reason == "because"
-
-
-def test_somebody_beside_is_passed_and_somebody_in_the_way_is_not() -> None:
-    margin = Margin(0.5, 0.2)
-    assert room_ahead(np.array([[1.0, 0.4]]), margin, LIMO) == np.inf
-    assert room_ahead(np.array([[1.0, 0.0]]), margin, LIMO) == pytest.approx(1.0 - 0.145 - 0.5)
-
-
-def test_a_scan_becomes_points_counter_clockwise_from_the_first_beam() -> None:
-    (point,) = scan_points(scan(np.array([np.inf, np.inf, 1.0], np.float32)), LIMO)
-    assert point == pytest.approx([0.103 + np.cos(2.0), np.sin(2.0)])
 
 
 BAD = {
@@ -109,6 +159,9 @@ BAD = {
     "outside the 640x480 image": look(boxes((700, 10, 64, 128))),
     "box (10, 10, 0, 128)": look(boxes((10, 10, 0, 128))),
     "do not belong together": replace(look(boxes((10, 10, 64, 128))), clothes=np.zeros((2, 2, 3))),
+    "(4,) and scores": replace(look(), detections=Detections(np.array([1, 2, 3, 4], np.int32), np.ones(4))),
+    "(1, 3) and scores": replace(look(), detections=Detections(np.ones((1, 3), np.int32), np.ones(1))),
+    "(2, 4) and scores (1,)": replace(look(), detections=Detections(np.full((2, 4), 9, np.int32), np.ones(1))),
     "not a number": look(boxes((10, 10, 64, 128), scores=(float("nan"),))),
     "odometry": replace(look(), odometry=Odometry(yaw=float("inf"))),
 }
@@ -158,9 +211,27 @@ def test_between_frames_a_newer_scan_stops_the_last_command() -> None:
     assert guard.recheck(0.1, scan_of([(0.6, 0.0)], 0.1), None, state).twist.linear == 0
 
 
-def test_silence_of_the_camera_stops_the_robot() -> None:
+@pytest.mark.parametrize("began", [0.0, 1.7e9])
+def test_silence_of_the_camera_stops_the_robot_on_any_clock(began: float) -> None:
     guard = ahead()
-    state = guard.step(replace(look(), scan=scan()), guard.start()).state
-    decision = guard.recheck(0.6, scan(stamp=0.6), None, state)
+    state = guard.step(replace(look(stamp=began), scan=scan(stamp=began)), guard.start()).state
+    assert guard.recheck(began + 0.4, scan(stamp=began + 0.4), None, state).twist.linear == 0.5
+    decision = guard.recheck(began + 0.6, scan(stamp=began + 0.6), None, state)
     assert decision.twist == Twist()
     assert "no camera frame for 0.6 s" in decision.reason
+
+
+def test_the_age_of_a_frame_counts_from_when_it_was_decided_on() -> None:
+    # A frame that comes 0.4 s late is not older the moment it is used.
+    guard = ahead()
+    late = replace(look(stamp=100.0), scan=scan(stamp=100.4), odometry=Odometry(100.4))
+    state = guard.step(late, guard.start()).state
+    assert guard.recheck(100.8, scan(stamp=100.8), Odometry(100.8), state).twist.linear == 0.5
+    assert guard.recheck(101.0, scan(stamp=101.0), Odometry(101.0), state).twist == Twist()
+
+
+def test_before_the_first_frame_and_after_a_fault_a_recheck_stands() -> None:
+    guard = ahead()
+    assert guard.recheck(0.0, scan(), None, guard.start()).twist == Twist()
+    faulty = guard.step(replace(look(), fault="dark"), guard.start())
+    assert guard.recheck(0.1, scan(stamp=0.1), None, faulty.state).reason == "no usable camera frame"

@@ -14,7 +14,7 @@ from limo_hog.follow.twist import Twist
 
 WIDTH, HEIGHT, FOCAL = 640, 480, 448.6
 RED, GREEN, BLUE = (40, 40, 170), (50, 140, 50), (130, 50, 35)
-NOBODY = Detections(np.empty((0, 4), np.int32), np.empty(0))
+NOBODY = Detections.none()
 
 
 def boxes(*rows: tuple[int, int, int, int], scores: tuple[float, ...] | None = None) -> Detections:

@@ -41,7 +41,7 @@ def test_rectangles_are_the_same_with_1_2_and_8_threads_a_hundred_times(
 
 
 def test_one_detector_serves_many_threads_at_once(image: NDArray[np.uint8]) -> None:
-    detector = limo_hog.PeopleDetector(threshold=-2.4, scale=1.2)
+    detector = limo_hog.PeopleDetector(threshold=-2.4, scale=1.2, min_height=None, nms="group")
     alone = detector.detect(image)
     with ThreadPoolExecutor(8) as pool:
         for together in pool.map(detector.detect, [image] * 16):

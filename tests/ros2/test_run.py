@@ -83,7 +83,7 @@ def test_a_nodes_windows_are_on_the_live_page_under_their_names(run: Run) -> Non
 def test_the_same_node_gives_the_same_run(run: Run) -> None:
     def log() -> list[tuple[object, ...]]:
         steps = run(node(FOLLOW), STANDING, 1.0).episode.steps
-        return [(step.time, step.truth.robot, step.twist, step.detections.boxes.tolist()) for step in steps]
+        return [(step.time, step.truth.robot, step.decision.twist, step.detections.boxes.tolist()) for step in steps]
 
     assert log() == log()
 

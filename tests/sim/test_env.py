@@ -13,8 +13,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
-from limo_hog.detector import PeopleDetector
-from limo_hog.follow import ApproachController, TrackingController
+from limo_hog.follow import ApproachController, TrackingController, detector_named
 from limo_hog.follow.sense.observation import Odometry, Scan, observed
 from limo_sim.env import LimoFollow, reward_parts
 from limo_sim.sensing.camera import FOCAL_PX
@@ -146,7 +145,7 @@ class Policy:
     """A controller of `limo_hog.follow` as a policy of the environment."""
 
     def __init__(self, controller: Any) -> None:
-        self.controller, self.state, self.detector = controller, controller.start(), PeopleDetector()
+        self.controller, self.state, self.detector = controller, controller.start(), detector_named("hog")
 
     def __call__(self, observation: Any, time: float) -> NDArray[np.float32]:
         image = np.ascontiguousarray(observation["image"][:, :, ::-1])

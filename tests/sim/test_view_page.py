@@ -33,7 +33,7 @@ def running() -> Iterator[tuple[View, Tunable[Any]]]:
 
         def episode() -> None:
             # A coarse search: this is about the page.
-            detector = PeopleDetector(scale=1.2)
+            detector = PeopleDetector(scale=1.2, min_height=None, nms="group")
             view.end(score(run_episode(SCENARIO, controller, detector, SECONDS, 0, watch=view.watch)).to_json())
 
         run = threading.Thread(target=episode)
@@ -79,7 +79,7 @@ async def _see_it_move(tab: Tab) -> None:
             return coloured > 200;
         })()"""
     )
-    for canvas in ("map", "plot-error", "plot-distance", "plot-speed"):
+    for canvas in ("map", "plot-error", "plot-distance", "plot-speed", "scale"):
         await tab.until(
             f"""(() => {{
                 const canvas = document.querySelector("#{canvas}");
@@ -109,11 +109,22 @@ async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
         await tab.look(width, height, dark)
         await tab.screenshot(PICTURES / f"{'phone' if width < 600 else 'desk'}-{'dark' if dark else 'light'}.png")
         assert await tab.value("document.documentElement.scrollWidth") <= width
+    # On the phone: the caption is text, not part of the picture, and every parameter tells what it is.
+    assert await tab.value("parseFloat(getComputedStyle(document.querySelector('#seen')).fontSize)") >= 14
+    fields = await tab.value(
+        "[...document.querySelectorAll('#fields label')].map((l) => [l.title, l.querySelector('input').max])"
+    )
+    assert len(fields) == len(controller.parameters)
+    assert all(len(title) > 20 and float(high) > 0 for title, high in fields)
+    # Both distances are told, each with a word of its own.
+    shown = await tab.value("['measured', 'distance'].map((id) => document.getElementById(id).parentNode.innerText)")
+    assert [text.split("\n")[0] for text in shown] == ["distance seen", "true distance"]
+    assert all(0.5 < float(text.split("\n")[1].split()[0]) < 5 for text in shown)
     set_field = "Object.assign(document.querySelector('[name=target_distance]'), {value: %s}).onchange()"
     await tab.value(set_field % "2.5")
     await tab.value(set_field % "-1")
-    await tab.until("document.querySelector('#complaint').textContent.includes('want a number from 0 on')")
-    assert controller.parameters["target_distance"] == 2.5
+    await tab.until("document.querySelector('#complaint').textContent.includes('want a number from')")
+    assert controller.parameters["target_distance"].value == 2.5
     view.pace.set_speed(0)
     await tab.value("document.querySelector('#pause').click()")
 

@@ -1,4 +1,4 @@
-"""What HOGDescriptor offers beyond OpenCV's, and what it says to wrong arguments."""
+"""What HOGDescriptor offers beyond OpenCV's, and its errors for wrong arguments."""
 
 from __future__ import annotations
 
@@ -118,6 +118,16 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 0).getDescriptorSize(), ValueError, "nbins is 0"),
     (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 300).getDescriptorSize(), ValueError, "nbins is 300"),
     (lambda: untyped.HOGDescriptor((2**40, 8), *GEOMETRY[1:]), ValueError, "_winSize is"),
+    (lambda: untyped.HOGDescriptor(*GEOMETRY, 1, 10**400), ValueError, "_winSigma is 1000.*larger than any float"),
+    (lambda: untyped.HOGDescriptor(*GEOMETRY[:4], 10**5000), ValueError, "_nbins is int of thousands of digits"),
+    (lambda: untyped.HOGDescriptor((10**400, 8), *GEOMETRY[1:]), ValueError, "_winSize is"),
+    (lambda: people().detectMultiScale(noise(200, 100), scale=10**400), ValueError, "scale is 1000"),
+    (lambda: people().detect(noise(200, 100), -(10**400)), ValueError, "hitThreshold is -1000"),
+    (lambda: people().compute(noise(200, 100), locations=[(10**400, 0)]), TypeError, "locations has shape"),
+    (lambda: people().detectROI(noise(200, 100), [(0, 0, 10**400, 9)]), TypeError, "regions has shape"),
+    (lambda: people().setSVMDetector([10**400] * 3781), TypeError, "real numbers"),
+    (lambda: untyped.groupRectangles([[0, 0, 1, 1]], 10**400), ValueError, "groupThreshold is 1000"),
+    (lambda: untyped.groupRectangles([[0, 0, 1, 1]], 1, 10**400), ValueError, "eps is 1000"),
     (lambda: people().detect(noise(200, 100), "1"), TypeError, "hitThreshold is '1'"),
     (lambda: people().detectMultiScale(noise(200, 100), scale="1"), TypeError, "scale is '1'"),
     (lambda: people().detect(noise(200, 100), 0, (8,)), TypeError, r"winStride is \(8,\)"),
@@ -135,6 +145,8 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: untyped.groupRectangles([[0, 0, 1, 2**40]], 1), ValueError, "beyond"),
     (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(36)), ValueError, "there are 36 values"),
     (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(3780), zoom=0), ValueError, "zoom is 0"),
+    (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(3780), zoom=10**400), ValueError, "zoom is 1000"),
+    (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(3780), zoom=1.5), TypeError, "zoom is 1.5"),
 ]
 
 
@@ -143,6 +155,7 @@ def test_a_wrong_argument_is_named_with_what_came(call: Any, kind: type[Exceptio
     with pytest.raises(limo_hog.HogError, match=told) as caught:
         call()
     assert isinstance(caught.value, kind)
+    assert len(str(caught.value)) < 300
 
 
 def test_regions_are_searched_each_as_an_image_of_its_own() -> None:
@@ -199,5 +212,5 @@ def test_opencv_4_keeps_its_own_names(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_without_opencv_there_is_nothing_to_install_into(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(limo_hog.MissingExtraError, match=r"pip install limo-hog\[cv\]"):
+    with pytest.raises(limo_hog.MissingExtraError, match=r"pip install 'limo-hog\[cv\]'"):
         limo_hog.install_into_cv2()

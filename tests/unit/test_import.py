@@ -1,11 +1,18 @@
-"""What `import limo_hog` brings along, and what it leaves for those who need it."""
+"""What `import limo_hog` brings along, and what it leaves to later imports."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from importlib.metadata import version
+from pathlib import Path
 
 import pytest
+
+import limo_hog
+
+ROOT = Path(__file__).parents[2]
 
 
 def modules_after(statement: str) -> set[str]:
@@ -29,3 +36,29 @@ def test_importing_the_detector_does_not_import(module: str, imported: set[str])
 def test_importing_the_detector_imports_neither_commands_nor_follower(imported: set[str]) -> None:
     unwanted = ("limo_hog.cli", "limo_hog.follow", "limo_hog.imaging", "limo_hog.ros2", "limo_hog.cv2_api.model_files")
     assert not [name for name in imported if name.startswith(unwanted)]
+
+
+def test_the_package_imports_nothing_but_its_extension_through_its_own_front_door() -> None:
+    package = Path(limo_hog.__file__).parent
+    rooms = [path for path in package.rglob("*.py") if "cli" not in path.parts]
+    through = {
+        f"{path.relative_to(package)}: {name}"
+        for path in rooms
+        for name in re.findall(r"^\s*(?:from limo_hog import|import limo_hog$) *(.*)", path.read_text(), re.MULTILINE)
+        if name != "_core"
+    }
+    assert not through
+
+
+def test_the_version_is_that_of_the_crate_for_both_distributions() -> None:
+    stated = [
+        re.search(r'^version = "(.+)"$', (ROOT / file).read_text(), re.MULTILINE)
+        for file in ("Cargo.toml", "sim/pyproject.toml")
+    ]
+    assert [found and found[1] for found in stated] == [limo_hog.__version__] * 2
+    assert version("limo-hog") == version("limo-sim") == limo_hog.__version__
+
+
+def test_what_the_package_has_not_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match=r"'limo_hog' has no attribute 'nothing'"):
+        getattr(limo_hog, "nothing")  # noqa: B009

@@ -1,4 +1,4 @@
-"""What the user names becomes pictures, and what is none is said in one line."""
+"""Inputs become pictures; an input that is none is an error of one line."""
 
 from __future__ import annotations
 

@@ -1,41 +1,100 @@
-"""IoU and soft suppression agree with their definitions."""
+"""Non-maximum suppression agrees with its definitions and with OpenCV's."""
 
 from __future__ import annotations
+
+import time
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from limo_hog.suppression import overlaps, soften, suppress
+from limo_hog.suppression import intersection_over_smaller, intersection_over_union, nms, soft_nms
 
-
-def test_overlap_is_intersection_over_union() -> None:
-    boxes = np.array([[0, 0, 10, 10], [5, 0, 10, 10], [20, 20, 5, 5], [0, 0, 0, 0]])
-    assert overlaps(boxes[0], boxes) == pytest.approx([1.0, 50 / 150, 0.0, 0.0])
+Boxes = NDArray[np.int_]
 
 
-def test_suppression_keeps_what_opencvs_keeps() -> None:
-    random = np.random.default_rng(1)
-    boxes = np.concatenate([random.integers(0, 80, (200, 2)), random.integers(20, 60, (200, 2))], axis=1)
-    scores = random.permutation(200) / 200 + 0.001
+def crowd(count: int, people: int, seed: int = 0) -> tuple[Boxes, NDArray[np.float64]]:
+    """Hits around some places, as a detector finds them; few scores are equal."""
+    rng = np.random.default_rng(seed)
+    corners = rng.integers(0, 1500, (people, 2))[rng.integers(0, people, count)] + rng.integers(-12, 13, (count, 2))
+    sides = np.outer(rng.uniform(1, 2, count), (64, 128)).astype(int)
+    return np.concatenate([corners, sides], axis=1), np.round(rng.random(count), 3)
+
+
+def greedy(boxes: Boxes, scores: NDArray[Any], threshold: float, smaller: bool) -> list[int]:
+    """The definition, box by box."""
+    kept: list[int] = []
+    for i in sorted(range(len(boxes)), key=lambda i: (-scores[i], i)):
+        for j in kept:
+            (ax, ay, aw, ah), (bx, by, bw, bh) = boxes[i].tolist(), boxes[j].tolist()
+            shared = max(0, min(ax + aw, bx + bw) - max(ax, bx)) * max(0, min(ay + ah, by + bh) - max(ay, by))
+            whole = min(aw * ah, bw * bh) if smaller else aw * ah + bw * bh - shared
+            if shared / whole > threshold:
+                break
+        else:
+            kept.append(i)
+    return kept
+
+
+def test_overlap_is_shared_area_over_the_union_or_over_the_smaller() -> None:
+    boxes = np.array([[0, 0, 10, 10], [5, 0, 10, 10], [10, 0, 10, 10], [3, 3, 0, 0], [2, 2, 5, 4]])
+    assert intersection_over_union(boxes[:1], boxes) == pytest.approx(np.array([[1, 50 / 150, 0, 0, 0.2]]))
+    assert intersection_over_smaller(boxes[:1], boxes) == pytest.approx(np.array([[1, 0.5, 0, 0, 1]]))
+    assert intersection_over_union(boxes, boxes[:2]).shape == (5, 2)
+
+
+@pytest.mark.parametrize("count", [1, 2, 255, 256, 257, 700])
+@pytest.mark.parametrize("threshold", [0.0, 0.3, 0.65, 1.0])
+def test_nms_keeps_what_its_definition_keeps(count: int, threshold: float) -> None:
+    boxes, scores = crowd(count, 1 + count // 20)
+    assert nms(boxes, scores, threshold).tolist() == greedy(boxes, scores, threshold, smaller=False)
+    kept = nms(boxes, scores, threshold, intersection_over_smaller)
+    assert kept.tolist() == greedy(boxes, scores, threshold, smaller=True)
+
+
+def test_nms_keeps_what_opencvs_keeps() -> None:
+    boxes, scores = crowd(60, 8)
+    scores += np.random.default_rng(1).random(60) * 1e-4  # OpenCV orders equal scores in its own way
     theirs = cv2.dnn.NMSBoxes(boxes.tolist(), scores.tolist(), 0.0, 0.4)
-    assert suppress(boxes, scores, 0.4).tolist() == list(theirs)
+    assert nms(boxes, scores, 0.4).tolist() == list(theirs)
 
 
-def test_nothing_suppressed_is_nothing_kept() -> None:
+def test_a_part_of_a_person_is_no_second_person() -> None:
+    whole_and_part = np.array([[0, 0, 64, 128], [16, 4, 32, 64]])
+    assert nms(whole_and_part, np.array([1.0, 0.9]), 0.65).tolist() == [0, 1]
+    assert nms(whole_and_part, np.array([1.0, 0.9]), 0.65, intersection_over_smaller).tolist() == [0]
+
+
+def test_thousands_of_hits_are_suppressed_at_once() -> None:
+    boxes, scores = crowd(5000, 100)
+    start = time.process_time()
+    nms(boxes, scores, 0.65, intersection_over_smaller)
+    # 5 ms on a quiet machine; box by box it is seconds.
+    assert time.process_time() - start < 0.2
+
+
+def test_no_boxes_leave_no_boxes() -> None:
     empty = np.empty((0, 4), np.int32)
-    assert suppress(empty, np.empty(0), 0.5).size == 0
-    assert soften(empty, np.empty(0), 0.5, 0.0)[0].size == 0
+    assert nms(empty, np.empty(0), 0.5).size == 0
+    assert soft_nms(empty, np.empty(0), 0.5, 0.0)[0].size == 0
 
 
-def test_soft_suppression_lowers_neighbours_and_keeps_strangers() -> None:
-    boxes = np.array([[0, 0, 10, 10], [2, 0, 10, 10], [50, 0, 10, 10]])
-    kept, scores = soften(boxes, np.array([2.0, 1.5, 1.0]), 0.5, 0.0)
-    assert kept.tolist() == [0, 2, 1]
-    assert scores == pytest.approx([2.0, 1.0, 1.5 * np.exp(-((80 / 120) ** 2) / 0.5)])
+def test_soft_nms_lowers_the_scores_of_neighbours_alone() -> None:
+    boxes = np.array([[0, 0, 10, 10], [5, 0, 10, 10], [100, 0, 10, 10]])
+    kept, scores = soft_nms(boxes, np.array([2.0, 1.5, 1.0]), 0.5, 0.0)
+    assert kept.tolist() == [0, 1, 2]
+    assert scores == pytest.approx([2.0, 1.5 * np.exp(-(1 / 9) / 0.5), 1.0])
 
 
-def test_soft_suppression_drops_what_is_left_of_a_copy() -> None:
-    boxes = np.array([[0, 0, 10, 10]] * 2)
-    kept, _ = soften(boxes, np.array([2.0, 0.1]), 0.1, 0.0)
+def test_soft_nms_drops_what_is_left_of_a_copy() -> None:
+    boxes = np.array([[0, 0, 10, 10], [0, 0, 10, 10]])
+    kept, _ = soft_nms(boxes, np.array([2.0, 0.1]), 0.1, 0.0)
     assert kept.tolist() == [0]
+
+
+def test_soft_nms_never_raises_a_score_below_zero() -> None:
+    boxes = np.array([[0, 0, 10, 10], [3, 0, 10, 10]])
+    _, scores = soft_nms(boxes, np.array([1.0, -0.5]), 0.5, -1.0)
+    assert scores[1] < -0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from limo_hog.atomic import whole_file
+from limo_hog.atomic import about, whole_file
 from limo_hog.extras import MissingExtraError
 from limo_hog.imaging.writing import WriteError, video_writer, write_image
 
@@ -24,8 +25,9 @@ def test_an_image_comes_back_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_an_unknown_picture_format_is_refused(tmp_path: Path) -> None:
-    with pytest.raises((WriteError, cv2.error)):
-        write_image(tmp_path / "a.docx", np.zeros((4, 4, 3), np.uint8))
+    for name in ("a.docx", "a"):
+        with pytest.raises(WriteError, match="OpenCV cannot encode"):
+            write_image(tmp_path / name, np.zeros((4, 4, 3), np.uint8))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -37,6 +39,43 @@ def test_what_fails_half_way_leaves_the_old_file_and_nothing_else(tmp_path: Path
         raise KeyboardInterrupt
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+class ForeignError(OSError):
+    """As PyAV's: its file cannot be set."""
+
+    @property
+    def filename(self) -> str | None:
+        return self.named
+
+    named: str | None = None
+
+
+@pytest.mark.parametrize("kind", [OSError, ForeignError])
+@pytest.mark.parametrize("named", [True, False])
+def test_an_error_of_the_unfinished_file_names_the_file_itself(
+    kind: type[OSError], named: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "film.mp4"
+    with pytest.raises(OSError, match="No space left on device") as caught, whole_file(path) as part, about(path):
+        error = kind(errno.ENOSPC, "No space left on device", *([str(part)] if named and kind is OSError else []))
+        if named and isinstance(error, ForeignError):
+            error.named = str(part)
+        raise error
+    assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, str(path))
+
+
+def test_an_error_of_another_file_keeps_its_name(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError) as caught, whole_file(tmp_path / "a.json"), about(tmp_path / "a.json"):
+        (tmp_path / "other.json").read_bytes()
+    assert caught.value.filename == str(tmp_path / "other.json")
+
+
+def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:
+    for folder in (tmp_path, Path(), Path("/"), Path("..")):
+        with pytest.raises(IsADirectoryError) as caught, whole_file(folder):
+            pass
+        assert caught.value.filename == str(folder)
 
 
 @pytest.mark.parametrize(("width", "height"), [(64, 48), (63, 47)])

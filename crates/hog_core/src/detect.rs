@@ -1,34 +1,33 @@
 //! Composes the stages: descriptors and hits of one image, and of a whole pyramid on several threads.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use crate::error::{HogError, Result};
-use crate::gradient::{Gradient, Padding, gradient};
-use crate::grid::{Grid, Steps};
-use crate::group::{Candidate, Rect, clip, group_candidates, mean_shift};
+use crate::error::{BackendError, ParameterError, Result};
+use crate::exact::{self, Gradient, Svm, Tables};
+use crate::fast::{self, Backend, Plan, Planes};
+use crate::geometry::{Padding, Rect, Size};
+use crate::group::{Candidate, clip, group_candidates, mean_shift};
 use crate::image::ImageView;
-use crate::params::{HogParams, HogSpec, Size};
-use crate::pyramid::{Level, levels, resize, to_image};
-use crate::reference;
-use crate::simd::{self, Backend};
-use crate::svm::Svm;
+use crate::params::{HogParams, HogSpec};
+use crate::pyramid::{Level, Steps, levels, to_image};
+use crate::rescore::{Fast, Hit, Scorer};
+use crate::threads::in_order;
 use crate::workspace::Pool;
 
 /// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
 #[derive(Debug, Clone)]
 pub struct Hog {
     spec: HogSpec,
+    tables: Tables,
     svm: Option<Svm>,
     /// The fast path, where the geometry has one.
-    fast: Option<simd::Plan>,
+    plan: Option<Plan>,
     backend: Backend,
 }
 
 /// The image as the fast path wants it, shared by all levels of a call.
-static PLANES: Pool<simd::Planes> = Pool::new();
-/// Scratch memory of the fast path, one per thread at work.
-static SCRATCH: Pool<simd::Scratch> = Pool::new();
+static PLANES: Pool<Planes> = Pool::new();
+
+/// Where the fast path's scores may be further off than this, it only finds the hits: the exact path weighs them all.
+const SCORE_ERROR_MAX: f64 = 1e-4;
 
 /// Where and how densely to look.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,36 +49,6 @@ pub enum Grouping {
     MeanShift(f64),
 }
 
-/// A window that scored at least the threshold.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hit {
-    /// Left edge of the window; negative inside the padding [px].
-    pub x: i64,
-    /// Upper edge [px].
-    pub y: i64,
-    /// SVM score with its bias.
-    pub weight: f64,
-}
-
-impl Hit {
-    fn new(grid: &Grid, (x, y): (usize, usize), weight: f64) -> Self {
-        let (x, y) = grid.to_image(x, y);
-        Self { x, y, weight }
-    }
-}
-
-/// The fast path at work on one image.
-#[derive(Clone, Copy)]
-struct Fast<'a> {
-    plan: &'a simd::Plan,
-    planes: &'a simd::Planes,
-    /// Windows scored closer than this to the threshold are scored again by the exact sums, as OpenCV orders them.
-    doubt: f64,
-}
-
-/// A path whose scores may be further off than this only finds the hits: the exact sums weigh them.
-const NOISE_MAX: f64 = 1e-4;
-
 impl Hog {
     /// A detector of this geometry; `coefficients` of the SVM, if any, must fit it.
     pub fn new(params: &HogParams, coefficients: Option<&[f32]>) -> Result<Self> {
@@ -89,12 +58,12 @@ impl Hog {
     /// [`new`](Self::new) with a backend other than the one in force; this CPU must have it.
     pub fn with_backend(params: &HogParams, coefficients: Option<&[f32]>, backend: Backend) -> Result<Self> {
         if !backend.is_available() {
-            return Err(HogError::Backend(format!("this machine has no {}", backend.name())));
+            return Err(BackendError::Missing { name: backend.name() }.into());
         }
         let spec = HogSpec::new(params)?;
         let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
-        let fast = svm.as_ref().and_then(|svm| simd::Plan::new(&spec, svm, backend));
-        Ok(Self { spec, svm, fast, backend })
+        let plan = svm.as_ref().and_then(|svm| fast::plan(backend, &spec, svm));
+        Ok(Self { tables: Tables::new(&spec), spec, svm, plan, backend })
     }
 
     /// The checked geometry.
@@ -108,26 +77,21 @@ impl Hog {
         image: ImageView,
         [left, top, right, bottom]: [i64; 4],
     ) -> Result<(Gradient, Size)> {
-        let side = |name: &str, length: usize, before: i64, after: i64| {
+        let side = |axis: &'static str, length: usize, before: i64, after: i64| {
             let padded = (length as i64).saturating_add(before).saturating_add(after);
             if (1..=i64::from(i32::MAX)).contains(&padded) {
                 return Ok(padded as usize);
             }
-            Err(HogError::Parameter(format!(
-                "the padded {name} would be {padded} pixels; at least 1 is wanted"
-            )))
+            Err(ParameterError::PaddedSide { axis, got: padded })
         };
         let size = Size::new(
             side("width", image.width(), left, right)?,
             side("height", image.height(), top, bottom)?,
         );
         if size.width.saturating_mul(size.height) > i32::MAX as usize {
-            return Err(HogError::Parameter(format!(
-                "the padded image would have {} x {} pixels; at most 2^31 - 1 are allowed",
-                size.width, size.height
-            )));
+            return Err(ParameterError::PaddedArea { width: size.width, height: size.height }.into());
         }
-        Ok((gradient(image, Padding { left, top, size }, &self.spec), size))
+        Ok((exact::gradient(image, Padding { left, top, size }, &self.spec, &self.tables), size))
     }
 
     /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).
@@ -139,16 +103,14 @@ impl Hog {
         search: &Search,
         locations: Option<&[(i64, i64)]>,
     ) -> Result<usize> {
-        let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
-        let count = locations.map_or(grid.len(), <[_]>::len);
-        let elements = count.saturating_mul(self.spec.descriptor_len());
-        if elements > i32::MAX as usize {
-            return Err(HogError::Parameter(format!(
-                "{count} windows of {} elements are too many for one array; use a larger winStride",
-                self.spec.descriptor_len()
-            )));
+        let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
+        let windows = locations.map_or(grid.len(), <[_]>::len);
+        let elements = self.spec.descriptor_len();
+        let all = windows.saturating_mul(elements);
+        if all > i32::MAX as usize {
+            return Err(ParameterError::Descriptors { windows, elements }.into());
         }
-        Ok(elements)
+        Ok(all)
     }
 
     /// Writes the descriptors whose elements [`Hog::compute_len`] counts, one after the other, into `out`.
@@ -161,14 +123,14 @@ impl Hog {
         locations: Option<&[(i64, i64)]>,
         out: &mut [f32],
     ) -> Result<()> {
-        let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
+        let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
         let Some(locations) = locations else {
-            reference::descriptors(image, &grid, &self.spec, out);
+            exact::descriptors(image, &grid, &self.spec, &self.tables, out);
             return Ok(());
         };
         let places: Vec<_> = locations.iter().map(|&at| grid.to_padded(at, &self.spec)).collect();
         let inside: Vec<_> = places.iter().flatten().copied().collect();
-        let mut windows = reference::Windows::new(image, &grid, &inside, &self.spec);
+        let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables);
         for (place, out) in places.into_iter().zip(out.chunks_exact_mut(self.spec.descriptor_len().max(1))) {
             match place {
                 Some(at) => out.copy_from_slice(windows.descriptor(at)),
@@ -187,15 +149,13 @@ impl Hog {
         search: &Search,
         locations: Option<&[(i64, i64)]>,
     ) -> Result<Vec<Hit>> {
-        let grid = self.steps(search, self.spec.cell)?.grid(size_of(image), &self.spec);
+        let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
-            let hits =
-                |fast: Option<Fast>| self.hits(image, fast, size_of(image), &grid, search.hit_threshold, svm);
-            return self.with_fast(image, false, hits);
+            return self.with_scorer(image, svm, search, false, |scorer| scorer.hits(image.size(), &grid));
         };
         let inside: Vec<_> = locations.iter().filter_map(|&at| grid.to_padded(at, &self.spec)).collect();
-        let mut windows = reference::Windows::new(image, &grid, &inside, &self.spec);
+        let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables);
         let scored = inside.iter().map(|&at| Hit::new(&grid, at, windows.score(at, svm)));
         Ok(scored.filter(|hit| hit.weight >= search.hit_threshold).collect())
     }
@@ -214,18 +174,18 @@ impl Hog {
     ) -> Result<Vec<(Rect, f64)>> {
         let steps = self.steps(search, self.spec.stride)?;
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
-        let levels = levels(size_of(image), scale, &self.spec);
-        let mut candidates = Vec::new();
-        // Mean-shift truncates to whole pixels: there the last bit of a weight may tell.
+        let levels = levels(image.size(), scale, &self.spec);
+        // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
         let exact_weights = matches!(grouping, Grouping::MeanShift(_));
-        self.with_fast(image, exact_weights, |fast| {
-            let of_level =
-                |level: &Level| self.level_candidates(image, fast, level, &steps, search.hit_threshold, svm);
+        let search_levels = |scorer: &Scorer| -> Result<Vec<Candidate>> {
+            let of_level = |level: &Level| self.level_candidates(scorer, level, &steps);
+            let mut candidates = Vec::new();
             for found in in_order(&levels, threads, of_level) {
                 candidates.append(&mut found?);
             }
-            Ok(())
-        })?;
+            Ok(candidates)
+        };
+        let candidates = self.with_scorer(image, svm, search, exact_weights, search_levels)?;
         let win = self.spec.win;
         let found = match grouping {
             Grouping::Similar(threshold) => group_candidates(&candidates, threshold),
@@ -240,148 +200,34 @@ impl Hog {
         Steps::new(search.win_stride, search.padding, default_stride, &self.spec)
     }
 
-    /// Runs `work` with the fast path, if there is one.
-    fn with_fast<R>(&self, image: ImageView, exact_weights: bool, work: impl FnOnce(Option<Fast>) -> R) -> R {
-        let Some(plan) = &self.fast else { return work(None) };
-        let doubt = if exact_weights || plan.noise() > NOISE_MAX { f64::INFINITY } else { plan.noise() };
+    /// Runs `work` with a scorer of the image: by the fast path, where the geometry has one.
+    fn with_scorer<R>(
+        &self,
+        image: ImageView,
+        svm: &Svm,
+        search: &Search,
+        exact_weights: bool,
+        work: impl FnOnce(&Scorer) -> R,
+    ) -> R {
+        let Self { spec, tables, plan, backend, .. } = self;
+        let hit_threshold = search.hit_threshold;
+        let exact = Scorer { image, spec, tables, svm, hit_threshold, fast: None };
+        let Some(plan) = plan else { return work(&exact) };
+        let error = plan.score_error_bound();
+        let rescore_margin = if exact_weights || error > SCORE_ERROR_MAX { f64::INFINITY } else { error };
         PLANES.with(|planes| {
-            simd::split(self.backend, planes, image);
-            work(Some(Fast { plan, planes, doubt }))
+            fast::fill_planes(*backend, planes, image);
+            work(&Scorer { fast: Some(Fast { backend: *backend, plan, planes, rescore_margin }), ..exact })
         })
     }
 
-    fn level_candidates(
-        &self,
-        image: ImageView,
-        fast: Option<Fast>,
-        level: &Level,
-        steps: &Steps,
-        hit_threshold: f64,
-        svm: &Svm,
-    ) -> Result<Vec<Candidate>> {
-        let grid = steps.grid(level.size, &self.spec);
-        let hits = self.hits(image, fast, level.size, &grid, hit_threshold, svm)?;
+    fn level_candidates(&self, scorer: &Scorer, level: &Level, steps: &Steps) -> Result<Vec<Candidate>> {
+        let hits = scorer.hits(level.size, &steps.grid(level.size, &self.spec))?;
         let candidate = |hit: &Hit| Candidate {
             rect: to_image(hit.x, hit.y, level.scale, &self.spec),
             weight: hit.weight,
             scale: level.scale,
         };
         Ok(hits.iter().map(candidate).collect())
-    }
-
-    /// The hits among all windows of the image shrunk to `size`, row by row.
-    fn hits(
-        &self,
-        image: ImageView,
-        fast: Option<Fast>,
-        size: Size,
-        grid: &Grid,
-        hit_threshold: f64,
-        svm: &Svm,
-    ) -> Result<Vec<Hit>> {
-        if let Some(Fast { plan, planes, doubt }) = fast
-            && simd::serves(grid)
-        {
-            return SCRATCH.with(|scratch| {
-                simd::detect(self.backend, plan, planes, size, grid, hit_threshold, scratch);
-                let sure = |score: f64| (score - hit_threshold).abs() > doubt;
-                let hits = |weigh: &dyn Fn(usize, usize, f64) -> f64| {
-                    let found = scratch.found.iter();
-                    let weighed = found.map(|&(x, y, score)| Hit::new(grid, (x, y), weigh(x, y, score)));
-                    Ok(weighed.filter(|hit| hit.weight >= hit_threshold).collect())
-                };
-                let close = scratch.found.iter().filter(|&&(_, _, score)| !sure(score)).count();
-                if close == 0 {
-                    return hits(&|_, _, score| score);
-                }
-                let level = Shrunk::new(image, size)?;
-                let level = level.view()?;
-                // Neighbouring windows share pixels and blocks: many are scored all at once.
-                let many = close * self.spec.win.area() > grid.padded.area();
-                let all = if many { reference::scores(level, grid, &self.spec, svm) } else { Vec::new() };
-                hits(&|x, y, score| {
-                    let index = y / grid.stride.height * grid.windows.width + x / grid.stride.width;
-                    let one = || reference::window_score(level, grid, (x, y), &self.spec, svm);
-                    if sure(score) { score } else { all.get(index).copied().unwrap_or_else(one) }
-                })
-            });
-        }
-        let level = Shrunk::new(image, size)?;
-        let scores = reference::scores(level.view()?, grid, &self.spec, svm);
-        let place = |index: usize| {
-            let (i, j) = (index % grid.windows.width, index / grid.windows.width);
-            (i * grid.stride.width, j * grid.stride.height)
-        };
-        let found = scores.into_iter().enumerate().filter(|&(_, weight)| weight >= hit_threshold);
-        Ok(found.map(|(index, weight)| Hit::new(grid, place(index), weight)).collect())
-    }
-}
-
-/// The image at a level's size.
-struct Shrunk<'a> {
-    image: ImageView<'a>,
-    /// Its size and pixels, unless it is the image itself.
-    pixels: Option<(Size, Vec<u8>)>,
-}
-
-impl<'a> Shrunk<'a> {
-    fn new(image: ImageView<'a>, size: Size) -> Result<Self> {
-        let pixels = if size == size_of(image) { None } else { Some((size, resize(image, size)?)) };
-        Ok(Self { image, pixels })
-    }
-
-    fn view(&self) -> Result<ImageView<'_>> {
-        let Some((size, pixels)) = &self.pixels else { return Ok(self.image) };
-        let channels = self.image.channels();
-        ImageView::new(pixels, size.width, size.height, channels, size.width * channels)
-    }
-}
-
-fn size_of(image: ImageView) -> Size {
-    Size::new(image.width(), image.height())
-}
-
-/// `work` of every item, on up to `threads` threads fed from one queue; results in the items' order.
-fn in_order<T: Sync, R: Send>(items: &[T], threads: usize, work: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let threads = threads.clamp(1, items.len().max(1));
-    if threads == 1 {
-        return items.iter().map(work).collect();
-    }
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(Vec::with_capacity(items.len()));
-    let worker = || {
-        while let Some((index, item)) = {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            items.get(index).map(|item| (index, item))
-        } {
-            let result = work(item);
-            done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, result));
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..threads {
-            scope.spawn(worker);
-        }
-        worker();
-    });
-    let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    done.sort_unstable_by_key(|&(index, _)| index);
-    done.into_iter().map(|(_, result)| result).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn results_come_in_order_whatever_the_number_of_threads() {
-        let items: Vec<usize> = (0..100).collect();
-        for threads in [1, 2, 8, 200] {
-            assert_eq!(
-                in_order(&items, threads, |&i| i * i),
-                items.iter().map(|i| i * i).collect::<Vec<_>>()
-            );
-        }
-        assert!(in_order(&[] as &[u8], 4, |_| 0).is_empty());
     }
 }

@@ -1,15 +1,16 @@
-//! What the detector refuses, each with its numbers.
+//! What the detector refuses: closed enums with the numbers that came, one enum per exception of Python.
 
 use thiserror::Error;
 
+use crate::geometry::Size;
+
 /// Every way in which input can be refused; nothing else can fail.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum HogError {
     /// Window, block, stride and cell sizes do not fit together.
-    #[error("{0}")]
-    Geometry(String),
-    /// The linear SVM has not one coefficient per descriptor element (and perhaps a bias).
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// The number of the linear SVM's coefficients is neither that of the descriptor's elements nor one more (the bias).
     #[error("the detector has {got} coefficients; this geometry needs {wanted} or {} (with bias last)", wanted + 1)]
     DetectorSize {
         /// How many coefficients came.
@@ -18,14 +19,192 @@ pub enum HogError {
         wanted: usize,
     },
     /// The image is not one this detector can read.
-    #[error("{0}")]
-    Image(String),
+    #[error(transparent)]
+    Image(#[from] ImageError),
     /// A search parameter lies outside its range.
-    #[error("{0}")]
-    Parameter(String),
-    /// The forced instruction set is unknown, or this CPU has not got it.
-    #[error("{0}")]
-    Backend(String),
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// The forced instruction set is unknown, or this CPU does not have it.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+}
+
+/// A geometry that [`HogSpec`](crate::HogSpec) refuses.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum GeometryError {
+    /// A size is not positive, or too large.
+    #[error("{name} is ({x}, {y}); both sides must be 1 to {most} pixels")]
+    Side {
+        /// The argument, in OpenCV's words.
+        name: &'static str,
+        /// Side along x [px].
+        x: i64,
+        /// Side along y [px].
+        y: i64,
+        /// The largest side allowed [px].
+        most: i64,
+    },
+    /// The number of orientation bins is out of range.
+    #[error("nbins is {got}; it must be 1 to 256")]
+    Bins {
+        /// How many bins were asked for.
+        got: i64,
+    },
+    /// The block does not hold a whole number of cells.
+    #[error("blockSize ({}, {}) must be a multiple of cellSize ({}, {})", block.width, block.height, cell.width, cell.height)]
+    Cells {
+        /// Block [px].
+        block: Size,
+        /// Cell [px].
+        cell: Size,
+    },
+    /// The number of levels is not positive.
+    #[error("nlevels is {got}; it must be at least 1")]
+    Levels {
+        /// How many levels were asked for.
+        got: i64,
+    },
+    /// The window does not hold a whole number of block strides beyond its first block.
+    #[error("window {axis} {window} minus block {axis} {block} must be a multiple of block stride {stride}")]
+    Stride {
+        /// "width" or "height".
+        axis: &'static str,
+        /// Window along the axis [px].
+        window: usize,
+        /// Block along the axis [px].
+        block: usize,
+        /// Block stride along the axis [px].
+        stride: usize,
+    },
+    /// A descriptor has more elements than an array of OpenCV can hold.
+    #[error("a window's descriptor would have {elements} elements")]
+    DescriptorLength {
+        /// Elements of one window.
+        elements: usize,
+    },
+}
+
+/// An image that [`ImageView`](crate::ImageView) refuses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum ImageError {
+    /// An array is neither rows and columns, nor rows, columns and channels.
+    #[error("an image has 2 or 3 dimensions, this array has {got}")]
+    Dimensions {
+        /// Dimensions of the array.
+        got: usize,
+    },
+    /// Neither gray nor colour.
+    #[error("the image has {got} channels; 1 or 3 are wanted")]
+    Channels {
+        /// Channels of the image.
+        got: usize,
+    },
+    /// No pixels.
+    #[error("the image is empty: {width} x {height} pixels")]
+    Empty {
+        /// Width [px].
+        width: usize,
+        /// Height [px].
+        height: usize,
+    },
+    /// Coordinates would overflow.
+    #[error("the image is too large: {width} x {height} pixels")]
+    TooLarge {
+        /// Width [px].
+        width: usize,
+        /// Height [px].
+        height: usize,
+    },
+    /// The pixels leave the data.
+    #[error(
+        "{len} bytes with a row stride of {row_stride} do not hold {width} x {height} x {channels} pixels"
+    )]
+    Data {
+        /// Bytes of data.
+        len: usize,
+        /// Bytes from row to row.
+        row_stride: usize,
+        /// Width [px].
+        width: usize,
+        /// Height [px].
+        height: usize,
+        /// Channels of the image.
+        channels: usize,
+    },
+    /// A level without pixels.
+    #[error("cannot resize to {width} x {height} pixels")]
+    Resize {
+        /// Wanted width [px].
+        width: usize,
+        /// Wanted height [px].
+        height: usize,
+    },
+}
+
+/// A search that cannot be made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum ParameterError {
+    /// The window stride does not move forward.
+    #[error("winStride is ({x}, {y}); both must be 1 pixel or more")]
+    WinStride {
+        /// Stride along x [px].
+        x: i64,
+        /// Stride along y [px].
+        y: i64,
+    },
+    /// More padding than allowed.
+    #[error("padding is {got}; at most {most} pixels are allowed")]
+    Padding {
+        /// Padding along one axis [px].
+        got: i64,
+        /// The most allowed [px].
+        most: i64,
+    },
+    /// A crop leaves no pixels, or a side overflows.
+    #[error("the padded {axis} would be {got} pixels; at least 1 is wanted")]
+    PaddedSide {
+        /// "width" or "height".
+        axis: &'static str,
+        /// Side of the padded image [px].
+        got: i64,
+    },
+    /// The padded image has more pixels than an array of OpenCV can hold.
+    #[error("the padded image would have {width} x {height} pixels; at most 2^31 - 1 are allowed")]
+    PaddedArea {
+        /// Width of the padded image [px].
+        width: usize,
+        /// Height of the padded image [px].
+        height: usize,
+    },
+    /// All descriptors together have more elements than an array of OpenCV can hold.
+    #[error("{windows} windows of {elements} elements are too many for one array; use a larger winStride")]
+    Descriptors {
+        /// How many windows.
+        windows: usize,
+        /// Elements of the descriptor of each.
+        elements: usize,
+    },
+}
+
+/// A backend that cannot serve.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum BackendError {
+    /// The environment variable names none of this machine's backends.
+    #[error("{variable} is {name:?}; this machine has auto, {}", available.join(", "))]
+    Unknown {
+        /// The environment variable.
+        variable: &'static str,
+        /// What it says.
+        name: String,
+        /// The backends of this machine.
+        available: Vec<&'static str>,
+    },
+    /// This CPU does not have it.
+    #[error("this machine has no {name}")]
+    Missing {
+        /// The backend's name.
+        name: &'static str,
+    },
 }
 
 /// Shorthand for this crate's results.

@@ -1,6 +1,7 @@
 //! Borrowed views of 8-bit images, and the border rule.
 
-use crate::error::{HogError, Result};
+use crate::error::{ImageError, Result};
+use crate::geometry::Size;
 
 /// A borrowed 8-bit image: rows of interleaved pixels, `row_stride` bytes apart.
 #[derive(Debug, Clone, Copy)]
@@ -22,21 +23,18 @@ impl<'a> ImageView<'a> {
         row_stride: usize,
     ) -> Result<Self> {
         if channels != 1 && channels != 3 {
-            return Err(HogError::Image(format!("the image has {channels} channels; 1 or 3 are wanted")));
+            return Err(ImageError::Channels { got: channels }.into());
         }
         if width == 0 || height == 0 {
-            return Err(HogError::Image(format!("the image is empty: {width} x {height} pixels")));
+            return Err(ImageError::Empty { width, height }.into());
         }
         if width > i32::MAX as usize / 4 || height > i32::MAX as usize / 4 {
-            return Err(HogError::Image(format!("the image is too large: {width} x {height} pixels")));
+            return Err(ImageError::TooLarge { width, height }.into());
         }
         let row = width * channels;
         let needed = row_stride.checked_mul(height - 1).and_then(|bytes| bytes.checked_add(row));
         if row_stride < row || needed.is_none_or(|bytes| bytes > data.len()) {
-            return Err(HogError::Image(format!(
-                "{} bytes with a row stride of {row_stride} do not hold {width} x {height} x {channels} pixels",
-                data.len()
-            )));
+            return Err(ImageError::Data { len: data.len(), row_stride, width, height, channels }.into());
         }
         Ok(Self { data, width, height, channels, row_stride })
     }
@@ -49,6 +47,11 @@ impl<'a> ImageView<'a> {
     /// Height [px].
     pub fn height(&self) -> usize {
         self.height
+    }
+
+    /// Width and height [px].
+    pub fn size(&self) -> Size {
+        Size::new(self.width, self.height)
     }
 
     /// 1 (gray) or 3 (colour, in any order).

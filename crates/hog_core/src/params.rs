@@ -1,29 +1,7 @@
-//! What the user says ([`HogParams`]) and what follows from it ([`HogSpec`]): every derived count, validated once.
+//! What the user asks for ([`HogParams`]) and the counts that follow from it ([`HogSpec`]), checked once.
 
-use crate::blocks::BlockWeights;
-use crate::error::{HogError, Result};
-use crate::gradient::gamma_table;
-
-/// Width and height [px] (or a stride or padding along x and y).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Size {
-    /// Along x.
-    pub width: usize,
-    /// Along y.
-    pub height: usize,
-}
-
-impl Size {
-    /// A size of `width` by `height`.
-    pub const fn new(width: usize, height: usize) -> Self {
-        Self { width, height }
-    }
-
-    /// Width times height.
-    pub const fn area(self) -> usize {
-        self.width * self.height
-    }
-}
+use crate::error::{GeometryError, Result};
+use crate::geometry::Size;
 
 /// The constructor arguments of `cv2.HOGDescriptor`, unchecked; sizes are (x, y) [px].
 #[derive(Debug, Clone, PartialEq)]
@@ -79,7 +57,7 @@ impl HogParams {
     }
 }
 
-/// A checked geometry with all that is derived from it. Functions that take a `HogSpec` cannot fail on geometry.
+/// A checked geometry with its derived counts. Functions that take a `HogSpec` cannot fail on geometry.
 #[derive(Debug, Clone)]
 pub struct HogSpec {
     /// Detection window [px].
@@ -106,30 +84,24 @@ pub struct HogSpec {
     pub signed_gradient: bool,
     /// The block's Gaussian [px].
     pub sigma: f32,
-    /// What each pixel value stands for before the gradient.
-    pub gamma: [f32; 256],
-    /// Which pixel of a block adds how much to which cell.
-    pub weights: BlockWeights,
 }
 
 /// Largest side that keeps every derived count far from overflow.
 const SIDE_MAX: i64 = 1 << 15;
 
-fn positive(name: &str, (x, y): (i64, i64)) -> Result<Size> {
+fn positive(name: &'static str, (x, y): (i64, i64)) -> Result<Size> {
     if (1..=SIDE_MAX).contains(&x) && (1..=SIDE_MAX).contains(&y) {
         return Ok(Size::new(x as usize, y as usize));
     }
-    Err(HogError::Geometry(format!("{name} is ({x}, {y}); both sides must be 1 to {SIDE_MAX} pixels")))
+    Err(GeometryError::Side { name, x, y, most: SIDE_MAX }.into())
 }
 
 /// Blocks along one axis; the window must hold a whole number of strides beyond the first block.
-fn blocks_along(axis: &str, win: usize, block: usize, stride: usize) -> Result<usize> {
-    if !win.abs_diff(block).is_multiple_of(stride) {
-        return Err(HogError::Geometry(format!(
-            "window {axis} {win} minus block {axis} {block} must be a multiple of block stride {stride}"
-        )));
+fn blocks_along(axis: &'static str, window: usize, block: usize, stride: usize) -> Result<usize> {
+    if !window.abs_diff(block).is_multiple_of(stride) {
+        return Err(GeometryError::Stride { axis, window, block, stride }.into());
     }
-    Ok(if win < block { 0 } else { (win - block) / stride + 1 })
+    Ok(if window < block { 0 } else { (window - block) / stride + 1 })
 }
 
 impl HogSpec {
@@ -140,16 +112,13 @@ impl HogSpec {
         let stride = positive("blockStride", params.block_stride)?;
         let cell = positive("cellSize", params.cell_size)?;
         if !(1..=256).contains(&params.nbins) {
-            return Err(HogError::Geometry(format!("nbins is {}; it must be 1 to 256", params.nbins)));
+            return Err(GeometryError::Bins { got: params.nbins }.into());
         }
         if !block.width.is_multiple_of(cell.width) || !block.height.is_multiple_of(cell.height) {
-            return Err(HogError::Geometry(format!(
-                "blockSize ({}, {}) must be a multiple of cellSize ({}, {})",
-                block.width, block.height, cell.width, cell.height
-            )));
+            return Err(GeometryError::Cells { block, cell }.into());
         }
         if params.nlevels < 1 {
-            return Err(HogError::Geometry(format!("nlevels is {}; it must be at least 1", params.nlevels)));
+            return Err(GeometryError::Levels { got: params.nlevels }.into());
         }
         let blocks = Size::new(
             blocks_along("width", win.width, block.width, stride.width)?,
@@ -160,9 +129,8 @@ impl HogSpec {
         let block_len = cells.width.saturating_mul(cells.height).saturating_mul(nbins);
         let elements = block_len.saturating_mul(blocks.width).saturating_mul(blocks.height);
         if elements > i32::MAX as usize {
-            return Err(HogError::Geometry(format!("a window's descriptor would have {elements} elements")));
+            return Err(GeometryError::DescriptorLength { elements }.into());
         }
-        let sigma = params.effective_win_sigma() as f32;
         Ok(Self {
             win,
             block,
@@ -175,9 +143,7 @@ impl HogSpec {
             gamma_correction: params.gamma_correction,
             nlevels: params.nlevels.min(i64::from(i32::MAX)) as usize,
             signed_gradient: params.signed_gradient,
-            sigma,
-            gamma: gamma_table(params.gamma_correction),
-            weights: BlockWeights::new(block, cell, sigma),
+            sigma: params.effective_win_sigma() as f32,
         })
     }
 
@@ -201,12 +167,17 @@ mod tests {
     #[test]
     fn a_geometry_that_does_not_fit_is_named_with_its_numbers() {
         let odd = HogParams { win_size: (65, 128), ..HogParams::default() };
-        let text = HogSpec::new(&odd).unwrap_err().to_string();
-        assert!(text.contains("65") && text.contains("16") && text.contains('8'), "{text}");
+        let refused = |params: &HogParams| HogSpec::new(params).unwrap_err();
+        let stride = GeometryError::Stride { axis: "width", window: 65, block: 16, stride: 8 };
+        assert_eq!(refused(&odd), stride.into());
+        assert_eq!(
+            refused(&odd).to_string(),
+            "window width 65 minus block width 16 must be a multiple of block stride 8"
+        );
         let zero = HogParams { block_stride: (8, 0), ..HogParams::default() };
-        assert!(HogSpec::new(&zero).unwrap_err().to_string().contains("blockStride is (8, 0)"));
+        assert!(refused(&zero).to_string().contains("blockStride is (8, 0); both sides must be 1 to 32768"));
         let many = HogParams { nbins: 300, ..HogParams::default() };
-        assert!(HogSpec::new(&many).unwrap_err().to_string().contains("300"));
+        assert_eq!(refused(&many), GeometryError::Bins { got: 300 }.into());
     }
 
     #[test]

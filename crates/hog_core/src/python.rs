@@ -8,6 +8,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
+use crate::error::ImageError;
 use crate::{Backend, Grouping, HogError, HogParams, ImageView, Rect, Search};
 
 type Pair = (i64, i64);
@@ -55,8 +56,7 @@ impl<'a> Pixels<'a> {
             [height, width] => (height, width, 1),
             [height, width, channels] => (height, width, channels),
             ref shape => {
-                let text = format!("an image has 2 or 3 dimensions, this array has {}", shape.len());
-                return Err(raised(py, &HogError::Image(text)));
+                return Err(raised(py, &ImageError::Dimensions { got: shape.len() }.into()));
             }
         };
         // `as_slice` also succeeds on Fortran order, with the pixels in that order.

@@ -1,90 +1,56 @@
-//! Every backend that this CPU has against the reference.
+//! The fast path on every backend of this CPU against the exact path, which scores the whole grid on its own.
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Search, model};
+mod common;
+
+use common::{Detector, Picture, assert_same, available, reached_by};
+use hog_core::group::{Candidate, clip, group_candidates, mean_shift};
+use hog_core::pyramid::{levels, resize, to_image};
+use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Rect, Search, Size, model};
 use proptest::prelude::*;
 
-fn available() -> impl Iterator<Item = Backend> {
-    Backend::ALL.into_iter().filter(|backend| backend.is_available())
+const ALL_WINDOWS: f64 = -1e9;
+
+fn hog(detector: &Detector, backend: Backend) -> Hog {
+    Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap()
 }
 
-/// A repeatable image with edges, texture and flat parts.
-fn pixels(width: usize, height: usize, channels: usize, seed: u32) -> Vec<u8> {
-    let mut state = seed.wrapping_mul(2_654_435_761) | 1;
-    let mut noise = move || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        state >> 24
-    };
-    let mut out = Vec::with_capacity(width * height * channels);
-    for y in 0..height {
-        for x in 0..width {
-            let shape = if (x / 13 + y / 29) % 3 == 0 { 170 } else { 40 + (x as u32 * 3 + y as u32) % 90 };
-            for channel in 0..channels as u32 {
-                let texture = if (x / 40 + y / 40) % 2 == 0 { noise() / 5 } else { 0 };
-                out.push((shape + texture + 7 * channel) as u8);
-            }
-        }
-    }
-    out
-}
-
-fn detector(params: &HogParams, coefficients: &[f32], backend: Backend) -> Hog {
-    Hog::with_backend(params, Some(coefficients), backend).unwrap()
-}
-
-fn daimler() -> HogParams {
-    HogParams { win_size: (48, 96), gamma_correction: false, ..HogParams::default() }
-}
-
-/// The windows that are hits, and their scores within `tolerance`.
-fn assert_same(found: &[Hit], wanted: &[Hit], tolerance: f64, what: &str) {
-    let places = |hits: &[Hit]| hits.iter().map(|hit| (hit.x, hit.y)).collect::<Vec<_>>();
-    assert_eq!(places(found), places(wanted), "{what}");
-    for (found, wanted) in found.iter().zip(wanted) {
-        let off = (found.weight - wanted.weight).abs();
-        assert!(off <= tolerance, "{what}: {} is off by {off:e}", wanted.weight);
-    }
-}
-
-/// The reference: a detector whose geometry is the same, but which is asked for each window by its place.
-fn one_by_one(hog: &Hog, image: ImageView, search: &Search, everywhere: &[Hit]) -> Vec<Hit> {
-    let places: Vec<_> = everywhere.iter().map(|hit| (hit.x, hit.y)).collect();
-    hog.detect(image, search, Some(&places)).unwrap()
-}
-
-fn compare(
-    params: &HogParams,
-    model: &[f32],
-    size: (usize, usize),
-    channels: usize,
-    search: Search,
-    seed: u32,
-) {
-    let (width, height) = size;
-    let data = pixels(width, height, channels, seed);
-    let image = ImageView::new(&data, width, height, channels, width * channels).unwrap();
+/// Every backend scores every window as the exact path does, and decides as it does where the threshold is exactly the
+/// score of a window.
+fn compare(detector: &Detector, size: (usize, usize), channels: usize, search: Search, seed: u32) {
+    let picture = Picture::new(size.0, size.1, channels, seed);
+    let image = picture.view();
+    let wanted = detector.every_window(image, &search);
     for backend in available() {
-        let what = format!("{} {width}x{height}x{channels} {search:?}", backend.name());
-        let hog = detector(params, model, backend);
-        let all = Search { hit_threshold: -1e9, ..search };
-        let found = hog.detect(image, &all, None).unwrap();
-        let wanted = one_by_one(&hog, image, &all, &found);
-        assert_same(&found, &wanted, 4e-6, &what);
-        // A threshold that is exactly a window's score: the reference decides, and the window is a hit.
-        if let Some(middle) = wanted.get(wanted.len() / 2) {
-            let at = Search { hit_threshold: middle.weight, ..search };
-            let found = hog.detect(image, &at, None).unwrap();
-            let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= middle.weight).collect();
-            assert_same(&found, &hits, 4e-6, &what);
+        let what = format!("{} {size:?}x{channels} {search:?}", backend.name());
+        let hog = hog(detector, backend);
+        let found = hog.detect(image, &Search { hit_threshold: ALL_WINDOWS, ..search }, None).unwrap();
+        assert_same(&found, &wanted, detector.rounding(), &what);
+        if wanted.is_empty() {
+            continue;
+        }
+        for share in [0.0, 0.02, 0.5] {
+            let hit_threshold = reached_by(&wanted, share);
+            let found = hog.detect(image, &Search { hit_threshold, ..search }, None).unwrap();
+            let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
+            assert_same(&found, &hits, detector.rounding(), &format!("{what} at {hit_threshold}"));
         }
     }
+}
+
+const STEPS: Search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (4, 4) };
+
+/// `cases`, unless PROPTEST_CASES says otherwise.
+fn cases(cases: u32) -> ProptestConfig {
+    let config = ProptestConfig::default();
+    if std::env::var_os("PROPTEST_CASES").is_some() { config } else { ProptestConfig { cases, ..config } }
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(cases(24))]
 
     #[test]
-    fn every_backend_finds_what_the_reference_finds(
+    fn every_backend_finds_what_the_exact_path_finds(
         width in 1usize..260,
         height in 1usize..200,
         colour in any::<bool>(),
@@ -94,86 +60,195 @@ proptest! {
         seed in any::<u32>(),
     ) {
         let search = Search { hit_threshold: 0.0, win_stride: (4 * stride.0, 4 * stride.1), padding };
-        let channels = if colour { 3 } else { 1 };
-        if people {
-            compare(&HogParams::default(), model::default_people(), (width, height), channels, search, seed);
-        } else {
-            compare(&daimler(), model::daimler_people(), (width, height), channels, search, seed);
-        }
+        let detector = if people { Detector::people() } else { Detector::daimler() };
+        compare(&detector, (width, height), if colour { 3 } else { 1 }, search, seed);
     }
 }
 
 #[test]
 fn every_width_up_to_200_is_served() {
-    let search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (4, 4) };
     for width in 1..=200 {
-        compare(&daimler(), model::daimler_people(), (width, 97), 1, search, width as u32);
+        compare(&Detector::daimler(), (width, 97), 1, STEPS, width as u32);
     }
 }
 
 #[test]
 fn every_height_up_to_200_is_served() {
-    let search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (4, 4) };
     for height in 1..=200 {
-        compare(&daimler(), model::daimler_people(), (61, height), 3, search, height as u32);
+        compare(&Detector::daimler(), (61, height), 3, STEPS, height as u32);
     }
 }
 
 #[test]
-fn pyramids_are_equal_on_every_backend_at_every_number_of_threads() {
-    let (width, height) = (333, 251);
-    let data = pixels(width, height, 3, 5);
-    let image = ImageView::new(&data, width, height, 3, width * 3).unwrap();
-    let search = Search { hit_threshold: -3.0, win_stride: (8, 8), padding: (4, 4) };
-    let mut answers = Vec::new();
-    for backend in available() {
-        let hog = detector(&HogParams::default(), model::default_people(), backend);
-        for threads in [1, 2, 5] {
-            let found = hog.detect_multi_scale(image, &search, 1.05, Grouping::Similar(0), threads).unwrap();
-            assert!(!found.is_empty());
-            answers.push(found.into_iter().map(|(rect, _)| rect).collect::<Vec<_>>());
+fn images_that_are_made_in_several_bands_are_scored_alike() {
+    // A band is 384 KB of pixels: 272 rows of the gray image, 128 and 160 of those in colour.
+    compare(&Detector::people(), (1100, 620), 1, STEPS, 1);
+    compare(&Detector::people(), (650, 410), 3, STEPS, 2);
+    compare(&Detector::daimler(), (501, 330), 3, Search { win_stride: (4, 12), ..STEPS }, 3);
+}
+
+#[test]
+fn a_window_as_large_as_the_kernels_serve_is_scored_alike() {
+    // 20 × 20 blocks, with clipping off and on.
+    for l2_hys_threshold in [1.0, 0.2, 0.05] {
+        let params = HogParams { win_size: (168, 168), l2_hys_threshold, ..HogParams::default() };
+        let coefficients = (0..36 * 400).map(|i| ((i * i % 511) as f32 - 255.0) / 4e3).collect();
+        compare(&Detector { params, coefficients }, (200, 190), 3, STEPS, 4);
+    }
+}
+
+#[test]
+fn a_detector_that_is_a_windows_own_descriptor_is_scored_alike() {
+    // The largest sums that the prefilter can meet: weights in the direction of the features.
+    for (seed, scale) in [(1, 0.1), (2, 1.0)] {
+        let picture = Picture::new(150, 200, 3, seed);
+        let params = HogParams::default();
+        let hog = Hog::new(&params, None).unwrap();
+        let mut own = vec![0.0; 3780];
+        hog.compute(picture.view(), &STEPS, Some(&[(16, 24)]), &mut own).unwrap();
+        let coefficients = own.iter().map(|x| scale * x).collect();
+        compare(&Detector { params, coefficients }, (150, 200), 3, STEPS, seed);
+    }
+}
+
+/// All hits of a pyramid, by the exact path alone.
+fn candidates(detector: &Detector, image: ImageView, search: &Search, scale: f64) -> Vec<Candidate> {
+    let (spec, mut found) = (detector.spec(), Vec::new());
+    let steps = Search { win_stride: (8, 8), ..*search };
+    for level in levels(Size::new(image.width(), image.height()), scale, &spec) {
+        let shrunk = resize(image, level.size).unwrap();
+        let (width, channels) = (level.size.width, image.channels());
+        let shrunk = ImageView::new(&shrunk, width, level.size.height, channels, width * channels).unwrap();
+        let hits = detector.every_window(shrunk, &steps);
+        found.extend(hits.iter().filter(|hit| hit.weight >= search.hit_threshold).map(|hit| Candidate {
+            rect: to_image(hit.x, hit.y, level.scale, &spec),
+            weight: hit.weight,
+            scale: level.scale,
+        }));
+    }
+    found
+}
+
+fn rects(found: &[(Rect, f64)]) -> Vec<Rect> {
+    found.iter().map(|&(rect, _)| rect).collect()
+}
+
+#[test]
+fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_threads() {
+    for (size, channels) in [((333, 251), 3), ((700, 520), 3), ((1001, 500), 1)] {
+        let picture = Picture::new(size.0, size.1, channels, 5);
+        let (image, mut detector) = (picture.view(), Detector::people());
+        // A bias that lets a few windows in a hundred score more than 0.
+        detector.coefficients[3780] -= reached_by(&detector.every_window(image, &STEPS), 0.03) as f32;
+        let search = STEPS;
+        let candidates = candidates(&detector, image, &search, 1.1);
+        let inside = |found| clip(found, size.0 as i32, size.1 as i32);
+        let every = inside(group_candidates(&candidates, 0));
+        let grouped = inside(group_candidates(&candidates, 2));
+        let modes = inside(mean_shift(&candidates, 0.1, (64, 128)));
+        let counts = [every.len(), grouped.len(), modes.len()];
+        assert!(counts.iter().zip([50, 3, 3]).all(|(count, least)| *count >= least), "too few: {counts:?}");
+        for backend in available() {
+            let hog = hog(&detector, backend);
+            for threads in [1, 2, 5] {
+                let detect =
+                    |grouping| hog.detect_multi_scale(image, &search, 1.1, grouping, threads).unwrap();
+                let found = detect(Grouping::Similar(0));
+                assert_eq!(rects(&found), rects(&every), "{}", backend.name());
+                let off = found.iter().zip(&every).map(|(found, wanted)| (found.1 - wanted.1).abs());
+                assert!(off.fold(0.0, f64::max) <= detector.rounding(), "{}", backend.name());
+                assert_eq!(rects(&detect(Grouping::Similar(2))), rects(&grouped), "{}", backend.name());
+            }
+            // Mean-shift is given exact weights: not a bit differs.
+            let found = hog.detect_multi_scale(image, &search, 1.1, Grouping::MeanShift(0.1), 2).unwrap();
+            assert_eq!(found, modes, "{}", backend.name());
         }
     }
-    assert!(answers.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
 #[test]
-fn many_hits_of_a_loud_detector_weigh_what_each_weighs_alone() {
+fn many_hits_of_a_loud_detector_weigh_what_each_weighs_exactly() {
     // Weights of hundreds: the kernels' sums are too coarse, and every hit is weighed exactly.
-    let loud: Vec<f32> = model::default_people().iter().map(|w| 1e4 * w).collect();
-    let data = pixels(150, 170, 3, 9);
-    let image = ImageView::new(&data, 150, 170, 3, 450).unwrap();
-    let hog = Hog::new(&HogParams::default(), Some(&loud)).unwrap();
-    for hit_threshold in [-1e9, -1e4] {
-        let search = Search { hit_threshold, win_stride: (8, 4), padding: (8, 8) };
-        let found = hog.detect(image, &search, None).unwrap();
-        assert!(!found.is_empty());
-        assert_same(&found, &one_by_one(&hog, image, &search, &found), 0.0, "loud");
+    let mut detector = Detector::people();
+    detector.coefficients.iter_mut().for_each(|weight| *weight *= 1e4);
+    let picture = Picture::new(150, 170, 3, 9);
+    let search = Search { hit_threshold: ALL_WINDOWS, win_stride: (8, 4), padding: (8, 8) };
+    let wanted = detector.every_window(picture.view(), &search);
+    for backend in available() {
+        for share in [0.1, 1.0] {
+            let hit_threshold = reached_by(&wanted, share);
+            let found =
+                hog(&detector, backend).detect(picture.view(), &Search { hit_threshold, ..search }, None);
+            let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
+            assert_same(&found.unwrap(), &hits, 0.0, backend.name());
+        }
     }
 }
 
 #[test]
-fn a_detector_with_a_weight_that_is_no_number_scores_as_the_reference_does() {
-    let mut model = model::default_people().to_vec();
-    model[7] = f32::NAN;
-    let data = pixels(64, 128, 1, 3);
-    let image = ImageView::new(&data, 64, 128, 1, 64).unwrap();
-    let search = Search { hit_threshold: -1e9, win_stride: (8, 8), padding: (0, 0) };
+fn geometries_without_kernels_and_odd_strides_find_what_the_exact_path_finds() {
+    let geometry = |win_size, block_size, block_stride, cell_size, nbins| HogParams {
+        win_size,
+        block_size,
+        block_stride,
+        cell_size,
+        nbins,
+        ..HogParams::default()
+    };
+    let cases = [
+        (HogParams::default(), (5, 3)),
+        (HogParams::default(), (6, 8)),
+        (geometry((36, 60), (12, 12), (6, 6), (6, 6), 9), (6, 6)),
+        (geometry((40, 40), (8, 8), (8, 8), (8, 8), 7), (8, 8)),
+    ];
+    let picture = Picture::new(131, 170, 3, 6);
+    let image = picture.view();
+    for (params, win_stride) in cases {
+        let len = hog_core::HogSpec::new(&params).unwrap().descriptor_len();
+        let coefficients = (0..=len).map(|i| ((i * i % 511) as f32 - 255.0) / 4e3).collect();
+        let detector = Detector { params, coefficients };
+        let search = Search { win_stride, ..STEPS };
+        let wanted = detector.every_window(image, &search);
+        let hit_threshold = reached_by(&wanted, 0.3);
+        let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
+        for backend in available() {
+            let hog = hog(&detector, backend);
+            let found = hog.detect(image, &Search { hit_threshold, ..search }, None).unwrap();
+            assert_same(&found, &hits, 0.0, backend.name());
+            // The same windows, each asked for by its place.
+            let places: Vec<_> = wanted.iter().map(|hit| (hit.x, hit.y)).collect();
+            let all = Search { hit_threshold: ALL_WINDOWS, ..search };
+            assert_same(&hog.detect(image, &all, Some(&places)).unwrap(), &wanted, 0.0, backend.name());
+        }
+    }
+}
+
+#[test]
+fn a_detector_with_a_weight_that_is_no_number_has_no_hits() {
+    let mut detector = Detector::people();
+    detector.coefficients[7] = f32::NAN;
+    let picture = Picture::new(64, 128, 1, 3);
+    let search = Search { hit_threshold: ALL_WINDOWS, win_stride: (8, 8), padding: (0, 0) };
+    assert!(detector.every_window(picture.view(), &search)[0].weight.is_nan());
     for backend in available() {
-        let hog = detector(&HogParams::default(), &model, backend);
-        assert!(hog.detect(image, &search, None).unwrap().is_empty());
+        assert!(hog(&detector, backend).detect(picture.view(), &search, None).unwrap().is_empty());
     }
 }
 
 #[test]
 fn a_threshold_that_is_no_number_has_no_hits_and_minus_infinity_has_all() {
-    let data = pixels(80, 136, 1, 3);
-    let image = ImageView::new(&data, 80, 136, 1, 80).unwrap();
+    let picture = Picture::new(80, 136, 1, 3);
     for backend in available() {
-        let hog = detector(&HogParams::default(), model::default_people(), backend);
+        let hog = hog(&Detector::people(), backend);
         for (hit_threshold, count) in [(f64::NAN, 0), (f64::NEG_INFINITY, 6), (f64::INFINITY, 0)] {
             let search = Search { hit_threshold, win_stride: (8, 8), padding: (0, 0) };
-            assert_eq!(hog.detect(image, &search, None).unwrap().len(), count);
+            assert_eq!(hog.detect(picture.view(), &search, None).unwrap().len(), count);
         }
     }
+}
+
+#[test]
+fn the_models_fit_their_geometries() {
+    assert_eq!(Detector::people().spec().descriptor_len() + 1, model::default_people().len());
+    assert_eq!(Detector::daimler().spec().descriptor_len() + 1, model::daimler_people().len());
 }

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import gc
-import statistics
-import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +15,18 @@ from rich.console import Console
 from rich.table import Table
 
 import limo_hog
-from limo_hog.cli.support.arguments import size, threads
+from limo_hog.cli.support.arguments import output_file, size, threads
 from limo_hog.cli.support.environment import cores, environment
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
+from limo_hog.cli.support.race import Rounds, Timing, race
 from limo_hog.cli.support.scene import street
 from limo_hog.exceptions import LimoHogError
 
 #: The workshop's parameters.
 PARAMETERS: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
 SIZES = [(640, 480), (1280, 720), (1920, 1080)]
-SECONDS_A_ROW, LEAST_ROUNDS, MOST_ROUNDS = 3.0, 5, 200
+ROUNDS = Rounds(seconds=3.0)
 
 Image = NDArray[np.uint8]
 
@@ -38,16 +36,8 @@ class ParityError(LimoHogError):
 
 
 @dataclass(frozen=True)
-class Timing:
-    """Milliseconds of a call: the least, and the median."""
-
-    min: float
-    p50: float
-
-
-@dataclass(frozen=True)
 class Row:
-    """One size, channel count and thread count; what concerns cv2 is None where there is no cv2 with HOG."""
+    """The result for one size, channel count and thread count; without an OpenCV that has HOG, its fields are None."""
 
     size: tuple[int, int]
     channels: int
@@ -71,13 +61,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--channels", choices=["gray", "bgr"], help="only this kind of image (both)")
     parser.add_argument("--threads", type=threads, nargs="+", metavar="N", help="thread counts, 0 for all cores (1 0)")
     parser.add_argument("--image", type=Path, metavar="FILE", help="a picture instead of the drawn street")
-    parser.add_argument("--json", metavar="FILE", help="write the result as JSON; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write the result as JSON; - is standard output"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Bench every combination, print a table and, if asked, JSON."""
     facts = environment()
-    rival = _rival() if facts["opencv_has_hog"] else None
+    opencv = _opencv() if facts["opencv_has_hog"] else None
     images = [
         (_picture(size, channels, args.image))
         for size in (args.size or ([None] if args.image else SIZES))
@@ -90,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         task = bar.add_task("timing", total=len(images) * len(counts))
         for image in images:
             for count in counts:
-                rows.append(_row(image, count, str(facts["backend"]), rival))
+                rows.append(_row(image, count, str(facts["backend"]), opencv))
                 bar.advance(task)
     if args.json:
         write_json(args.json, {"environment": facts, "rows": [asdict(row) for row in rows]})
@@ -117,7 +109,7 @@ def _picture(size: tuple[int, int] | None, channels: int, path: Path | None) -> 
     return image if channels == 3 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
 
 
-def _rival() -> Any:
+def _opencv() -> Any:
     import cv2
 
     hog = cv2.HOGDescriptor()
@@ -125,55 +117,30 @@ def _rival() -> Any:
     return hog
 
 
-def _row(image: Image, threads: int, backend: str, rival: Any) -> Row:
+def _row(image: Image, threads: int, backend: str, opencv: Any) -> Row:
     hog = limo_hog.HOGDescriptor()
     hog.setSVMDetector(limo_hog.HOGDescriptor_getDefaultPeopleDetector())
     limo_hog.set_num_threads(threads)
     height, width = image.shape[:2]
     size, channels = (width, height), 1 if image.ndim == 2 else 3
-    if rival is None:
-        (ours,) = _race([lambda: hog.detectMultiScale(image, **PARAMETERS)])
+    if opencv is None:
+        (ours,) = race([partial(hog.detectMultiScale, image, **PARAMETERS)], ROUNDS)
         return Row(size, channels, threads, backend, ours, None, None, None, None)
     import cv2
 
-    # With several threads cv2 now and then pairs a rectangle with another's weight: it is judged with one.
+    # With several threads cv2 now and then pairs a rectangle with another's weight: parity is checked with one.
     cv2.setNumThreads(1)
-    equal, difference = _parity(hog, rival, image)
+    equal, difference = _parity(hog, opencv, image)
     cv2.setNumThreads(threads)
-    ours, theirs = _race(
-        [
-            lambda: hog.detectMultiScale(image, **PARAMETERS),
-            lambda: rival.detectMultiScale(image, **PARAMETERS),
-        ]
-    )
+    ours, theirs = race([partial(each.detectMultiScale, image, **PARAMETERS) for each in (hog, opencv)], ROUNDS)
     return Row(size, channels, threads, backend, ours, theirs, theirs.min / ours.min, equal, difference)
 
 
-def _race(calls: list[Callable[[], object]]) -> list[Timing]:
-    """Time calls in turn, so that whatever slows the machine down slows them all."""
-    times: list[list[float]] = [[] for _ in calls]
-    for call in calls:
-        call()
-    gc.disable()
-    start = time.perf_counter()
-    try:
-        while len(times[0]) < LEAST_ROUNDS or (
-            len(times[0]) < MOST_ROUNDS and time.perf_counter() - start < SECONDS_A_ROW
-        ):
-            for call, spent in zip(calls, times, strict=True):
-                before = time.perf_counter()
-                call()
-                spent.append(1e3 * (time.perf_counter() - before))
-    finally:
-        gc.enable()
-    return [Timing(min(spent), statistics.median(spent)) for spent in times]
-
-
-def _parity(hog: Any, rival: Any, image: Image) -> tuple[bool, float | None]:
+def _parity(hog: Any, opencv: Any, image: Image) -> tuple[bool, float | None]:
     """Compare rectangles, grouped and raw, and the weights of equal ones."""
     worst = 0.0
     for group in (2, 0):
-        ours, theirs = (_found(h.detectMultiScale(image, **PARAMETERS, groupThreshold=group)) for h in (hog, rival))
+        ours, theirs = (_found(h.detectMultiScale(image, **PARAMETERS, groupThreshold=group)) for h in (hog, opencv))
         if [rect for rect, _ in ours] != [rect for rect, _ in theirs]:
             return False, None
         for (_, a), (_, b) in zip(ours, theirs, strict=True):
@@ -189,8 +156,8 @@ def _found(result: tuple[Any, Any]) -> list[tuple[tuple[int, ...], float]]:
 
 def _print(facts: dict[str, Any], rows: list[Row]) -> None:
     console = Console(highlight=False)
-    rival = f"OpenCV {facts['opencv']}" if facts["opencv_has_hog"] else "nothing"
-    console.print(f"[bold]limo-hog {facts['limo_hog']} ({facts['backend']}) against {rival}[/]")
+    opponent = f"OpenCV {facts['opencv']}" if facts["opencv_has_hog"] else "nothing"
+    console.print(f"[bold]limo-hog {facts['limo_hog']} ({facts['backend']}) against {opponent}[/]")
     console.print(f"{facts['cpu']}, {facts['cores']} cores, Python {facts['python']}")
     if (facts["load"] or 0) > 0.5 * facts["cores"]:
         console.print(f"[yellow]The machine is busy (load {facts['load']}): do not trust these times.[/]")

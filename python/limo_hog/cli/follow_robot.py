@@ -62,6 +62,6 @@ def run(args: argparse.Namespace) -> int:
         write_json(args.json, card)
     if args.json != STDOUT:
         modes = ", ".join(f"{mode} {count}" for mode, count in report.modes.items())
-        print(f"{report.frames} pictures, somebody in {report.found}; commands: {modes}")
-        print(f"answer {answer or 0:.1f} ms after a picture; messages dropped {report.dropped}", file=sys.stderr)
+        print(f"{report.frames} images, a person in {report.found}; commands: {modes}")
+        print(f"command {answer or 0:.1f} ms after an image; messages dropped {report.dropped}", file=sys.stderr)
     return 0

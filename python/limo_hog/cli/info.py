@@ -1,25 +1,27 @@
-"""`limo-hog info`: what is installed here, and what the detector makes of it."""
+"""`limo-hog info`: versions, CPU features, backend, OpenCV and extras."""
 
 from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Mapping
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from limo_hog.cli.support.environment import environment
+from limo_hog.cli.support.environment import Extra, environment, extras
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `info`."""
     subparsers.add_parser(
-        "info", description="Show versions, CPU features, the chosen backend, and what OpenCV is installed."
+        "info", description="Show versions, CPU features, the chosen backend, what OpenCV is installed, and the extras."
     )
 
 
 def run(args: argparse.Namespace) -> int:  # noqa: ARG001
-    """Print the environment as a table."""
+    """Print the environment and the extras as tables."""
     facts = environment()
     opencv = f"{facts['opencv']} ({'with' if facts['opencv_has_hog'] else 'without'} HOGDescriptor)"
     features = facts["cpu_features"]
@@ -28,16 +30,29 @@ def run(args: argparse.Namespace) -> int:  # noqa: ARG001
         "limo-hog": facts["limo_hog"],
         "backend": f"{facts['backend']} (LIMO_HOG_BACKEND={forced})" if forced else facts["backend"],
         "CPU": facts["cpu"],
-        "CPU features": ", ".join(features) if isinstance(features, list) and features else "none that count",
+        "CPU features": ", ".join(features) if isinstance(features, list) and features else "none with kernels",
         "threads": f"{facts['threads']} of {facts['cores']} cores",
-        "OpenCV": opencv if facts["opencv"] else "not installed: pip install 'limo-hog[cv]'",
+        "OpenCV": opencv if facts["opencv"] else "not installed",
         "numpy": facts["numpy"],
         "Python": f"{facts['python']} on {facts['platform']} ({facts['machine']})",
     }
+    console = Console(highlight=False)
+    console.print(_table(rows))
+    console.print("\n[bold]extras[/]")
+    console.print(_table({extra.name: _told(extra) for extra in extras()}))
+    return 0
+
+
+def _told(extra: Extra) -> str:
+    missing = f"not installed: {extra.install}" if extra.install else ""
+    return "; ".join([*extra.installed, *filter(None, [missing])])
+
+
+def _table(rows: Mapping[str, object]) -> Table:
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_column(style="bold")
     table.add_column(overflow="fold")
     for name, value in rows.items():
-        table.add_row(name, str(value))
-    Console(highlight=False).print(table)
-    return 0
+        # As text: rich would take the [cv] of an install line for a style.
+        table.add_row(name, Text(str(value)))
+    return table

@@ -10,13 +10,16 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from types import ModuleType
 
 from limo_hog.cli.support.output import UsageError, one_line
+from limo_hog.cli.support.signals import stopping
 from limo_hog.exceptions import LimoHogError
-from limo_hog.extras import MissingExtraError
+from limo_hog.extras import MissingExtraError, missing_extra
 
 #: Entry points of this group are commands: the name is the command's, the value its module.
 ENTRY_POINTS = "limo_hog.commands"
@@ -39,20 +42,24 @@ ARENA = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line and return 0 done, 1 a named error, 2 wrong arguments, 130 Ctrl-C."""
+    """Run the command line and return 0 done, 1 a named error, 2 wrong arguments, 128 + n stopped by signal n."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        code = _run(arguments)
+        with stopping():
+            code = _run(arguments)
         # What is still buffered is written here, where a closed pipe or a full disk can be answered.
         sys.stdout.flush()
-    except KeyboardInterrupt:
-        print("limo-hog: stopped", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as error:
+        with suppress(OSError):  # the terminal may be gone
+            print("limo-hog: stopped", file=sys.stderr)
+        return 128 + getattr(error, "signal", signal.SIGINT)
     except BrokenPipeError:
-        # The reader has seen enough; Python must not complain again when it closes standard output.
+        # The reader has closed the pipe; Python must not complain again when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (LimoHogError, OSError) as error:
+    except (LimoHogError, OSError, MemoryError, ModuleNotFoundError) as error:
+        if isinstance(error, ModuleNotFoundError):
+            error = missing_extra(f"limo-hog {arguments[0]}", error)
         if "--debug" in arguments:
             raise
         print(f"limo-hog: {one_line(error)}", file=sys.stderr)
@@ -81,19 +88,35 @@ def _run(arguments: list[str]) -> int:
             "--debug", action="store_true", default=argparse.SUPPRESS, help="show the traceback of an error"
         )
     try:
-        args = parser.parse_args(arguments)
+        if wanted is not None and module is None:
+            hint = _likely(wanted, commands.choices) or "limo-hog --help lists them all"
+            parser.error(f"no command {wanted!r}; {hint}")
+        args, unknown = parser.parse_known_args(arguments)
+        if unknown:
+            asked = commands.choices[wanted] if wanted else parser
+            hint = _likely(unknown[0].partition("=")[0], asked._option_string_actions)
+            asked.error("; ".join(filter(None, [f"unrecognized arguments: {' '.join(unknown)}", hint])))
     except SystemExit as exit_:
         # argparse has printed its help (0) or what was wrong (2).
         return int(exit_.code or 0)
     if args.version:
-        from importlib.metadata import version
+        import limo_hog
 
-        print(f"limo-hog {version('limo-hog')}")
+        print(f"limo-hog {limo_hog.__version__}")
         return 0
     if module is None:
         parser.print_help(sys.stderr)
         return 2
     return int(module.run(args))
+
+
+def _likely(word: str, known: Iterable[str]) -> str:
+    """Return the question whether another word was meant; nothing where none is like it."""
+    # Imported here: only a mistyped word needs it.
+    from difflib import get_close_matches
+
+    found = get_close_matches(word, list(known), 1)
+    return f"did you mean {found[0]}?" if found else ""
 
 
 def _module_of(command: str, arguments: list[str]) -> ModuleType | None:
@@ -105,7 +128,7 @@ def _module_of(command: str, arguments: list[str]) -> ModuleType | None:
         A command of the arena, which is not installed.
     """
     if command == "follow" and "--ros2" in arguments:
-        # A robot has no arena installed.
+        # The robot has no simulator.
         return importlib.import_module("limo_hog.cli.follow_robot")
     if command in BUILT_IN:
         return importlib.import_module(f"limo_hog.cli.{command}")

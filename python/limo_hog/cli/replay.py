@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import time
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,49 +17,35 @@ from rich.table import Table
 from limo_hog.cli.support.arguments import file_ending
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
-from limo_hog.detector import Detections
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
-from limo_hog.follow.sense.detectors import NAMES, Detector, detector_named
+from limo_hog.follow.sense.detectors import NAMES, detector_named
+
+if TYPE_CHECKING:
+    from limo_hog.ros2.replay import Replayed
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `replay`."""
     parser = subparsers.add_parser(
         "replay",
-        description="Let the detector and a follower look at a recording (an MCAP file of --record, or any ROS 2 bag), "
-        "and compare what they find and decide with what was recorded.",
+        description="Run the detector and a follower over a recording (an MCAP file of --record, or any ROS 2 bag), "
+        "and compare detections and commands with those recorded.",
     )
     parser.add_argument("file", type=Path, metavar="FILE")
-    parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="who decides (%(default)s)")
-    parser.add_argument("--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="who finds (hog)")
+    parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="controller (%(default)s)")
+    parser.add_argument("--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="detector (hog)")
     parser.add_argument("--image", metavar="TOPIC", help="topic of the camera (/limo_camera/image)")
-    parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="film what is found (H.264)")
+    parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="video of the detections (H.264)")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - is standard output")
-
-
-class Timed:
-    """A detector with a watch."""
-
-    def __init__(self, detector: Detector) -> None:
-        self._detector = detector
-        self.ms: list[float] = []
-
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        """Find people, and note how long it took."""
-        began = time.perf_counter()
-        found = self._detector.detect(image)
-        self.ms.append(1e3 * (time.perf_counter() - began))
-        return found
 
 
 def run(args: argparse.Namespace) -> int:
     """Replay a recording and show the figures."""
     from limo_hog.ros2.bag import read_bag
     from limo_hog.ros2.names import IMAGE
-    from limo_hog.ros2.replay import Replayed, replay
+    from limo_hog.ros2.replay import replay
 
-    detector = Timed(detector_named(args.detector))
-    controller = controller_named(args.controller)
+    detector, controller = detector_named(args.detector), controller_named(args.controller)
     frames: list[dict[str, Any]] = []
     with ExitStack() as stack:
         bar = stack.enter_context(progress("frames"))
@@ -73,15 +59,16 @@ def run(args: argparse.Namespace) -> int:
         def draw(frame: Replayed) -> NDArray[np.uint8]:
             from limo_hog.imaging.drawing import annotate
 
-            labels = [f"{score:.1f}" for score in frame.found.scores]
-            return annotate(frame.image, frame.found.boxes, labels, frame.target, f"{frame.stamp:.1f} s")
+            found, target = frame.sighting.detections, frame.sighting.decision.target
+            labels = [f"{score:.1f}" for score in found.scores]
+            return annotate(frame.image, found.boxes, labels, target, f"{frame.stamp:.1f} s")
 
         for frame in replay(read_bag(args.file), controller, detector, args.image or IMAGE):
             frames.append(_compared(frame))
             if write is not None:
                 write(draw(frame))
             bar.advance(task)
-    card = _card(args, frames, detector.ms)
+    card = _card(args, frames)
     if args.json:
         write_json(args.json, card)
     if args.json != STDOUT:
@@ -90,21 +77,32 @@ def run(args: argparse.Namespace) -> int:
             shown = f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)
             table.add_row(name.replace("_", " "), shown)
         Console(highlight=False).print(table)
+    failures = [frame["failure"] for frame in frames if frame["failure"]]
+    if failures:
+        print(f"{len(failures)} of {len(frames)} frames: {failures[0]}", file=sys.stderr)
     return 0
 
 
-def _compared(frame: Any) -> dict[str, Any]:
-    row: dict[str, Any] = {"found": len(frame.found) > 0, "same": None, "linear": None, "angular": None}
+def _compared(frame: Replayed) -> dict[str, Any]:
+    found, twist = frame.sighting.detections, frame.sighting.decision.twist
+    row: dict[str, Any] = {
+        "found": len(found) > 0,
+        "failure": frame.sighting.failure,
+        "detect_ms": frame.sighting.detect_ms,
+        "same": None,
+        "linear": None,
+        "angular": None,
+    }
     if frame.recorded is not None:
-        boxes = np.array_equal(frame.found.boxes, frame.recorded.boxes)
-        row["same"] = boxes and bool(np.allclose(frame.found.scores, frame.recorded.scores, rtol=0, atol=1e-5))
+        boxes = np.array_equal(found.boxes, frame.recorded.boxes)
+        row["same"] = boxes and bool(np.allclose(found.scores, frame.recorded.scores, rtol=0, atol=1e-5))
     if frame.recorded_twist is not None:
-        row["linear"] = abs(frame.twist.linear - frame.recorded_twist.linear)
-        row["angular"] = abs(frame.twist.angular - frame.recorded_twist.angular)
+        row["linear"] = abs(twist.linear - frame.recorded_twist.linear)
+        row["angular"] = abs(twist.angular - frame.recorded_twist.angular)
     return row
 
 
-def _card(args: argparse.Namespace, frames: list[dict[str, Any]], ms: list[float]) -> dict[str, Any]:
+def _card(args: argparse.Namespace, frames: list[dict[str, Any]]) -> dict[str, Any]:
     compared = [frame["same"] for frame in frames if frame["same"] is not None]
     return {
         "file": str(args.file),
@@ -116,5 +114,6 @@ def _card(args: argparse.Namespace, frames: list[dict[str, Any]], ms: list[float
         "same_detections": sum(compared),
         "linear_difference_max": max((f["linear"] for f in frames if f["linear"] is not None), default=None),
         "angular_difference_max": max((f["angular"] for f in frames if f["angular"] is not None), default=None),
-        "detect_ms_p50": median(ms),
+        "detector_failures": sum(bool(frame["failure"]) for frame in frames),
+        "detect_ms_p50": median(frame["detect_ms"] for frame in frames),
     }

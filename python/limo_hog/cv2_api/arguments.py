@@ -1,4 +1,4 @@
-"""What callers pass in, as OpenCV's bindings would take it, or a named error that says what came instead."""
+"""Checks of arguments: what OpenCV's bindings take is taken, anything else is a named error."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from limo_hog.exceptions import ImageError, ImageTypeError, ParameterError, Para
 Pair = Sequence[int] | NDArray[np.integer[Any]]
 #: Many of them: (n, 2) integers.
 Pairs = Sequence[Pair] | NDArray[np.integer[Any]]
-#: OpenCV's way to say "nothing": an empty tuple where an array would stand.
+#: The empty tuple that OpenCV returns in place of an empty array.
 Nothing = tuple[()]
 
 _INT_MAX = 2**31 - 1
+_SHOWN = 60
 
 
 def pixels(image: Any) -> NDArray[np.uint8]:
@@ -77,9 +78,9 @@ def pair(name: str, value: Pair | None, default: tuple[int, int] = (0, 0)) -> tu
         x, y = value
         found = operator.index(x), operator.index(y)
     except (TypeError, ValueError):
-        raise ParameterTypeError(f"{name} is {value!r}; two integers (x, y) are wanted") from None
+        raise ParameterTypeError(f"{name} is {shown(value)}; two integers (x, y) are wanted") from None
     if max(map(abs, found)) > _INT_MAX:
-        raise ParameterError(f"{name} is {found}; at most {_INT_MAX} is allowed")
+        raise ParameterError(f"{name} is {shown(found)}; at most {_INT_MAX} is allowed")
     return found
 
 
@@ -122,11 +123,13 @@ def real(name: str, value: SupportsFloat | None, default: float) -> float:
     if value is None:
         return default
     if not isinstance(value, (SupportsFloat, SupportsIndex)):
-        raise ParameterTypeError(f"{name} is {value!r}; a number is wanted")
+        raise ParameterTypeError(f"{name} is {shown(value)}; a number is wanted")
     try:
         return float(value)
     except TypeError:  # an array of more than one number
-        raise ParameterTypeError(f"{name} is {value!r}; one number is wanted") from None
+        raise ParameterTypeError(f"{name} is {shown(value)}; one number is wanted") from None
+    except OverflowError:
+        raise ParameterError(f"{name} is {shown(value)}; it is larger than any float") from None
 
 
 def integer(name: str, value: SupportsIndex | None, default: int) -> int:
@@ -136,10 +139,19 @@ def integer(name: str, value: SupportsIndex | None, default: int) -> int:
     try:
         found = operator.index(value)
     except TypeError:
-        raise ParameterTypeError(f"{name} is {value!r}; an integer is wanted") from None
+        raise ParameterTypeError(f"{name} is {shown(value)}; an integer is wanted") from None
     if abs(found) > _INT_MAX:
-        raise ParameterError(f"{name} is {found}; at most {_INT_MAX} is allowed")
+        raise ParameterError(f"{name} is {shown(found)}; at most {_INT_MAX} is allowed")
     return found
+
+
+def shown(value: object) -> str:
+    """Return an argument as an error message shows it: its repr, cut after 60 characters."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of more digits than Python prints
+        text = f"{type(value).__name__} of thousands of digits"
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 
 def _downloaded(value: Any) -> Any:

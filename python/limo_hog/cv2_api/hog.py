@@ -25,14 +25,15 @@ from limo_hog.cv2_api.arguments import (
     real,
     rectangles,
 )
-from limo_hog.cv2_api.geometry import Attributes, Geometry
+from limo_hog.cv2_api.features import Features
+from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.exceptions import ParameterTypeError
 
 #: Rectangles or places and their weights.
 Found = tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]
 
 
-class HOGDescriptor(Attributes):
+class HOGDescriptor(Features):
     """Histograms of oriented gradients, and a linear SVM that finds people by them.
 
     `HOGDescriptor()` has the geometry of OpenCV's default people detector, gamma correction on. With arguments the
@@ -41,7 +42,7 @@ class HOGDescriptor(Attributes):
     first use: what does not fit raises `GeometryError`.
     """
 
-    __slots__ = ("_armed", "_bare", "_svm")
+    __slots__ = ("_armed", "_svm")
 
     def __init__(
         self,
@@ -73,8 +74,7 @@ class HOGDescriptor(Attributes):
         if 0 < len(missing) < len(sizes):
             raise ParameterTypeError(f"HOGDescriptor(...) needs {', '.join(sizes)}; missing: {', '.join(missing)}")
         default = Geometry()
-        self._svm: NDArray[np.float32] | None = None
-        self._set(
+        super().__init__(
             Geometry(
                 pair("_winSize", _winSize, default.winSize),
                 pair("_blockSize", _blockSize, default.blockSize),
@@ -90,27 +90,16 @@ class HOGDescriptor(Attributes):
                 bool(_signedGradient),
             )
         )
+        self._svm: NDArray[np.float32] | None = None
+        # The compiled geometry with the SVM, made when first needed.
+        self._armed: _core.Hog | None = None
         if filename is not None:
             self.load(filename)
-
-    def _set(self, geometry: Geometry) -> None:
-        self._geometry = geometry
-        # The compiled detector without and with its SVM, each made when first needed.
-        self._bare: _core.Hog | None = None
-        self._armed: _core.Hog | None = None
 
     @property
     def svmDetector(self) -> NDArray[np.float32] | Nothing:
         """float32 (n,): the coefficients in force, the bias last if there is one; `()` when unset."""
         return () if self._svm is None else self._svm.copy()
-
-    def getDescriptorSize(self) -> int:
-        """Elements of one window's descriptor: bins × cells of a block × blocks of a window."""
-        return self._features.descriptor_len
-
-    def getWinSigma(self) -> float:
-        """Gaussian window in force [px]: `winSigma`, or (block width + block height) / 8 where that is not positive."""
-        return self._geometry.sigma
 
     def checkDetectorSize(self) -> bool:
         """Whether the detector, if any, fits the geometry; false only after `load` of a file without a detector."""
@@ -131,7 +120,7 @@ class HOGDescriptor(Attributes):
             `n` is neither the descriptor's size nor one more; the detector in force stays.
         """
         svm = coefficients(svmdetector)
-        self._armed = None if svm is None else self._compiled(svm)
+        self._armed = None if svm is None else self._geometry.compiled(svm)
         self._svm = svm
 
     @staticmethod
@@ -143,71 +132,6 @@ class HOGDescriptor(Attributes):
     def getDaimlerPeopleDetector() -> NDArray[np.float32]:
         """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
         return _core.daimler_people_detector()
-
-    def computeGradient(
-        self,
-        img: NDArray[np.uint8],
-        grad: NDArray[np.float32] | None = None,
-        angleOfs: NDArray[np.uint8] | None = None,
-        paddingTL: Pair | None = None,
-        paddingBR: Pair | None = None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]] | tuple[Nothing, Nothing]:
-        """Gradient magnitudes shared between the two nearest orientation bins.
-
-        Parameters
-        ----------
-        img
-            uint8 (H, W), (H, W, 1) or (H, W, 3).
-        grad, angleOfs
-            Arrays to fill, of the results' shapes and types; others, and None, are left alone.
-        paddingTL, paddingBR
-            Columns and rows (x, y) to add (or, if negative, to drop) at the top left and the bottom right [px].
-
-        Returns
-        -------
-        grad, angleOfs
-            float32 (H', W', 2) magnitudes and uint8 (H', W', 2) bins; `((), ())` where no pixel is left.
-        """
-        image = pixels(img)
-        (left, top), (right, bottom) = pair("paddingTL", paddingTL), pair("paddingBR", paddingBR)
-        if 0 in (image.shape[0] + top + bottom, image.shape[1] + left + right):
-            return (), ()
-        shares, bins = self._features.gradient(image, (left, top, right, bottom))
-        return _filled(grad, shares), _filled(angleOfs, bins)
-
-    def compute(
-        self,
-        img: NDArray[np.uint8],
-        winStride: Pair | None = None,
-        padding: Pair | None = None,
-        locations: Pairs | None = None,
-    ) -> NDArray[np.float32] | Nothing:
-        """Descriptors of the windows of an image.
-
-        Parameters
-        ----------
-        img
-            uint8 (H, W), (H, W, 1) or (H, W, 3).
-        winStride
-            Distance of neighbouring windows (x, y) [px]; by default the cell size.
-        padding
-            Border around the image (x, y) [px], mirrored.
-        locations
-            Top left corners (x, y) of the windows [px]; by default the whole grid, row by row.
-
-        Returns
-        -------
-        descriptors
-            float32 (windows × descriptor size,), blocks column by column; zeros for a location outside. `()` when
-            no window fits.
-        """
-        descriptors = self._features.compute(
-            pixels(img),
-            pair("winStride", winStride),
-            pair("padding", padding),
-            places("locations", locations),
-        )
-        return descriptors if len(descriptors) else ()
 
     def detect(
         self,
@@ -388,13 +312,11 @@ class HOGDescriptor(Attributes):
         from limo_hog.cv2_api import model_files
 
         geometry, svm = model_files.load(filename, objname)
-        loaded = HOGDescriptor()
-        loaded._set(geometry)
-        loaded.getDescriptorSize()
-        loaded.setSVMDetector(svm)
-        self._set(geometry)
+        # Compiled first: what does not fit raises here, and changes nothing.
+        hog = geometry.compiled(coefficients(svm))
+        self._geometry, self._bare, self._armed = geometry, None, None
         if svm:
-            self._svm = loaded._svm
+            self._svm, self._armed = coefficients(svm), hog
         return True
 
     def __eq__(self, other: object) -> bool:
@@ -415,43 +337,13 @@ class HOGDescriptor(Attributes):
         return _restored, (type(self), tuple(self._geometry), self._svm)
 
     @property
-    def _features(self) -> _core.Hog:
-        if self._bare is None:
-            self._bare = self._compiled(None)
-        return self._bare
-
-    @property
     def _detector(self) -> _core.Hog:
         if self._armed is None:
-            self._armed = self._compiled(self._svm)
+            self._armed = self._geometry.compiled(self._svm)
         return self._armed
-
-    def _compiled(self, svm: NDArray[np.float32] | None) -> _core.Hog:
-        g = self._geometry
-        return _core.Hog(
-            g.winSize,
-            g.blockSize,
-            g.blockStride,
-            g.cellSize,
-            g.nbins,
-            g.winSigma,
-            g.L2HysThreshold,
-            g.gammaCorrection,
-            g.nlevels,
-            g.signedGradient,
-            svm,
-        )
 
 
 def _restored(kind: type[HOGDescriptor], geometry: tuple[Any, ...], svm: NDArray[np.float32] | None) -> HOGDescriptor:
     hog = kind(*geometry)
     hog._svm = svm
     return hog
-
-
-def _filled(target: Any, result: Any) -> Any:
-    """Return `target` holding `result` where it can, else `result` itself."""
-    if isinstance(target, np.ndarray) and target.shape == result.shape and target.dtype == result.dtype:
-        target[...] = result
-        return target
-    return result

@@ -7,6 +7,7 @@ here is what `cv2.HOGDescriptor.save` writes.
 from __future__ import annotations
 
 import gzip
+import io
 import json
 import math
 import os
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.atomic import whole_file
+from limo_hog.cv2_api.arguments import shown
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.exceptions import ModelFormatError, ParameterError
 
@@ -29,6 +31,10 @@ Entries = dict[str, list[str]]
 
 _TYPE = "opencv-object-detector-hog"
 _GZIP_MAGIC = b"\x1f\x8b"
+#: Text of a file, unpacked: room for three million coefficients, 800 times the people detector's.
+_MOST_BYTES = 64 << 20
+#: XML tags inside each other; OpenCV's own files have three.
+_MOST_DEPTH = 16
 #: A line is broken before it would grow beyond this.
 _MARGIN = 71
 
@@ -46,13 +52,20 @@ def load(filename: str | os.PathLike[str], name: str = "") -> tuple[Geometry, li
         It is not one of OpenCV's files, or has no such object, or that is no HOG detector.
     """
     path = Path(filename)
-    data = path.read_bytes()
     try:
-        text = (gzip.decompress(data) if data.startswith(_GZIP_MAGIC) else data).decode()
-        objects = _parse(text.lstrip("\ufeff \t\r\n"))
+        objects = _parse(_text(path).lstrip("\ufeff \t\r\n"))
         return _from_entries(_chosen(objects, name))
-    except (ValueError, EOFError, gzip.BadGzipFile, zlib.error, ElementTree.ParseError) as error:
+    except (ValueError, RecursionError, EOFError, gzip.BadGzipFile, zlib.error, ElementTree.ParseError) as error:
         raise ModelFormatError(f"{path} holds no HOG detector: {error}") from error
+
+
+def _text(path: Path) -> str:
+    with path.open("rb") as file:
+        stream = gzip.GzipFile(fileobj=file) if file.peek(2).startswith(_GZIP_MAGIC) else file
+        data = stream.read(_MOST_BYTES + 1)
+    if len(data) > _MOST_BYTES:
+        raise ValueError(f"it has more than {_MOST_BYTES >> 20} MiB of text")
+    return data.decode()
 
 
 def save(filename: str | os.PathLike[str], geometry: Geometry, svm: NDArray[np.float32] | None, name: str = "") -> None:
@@ -110,27 +123,32 @@ def _from_entries(entries: Entries) -> tuple[Geometry, list[float]]:
     def number(key: str) -> float:
         found = numbers(key) or [0.0]
         if len(found) > 1 or not math.isfinite(found[0]):
-            raise ValueError(f"{key} is {found}; one finite number is wanted")
+            raise ValueError(f"{key} is {shown(found)}; one finite number is wanted")
         return found[0]
+
+    def integer(key: str, value: float) -> int:
+        if not abs(value) < 2**31:
+            raise ValueError(f"{key} is {value:g}; an integer of 32 bits is wanted")
+        return int(value)
 
     def size(key: str) -> tuple[int, int]:
         found = numbers(key)
-        if len(found) != 2 or not all(map(math.isfinite, found)):
-            raise ValueError(f"{key} is {found or 'missing'}; two integers are wanted")
-        return int(found[0]), int(found[1])
+        if len(found) != 2:
+            raise ValueError(f"{key} is {shown(found) if found else 'missing'}; two integers are wanted")
+        return integer(key, found[0]), integer(key, found[1])
 
     geometry = Geometry(
         size("winSize"),
         size("blockSize"),
         size("blockStride"),
         size("cellSize"),
-        int(number("nbins")),
-        int(number("derivAperture")),
+        integer("nbins", number("nbins")),
+        integer("derivAperture", number("derivAperture")),
         number("winSigma"),
-        int(number("histogramNormType")),
+        integer("histogramNormType", number("histogramNormType")),
         number("L2HysThreshold"),
         bool(number("gammaCorrection")),
-        int(number("nlevels")),
+        integer("nlevels", number("nlevels")),
         bool(number("signedGradient")),
     )
     return geometry, numbers("SVMDetector")
@@ -152,7 +170,15 @@ def _parse(text: str) -> dict[str, Entries]:
 
 
 def _parse_xml(text: str) -> dict[str, Entries]:
-    root = ElementTree.fromstring(text)  # noqa: S314 - expat itself limits the expansion of entities
+    depth, root = 0, None
+    # Read tag by tag, so that a tower of tags ends before it stands. Expat itself limits the expansion of entities.
+    for event, node in ElementTree.iterparse(io.StringIO(text), ("start", "end")):  # noqa: S314
+        root = node if root is None else root
+        depth += 1 if event == "start" else -1
+        if depth > _MOST_DEPTH:
+            raise ValueError(f"more than {_MOST_DEPTH} XML tags lie inside each other")
+    if root is None:
+        raise ValueError("it has no XML tag")
     if root.tag != "opencv_storage":
         raise ValueError(f"its outermost tag is <{root.tag}>, not <opencv_storage>")
     return {node.tag: {entry.tag: " ".join(entry.itertext()).split() for entry in node} for node in root}
@@ -160,7 +186,7 @@ def _parse_xml(text: str) -> dict[str, Entries]:
 
 #: An object's line; an entry in one line, over several lines in brackets, or as one `- item` a line.
 _YAML_OBJECT = re.compile(r"^([\w-]+):[ \t]*(?:!\S+[ \t]*)?(?:#.*)?$", re.MULTILINE)
-_YAML_ENTRY = re.compile(r"^[ \t]+([\w-]+):[ \t]*(\[[^\]]*\]|(?:\n[ \t]+-[ \t][^\n]*)+|[^\n#]*)", re.MULTILINE)
+_YAML_ENTRY = re.compile(r"^[ \t]+([\w-]+):[ \t]*(\[[^\]:]*\]|(?:\n[ \t]+-[ \t][^\n]*)+|[^\n#]*)", re.MULTILINE)
 
 
 def _parse_yaml(text: str) -> dict[str, Entries]:

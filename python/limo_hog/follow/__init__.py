@@ -1,4 +1,4 @@
-"""What the follower sees and what it says: types and controllers, without simulator or clock."""
+"""Follow a person: observations, controllers and the safety layer, without simulator or clock."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from limo_hog.follow.control.distance import ProxemicController
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.decision import Controller, Decision, Mode
+from limo_hog.follow.pipeline import Follower, Sensors, Sighting
 from limo_hog.follow.safety.guard import Guard
 from limo_hog.follow.sense.detectors import Detector, detector_named
 from limo_hog.follow.sense.observation import Observation, Odometry, Scan
-from limo_hog.follow.sense.ranging import Zone, zone_of
+from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.sense.region import Region
 from limo_hog.follow.twist import Twist
+from limo_hog.follow.zones import Zone, zone_of
 
 __all__ = [
     "CONTROLLERS",
@@ -20,6 +22,7 @@ __all__ = [
     "Controller",
     "Decision",
     "Detector",
+    "Follower",
     "Guard",
     "Mode",
     "Observation",
@@ -27,10 +30,13 @@ __all__ = [
     "ProxemicController",
     "Region",
     "Scan",
+    "Sensors",
+    "Sighting",
     "TrackingController",
     "Twist",
     "Zone",
     "controller_named",
     "detector_named",
+    "person_depth",
     "zone_of",
 ]

@@ -1,4 +1,4 @@
-"""What a follower decides at one instant, and what every controller offers."""
+"""What a follower decides at one instant, and the interface of every controller."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ class Mode(str, Enum):
     """What the follower is doing, in words for the score card."""
 
     SEARCH = "search"
-    """Nobody has been found yet."""
+    """No person has been found yet."""
     FOLLOW = "follow"
-    """Somebody is being followed."""
+    """A person is being followed."""
     HOLD = "hold"
-    """Somebody is being followed and stands where they should: no need to move."""
+    """The followed person is at the target distance: no need to drive."""
     BLOCKED = "blocked"
-    """Something is in the way, or the senses cannot be trusted: the robot may not do what it wanted to."""
+    """An obstacle is in the way, or an input is faulty: the robot may not do what the controller asked for."""
     LOST = "lost"
-    """Somebody was followed and is not seen any more."""
+    """A person was followed and is not found any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +37,11 @@ class Decision(Generic[S]):
     twist
         What the robot should do now.
     state
-        What the controller wants back with the next observation.
+        The controller's memory, to be handed in with the next observation.
     mode, reason
         What the follower is doing, and why, in a few words.
     target
-        Index into `observation.detections` of the person who is followed; None where nobody is.
+        Index into `observation.detections` of the person followed; None where there is none.
     region
         Where to look in the next frame; None asks for the whole image.
     """
@@ -55,7 +55,7 @@ class Decision(Generic[S]):
 
 
 class Controller(Protocol[S]):
-    """Steers the robot by what it sees: parameters are frozen, all memory is in the state it is handed."""
+    """Steers the robot by observations: parameters are frozen, all memory is in the state."""
 
     def start(self) -> S:
         """Return the state before the first observation."""

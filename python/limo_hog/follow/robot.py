@@ -1,13 +1,17 @@
-"""The robot's shape and where its sensors sit, in the base frame: x forward, y left, origin at the centre."""
+"""The Limo: its outline, where its sensors and wheels sit, and what its camera sees.
+
+Everything is in the base frame: x forward, y left, z up, origin on the floor below the middle of the body.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
-    """The Limo, from LCAS/limo_ros2's `limo_four_diff.xacro`; all lengths in metres.
+class RobotGeometry:
+    """Lengths of a robot [m], from LCAS/limo_ros2's `limo_four_diff.xacro`.
 
     Attributes
     ----------
@@ -15,15 +19,26 @@ class Body:
         Half of the body's outline.
     camera_x, camera_z
         Where the camera sits, ahead of the centre and above the floor; it looks level and straight ahead.
-    lidar_x
-        Where the lidar sits, ahead of the centre.
+    field_of_view
+        Horizontal field of view of the camera [rad].
+    lidar_x, lidar_z
+        Where the lidar sits, ahead of the centre and above the floor; its plane is level.
+    wheel_separation
+        Between the left and the right wheels, as the differential drive counts it.
     """
 
     half_length: float = 0.145
     half_width: float = 0.11
     camera_x: float = 0.084
     camera_z: float = 0.175
+    field_of_view: float = 1.23918
     lidar_x: float = 0.103
+    lidar_z: float = 0.111
+    wheel_separation: float = 0.172
+
+    def focal_px(self, width: int) -> float:
+        """Return the camera's focal length for images of `width` [px]: 448.6 for 640."""
+        return width / 2 / math.tan(self.field_of_view / 2)
 
 
-LIMO = Body()
+LIMO = RobotGeometry()

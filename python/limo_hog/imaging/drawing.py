@@ -1,4 +1,4 @@
-"""What the detector saw, drawn into the picture."""
+"""Detections drawn into the picture."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def annotate(
     Parameters
     ----------
     image
-        uint8 (height, width, 3) BGR, or (height, width) gray.
+        uint8 (height, width, 3) BGR, or (height, width) or (height, width, 1) gray.
     boxes
         int32 (N, 4): x, y, w, h [px].
     labels
         A text for each of the first boxes, above it.
     target
-        Index of the box that is followed, None for nobody.
+        Index of the followed box; None if there is none.
     caption
         A line at the bottom left.
 
@@ -43,8 +43,9 @@ def annotate(
     -------
     uint8 (height, width, 3) BGR.
     """
-    canvas = np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image.copy()
-    # Strokes and letters grow with the picture, but slower, from a thumbnail to a wall.
+    colours = image.reshape(*image.shape[:2], -1)
+    canvas = np.repeat(colours, 3, axis=2) if colours.shape[2] == 1 else colours.copy()
+    # Strokes and letters grow more slowly than the picture: readable in a thumbnail, not coarse at 4K.
     unit = (max(canvas.shape[:2]) / 640) ** 0.7
     thick = max(1, round(2 * unit))
     for i, (x, y, w, h) in enumerate(boxes.tolist()):
@@ -52,7 +53,7 @@ def annotate(
         cv2.rectangle(canvas, (x, y), (x + w - 1, y + h - 1), colour, thick, cv2.LINE_AA)
         if i == target:
             cv2.circle(canvas, (x + w // 2, y + h // 2), round(5 * unit), BLUE, cv2.FILLED, cv2.LINE_AA)
-    # Labels last, so that no box crosses one.
+    # Labels last, so that no box crosses them.
     for label, (x, y, _, _), i in zip(labels, boxes.tolist(), range(len(labels)), strict=False):
         _text(canvas, label, x, y, unit, RED if i == target else GREEN)
     if caption:

@@ -1,4 +1,4 @@
-"""From what the user names (files, folders, globs, a camera, standard input) to pictures."""
+"""Pictures from files, folders, globs, a camera or standard input."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ STDIN = "-"
 
 
 class ReadError(LimoHogError):
-    """Something that was named as an input is not a picture, a video or a camera that can be read."""
+    """An input is not a picture, a video or a camera that can be read."""
 
 
 class Kind(Enum):
-    """What an input holds."""
+    """Kinds of inputs."""
 
     IMAGE = "image"
     VIDEO = "video"
@@ -42,7 +42,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One thing to look at: its name as the user knows it, and where to read it."""
+    """One picture, video or camera: its name as the user gave it, and where to read it."""
 
     name: str
     path: Path
@@ -61,7 +61,7 @@ def find_sources(name: str) -> list[Source]:
     if name == STDIN:
         return [Source(name, path, Kind.IMAGE)]
     if path.is_dir():
-        found = sorted(p for p in path.rglob("*") if _kind_by_suffix(p) is not None and p.is_file())
+        found = sorted(p for p in path.rglob("*") if _kind_by_suffix(p) is not None and not p.is_dir())
         if not found:
             raise ReadError(f"{name}: no image or video in this folder")
     elif path.exists():
@@ -85,7 +85,7 @@ def _kind_by_suffix(path: Path) -> Kind | None:
 
 @contextmanager
 def standard_input() -> Iterator[Source]:
-    """Keep standard input in a file for as long as it is looked at: one image, or one video."""
+    """Keep standard input (one image or one video) in a temporary file."""
     with tempfile.TemporaryDirectory(prefix="limo-hog-") as folder:
         path = Path(folder) / "stdin"
         with path.open("wb") as file:
@@ -121,9 +121,9 @@ class Video:
     Attributes
     ----------
     fps
-        Frames a second as the file says, 25 where it does not say.
+        Frames a second by the file's header; 25 where it has none.
     frame_count
-        Frames as the file says; 0 for a camera and where it does not say.
+        Number of frames by the file's header; 0 where it has none, and for a camera.
     """
 
     source: Source
@@ -147,7 +147,7 @@ class Video:
                     break
                 yield number, image.astype(np.uint8, copy=False)
             number += 1
-        # Containers estimate their frame count from duration and rate: a few frames less are no loss.
+        # Containers estimate their frame count from duration and rate: a few frames fewer are no error.
         if number < 0.98 * self.frame_count - 2:
             raise ReadError(f"{self.source.name}: cut off: {number} of {self.frame_count} frames could be read")
 
@@ -159,7 +159,7 @@ def open_video(source: Source) -> Iterator[Video]:
     Raises
     ------
     ReadError
-        If it is none that OpenCV can read.
+        OpenCV cannot read it.
     """
     if source.kind is Kind.CAMERA:
         capture, wanted = cv2.VideoCapture(int(source.name)), "no camera with this index"

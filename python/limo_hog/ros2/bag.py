@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,11 +14,12 @@ from limo_hog.atomic import about, whole_file
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.ros2.mcap_reading import mcap_messages
 from limo_hog.ros2.messages import default_message, serialize, to_time, typestore
 
 with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
     from mcap.writer import CompressionType, Writer
-    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.highlevel import AnyReader
     from rosbags.typesys import get_types_from_msg
 
 DETECTIONS = "vision_msgs/msg/Detection2DArray"
@@ -78,7 +79,15 @@ def detections_message(stamp: float, found: Detections, frame: str) -> Any:
 
 
 def to_detections(message: Any) -> Detections:
-    """Read a Detection2DArray."""
+    """Read a Detection2DArray.
+
+    Raises
+    ------
+    BagError
+        If a box has no score.
+    """
+    if not all(one.results for one in message.detections):
+        raise BagError(f"a {DETECTIONS} has a box without a hypothesis: its score is missing")
     boxes = [
         (
             one.bbox.center.position.x - one.bbox.size_x / 2,
@@ -99,7 +108,15 @@ def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
     The file has its name only when it is whole.
     """
     _with_vision()
-    with whole_file(path) as part, part.open("wb") as file:
+    with whole_file(path) as part, ExitStack() as stack:
+        with about(path):
+            file = part.open("wb")
+
+        @stack.callback
+        def close() -> None:
+            with about(path):
+                file.close()
+
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="limo-hog")
         channels: dict[str, int] = {}
@@ -115,7 +132,8 @@ def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
                 writer.add_message(channels[topic], nanoseconds, serialize(message), nanoseconds)
 
         yield write
-        writer.finish()  # type: ignore[no-untyped-call]
+        with about(path):
+            writer.finish()  # type: ignore[no-untyped-call]
 
 
 def read_bag(path: Path) -> Iterator[Record]:
@@ -124,14 +142,36 @@ def read_bag(path: Path) -> Iterator[Record]:
     Raises
     ------
     BagError
-        If it is none, or cut off.
+        If it is none, or damaged or cut off: what was whole before that has been given by then.
+    OSError
+        If it cannot be read.
     """
-    _with_vision()
     if not path.exists():
         raise BagError(f"{path}: no such recording")
-    try:
-        with AnyReader([path], default_typestore=typestore()) as reader:
-            for connection, nanoseconds, data in reader.messages():
-                yield Record(connection.topic, nanoseconds * 1e-9, reader.deserialize(data, connection.msgtype))
-    except (AnyReaderError, ValueError, KeyError, IndexError, AssertionError) as error:
-        raise BagError(f"{path}: no ROS 2 recording that can be read, or cut off: {error}") from error
+    messages = _messages(path)
+    while True:
+        try:
+            topic, nanoseconds, message = next(messages)
+        except StopIteration:
+            return
+        except OSError as error:
+            error.filename = error.filename or str(path)
+            raise
+        # Foreign bytes in other libraries' parsers: whatever they raise, the file is why.
+        except Exception as error:
+            why = " ".join(str(error).split()) or type(error).__name__
+            raise BagError(f"{path}: no ROS 2 recording that can be read, or cut off: {why[:200]}") from error
+        yield Record(topic, nanoseconds * 1e-9, message)
+
+
+def _messages(path: Path) -> Iterator[tuple[str, int, Any]]:
+    _with_vision()
+    # The parts of a rosbag2 folder are numbered: _9 comes before _10.
+    parts = sorted(path.glob("*.mcap"), key=lambda part: (len(part.name), part.name)) if path.is_dir() else [path]
+    if parts and all(part.suffix == ".mcap" for part in parts):
+        for part in parts:
+            yield from mcap_messages(part)
+        return
+    with AnyReader([path], default_typestore=typestore()) as reader:
+        for connection, nanoseconds, data in reader.messages():
+            yield connection.topic, nanoseconds, reader.deserialize(data, connection.msgtype)

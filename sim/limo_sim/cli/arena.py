@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         bus = Bus()
         print(f"arena {scenario.name!r} is on ROS domain {bus.domain}; Ctrl-C ends it", file=sys.stderr)
     with watching(args, scenario) as audience:
-        arena = run_live(scenario, args.seed, args.seconds, bus, audience.watch if audience.watchers else None)
+        arena = run_live(scenario, args.seed, args.seconds, bus, audience.watch if audience else None)
     contacts = arena.contacts
     print(
         f"{arena.time:.1f} s; contacts: person {contacts.person}, wall {contacts.wall}; "

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             task = bar.add_task("search", total=args.seconds)
 
             def watch(moment: Moment) -> None:
-                bar.update(task, completed=round(moment.step.time, 1), description=moment.step.mode.value)
+                bar.update(task, completed=round(moment.step.time, 1), description=moment.step.decision.mode.value)
                 audience.watch(moment)
 
             episode = run_episode(

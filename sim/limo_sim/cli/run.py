@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         task = bar.add_task("search", total=args.seconds)
 
         def watch(moment: Moment) -> None:
-            bar.update(task, completed=round(moment.step.time, 1), description=moment.step.mode.value)
+            bar.update(task, completed=round(moment.step.time, 1), description=moment.step.decision.mode.value)
             audience.watch(moment)
 
         def log(time: float, level: str, name: str, message: str) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import file_ending
+from limo_hog.cli.support.signals import held
 
 if TYPE_CHECKING:
     from limo_sim.run.episode import Episode, Moment
@@ -60,16 +61,33 @@ def _address(text: str) -> tuple[str, int]:
 
 @dataclass
 class Watching:
-    """The watchers of one run: pass `watch` to the run, and call `end` after it."""
+    """The watchers of one run: pass `watch` to the run, and call `end` after it.
 
-    watchers: list[Callable[[Moment], None]] = field(default_factory=list)
+    Attributes
+    ----------
+    keepers
+        What writes to files; a signal does not interrupt these.
+    plot
+        File of the figure, drawn at the end.
+    view
+        The live page.
+    """
+
+    keepers: list[Callable[[Moment], None]] = field(default_factory=list)
     plot: Path | None = None
     view: View | None = None
 
+    def __bool__(self) -> bool:
+        """Whether a run needs to be shown to it."""
+        return bool(self.keepers) or self.view is not None
+
     def watch(self, moment: Moment) -> None:
-        """Pass a moment to every watcher; returns when the run may go on."""
-        for watcher in self.watchers:
-            watcher(moment)
+        """Keep and show a moment; returns when the run may go on."""
+        with held():
+            for keep in self.keepers:
+                keep(moment)
+        if self.view is not None:
+            self.view.watch(moment)
 
     def end(self, episode: Episode, card: ScoreCard) -> None:
         """Draw the figure, and show the score card on the live page."""
@@ -85,7 +103,7 @@ class Watching:
 def watching(
     args: argparse.Namespace, scenario: Scenario, controller: Tunable[Any] | None = None
 ) -> Iterator[Watching]:
-    """Open every output that was asked for; a missing library is named before the run. Ctrl-C leaves complete files.
+    """Open every output that was asked for; a missing library is named first. Ctrl-C and SIGTERM leave whole files.
 
     `controller` is the one whose parameters the page may set.
     """
@@ -100,24 +118,27 @@ def watching(
         if args.video is not None:
             from limo_sim.view.video import filmed
 
-            all_.watchers.append(stack.enter_context(filmed(args.video, scenario.camera.rate_hz)))
+            all_.keepers.append(stack.enter_context(filmed(args.video, scenario.camera.rate_hz)))
         if args.record is not None:
             from limo_sim.view.record import recorded
 
-            all_.watchers.append(stack.enter_context(recorded(args.record)))
+            all_.keepers.append(stack.enter_context(recorded(args.record)))
         if args.rerun is not None:
             from limo_sim.view.rerun_log import logged
 
-            all_.watchers.append(stack.enter_context(logged(args.rerun)))
+            all_.keepers.append(stack.enter_context(logged(args.rerun)))
         if args.view is not None:
             from limo_sim.view.server import View
 
             all_.view = stack.enter_context(View(scenario, controller, *args.view))
-            all_.watchers.append(all_.view.watch)
             print(f"watch the run at {all_.view.url}", file=sys.stderr)
         try:
             yield all_
         except KeyboardInterrupt as error:
             stopped = error
+        opened = stack.pop_all()
+    # Another signal does not interrupt the closing.
+    with held():
+        opened.close()
     if stopped is not None:
         raise stopped

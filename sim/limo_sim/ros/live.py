@@ -5,14 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from limo_hog.follow.decision import Mode
+from limo_hog.detector import Detections
+from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
 from limo_hog.ros2.dds import Bus
 from limo_hog.ros2.messages import to_twist
 from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
-from limo_sim.run.episode import NOTHING, Moment, Step
+from limo_sim.run.episode import FrameRecord, Moment, Step
 from limo_sim.world.scenario import Scenario
 
 #: After a delay the arena runs faster until this much is made up for [s]; more is dropped. Chosen: two camera frames.
@@ -73,17 +74,6 @@ def run_live(
 def _moment(arena: Arena, twist: Twist) -> Moment:
     frame = arena.frame()
     mode = Mode.HOLD if twist == Twist() else Mode.FOLLOW
-    step = Step(
-        time=arena.time,
-        truth=arena.truth(),
-        seen=frame.truth,
-        detections=NOTHING,
-        target=None,
-        region=None,
-        twist=twist,
-        mode=mode,
-        reason="driven by /cmd_vel",
-        detect_ms=0.0,
-        render_ms=0.0,
-    )
+    decision = Decision(twist, None, mode, "driven by /cmd_vel")
+    step = Step(arena.time, arena.truth(), decision, FrameRecord(frame.truth, Detections.none()))
     return Moment(step, frame, arena.scan(), arena.odometry())

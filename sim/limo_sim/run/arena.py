@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pymunk
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.twist import Twist
 from limo_sim.sensing import imu, lidar
@@ -20,7 +21,7 @@ from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
 from limo_sim.world.person import Pose, Walk, legs_at, trunk_radius
-from limo_sim.world.robot import HALF_LENGTH, HALF_WIDTH, Drive, integrate, twist_of
+from limo_sim.world.robot import Drive, integrate, twist_of
 from limo_sim.world.scenario import ROOM_HALF, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
@@ -236,7 +237,7 @@ class Arena:
 
     def _add_robot(self) -> pymunk.Body:
         settings = self.scenario.robot
-        size = (2 * HALF_LENGTH, 2 * HALF_WIDTH)
+        size = (2 * LIMO.half_length, 2 * LIMO.half_width)
         robot = pymunk.Body(mass=_MASS, moment=pymunk.moment_for_box(_MASS, size))
         robot.position = settings.x, settings.y
         robot.angle = settings.yaw

@@ -5,29 +5,44 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
-from limo_hog.follow.decision import Controller, Decision, Mode
-from limo_hog.follow.safety.guard import Guard, GuardState
-from limo_hog.follow.sense.detectors import Detector, detect_in
-from limo_hog.follow.sense.observation import Observation, Odometry, Scan, observed
+from limo_hog.follow.decision import Controller, Decision
+from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, Sensors
+from limo_hog.follow.sense.detectors import Detector
+from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.sense.region import Region
-from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.sensing.camera import FOCAL_PX, Frame
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, Truth
 
-S = TypeVar("S")
 
-#: A command is sent at least this often [s].
-CONTROL_PERIOD = 0.1
+@dataclass(frozen=True, slots=True)
+class FrameRecord:
+    """What was made of one camera frame.
 
-NOTHING = Detections(np.empty((0, 4), np.int32), np.empty(0))
+    Attributes
+    ----------
+    truth
+        The arena when the frame was taken.
+    detections
+        What was found in it.
+    region
+        Part of the frame that was searched; None where all of it was.
+    detect_ms, render_ms
+        Wall time of detection and of drawing the frame [ms].
+    """
+
+    truth: Truth
+    detections: Detections
+    region: Region | None = None
+    detect_ms: float = 0.0
+    render_ms: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,29 +55,26 @@ class Step:
         Of the arena, when the command was sent [s].
     truth
         The arena at `time`.
-    seen
-        The arena when the frame that was worked on was taken; None in a period without a new frame.
-    detections, target
-        What was found in that frame and which of it is followed.
-    region
-        Part of the frame that was searched; None where all of it was.
-    twist, mode, reason
-        The command, and what the follower said about it.
-    detect_ms, render_ms
-        Wall time of detection and of drawing the frame [ms]; 0 without a frame.
+    decision
+        The command, and what the follower says about it; its `target` is an index into `detections`.
+    frame
+        The frame that was worked on; None in a period without a new one.
     """
 
     time: float
     truth: Truth
-    seen: Truth | None
-    detections: Detections
-    target: int | None
-    region: Region | None
-    twist: Twist
-    mode: Mode
-    reason: str
-    detect_ms: float
-    render_ms: float
+    decision: Decision[Any]
+    frame: FrameRecord | None = None
+
+    @property
+    def seen(self) -> Truth | None:
+        """The arena when the frame was taken; None without a frame."""
+        return None if self.frame is None else self.frame.truth
+
+    @property
+    def detections(self) -> Detections:
+        """What was found in the frame; nothing without one."""
+        return Detections.none() if self.frame is None else self.frame.detections
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +125,7 @@ class Episode:
 
 def run_episode(
     scenario: Scenario,
-    controller: Controller[S],
+    controller: Controller[Any],
     detector: Detector,
     seconds: float,
     seed: int,
@@ -140,9 +152,7 @@ def run_episode(
     """
     began = time.perf_counter()
     arena = Arena(scenario, seed)
-    guard = Guard(controller)
-    state = guard.start()
-    region: Region | None = None
+    follower = Follower(controller, detector)
     steps = []
     last_frame, last_command = -np.inf, -np.inf
     while arena.time < seconds:
@@ -153,31 +163,17 @@ def run_episode(
         # Half a physics step of slack: times are sums of steps.
         if fresh or arena.time - last_command > CONTROL_PERIOD - 0.01:
             scan, odometry = arena.scan(), arena.odometry()
+            record = None
             if fresh:
                 last_frame = frame.stamp
-                decision, observation, detect_ms = _decide(guard, state, detector, frame, region, scan, odometry)
-                region = decision.region
-                seen, found = frame.truth, observation.detections
-                searched, target = observation.region, decision.target
+                sighting = follower.see(frame.stamp, frame.image, Sensors(FOCAL_PX, frame.depth, scan, odometry))
+                decision = sighting.decision
+                record = FrameRecord(frame.truth, sighting.detections, sighting.region, sighting.detect_ms, render_ms)
             else:
-                decision = guard.recheck(arena.time, scan, odometry, state)
-                seen, found, searched, target, detect_ms, render_ms = None, NOTHING, None, None, 0.0, 0.0
-            state = decision.state
+                decision = follower.recheck(arena.time, scan, odometry)
             arena.command(decision.twist)
             last_command = arena.time
-            step = Step(
-                arena.time,
-                arena.truth(),
-                seen,
-                found,
-                target,
-                searched,
-                decision.twist,
-                decision.mode,
-                decision.reason,
-                detect_ms,
-                render_ms,
-            )
+            step = Step(arena.time, arena.truth(), decision, record)
             steps.append(step)
             if watch is not None:
                 watch(Moment(step, frame if fresh else None, scan, odometry))
@@ -192,23 +188,3 @@ def run_episode(
         time.perf_counter() - began,
         getattr(controller, "target_distance", None),
     )
-
-
-def _decide(
-    guard: Guard[S],
-    state: GuardState[S],
-    detector: Detector,
-    frame: Frame,
-    region: Region | None,
-    scan: Scan | None,
-    odometry: Odometry | None,
-) -> tuple[Decision[GuardState[S]], Observation, float]:
-    """Detect and decide; returns the decision, what it was made on, and how long detection took [ms]."""
-    began = time.perf_counter()
-    try:
-        found, fault = detect_in(detector, frame.image, region), ""
-    except Exception as error:  # whatever a detector raises, the robot must stop and the run must go on
-        found, fault = NOTHING, f"the detector failed: {error}"
-    detect_ms = 1e3 * (time.perf_counter() - began)
-    observation = observed(frame.stamp, frame.image, FOCAL_PX, found, region, frame.depth, scan, odometry, fault)
-    return guard.step(observation, state), observation, detect_ms

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.ranging import Zone, zone_of
+from limo_hog.follow.zones import Zone, zone_of
 from limo_sim.run.episode import Episode, Step
 from limo_sim.sensing.camera import WIDTH
 from limo_sim.world.robot import max_turn_rate
@@ -192,7 +192,8 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
     boxed = [hit for step, hit in zip(frames, hits, strict=True) if len(step.detections)]
     errors = [_pixel_error(view) for view, ok in zip(views[after], visible[after], strict=True) if ok and view]
     gaps = _gaps(frames, targets, subject, criteria)
-    detect_ms = [step.detect_ms for step in frames]
+    detect_ms = [step.frame.detect_ms for step in frames if step.frame]
+    render_ms = [step.frame.render_ms for step in frames if step.frame]
     stamps = [step.seen.stamp for step, ok in zip(frames, found, strict=True) if ok and step.seen]
     known = [person for person in targets if person is not None]
     zones = Counter(zone_of(distance) for distance in distances)
@@ -230,12 +231,12 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         mean_abs_domega=_mean(np.abs(np.diff(_turn_rates(episode)))) or 0.0,
         jerk_mean=_jerk_mean(steps),
         path_m=_path(steps),
-        modes=_shares([step.mode.value for step in steps], [mode.value for mode in Mode]),
-        reasons=_shares([step.reason for step in steps], []),
+        modes=_shares([step.decision.mode.value for step in steps], [mode.value for mode in Mode]),
+        reasons=_shares([step.decision.reason for step in steps], []),
         detect_ms_p50=float(np.percentile(detect_ms, 50)) if detect_ms else None,
         detect_ms_p95=float(np.percentile(detect_ms, 95)) if detect_ms else None,
         detect_ms_mean=_mean(detect_ms),
-        render_ms_p50=float(np.percentile([step.render_ms for step in frames], 50)) if frames else None,
+        render_ms_p50=float(np.percentile(render_ms, 50)) if render_ms else None,
         real_time_factor=episode.seconds / episode.wall_seconds if episode.wall_seconds > 0 else 0.0,
     )
 
@@ -269,7 +270,7 @@ def _hit(box: NDArray[np.int32], people: Sequence[PersonTruth | None], criteria:
 
 def _target(step: Step, hits: Sequence[int]) -> int | None:
     """Return the person that the target is; None without a target."""
-    return None if step.target is None else hits[step.target]
+    return None if step.decision.target is None else hits[step.decision.target]
 
 
 def _people(truth: Truth | None) -> tuple[PersonTruth | None, ...]:
@@ -343,8 +344,8 @@ def _path_wrong(steps: Sequence[Step], criteria: Criteria) -> float:
     """Return the distance driven while the last target is no person [m]."""
     total, wrong = 0.0, False
     for step, after in itertools.pairwise(steps):
-        if step.target is not None:
-            wrong = _hits(step, criteria)[step.target] == NO_PERSON
+        if step.decision.target is not None:
+            wrong = _hits(step, criteria)[step.decision.target] == NO_PERSON
         if wrong:
             total += math.dist(step.truth.robot[:2], after.truth.robot[:2])
     return total
@@ -352,7 +353,7 @@ def _path_wrong(steps: Sequence[Step], criteria: Criteria) -> float:
 
 def _turn_rates(episode: Episode) -> NDArray[np.float64]:
     """Return the commanded turn rates [rad/s], as far as the wheels can turn the robot."""
-    rates = np.array([step.twist.angular for step in episode.steps], np.float64)
+    rates = np.array([step.decision.twist.angular for step in episode.steps], np.float64)
     limit = max_turn_rate(episode.scenario.robot.wheel_speed)
     return np.clip(np.where(np.isfinite(rates), rates, 0.0), -limit, limit)
 

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.robot import LIMO
 from limo_sim.world.truth import Truth
 
 WIDTH, HEIGHT = 640, 480
-FIELD = 1.23918
+FIELD = LIMO.field_of_view
 """Horizontal field of view [rad]."""
-FOCAL_PX = WIDTH / 2 / math.tan(FIELD / 2)
+FOCAL_PX = LIMO.focal_px(WIDTH)
 CENTRE_X, CENTRE_Y = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
-MOUNT_AHEAD, MOUNT_HEIGHT = 0.084, 0.175
+MOUNT_AHEAD, MOUNT_HEIGHT = LIMO.camera_x, LIMO.camera_z
 """Where the camera sits: ahead of the base centre and above the floor [m]; it looks level, straight ahead."""
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.sense.ranging import box_centre, person_depth, zone_of
+from limo_hog.follow.sense.ranging import box_centre, person_depth
+from limo_hog.follow.zones import zone_of
 from limo_hog.imaging.drawing import annotate
 from limo_sim.run.episode import Step
 from limo_sim.sensing.camera import WIDTH, Frame
@@ -38,22 +39,46 @@ class Reading:
 
 def reading(step: Step) -> Reading:
     """Read a control period."""
-    error = None
-    if step.target is not None:
-        error = WIDTH / 2 - box_centre(step.detections.boxes[step.target])[0]
+    error, twist = None, step.decision.twist
+    if step.decision.target is not None:
+        error = WIDTH / 2 - box_centre(step.detections.boxes[step.decision.target])[0]
     distances = [person.distance for person in step.truth.people if person is not None]
-    return Reading(step.time, error, min(distances, default=None), float(step.twist.linear), float(step.twist.angular))
+    return Reading(step.time, error, min(distances, default=None), float(twist.linear), float(twist.angular))
 
 
-def annotated(frame: Frame, step: Step) -> NDArray[np.uint8]:
-    """Draw what the follower saw: all boxes, whom it follows, how far that is by the depth image, and what it does."""
-    words = [f"{step.time:.1f} s", step.mode.value]
-    if step.target is not None:
-        distance = person_depth(frame.depth, step.detections.boxes[step.target])
-        if distance is not None:
-            words += [f"{distance:.2f} m", zone_of(distance).value]
+def measured_m(frame: Frame | None, step: Step) -> float | None:
+    """Return how far the followed person is as the follower measures it: from the camera to their front [m]."""
+    if frame is None or step.decision.target is None:
+        return None
+    return person_depth(frame.depth, step.detections.boxes[step.decision.target])
+
+
+def followed_person(step: Step) -> int | None:
+    """Return the index of the person that the followed box covers most of; None without a box or a person in it."""
+    if step.decision.target is None or step.seen is None:
+        return None
+    x, y, w, h = step.detections.boxes[step.decision.target].tolist()
+    shared = {}
+    for index, person in enumerate(step.seen.people):
+        if person is not None and person.box is not None:
+            left, top, width, height = person.box
+            wide = min(x + w, left + width) - max(x, left)
+            high = min(y + h, top + height) - max(y, top)
+            if wide > 0 and high > 0:
+                shared[index] = wide * high * person.visible
+    return max(shared, key=shared.__getitem__, default=None)
+
+
+def annotated(frame: Frame, step: Step, caption: bool = True) -> NDArray[np.uint8]:
+    """Draw what the follower saw: all boxes and which is followed; in the caption its distance and what it does."""
+    words = [f"{step.time:.1f} s", step.decision.mode.value]
+    distance = measured_m(frame, step)
+    if distance is not None:
+        words += [f"depth {distance:.2f} m", zone_of(distance).value]
     labels = [f"{score:.1f}" for score in step.detections.scores]
-    return annotate(frame.image, step.detections.boxes, labels, step.target, "  ".join(words))
+    return annotate(
+        frame.image, step.detections.boxes, labels, step.decision.target, "  ".join(words) if caption else ""
+    )
 
 
 def depth_picture(depth: NDArray[np.float32], far: float) -> NDArray[np.uint8]:
@@ -65,3 +90,9 @@ def depth_picture(depth: NDArray[np.float32], far: float) -> NDArray[np.uint8]:
     picture = cv2.applyColorMap(shade, cv2.COLORMAP_VIRIDIS)
     picture[~known] = 0
     return picture.astype(np.uint8, copy=False)
+
+
+def depth_colours(far: float, count: int = 17) -> list[str]:
+    """Return the colours of `depth_picture` at evenly spaced depths from 0 to `far` [m], as #rrggbb."""
+    scale = depth_picture(np.linspace(0, far, count, dtype=np.float32)[None], far)[0]
+    return [f"#{red:02x}{green:02x}{blue:02x}" for blue, green, red in scale.tolist()]

@@ -40,6 +40,6 @@ def recorded(path: Path) -> Iterator[Callable[[Moment], None]]:
                 write(IMAGE, now, messages.image(frame.stamp, frame.image))
                 found = detections_message(frame.stamp, step.detections, messages.CAMERA_FRAME)
                 write(DETECTIONS, now, found)
-            write(COMMAND, now, messages.twist(step.twist))
+            write(COMMAND, now, messages.twist(step.decision.twist))
 
         yield watch

@@ -40,7 +40,7 @@ def logged(path: Path) -> Iterator[Callable[[Moment], None]]:
                 # Every second pixel in millimetres, a tenth of the bytes: this is to look at.
                 depth = np.nan_to_num(1000 * frame.depth[::2, ::2], nan=0, posinf=0, neginf=0).astype(np.uint16)
                 log.log("depth", rr.DepthImage(depth, meter=1000))
-                colours = [_RED if i == step.target else _GREEN for i in range(len(step.detections))]
+                colours = [_RED if i == step.decision.target else _GREEN for i in range(len(step.detections))]
                 labels = [f"{score:.1f}" for score in step.detections.scores]
                 boxes = rr.Boxes2D(
                     array=step.detections.boxes, array_format=rr.Box2DFormat.XYWH, labels=labels, colors=colours
@@ -54,7 +54,7 @@ def logged(path: Path) -> Iterator[Callable[[Moment], None]]:
                 value = getattr(now, name)
                 if value is not None:
                     log.log(f"series/{name}", rr.Scalars(value))
-            log.log("mode", rr.TextLog(f"{step.mode.value}: {step.reason}"))
+            log.log("mode", rr.TextLog(f"{step.decision.mode.value}: {step.decision.reason}"))
 
         yield watch
         log.flush()

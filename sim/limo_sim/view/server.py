@@ -7,16 +7,18 @@ and only while somebody looks.
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
+import logging
 import math
+import socket
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from typing import Any
-from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
@@ -24,27 +26,76 @@ from aiohttp import WSMsgType, web
 from numpy.typing import NDArray
 
 from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.observation import Scan
-from limo_hog.follow.sense.ranging import ZONE_ENDS
+from limo_hog.follow.zones import ZONE_ENDS
 from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FIELD
 from limo_sim.sensing.lidar import MOUNT_AHEAD
+from limo_sim.view.door import HEADERS, Door, QuietLogger
 from limo_sim.view.pace import Pace
-from limo_sim.view.reading import annotated, depth_picture, reading
-from limo_sim.view.tuning import ParameterError, Tunable
+from limo_sim.view.reading import annotated, depth_colours, depth_picture, followed_person, measured_m, reading
+from limo_sim.view.tuning import Tunable
+from limo_sim.view.wishes import MAX_BYTES, obey
 from limo_sim.world.furniture import Disc
 from limo_sim.world.scenario import ROOM_HALF, Scenario
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 LOOPBACK = "127.0.0.1"
 #: How often the page is brought up to date [s].
 PERIOD = 0.1
 #: Control periods that a page which opens late is told of.
 _REMEMBERED = 3000
+#: A page that takes nothing for so long is dropped [s]; it comes back by itself when it can. Wi-Fi that roams is
+#: quiet for two or three.
+STALL_S = 5.0
+#: How long a page may take to hear that the run is over and to close [s]; a run ends within 2 s.
+_GOODBYE_S = 1.0
+#: What the system keeps for a page that does not read [bytes]: about two pictures, so that what it shows is new.
+_SEND_BUFFER = 1 << 17
 _JPEG = [cv2.IMWRITE_JPEG_QUALITY, 80]
 
 
 class ServeError(LimoHogError):
     """The page cannot be served where it was asked for."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Page:
+    """One open page.
+
+    Attributes
+    ----------
+    client, transport
+        Its connection, twice: what is sent through, and what can be cut.
+    complaints
+        What was wrong with its wishes, not told yet.
+    """
+
+    client: web.WebSocketResponse
+    transport: asyncio.Transport
+    complaints: deque[str] = field(default_factory=lambda: deque(maxlen=10))
+
+    async def send(self, message: dict[str, Any] | bytes) -> None:
+        """Send JSON or a picture; a page that does not take it in time is dropped.
+
+        Raises
+        ------
+        OSError
+            The connection is gone.
+        """
+        client = self.client
+        sending = client.send_bytes(message) if isinstance(message, bytes) else client.send_str(json.dumps(message))
+        try:
+            await asyncio.wait_for(sending, STALL_S)
+        except asyncio.TimeoutError as error:
+            self.abort()
+            raise ConnectionAbortedError("the page takes nothing") from error
+
+    def abort(self) -> None:
+        """Close the connection without waiting for what was not taken."""
+        self.transport.abort()
 
 
 class View:
@@ -82,10 +133,16 @@ class View:
         self._pictured: Moment | None = None
         self._rows: deque[list[float | None]] = deque(maxlen=_REMEMBERED)
         self._written = 0
+        # Index of the person followed last; None before, and during a search.
+        self._followed: int | None = None
         # Time and pose of the last control periods: a scan is as old as it is.
         self._poses: deque[tuple[float, float, float, float]] = deque(maxlen=32)
         self._ended: Mapping[str, Any] | None = None
-        self._clients: set[web.WebSocketResponse] = set()
+        # Who looks, and the task that shows them the run; the newest pictures, encoded once for all of them.
+        self._pages: dict[_Page, asyncio.Task[None]] = {}
+        self._encoded: tuple[Moment, asyncio.Future[list[bytes]]] | None = None
+        self._over = asyncio.Event()
+        self._door = Door(host, loopback=True)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="limo-hog view", daemon=True)
         self._runner: web.AppRunner | None = None
@@ -101,8 +158,13 @@ class View:
         if moment.frame is not None:
             self._pictured = moment
         now, (x, y, _) = reading(moment.step), moment.step.truth.robot
-        people = [(p.x, p.y) for p in moment.step.truth.people if p is not None]
-        self._rows.append([*asdict(now).values(), x, y, *(people[0] if people else (None, None))])
+        people = [(None, None) if p is None else (p.x, p.y) for p in moment.step.truth.people]
+        measured = measured_m(moment.frame, moment.step)
+        self._rows.append([*asdict(now).values(), measured, x, y, *itertools.chain(*people)])
+        if moment.step.decision.mode is Mode.SEARCH:
+            self._followed = None
+        elif (followed := followed_person(moment.step)) is not None:
+            self._followed = followed
         self._poses.append((moment.step.time, *moment.step.truth.robot))
         self._written += 1
         self._newest = moment
@@ -111,7 +173,7 @@ class View:
     def end(self, card: Mapping[str, Any]) -> None:
         """Tell everybody that the run is over, with its score card."""
         self._ended = card
-        asyncio.run_coroutine_threadsafe(self._say_goodbye(), self._loop).result(timeout=5)
+        asyncio.run_coroutine_threadsafe(self._say_goodbye(), self._loop).result()
 
     def __enter__(self) -> View:  # noqa: PYI034
         self._thread.start()
@@ -135,12 +197,17 @@ class View:
         self._loop.close()
 
     async def _start(self) -> None:
-        app = web.Application()
+        app = web.Application(middlewares=[self._guard])
+        app.on_response_prepare.append(_add_headers)
         app.router.add_get("/", _page("index.html", "text/html"))
         app.router.add_get("/view.css", _page("view.css", "text/css"))
         app.router.add_get("/view.js", _page("view.js", "text/javascript"))
         app.router.add_get("/live", self._live)
-        self._runner = web.AppRunner(app, access_log=None)
+        logger: Any = QuietLogger(logging.getLogger("limo_sim.view"), {})
+        # Connections that ask nothing, or never finish asking, do not hold up the end.
+        self._runner = web.AppRunner(
+            app, access_log=None, logger=logger, shutdown_timeout=0.1, lingering_time=0, keepalive_timeout=30
+        )
         await self._runner.setup()
         site = web.TCPSite(self._runner, self._host, self._port)
         try:
@@ -148,7 +215,18 @@ class View:
         except OSError:
             await self._runner.cleanup()
             raise
-        self._port = self._runner.addresses[0][1]
+        addresses = self._runner.addresses
+        self._port = addresses[0][1]
+        self._door = Door.at(self._host, [address[0] for address in addresses])
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        if self._door.admits(request.headers.get("Host"), request.headers.get("Origin")):
+            return await handler(request)
+        raise web.HTTPForbidden(
+            text="This page answers to this machine's own addresses, and to no other site.\n"
+            "Open it by the address that limo-hog printed, or give --view the name: --view NAME:PORT\n"
+        )
 
     async def _stop(self) -> None:
         await self._say_goodbye()
@@ -156,35 +234,35 @@ class View:
             await self._runner.cleanup()
 
     async def _say_goodbye(self) -> None:
-        text = json.dumps({"ended": _finite(self._ended or {})})
-
-        async def dismiss(client: web.WebSocketResponse) -> None:
-            with suppress(ConnectionError, asyncio.TimeoutError):
-                await asyncio.wait_for(client.send_str(text), 1)
-                await asyncio.wait_for(client.close(), 1)
-
-        await asyncio.gather(*map(dismiss, list(self._clients)))
+        """Let every page hear that it is over, and drop those that do not."""
+        self._over.set()
+        if self._pages:
+            await asyncio.wait(self._pages.values(), timeout=_GOODBYE_S)
+        for page in self._pages:
+            page.abort()
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
-        # Another site's page, open in the same browser, may not steer; nor may one whose name leads here.
-        origin = urlsplit(request.headers.get("Origin", f"//{request.host}"))
-        names = {LOOPBACK, "localhost"} if self._host == LOOPBACK else {origin.hostname}
-        if origin.netloc != request.host or origin.hostname not in names:
-            raise web.HTTPForbidden(text="this page is not for other sites")
-        client = web.WebSocketResponse(heartbeat=20, compress=False)
+        client = web.WebSocketResponse(heartbeat=20, compress=False, max_msg_size=MAX_BYTES, timeout=_GOODBYE_S)
         await client.prepare(request)
-        await client.send_str(json.dumps(self._welcome()))
-        self._clients.add(client)
-        showing = asyncio.create_task(self._show(client))
+        if request.transport is None:
+            return client
+        connection = request.transport.get_extra_info("socket")
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+        page = _Page(client, request.transport)
+        showing = self._pages[page] = asyncio.create_task(self._show(page))
         try:
             async for message in client:
-                if message.type is WSMsgType.TEXT:
-                    complaint = self._obey(message.data)
-                    if complaint:
-                        await client.send_str(json.dumps({"complaint": complaint}))
+                if message.type is WSMsgType.ERROR:
+                    break  # longer than any wish, or not of the protocol
+                wish = message.data if message.type is WSMsgType.TEXT else ""
+                complaint = obey(wish, self.pace, self._controller)
+                if complaint:
+                    page.complaints.append(complaint)
         finally:
-            self._clients.discard(client)
+            del self._pages[page]
             showing.cancel()
+            with suppress(asyncio.CancelledError):
+                await showing
         return client
 
     def _welcome(self) -> dict[str, Any]:
@@ -197,39 +275,61 @@ class View:
                 for f in (piece.footprint for piece in self._scenario.furniture)
             ],
             "zones": list(ZONE_ENDS.values()),
-            "parameters": self._controller.parameters if self._controller else {},
+            "depth": {"far": self._scenario.depth.far_m, "colours": depth_colours(self._scenario.depth.far_m)},
+            "parameters": [
+                {**asdict(one), "whole": one.whole}
+                for one in (self._controller.parameters.values() if self._controller else ())
+            ],
         }
 
-    async def _show(self, client: web.WebSocketResponse) -> None:
-        """Send a page what is new, as fast as it takes it and no faster than `PERIOD`."""
+    async def _show(self, page: _Page) -> None:
+        """Send a page what is new, as fast as it takes it and no faster than `PERIOD`; nothing else sends to it."""
         shown: tuple[Any, ...] = ()
         pictured, told = None, 0
-        while not client.closed:
-            newest, frame = self._newest, self._pictured
-            now = (newest, self.pace.paused, self.pace.speed)
-            if newest is not None and now != shown:
-                shown = now
-                written = self._written
-                rows = list(self._rows)[-(written - told) :] if written > told else []
-                told = written
-                await client.send_str(json.dumps({"state": self._state(newest), "rows": rows}))
-                if frame is not None and frame is not pictured:
-                    pictured = frame
-                    for picture in await self._loop.run_in_executor(None, self._pictures, frame):
-                        await client.send_bytes(picture)
-            # A run that hurries has no time to lose on pictures nobody can follow.
-            await asyncio.sleep(PERIOD if self.pace.speed else 2 * PERIOD)
+        with suppress(OSError):
+            await page.send(self._welcome())
+            while not page.client.closed:
+                while page.complaints:
+                    await page.send({"complaint": page.complaints.popleft()})
+                newest, frame = self._newest, self._pictured
+                now = (newest, self.pace.paused, self.pace.speed)
+                if newest is not None and now != shown:
+                    shown = now
+                    written = self._written
+                    rows = list(self._rows)[-(written - told) :] if written > told else []
+                    told = written
+                    await page.send({"state": self._state(newest), "rows": rows})
+                    if frame is not None and frame is not pictured:
+                        pictured = frame
+                        for picture in await self._pictures_of(frame):
+                            await page.send(picture)
+                if self._over.is_set():
+                    await page.send({"ended": _finite(self._ended or {})})
+                    await page.client.close()
+                    return
+                # A run that hurries has no time to lose on pictures nobody can follow.
+                with suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(self._over.wait(), PERIOD if self.pace.speed else 2 * PERIOD)
+
+    async def _pictures_of(self, moment: Moment) -> list[bytes]:
+        """Encode the pictures of a moment, once for all pages and beside the server's loop."""
+        if self._encoded is None or self._encoded[0] is not moment:
+            self._encoded = moment, self._loop.run_in_executor(None, self._pictures, moment)
+        # A page that leaves does not take the pictures from the others.
+        return await asyncio.shield(self._encoded[1])
 
     def _state(self, moment: Moment) -> dict[str, Any]:
         step = moment.step
         return {
             **asdict(reading(step)),
-            "mode": step.mode.value,
-            "reason": step.reason,
+            "mode": step.decision.mode.value,
+            "reason": step.decision.reason,
             "robot": step.truth.robot,
-            "people": [(p.x, p.y) for p in step.truth.people if p is not None],
+            "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
+            "followed": self._followed,
+            "measured_m": measured_m(moment.frame, step),
             "scan": _hits(moment.scan, list(self._poses)),
-            "detect_ms": step.detect_ms or None,
+            "detect_ms": step.frame.detect_ms or None if step.frame else None,
             "boxes": len(step.detections),
             "contacts": asdict(step.truth.contacts),
             "paused": self.pace.paused,
@@ -241,7 +341,7 @@ class View:
         if moment.frame is None:
             return []
         depth = depth_picture(moment.frame.depth[::2, ::2], self._scenario.depth.far_m)
-        pictures = {b"c": annotated(moment.frame, moment.step), b"d": depth}
+        pictures = {b"c": annotated(moment.frame, moment.step, caption=False), b"d": depth}
         encoded = [letter + cv2.imencode(".jpg", p, _JPEG)[1].tobytes() for letter, p in pictures.items()]
         # A window's name stands between its letter and its picture, ended by a line feed.
         return encoded + [
@@ -249,26 +349,9 @@ class View:
             for name, p in moment.windows.items()
         ]
 
-    def _obey(self, text: str) -> str | None:
-        """Do what a page wishes; returns what is wrong with the wish."""
-        try:
-            wish = json.loads(text)
-            if "set" in wish:
-                if self._controller is None:
-                    return "this run has no parameters"
-                self._controller.set(wish["set"], wish["value"])
-            elif wish["do"] == "speed":
-                speed = float(wish["value"])
-                if not 0 <= speed <= 100:
-                    return f"speed {speed:g} is not within 0 and 100"
-                self.pace.set_speed(speed)
-            else:
-                {"pause": self.pace.pause, "resume": self.pace.resume, "step": self.pace.step}[wish["do"]]()
-        except ParameterError as error:
-            return str(error)
-        except (ValueError, KeyError, TypeError):
-            return f"not understood: {text[:100]}"
-        return None
+
+async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(HEADERS)
 
 
 def _page(name: str, kind: str) -> Any:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+import inspect
+import re
+from collections.abc import Iterator
+from functools import cache
 from typing import Any, Generic, TypeVar
 
 from limo_hog.exceptions import LimoHogError
@@ -12,13 +15,69 @@ from limo_hog.follow.sense.observation import Observation
 
 S = TypeVar("S")
 
+#: Where a field gives no bounds: from 0 to so many times its default.
+_SPAN = 10.0
+
 
 class ParameterError(LimoHogError):
     """A controller has no such parameter, or it cannot have that value."""
 
 
+@dataclasses.dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number that can be set.
+
+    Attributes
+    ----------
+    name
+        Of the controller's field; of a field of a field with a dot between them.
+    value
+        What it is now; a whole number stays one.
+    low, high
+        What it may be, both included.
+    unit
+        Its unit, such as "m"; empty where it has none.
+    tooltip
+        What it does, in a sentence.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str = ""
+    tooltip: str = ""
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is a whole number."""
+        return isinstance(self.value, int)
+
+    def checked(self, value: Any) -> float:
+        """Return `value` as a number of this parameter's kind.
+
+        Raises
+        ------
+        ParameterError
+            It is no number within the bounds.
+        """
+        # A bool is an int to Python, and an int may be too long for a float; NaN is within no bounds.
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not self.low <= value <= self.high or (self.whole and value != int(value)):
+            kind, unit = "whole number" if self.whole else "number", f" {self.unit}" if self.unit else ""
+            raise ParameterError(
+                f"{self.name}: got {_short(value)}, want a {kind} from {self.low:g} to {self.high:g}{unit}"
+            )
+        return type(self.value)(value)
+
+
 class Tunable(Generic[S]):
-    """Stands for a controller, and can swap it for one with another parameter between two steps."""
+    """Stands for a controller, and can swap it for one with another parameter between two steps.
+
+    Parameters are the numeric fields of a dataclass. A field's `metadata` may give `low`, `high`, `unit` and
+    `tooltip`; unit and tooltip are otherwise those of the class's docstring, and bounds from 0 to ten times the
+    default. Numbers of a field that is a dataclass itself are parameters where their metadata give bounds.
+    """
 
     def __init__(self, controller: Controller[S]) -> None:
         self._controller = controller
@@ -34,30 +93,77 @@ class Tunable(Generic[S]):
     @property
     def target_distance(self) -> float | None:
         """Distance that the controller holds now [m]; None where it holds none."""
-        return self.parameters.get("target_distance")
+        target = self.parameters.get("target_distance")
+        return None if target is None else target.value
 
     @property
-    def parameters(self) -> dict[str, float]:
-        """The numbers that can be set."""
-        if not dataclasses.is_dataclass(self._controller):
-            return {}
-        values: dict[str, Any] = {
-            field.name: getattr(self._controller, field.name) for field in dataclasses.fields(self._controller)
-        }
-        return {name: value for name, value in values.items() if type(value) in (int, float)}
+    def parameters(self) -> dict[str, Parameter]:
+        """The numbers that can be set, by name."""
+        return {parameter.name: parameter for parameter in _parameters_of(self._controller)}
 
-    def set(self, name: str, value: float) -> None:
-        """Give a parameter a value; a whole number stays one.
+    def set(self, name: str, value: Any) -> None:
+        """Give a parameter a value.
 
         Raises
         ------
         ParameterError
-            There is no such parameter, or the value is not a finite number from 0 on.
+            There is no such parameter, or the value is not a number within its bounds.
         """
         parameters = self.parameters
         if name not in parameters:
-            raise ParameterError(f"no parameter {name!r}; there are {', '.join(parameters)}")
-        if not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
-            raise ParameterError(f"{name}: got {value!r}, want a number from 0 on")
-        controller: Any = self._controller
-        self._controller = dataclasses.replace(controller, **{name: type(parameters[name])(value)})
+            raise ParameterError(f"no parameter {_short(name)}; there are {', '.join(parameters)}")
+        self._controller = _replaced(self._controller, name.split("."), parameters[name].checked(value))
+
+
+def _parameters_of(owner: Any, prefix: str = "") -> Iterator[Parameter]:
+    if not dataclasses.is_dataclass(owner) or isinstance(owner, type):
+        return
+    for field in dataclasses.fields(owner):
+        value, about = getattr(owner, field.name), field.metadata
+        default: Any = field.default if type(field.default) in (int, float) else 0
+        if type(value) in (int, float) and ("high" in about or not prefix):
+            unit, tooltip = _documented(type(owner)).get(field.name, ("", ""))
+            yield Parameter(
+                prefix + field.name,
+                value,
+                about.get("low", 0),
+                about.get("high", _SPAN * (abs(default) or 1)),
+                about.get("unit", unit),
+                about.get("tooltip", tooltip),
+            )
+        else:
+            yield from _parameters_of(value, f"{prefix}{field.name}.")
+
+
+def _replaced(owner: Any, path: list[str], value: float) -> Any:
+    name, *rest = path
+    return dataclasses.replace(owner, **{name: _replaced(getattr(owner, name), rest, value) if rest else value})
+
+
+@cache
+def _documented(kind: type) -> dict[str, tuple[str, str]]:
+    """Read unit and meaning of each attribute from a class's docstring, in numpydoc's form.
+
+    The unit is what first stands in brackets, [1] for none; an entry of several names may have as many units, or one
+    for all.
+    """
+    _, _, section = (inspect.getdoc(kind) or "").partition("\nAttributes\n----------\n")
+    found = {}
+    for entry in re.finditer(r"^(\w[\w, ]*)\n((?:[ ]+.*\n?)+)", section, re.MULTILINE):
+        names = [name.strip() for name in entry[1].split(",")]
+        text = " ".join(entry[2].split())
+        bracket = re.search(r" \[([^\]]*)\]", text)
+        units = [one.strip() for one in bracket[1].split(",")] if bracket else ["1"]
+        for i, name in enumerate(names):
+            unit = units[i] if len(units) == len(names) else units[0]
+            found[name] = ("" if unit == "1" else unit, text.replace(bracket[0], "", 1) if bracket else text)
+    return found
+
+
+def _short(value: object) -> str:
+    """Show a value of any length in a few characters."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # Python refuses to write whole numbers of thousands of digits
+        text = type(value).__name__
+    return text if len(text) <= 40 else f"{text[:37]}…"

@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.twist import Twist
-
-WHEEL_SEPARATION = 0.172
-HALF_LENGTH, HALF_WIDTH = 0.145, 0.11
-"""Of the body, about the base centre [m]."""
 
 
 @dataclass(slots=True)
@@ -52,7 +49,7 @@ class Drive:
             self._wanted = Twist()
             self._commanded_at = None
             self.watchdog_stops += 1
-        turn = self._wanted.angular * WHEEL_SEPARATION / 2
+        turn = self._wanted.angular * LIMO.wheel_separation / 2
         wanted_left, wanted_right = self._wanted.linear - turn, self._wanted.linear + turn
         # a command too fast for one wheel is slowed as a whole, so that the robot keeps to its curve
         excess = max(abs(wanted_left), abs(wanted_right)) / self.wheel_speed
@@ -70,7 +67,7 @@ class Drive:
 
 def twist_of(left: float, right: float) -> Twist:
     """Return the motion of the robot from that of its wheels' rims, as speeds [m/s] or as distances [m]."""
-    return Twist((left + right) / 2, (right - left) / WHEEL_SEPARATION)
+    return Twist((left + right) / 2, (right - left) / LIMO.wheel_separation)
 
 
 def max_turn_rate(wheel_speed: float) -> float:

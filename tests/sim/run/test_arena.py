@@ -12,7 +12,7 @@ import sys
 import numpy as np
 import pytest
 
-from limo_hog.detector import PeopleDetector
+from limo_hog.follow import detector_named
 from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
@@ -228,7 +228,7 @@ def test_the_surface_distance_is_what_the_depth_image_shows_in_the_middle_of_a_p
     # 0.3 m/s: the gait goes through its phases, the direction stays
     away = distance + 0.6 * math.cos(facing), 0.6 * math.sin(facing)
     scenario = Scenario(people=(Person(route=((distance, 0.0, 0.0), (*away, 0.0)), speed=0.3),))
-    arena, detector, errors = Arena(scenario, 0), PeopleDetector(), []
+    arena, detector, errors = Arena(scenario, 0), detector_named("hog"), []
     while arena.time < 1.8:
         frame = arena.frame()
         person = frame.truth.people[0]

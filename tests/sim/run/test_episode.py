@@ -18,9 +18,11 @@ from limo_hog.follow import (
     Observation,
     ProxemicController,
     TrackingController,
+    Twist,
     controller_named,
 )
 from limo_hog.follow.control.tracking import TrackingState
+from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.episode import Episode, run_episode
 from limo_sim.run.score import score
 from limo_sim.view.tuning import Tunable
@@ -34,7 +36,7 @@ class Failing:
 
     def __init__(self) -> None:
         self.calls = 0
-        self.works = PeopleDetector()
+        self.works = detector_named("hog")
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
         self.calls += 1
@@ -45,7 +47,7 @@ class Failing:
 
 def run(scenario: str, seconds: float, controller: Any = None, detector: Any = None, seed: int = 0) -> Episode:
     return run_episode(
-        Scenario.load(scenario), controller or TrackingController(), detector or PeopleDetector(), seconds, seed
+        Scenario.load(scenario), controller or TrackingController(), detector or detector_named("hog"), seconds, seed
     )
 
 
@@ -169,11 +171,11 @@ def test_nobody_is_approached_nearer_than_the_safety_layer_allows() -> None:
 
 def test_a_detector_that_raises_stops_the_robot_until_it_works_again() -> None:
     episode = run("standing", 6.0, detector=Failing())
-    failed = [step for step in episode.steps if "GPU fell off" in step.reason]
+    failed = [step for step in episode.steps if "GPU fell off" in step.decision.reason]
     assert len(failed) == 10
-    assert all(step.mode is Mode.BLOCKED and step.twist.linear == step.twist.angular == 0 for step in failed)
+    assert all(step.decision.mode is Mode.BLOCKED and step.decision.twist == Twist() for step in failed)
     after = [step for step in episode.steps if step.time > failed[-1].time]
-    assert after[-1].mode in (Mode.FOLLOW, Mode.HOLD)
+    assert after[-1].decision.mode in (Mode.FOLLOW, Mode.HOLD)
 
 
 def test_nobody_is_found_where_nobody_is() -> None:
@@ -181,3 +183,19 @@ def test_nobody_is_found_where_nobody_is() -> None:
     assert result.in_view is None
     assert result.path_m < 0.05
     assert result.modes["search"] == 1.0
+
+
+def test_between_two_frames_of_a_slow_camera_a_command_goes_out_every_period_until_the_frame_is_too_old() -> None:
+    standing = Scenario.load("standing")
+    slow = dataclasses.replace(standing, camera=dataclasses.replace(standing.camera, rate_hz=1.0))
+    episode = run_episode(slow, controller_named("approach"), detector_named("hog"), 3.0, 0)
+    ages: dict[float, Any] = {}
+    last = 0.0
+    for step in episode.steps:
+        last = step.frame.truth.stamp if step.frame else last
+        ages.setdefault(round(step.time - last, 1), []).append(step.decision)
+    assert sorted(ages) == pytest.approx([0.1 * k for k in range(10)])
+    assert all(decision.mode is Mode.FOLLOW for age in (0.0, 0.1, 0.4) for decision in ages[age])
+    for age in (0.6, 0.7, 0.8, 0.9):
+        assert all(decision.twist == Twist() for decision in ages[age])
+        assert all(decision.reason == f"no camera frame for {age} s" for decision in ages[age])

@@ -11,9 +11,9 @@ import pytest
 from scipy.stats import t as student  # type: ignore[import-untyped]
 
 from limo_hog.detector import Detections
-from limo_hog.follow.decision import Mode
+from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
-from limo_sim.run.episode import NOTHING, Episode, Step
+from limo_sim.run.episode import Episode, FrameRecord, Step
 from limo_sim.run.score import ScoreCard, on_person, score
 from limo_sim.run.sweep import estimate, summarise
 from limo_sim.world.scenario import Scenario
@@ -46,9 +46,10 @@ def step(
     render_ms: float = 1.0,
 ) -> Step:
     truth = Truth(0.1 * number, robot or (at, 0.0, 0.0), people, Contacts(0, 0))
-    found = NOTHING if not boxes else Detections(np.array(boxes, np.int32), np.arange(len(boxes), 0.0, -1.0))
+    found = Detections.none() if not boxes else Detections(np.array(boxes, np.int32), np.arange(len(boxes), 0.0, -1.0))
     twist = Twist(0.0, 0.1 * number if turn is None else turn)
-    return Step(0.1 * number, truth, truth, found, target, None, twist, Mode.FOLLOW, "because", detect_ms, render_ms)
+    decision = Decision(twist, None, Mode.FOLLOW, "because", target)
+    return Step(0.1 * number, truth, decision, FrameRecord(truth, found, None, detect_ms, render_ms))
 
 
 def card(*steps: Step, target: float | None = 1.5, contacts: Contacts = TOUCHED) -> ScoreCard:

@@ -1,4 +1,4 @@
-"""Arguments that several commands take, and their types; argparse names them in its complaints."""
+"""Options that several commands share, and the types that check them."""
 
 from __future__ import annotations
 
@@ -6,27 +6,45 @@ from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 from pathlib import Path
 
+#: What a picture of `--size` may have: 64 megapixels take 1 GB to draw, and no camera has more.
+_MOST_PIXELS = 64_000_000
+#: Digits of the largest whole number an option takes.
+_MOST_DIGITS = 9
+
 
 def size(text: str) -> tuple[int, int]:
     """Read WIDTHxHEIGHT [px]."""
     width, _, height = text.lower().partition("x")
-    if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
-        raise ArgumentTypeError(f"{text!r} is no size; wanted is WIDTHxHEIGHT such as 640x480")
+    if not (width.isdecimal() and height.isdecimal() and width.strip("0") and height.strip("0")):
+        raise ArgumentTypeError(f"{_cut(text)} is no size; wanted is WIDTHxHEIGHT such as 640x480")
+    if max(len(width), len(height)) > _MOST_DIGITS or int(width) * int(height) > _MOST_PIXELS:
+        raise ArgumentTypeError(f"{_cut(text)} is too large; at most {_MOST_PIXELS / 1e6:g} megapixels are allowed")
     return int(width), int(height)
 
 
 def count(text: str) -> int:
     """Read a whole number from 1 on."""
-    if not text.isdecimal() or int(text) == 0:
-        raise ArgumentTypeError(f"{text!r} is no count; wanted is a whole number from 1 on")
-    return int(text)
+    return _whole(text, 1, "no count; wanted is a whole number from 1 on")
 
 
 def threads(text: str) -> int:
     """Read a number of threads, 0 for all cores."""
-    if not text.isdecimal():
-        raise ArgumentTypeError(f"{text!r} is no number of threads; wanted is 0 (all cores) or more")
+    return _whole(text, 0, "no number of threads; wanted is 0 (all cores) or more")
+
+
+def seed(text: str) -> int:
+    """Read a seed."""
+    return _whole(text, 0, "no seed; wanted is a whole number from 0 on")
+
+
+def _whole(text: str, least: int, complaint: str) -> int:
+    if not text.isdecimal() or len(text) > _MOST_DIGITS or int(text) < least:
+        raise ArgumentTypeError(f"{_cut(text)} is {complaint}, of at most {_MOST_DIGITS} digits")
     return int(text)
+
+
+def _cut(text: str) -> str:
+    return repr(text if len(text) <= 40 else f"{text[:40]}…")
 
 
 def number(text: str, low: float, high: float, what: str) -> float:
@@ -36,7 +54,7 @@ def number(text: str, low: float, high: float, what: str) -> float:
     except ValueError:
         value = float("nan")
     if not low <= value <= high:
-        raise ArgumentTypeError(f"{text!r} is no {what}; wanted is a number from {low:g} to {high:g}")
+        raise ArgumentTypeError(f"{_cut(text)} is no {what}; wanted is a number from {low:g} to {high:g}")
     return value
 
 
@@ -50,11 +68,13 @@ def seconds(text: str) -> float:
     return number(text, 0.1, 86400.0, "duration in seconds")
 
 
-def seed(text: str) -> int:
-    """Read a seed."""
-    if not text.isdecimal():
-        raise ArgumentTypeError(f"{text!r} is no seed; wanted is a whole number from 0 on")
-    return int(text)
+def output_file(text: str) -> str:
+    """Read the name of a file to write, or "-" for standard output."""
+    if not text:
+        raise ArgumentTypeError("'' is no file; wanted is a file's name, or - for standard output")
+    if Path(text).is_dir():
+        raise ArgumentTypeError(f"{text!r} is a folder; wanted is a file's name, or - for standard output")
+    return text
 
 
 def file_ending(*suffixes: str) -> Callable[[str], Path]:

@@ -1,12 +1,14 @@
-"""What this machine is made of, as far as it bears on speed and results."""
+"""Facts about this machine and its libraries that affect speed and results."""
 
 from __future__ import annotations
 
-import importlib.metadata
 import importlib.util
 import os
 import platform
+import re
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
+from typing import NamedTuple
 
 import limo_hog
 from limo_hog import _core
@@ -16,7 +18,7 @@ def environment() -> dict[str, str | int | float | bool | list[str] | None]:
     """Describe machine and libraries; plain values, for a table or JSON."""
     opencv, has_hog = _opencv()
     return {
-        "limo_hog": importlib.metadata.version("limo-hog"),
+        "limo_hog": limo_hog.__version__,
         "backend": _core.backend(),
         "cpu_features": [name for name in _core.available_backends() if name != "scalar"],
         "cpu": _cpu(),
@@ -25,11 +27,47 @@ def environment() -> dict[str, str | int | float | bool | list[str] | None]:
         "threads": limo_hog.get_num_threads(),
         "opencv": opencv,
         "opencv_has_hog": has_hog,
-        "numpy": importlib.metadata.version("numpy"),
+        "numpy": version("numpy"),
         "python": platform.python_version(),
         "platform": platform.platform(terse=True),
         "machine": platform.machine(),
     }
+
+
+class Extra(NamedTuple):
+    """Optional libraries: what of them is installed (a name and version each), and the line that installs the rest."""
+
+    name: str
+    installed: list[str]
+    install: str | None
+
+
+def extras() -> list[Extra]:
+    """List the package's extras and the simulator, as the package's metadata has them."""
+    wanted: dict[str, list[str]] = {}
+    for line in requires("limo-hog") or []:
+        found = re.match(r"([\w.-]+).*\bextra == ['\"]([\w-]+)['\"]", line)
+        if found and found[1] != "limo-hog":
+            wanted.setdefault(found[2], []).append(found[1])
+    listed = [_extra(name, libraries, f"'limo-hog[{name}]'") for name, libraries in sorted(wanted.items())]
+    return [*listed, _extra("simulator", ["limo-sim"], "limo-sim")]
+
+
+def _extra(name: str, libraries: list[str], install: str) -> Extra:
+    versions = {library: _version(library) for library in libraries}
+    installed = [found for found in versions.values() if found]
+    return Extra(name, installed, None if len(installed) == len(libraries) else f"pip install {install}")
+
+
+def _version(library: str) -> str | None:
+    if library.startswith("opencv"):
+        # Any of OpenCV's distributions serves.
+        found = _opencv()[0]
+        return found and f"cv2 {found}"
+    try:
+        return f"{library} {version(library)}"
+    except PackageNotFoundError:
+        return None
 
 
 def _opencv() -> tuple[str | None, bool]:

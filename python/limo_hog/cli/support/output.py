@@ -14,7 +14,7 @@ STDOUT = "-"
 
 
 class UsageError(LimoHogError):
-    """Arguments that do not go together."""
+    """Arguments are wrong, or contradict each other."""
 
 
 def write_json(target: str, value: object) -> None:
@@ -28,7 +28,9 @@ def write_json(target: str, value: object) -> None:
 
 
 def one_line(error: Exception) -> str:
-    """Tell an error in one line, with the file it is about."""
+    """Return an error in one line, with the name of its file."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
+    if isinstance(error, MemoryError):
+        return f"out of memory: {error}"
     return " ".join(str(error).split())

@@ -1,4 +1,4 @@
-"""The work of `limo-hog detect`: read, look, draw and write, on all cores, results in the order of the inputs."""
+"""The work of `limo-hog detect`: read, detect, draw and write on all cores; results in the order of the inputs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import TypeVar
@@ -21,8 +21,8 @@ from rich.progress import Progress
 
 import limo_hog
 from limo_hog.cli.support.environment import cores
-from limo_hog.cli.support.output import one_line
-from limo_hog.cli.support.results import Results
+from limo_hog.cli.support.output import UsageError, one_line
+from limo_hog.cli.support.results import Result, Results, refuse_to_overwrite
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ImageError
 from limo_hog.imaging.drawing import annotate
@@ -36,32 +36,31 @@ from limo_hog.imaging.reading import (
     read_image,
     standard_input,
 )
-from limo_hog.imaging.search import Search
 from limo_hog.imaging.writing import video_writer, write_image
 
 Image = NDArray[np.uint8]
 Item = TypeVar("Item")
-Result = TypeVar("Result")
+Answer = TypeVar("Answer")
 
 
-def in_order(work: Callable[[Item], Result], items: Iterable[Item], workers: int) -> Iterator[Result]:
-    """Map like `map`, on several threads, with few items in flight however many there are."""
+def in_order(work: Callable[[Item], Answer], items: Iterable[Item], workers: int) -> Iterator[Answer]:
+    """Map like `map`, on several threads, with at most 2 × `workers` items in flight."""
     with ThreadPoolExecutor(workers) as pool:
-        flying: deque[Future[Result]] = deque()
+        pending: deque[Future[Answer]] = deque()
         try:
             for item in items:
-                flying.append(pool.submit(work, item))
-                if len(flying) > 2 * workers:
-                    yield flying.popleft().result()
-            while flying:
-                yield flying.popleft().result()
+                pending.append(pool.submit(work, item))
+                if len(pending) > 2 * workers:
+                    yield pending.popleft().result()
+            while pending:
+                yield pending.popleft().result()
         finally:
             pool.shutdown(cancel_futures=True)
 
 
 @dataclass(frozen=True)
 class Found:
-    """What was found in one picture."""
+    """The people found in one picture."""
 
     source: str
     frame: int
@@ -73,39 +72,58 @@ class Found:
 
 
 class Run:
-    """One `detect` run: its options, and what came of it so far."""
+    """One `detect` run: its options and its results so far."""
 
-    def __init__(self, args: argparse.Namespace, results: Results, bar: Progress) -> None:
-        self._args, self._results, self._bar = args, results, bar
-        detector = PeopleDetector(threshold=args.threshold)
-        if args.nms is not None:
-            detector = replace(detector, nms="iou", overlap=args.nms)
-        self._search = Search(detector, args.min_height, args.max_height)
+    def __init__(self, args: argparse.Namespace, detector: PeopleDetector, bar: Progress) -> None:
+        self._args, self._detector, self._bar = args, detector, bar
+        self._sources: list[Source] = []
         self._copies: dict[Source, Path] = {}
         self._workers = 1
+        self._write: Callable[[Result], None]
+        self._done: dict[str, set[int]] | None = None
+        #: The result of each picture, kept if a table is written at the end.
+        self.results: list[Result] | None = [] if args.csv or args.coco else None
         self._task = bar.add_task("looking", total=0)
         self.pictures = self.peopled = self.people = self.failed = self.known = 0
         self._ms = 0.0
 
-    def look(self) -> None:
-        """Look at every input."""
-        with ExitStack() as stack:
-            # What two inputs stand for is looked at once.
-            named = dict.fromkeys(s for name in self._args.inputs for s in self._sources(name, stack))
-            sources = list(named)
-            if self._args.out is not None:
-                self._copies = _copies(sources, self._args.out)
-            self._share_cores(sources)
-            self._expect(sum(source.kind is Kind.IMAGE for source in sources))
-            for images, group in groupby(sources, key=lambda source: source.kind is Kind.IMAGE):
-                if images:
-                    self._look_at_images(list(group))
-                else:
-                    for source in group:
-                        self._look_at_video(source)
+    def find(self, stack: ExitStack) -> None:
+        """Expand every input, and name each annotated copy.
+
+        Raises
+        ------
+        UsageError
+            Copies would overwrite files.
+        """
+        # A picture that two inputs name is searched once.
+        named = dict.fromkeys(source for name in self._args.inputs for source in self._expand(name, stack))
+        self._sources = list(named)
+        if self._args.out is not None:
+            self._copies = _copies(self._sources, self._args.out, self._args.format)
+            own = {source.path.resolve() for source in self._sources}
+            for copy in self._copies.values():
+                if copy.resolve() in own:
+                    raise UsageError(f"{copy} is itself an input: choose another folder for --out")
+            if not self._args.resume and not self._args.overwrite:
+                refuse_to_overwrite(self._copies.values(), ", --resume makes only what is missing")
+
+    def look(self, results: Results) -> None:
+        """Search every input."""
+        self._write = results.write
+        self._done = None if results.earlier is None else results.done()
+        if self.results is not None:
+            self.results += results.earlier or []
+        self._share_cores(self._sources)
+        self._expect(sum(source.kind is Kind.IMAGE for source in self._sources))
+        for images, group in groupby(self._sources, key=lambda source: source.kind is Kind.IMAGE):
+            if images:
+                self._look_at_images(list(group))
+            else:
+                for source in group:
+                    self._look_at_video(source)
 
     def summary(self, seconds: float) -> str:
-        """Say what came of it in one line."""
+        """Return counts and times in one line."""
         pictures = "picture" if self.pictures == 1 else "pictures"
         words = [f"{self.pictures} {pictures}, {self.people} people in {self.peopled} of them"]
         if self.pictures:
@@ -116,7 +134,7 @@ class Run:
             words.append(f"{self.failed} could not be read")
         return "; ".join(words)
 
-    def _sources(self, name: str, stack: ExitStack) -> list[Source]:
+    def _expand(self, name: str, stack: ExitStack) -> list[Source]:
         try:
             return [stack.enter_context(standard_input())] if name == STDIN else find_sources(name)
         except ReadError as error:
@@ -124,7 +142,7 @@ class Run:
             return []
 
     def _share_cores(self, sources: list[Source]) -> None:
-        """Give each picture a core of its own where there are many, and one picture all cores."""
+        """Use a core for each of many pictures, and all cores for a single one."""
         threads = self._args.threads or cores()
         many = len(sources) > 1 or any(source.kind is Kind.VIDEO for source in sources)
         self._workers = threads if many else 1
@@ -161,9 +179,9 @@ class Run:
             except (ReadError, OSError) as error:
                 self._fail(one_line(error))
                 return
-            every, done = self._args.every, (self._results.done or {}).get(source.name, set())
+            every, done = self._args.every, (self._done or {}).get(source.name, set())
             write = copy and stack.enter_context(video_writer(copy, video.fps / every))
-            # An annotated copy is made anew from its first frame.
+            # An annotated copy always starts at the first frame.
             skip = set() if write else done
             self.known += len(skip)
             self._expect(max(0, -(-video.frame_count // every) - len(skip)))
@@ -185,13 +203,13 @@ class Run:
                         self._keep(found)
                     self._bar.advance(self._task)
             except KeyboardInterrupt:
-                # A camera has no other end: what was seen until now is whole.
+                # Ctrl-C is how a camera's run ends: its copy is complete.
                 if source.kind is not Kind.CAMERA:
                     raise
 
     def _find(self, source: Source, frame: int, image: Image) -> tuple[Found, Image | None]:
         start = time.perf_counter()
-        detections = self._search.detect(image)
+        detections = self._detector.detect(image)
         ms = 1e3 * (time.perf_counter() - start)
         height, width = image.shape[:2]
         boxes = detections.person_boxes if self._args.person_box else detections.boxes
@@ -204,14 +222,16 @@ class Run:
     def _is_done(self, source: Source) -> bool:
         if not self._args.resume:
             return False
-        written = self._results.done is None or 0 in self._results.done.get(source.name, ())
+        written = self._done is None or 0 in self._done.get(source.name, ())
         return written and (source not in self._copies or self._copies[source].exists())
 
     def _expect(self, pictures: int) -> None:
         self._bar.update(self._task, total=(self._bar.tasks[0].total or 0) + pictures)
 
     def _keep(self, found: Found) -> None:
-        self._results.write(vars(found))
+        self._write(vars(found))
+        if self.results is not None:
+            self.results.append(vars(found))
         self.pictures += 1
         self.people += len(found.scores)
         self.peopled += bool(found.scores)
@@ -225,13 +245,17 @@ class Run:
         self._bar.console.print(f"limo-hog: {line}", highlight=False, markup=False, soft_wrap=True)
 
 
-def _copies(sources: list[Source], folder: Path) -> dict[Source, Path]:
-    """Name each source's annotated copy: its place below what all sources have in common, in `folder`."""
+def _copies(sources: list[Source], folder: Path, wanted: str | None) -> dict[Source, Path]:
+    """Name each source's annotated copy: its place below what all sources have in common, in `folder`.
+
+    Images are of the `wanted` format, or else JPEG where the source is, and PNG where not.
+    """
     folders = {source: source.path.absolute().parent for source in sources if source.name != STDIN}
     root = os.path.commonpath(folders.values()) if folders else ""
     names: dict[Source, Path] = {}
     for source in sources:
-        suffix = ".png" if source.kind is Kind.IMAGE else ".mp4"
+        like_source = "jpg" if source.path.suffix.lower() in (".jpg", ".jpeg") else "png"
+        suffix = f".{wanted or like_source}" if source.kind is Kind.IMAGE else ".mp4"
         place = folder / folders[source].relative_to(root) if source in folders else folder
         stem = "stdin" if source.name == STDIN else source.path.stem
         names[source] = place / f"{stem}{suffix}"

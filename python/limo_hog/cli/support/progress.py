@@ -1,4 +1,4 @@
-"""Progress on standard error, where somebody watches."""
+"""Progress bars on standard error, where that is a terminal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class RateColumn(ProgressColumn):
     """Steps a second."""
 
     def render(self, task: Task) -> Text:
-        """Say the rate, once there is one."""
+        """Return the rate, once it is known."""
         return Text(f"{task.speed:.4g}/s" if task.speed else "", style="progress.data.speed")
 
 
@@ -33,7 +33,7 @@ class CountColumn(ProgressColumn):
         self._unit = unit
 
     def render(self, task: Task) -> Text:
-        """Say how far it is."""
+        """Return the steps done and, if known, of how many."""
         of = "" if task.total is None else f" of {task.total:g}"
         return Text(f"{task.completed:g}{of} {self._unit}")
 

@@ -1,83 +1,159 @@
-"""JSON lines of a `detect` run: whole lines whatever happens, and what an earlier run has done."""
+"""Results of a `detect` run: JSON lines that are whole whatever happens, what an earlier run has done, CSV and COCO."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from limo_hog.atomic import about, part_of
-from limo_hog.cli.support.output import STDOUT
+from limo_hog.atomic import about, part_of, whole_file
+from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.exceptions import LimoHogError
+
+#: One line: source, frame, width, height, boxes, scores, ms, parameters.
+Result = dict[str, Any]
 
 
 class ResumeError(LimoHogError):
-    """The results of an earlier run cannot be gone on from."""
+    """The results of an earlier run cannot be continued."""
 
 
 class Results(NamedTuple):
-    """Where results go, and which frames of which source are there already: None where nothing is kept."""
+    """A function that writes a result, and the results of an earlier run (None if no file is kept)."""
 
-    write: Callable[[dict[str, Any]], None]
-    done: dict[str, set[int]] | None
+    write: Callable[[Result], None]
+    earlier: list[Result] | None
+
+    def done(self) -> dict[str, set[int]]:
+        """Return the frames of each source that an earlier run has done."""
+        frames: dict[str, set[int]] = defaultdict(set)
+        for result in self.earlier or []:
+            frames[result["source"]].add(result["frame"])
+        return frames
+
+
+def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
+    """Refuse to replace files that exist.
+
+    Raises
+    ------
+    UsageError
+        One of them exists; `resume` is the hint to the alternative of overwriting.
+    """
+    there = [path for path in paths if path.exists()]
+    if there:
+        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+        raise UsageError(f"{there[0]}{more} would be overwritten: --overwrite replaces it{resume}")
 
 
 @contextmanager
-def json_lines(target: str | None, resume: bool) -> Iterator[Results]:
-    """Open a file (or "-", or nothing) for one JSON object a line.
+def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, overwrite: bool) -> Iterator[Results]:
+    """Open a file (or "-", or nothing) for one JSON object a line; each gets the run's `parameters`.
 
-    The file gets its name at the end, or when the run is stopped: with every line written so far, and no half one.
-    A run that was killed leaves it beside, and is gone on from all the same.
+    The file gets its name at the end, or when the run is stopped: with every line written so far, and no half line.
+    A killed run leaves the unfinished file beside it, which can be resumed, too.
+
+    Raises
+    ------
+    UsageError
+        The file is there, and the run neither resumes nor overwrites.
+    ResumeError
+        The file is not of an earlier run with the same parameters.
     """
     if target is None or target == STDOUT:
-        # Flushed line by line for who reads along.
-        show = (lambda result: print(json.dumps(result), flush=True)) if target else (lambda _: None)
+        # Flushed line by line for a reader at the other end of a pipe.
+        show = (lambda result: print(json.dumps(result | {"parameters": parameters}), flush=True)) if target else _drop
         yield Results(show, None)
         return
     path = Path(target)
     part = part_of(path)
-    done = _take_up(path, part) if resume else {}
+    if not resume and not overwrite:
+        refuse_to_overwrite([path, part], ", --resume goes on from it")
+    earlier = _continue(path, part, parameters) if resume else []
     with about(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         opened = part.open("ab" if resume else "wb", buffering=0)
     with opened as file:
         whole = file.tell()
 
-        def write(result: dict[str, Any]) -> None:
+        def write(result: Result) -> None:
             nonlocal whole
-            data = json.dumps(result).encode() + b"\n"
+            data = json.dumps(result | {"parameters": parameters}).encode() + b"\n"
             with about(path):
                 while data:
                     data = data[file.write(data) :]
             whole = file.tell()
 
         try:
-            yield Results(write, done)
+            yield Results(write, earlier)
         finally:
             # A full disk may have taken half a line.
             file.truncate(whole)
             part.replace(path)
 
 
-def _take_up(path: Path, part: Path) -> dict[str, set[int]]:
-    """Make `part` what an earlier run has done, without half a line at its end."""
-    if not part.exists():
-        if not path.exists():
-            return {}
-        path.replace(part)
-    text = part.read_bytes()
+def _drop(_: Result) -> None:
+    """Keep no result."""
+
+
+def _continue(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result]:
+    """Rename an earlier run's file to `part`, cut half a line off its end, and return its results."""
+    found = part if part.exists() else path
+    if not found.exists():
+        return []
+    text = found.read_bytes()
     whole = text.rfind(b"\n") + 1
-    done: dict[str, set[int]] = defaultdict(set)
     try:
-        for line in text[:whole].splitlines():
-            result = json.loads(line)
-            done[result["source"]].add(result["frame"])
-    except (ValueError, KeyError, TypeError) as error:
-        part.replace(path)
+        results = [json.loads(line) for line in text[:whole].splitlines()]
+        made_with = [(result["source"], result["frame"], result["parameters"])[2] for result in results]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ResumeError(f"{path}: not the JSON lines of an earlier run") from error
+    for earlier in made_with:
+        if earlier != parameters:
+            raise ResumeError(f"{path} was made with other parameters: {_difference(earlier, parameters)}")
+    found.replace(part)
     with part.open("rb+") as file:
         file.truncate(whole)
-    return done
+    return results
+
+
+def _difference(earlier: Any, now: dict[str, Any]) -> str:
+    was = earlier if isinstance(earlier, dict) else {}
+    names = [name for name in {**now, **was} if was.get(name) != now.get(name)]
+    return ", ".join(f"{name} {was.get(name)}, now {now.get(name)}" for name in names)
+
+
+def write_csv(path: Path, results: Iterable[Result]) -> None:
+    """Write a line a person: source, frame, width, height of the picture; x, y, w, h of the box [px]; score."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(("source", "frame", "width", "height", "x", "y", "w", "h", "score"))
+    for result in results:
+        about_picture = [result[name] for name in ("source", "frame", "width", "height")]
+        for box, score in zip(result["boxes"], result["scores"], strict=True):
+            table.writerow((*about_picture, *box, score))
+    _write(path, text.getvalue())
+
+
+def write_coco(path: Path, results: Iterable[Result]) -> None:
+    """Write one JSON object of images, annotations with scores and the category person, as COCO has them."""
+    images: list[Result] = []
+    annotations: list[Result] = []
+    for number, result in enumerate(results, 1):
+        size = {"width": result["width"], "height": result["height"]}
+        images.append({"id": number, "file_name": result["source"], "frame": result["frame"], **size})
+        for box, score in zip(result["boxes"], result["scores"], strict=True):
+            annotation = {"id": len(annotations) + 1, "image_id": number, "category_id": 1, "bbox": box}
+            annotations.append({**annotation, "area": box[2] * box[3], "iscrowd": 0, "score": score})
+    categories = [{"id": 1, "name": "person"}]
+    _write(path, json.dumps({"images": images, "annotations": annotations, "categories": categories}) + "\n")
+
+
+def _write(path: Path, text: str) -> None:
+    with whole_file(path) as part, about(path):
+        part.write_text(text, "utf-8")

@@ -1,4 +1,4 @@
-"""A street drawn from nothing, with people: it costs a detector what a photograph costs."""
+"""A generated picture of a street with people; detecting in it takes as long as in a photograph."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The workshop's first controller: turn towards the surest box and drive."""
+"""The workshop's first controller: turn towards the box with the highest score and drive."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.sense.observation import Observation
 from limo_hog.follow.sense.ranging import box_centre
 from limo_hog.follow.twist import Twist
@@ -14,9 +15,9 @@ from limo_hog.follow.twist import Twist
 
 @dataclass(frozen=True, slots=True)
 class ApproachController:
-    """Steer by the horizontal error of the surest box, drive at one speed, stop when nobody is seen.
+    """Steer by the horizontal error of the best box, drive at one speed, stop without a box.
 
-    The state is whether anybody was seen before.
+    The state is whether a person was detected before. The numbers are the workshop's.
 
     Attributes
     ----------
@@ -28,30 +29,30 @@ class ApproachController:
         Speed towards a person [m/s].
     """
 
-    angular_gain: float = 0.005
-    dead_band_px: float = 20.0
-    linear_speed: float = 0.2
+    angular_gain: float = bounded(0.005, 0, 0.05)
+    dead_band_px: float = bounded(20.0, 0, 320)
+    linear_speed: float = bounded(0.2, 0, 1)
 
     def start(self) -> bool:
-        """Nobody has been seen yet."""
+        """Return the state before the first observation: no person detected yet."""
         return False
 
     def step(self, observation: Observation, state: bool) -> Decision[bool]:
-        """Turn towards the surest box, if there is one."""
+        """Turn towards the best box, if there is one."""
         if len(observation.detections) == 0:
-            return nobody_seen(state)
-        target, error = surest(observation)
+            return no_detection(state)
+        target, error = best_box(observation)
         angular = 0.0 if abs(error) < self.dead_band_px else self.angular_gain * error
         return Decision(Twist(self.linear_speed, angular), True, Mode.FOLLOW, "driving towards a person", target)
 
 
-def surest(observation: Observation) -> tuple[int, int]:
-    """Return which box is the surest, and how far left of the image's middle it is [px]."""
+def best_box(observation: Observation) -> tuple[int, int]:
+    """Return the index of the box with the highest score, and how far left of the image's middle it is [px]."""
     target = int(np.argmax(observation.detections.scores))
     return target, observation.width // 2 - box_centre(observation.detections.boxes[target])[0]
 
 
-def nobody_seen(seen_before: bool) -> Decision[bool]:
+def no_detection(detected_before: bool) -> Decision[bool]:
     """Stop, as both workshop controllers do without a box."""
-    mode = Mode.LOST if seen_before else Mode.SEARCH
-    return Decision(Twist(), seen_before, mode, "nobody seen")
+    mode = Mode.LOST if detected_before else Mode.SEARCH
+    return Decision(Twist(), detected_before, mode, "no person detected")

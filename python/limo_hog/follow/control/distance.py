@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from limo_hog.follow.control.approach import nobody_seen, surest
+from limo_hog.follow.control.approach import best_box, no_detection
 from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.sense.observation import Observation
-from limo_hog.follow.sense.ranging import person_depth, zone_of
+from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.twist import Twist
+from limo_hog.follow.zones import zone_of
 
 
 @dataclass(frozen=True, slots=True)
 class ProxemicController:
     """Two proportional controllers: the box to the middle of the image, the person to a distance.
 
-    The state is whether anybody was seen before.
+    The state is whether a person was detected before. The numbers are the workshop's.
 
     Attributes
     ----------
@@ -29,21 +31,21 @@ class ProxemicController:
         Limits of the command, either way [m/s, rad/s].
     """
 
-    target_distance: float = 1.5
-    linear_gain: float = 0.5
-    angular_gain: float = 0.005
-    max_linear: float = 0.3
-    max_angular: float = 0.8
+    target_distance: float = bounded(1.5, 0.1, 8)
+    linear_gain: float = bounded(0.5, 0, 5)
+    angular_gain: float = bounded(0.005, 0, 0.05)
+    max_linear: float = bounded(0.3, 0, 1)
+    max_angular: float = bounded(0.8, 0, 3)
 
     def start(self) -> bool:
-        """Nobody has been seen yet."""
+        """Return the state before the first observation: no person detected yet."""
         return False
 
     def step(self, observation: Observation, state: bool) -> Decision[bool]:
-        """Turn towards the surest box and mind its distance; stop without a box or a distance."""
+        """Turn towards the best box and hold its distance; stop without a box or a distance."""
         if len(observation.detections) == 0:
-            return nobody_seen(state)
-        target, error = surest(observation)
+            return no_detection(state)
+        target, error = best_box(observation)
         box = observation.detections.boxes[target]
         distance = None if observation.depth is None else person_depth(observation.depth, box)
         if distance is None:

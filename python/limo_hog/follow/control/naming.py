@@ -11,12 +11,12 @@ from limo_hog.follow.control.distance import ProxemicController
 from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.decision import Controller
 
-#: From the workshop's first task to what is worth trusting.
+#: The workshop's two controllers, then the one to use.
 CONTROLLERS = ("approach", "proxemic", "tracking")
 
 
 class ControllerError(LimoHogError):
-    """A controller that is not to be had, or a parameter it does not know."""
+    """There is no such controller, or it has no such parameter."""
 
 
 def controller_named(name: str, target_distance: float | None = None) -> Controller[Any]:

@@ -1,4 +1,4 @@
-"""Reasons not to trust an observation, each in one line."""
+"""What can be wrong with an observation: the checks that stop the robot."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from limo_hog.follow.sense.observation import Observation, Odometry, Scan
 
 
 def find_fault(observation: Observation, last_stamp: float | None) -> str:
-    """Return what is wrong with an observation, "" if nothing is.
+    """Return what is wrong with an observation, in one line; "" if nothing is.
 
     Parameters
     ----------
     observation
-        What the sensors and the detector say.
+        The sensors' readings and the detections.
     last_stamp
         Stamp of the observation before [s]; None for the first.
     """

@@ -1,6 +1,6 @@
-"""The layer no controller can pass: it lets a command through, slows it, or stops the robot and says why.
+"""The last stage before the wheels: it lets a command through, slows it, or stops the robot and says why.
 
-Not seeing anybody is no proof that nobody is there, so clearance is kept by the lidar and the depth image,
+That no person is detected is no proof that none is there, so clearance is kept by the lidar and the depth image,
 whatever the boxes say. The lidar does not look behind; what it saw there shortly before is remembered.
 """
 
@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Controller, Decision, Mode
-from limo_hog.follow.robot import LIMO, Body
+from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.safety.faults import find_fault
 from limo_hog.follow.sense.clearance import (
     NO_POINTS,
+    DepthGrid,
     Margin,
     Points,
-    depth_points,
     from_odometry,
     room_ahead,
     room_behind,
@@ -33,9 +33,6 @@ from limo_hog.follow.twist import Twist
 
 S = TypeVar("S")
 
-#: Points further away than this are not remembered [m].
-_REMEMBERED_WITHIN = 1.5
-
 
 @dataclass(frozen=True, slots=True)
 class GuardState(Generic[S]):
@@ -45,26 +42,26 @@ class GuardState(Generic[S]):
     ----------
     inner
         The guarded controller's state.
-    wish
-        What the controller wanted last; None where there is nothing to want.
-    stamp, heard
-        Stamp of the last frame, and the newest stamp known when it was worked on [s].
-    near
-        float64 (N, 2) [m], base frame: what the depth camera saw near the robot in that frame.
-    scanned
+    proposed
+        The controller's last decision, before limits; None before the first and after a fault.
+    stamp, newest_stamp
+        Stamp of the last frame, and the newest of any sensor when it was decided on [s].
+    depth_points
+        float64 (N, 2) [m], base frame: obstacles in the depth image of that frame.
+    scan_stamp
         Stamp of the last scan [s].
-    seen, seen_at
-        float64 (N, 2) [m], odometry frame, and float64 (N,) [s]: what the lidar saw near the robot, and when.
+    scan_points, scan_points_at
+        float64 (N, 2) [m], odometry frame, and float64 (N,) [s]: returns near the robot, and the stamps of their scans.
     """
 
     inner: S
-    wish: Decision[S] | None = None
+    proposed: Decision[S] | None = None
     stamp: float | None = None
-    heard: float = -math.inf
-    near: Points = field(default_factory=lambda: NO_POINTS)
-    scanned: float = -math.inf
-    seen: Points = field(default_factory=lambda: NO_POINTS)
-    seen_at: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    newest_stamp: float = -math.inf
+    depth_points: Points = field(default_factory=lambda: NO_POINTS)
+    scan_stamp: float = -math.inf
+    scan_points: Points = field(default_factory=lambda: NO_POINTS)
+    scan_points_at: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,31 +71,42 @@ class Guard(Generic[S]):
     Attributes
     ----------
     controller
-        Whose wishes are guarded.
+        Whose commands are limited.
     margin
         Ground kept free ahead of the robot's outline, and behind it.
     braking
-        Deceleration counted on [m/s²]: half of what the wheels can do.
-    reaction
-        Time between something being there and the robot braking [s]: a scan's, a frame's and a command's age.
-    remember
-        How long what was seen around the robot counts for what is behind it [s].
-    backwards
-        Highest speed backwards [m/s]: whoever has come up from behind since is in no sensor's sight.
-    patience
-        After so long without a camera frame, or with a scan so old, the robot stops [s].
-    body
-        The robot's outline.
+        Deceleration counted on [m/s²]. Chosen: half of what the wheels can do, 1.0.
+    reaction_s
+        Time from an obstacle's appearance to braking [s]: a scan's period of .125, a command's of .1, and computing.
+    depth_reach
+        Depth further than this from the margin's end is not looked at [m]. Computed: with 1.0 m of room .88 m/s are
+        allowed, more than any controller drives.
+    memory_s, memory_radius
+        Returns count for the space behind the robot for so long, if they were so near [s, m]. Chosen: the time a robot
+        backs off at .15 m/s through the radius; further than it the robot never backs off at once.
+    max_backward
+        Highest speed backwards [m/s]. Chosen: what has come up from behind since is in no sensor's field of view; from
+        .4 m/s the robot stops within .26 m.
+    max_age_s
+        The robot stops without a camera frame, or with a scan, this old [s]. Chosen: four lidar periods, the time of
+        the robot's own watchdog.
+    depth_grid
+        Which depth pixels are looked at.
+    robot
+        The robot's outline and mounts.
     """
 
     controller: Controller[S]
     margin: Margin = field(default_factory=Margin)
     braking: float = 0.5
-    reaction: float = 0.25
-    remember: float = 10.0
-    backwards: float = 0.4
-    patience: float = 0.5
-    body: Body = LIMO
+    reaction_s: float = 0.25
+    depth_reach: float = 1.0
+    memory_s: float = 10.0
+    memory_radius: float = 1.5
+    max_backward: float = 0.4
+    max_age_s: float = 0.5
+    depth_grid: DepthGrid = field(default_factory=DepthGrid)
+    robot: RobotGeometry = LIMO
 
     def start(self) -> GuardState[S]:
         """Return the state before the first observation."""
@@ -108,79 +116,91 @@ class Guard(Generic[S]):
         """Ask the controller and let through what is safe; a faulty observation stops the robot."""
         fault = find_fault(observation, state.stamp)
         if fault:
-            # A clock that was set back starts a new story: what is remembered belongs to the old one.
-            backwards = state.stamp is not None and observation.stamp < state.stamp
+            # When the clock was set back, what is remembered has stamps of the old clock.
+            set_back = state.stamp is not None and observation.stamp < state.stamp
             stamp = observation.stamp if math.isfinite(observation.stamp) else state.stamp
-            after = replace(self.start() if backwards else state, stamp=stamp, wish=None)
+            after = replace(self.start() if set_back else state, stamp=stamp, proposed=None)
             return Decision(Twist(), after, Mode.BLOCKED, fault)
-        wish = self.controller.step(observation, state.inner)
-        reach = 2 * self.body.half_length + self.margin.ahead + 1.0
-        near = NO_POINTS
+        proposed = self.controller.step(observation, state.inner)
+        depth_points = NO_POINTS
         if observation.depth is not None:
-            near = depth_points(observation.depth, observation.focal_px, reach, self.body)
-        state = replace(state, inner=wish.state, wish=wish, stamp=observation.stamp, heard=observation.now, near=near)
-        return self._allowed(wish, state, observation.scan, observation.odometry, observation.now)
+            reach = 2 * self.robot.half_length + self.margin.ahead + self.depth_reach
+            depth_points = self.depth_grid.points(observation.depth, observation.focal_px, reach, self.robot)
+        state = replace(
+            state,
+            inner=proposed.state,
+            proposed=proposed,
+            stamp=observation.stamp,
+            newest_stamp=observation.now,
+            depth_points=depth_points,
+        )
+        return self._limited(proposed, state, observation.scan, observation.odometry, observation.now)
 
     def recheck(
         self, now: float, scan: Scan | None, odometry: Odometry | None, state: GuardState[S]
     ) -> Decision[GuardState[S]]:
-        """Check the last wish against a newer scan, for a control period without a camera frame."""
-        if state.wish is None:
-            return Decision(Twist(), state, Mode.BLOCKED, "no camera frame to go by")
-        if now - state.heard > self.patience:
-            return Decision(Twist(), state, Mode.BLOCKED, f"no camera frame for {now - state.heard:.1f} s")
-        return self._allowed(state.wish, state, scan, odometry, now)
+        """Check the controller's last decision against a newer scan, for a control period without a camera frame.
 
-    def _allowed(
+        The decision has no target and no region: these belong to a frame.
+        """
+        if state.proposed is None:
+            return Decision(Twist(), state, Mode.BLOCKED, "no usable camera frame")
+        age = now - state.newest_stamp
+        if age > self.max_age_s:
+            return Decision(Twist(), state, Mode.BLOCKED, f"no camera frame for {age:.1f} s")
+        proposed = replace(state.proposed, target=None, region=None)
+        return self._limited(proposed, state, scan, odometry, now)
+
+    def _limited(
         self,
-        wish: Decision[S],
+        proposed: Decision[S],
         state: GuardState[S],
         scan: Scan | None,
         odometry: Odometry | None,
         now: float,
     ) -> Decision[GuardState[S]]:
-        # Without wheels to tell how the robot moved, what was seen before cannot be carried along.
+        # Without odometry, remembered points cannot be carried along.
         pose = odometry or Odometry()
         if odometry is None:
-            state = replace(state, seen=NO_POINTS, seen_at=np.empty(0), scanned=-math.inf)
-        if scan is not None and scan.stamp != state.scanned:
-            state = self._remembering(state, scan, pose)
+            state = replace(state, scan_points=NO_POINTS, scan_points_at=np.empty(0), scan_stamp=-math.inf)
+        if scan is not None and scan.stamp != state.scan_stamp:
+            state = self._remember(state, scan, pose)
 
-        def decided(twist: Twist, mode: Mode, reason: str) -> Decision[GuardState[S]]:
-            return Decision(twist, state, mode, reason, wish.target, wish.region)
+        def decision(twist: Twist, mode: Mode, reason: str) -> Decision[GuardState[S]]:
+            return Decision(twist, state, mode, reason, proposed.target, proposed.region)
 
-        if not wish.twist.is_finite:
-            return decided(Twist(), Mode.BLOCKED, "the controller's command is not a number")
-        if scan is not None and now - scan.stamp > self.patience:
-            return decided(Twist(), Mode.BLOCKED, f"the scan is {now - scan.stamp:.1f} s old")
-        around = from_odometry(state.seen, pose)
-        ahead = self._speed(room_ahead(np.concatenate([around, state.near]), self.margin, self.body))
-        behind = self._speed(room_behind(around, self.margin, self.body))
-        wanted = max(wish.twist.linear, -self.backwards)
+        if not proposed.twist.is_finite:
+            return decision(Twist(), Mode.BLOCKED, "the controller's command is not a number")
+        if scan is not None and now - scan.stamp > self.max_age_s:
+            return decision(Twist(), Mode.BLOCKED, f"the scan is {now - scan.stamp:.1f} s old")
+        around = from_odometry(state.scan_points, pose)
+        ahead = self._speed(room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot))
+        behind = self._speed(room_behind(around, self.margin, self.robot))
+        wanted = max(proposed.twist.linear, -self.max_backward)
         linear = min(max(wanted, -behind), ahead)
-        twist = Twist(linear, wish.twist.angular)
+        twist = Twist(linear, proposed.twist.angular)
         if linear == wanted:
-            return decided(twist, wish.mode, wish.reason)
+            return decision(twist, proposed.mode, proposed.reason)
         where = "ahead" if wanted > 0 else "behind"
         if linear == 0:
-            return decided(twist, Mode.BLOCKED, f"something is too near {where}")
-        return decided(twist, wish.mode, f"slowed by something {where}")
+            return decision(twist, Mode.BLOCKED, f"an obstacle is too close {where}")
+        return decision(twist, proposed.mode, f"slowed by an obstacle {where}")
 
     def _speed(self, room: float) -> float:
-        return speed_within(room, self.braking, self.reaction)
+        return speed_within(room, self.braking, self.reaction_s)
 
-    def _remembering(self, state: GuardState[S], scan: Scan, pose: Odometry) -> GuardState[S]:
-        """Add a scan; of what was seen before, keep what is young and out of the lidar's sight now."""
-        new = scan_points(scan, self.body)
-        new = to_odometry(new[np.hypot(new[:, 0], new[:, 1]) < _REMEMBERED_WITHIN], pose)
-        old = from_odometry(state.seen, pose)
-        angle = np.arctan2(old[:, 1], old[:, 0] - self.body.lidar_x)
-        out_of_sight = (angle < scan.angle_min) | (angle > scan.angle_max)
-        age = scan.stamp - state.seen_at
-        kept = out_of_sight & (age >= 0) & (age < self.remember)
+    def _remember(self, state: GuardState[S], scan: Scan, pose: Odometry) -> GuardState[S]:
+        """Add a scan; of earlier returns, keep those that are recent and out of the lidar's field of view now."""
+        new = scan_points(scan, self.robot)
+        new = to_odometry(new[np.hypot(new[:, 0], new[:, 1]) < self.memory_radius], pose)
+        old = from_odometry(state.scan_points, pose)
+        angle = np.arctan2(old[:, 1], old[:, 0] - self.robot.lidar_x)
+        out_of_view = (angle < scan.angle_min) | (angle > scan.angle_max)
+        age = scan.stamp - state.scan_points_at
+        kept = out_of_view & (age >= 0) & (age < self.memory_s)
         return replace(
             state,
-            scanned=scan.stamp,
-            seen=np.concatenate([state.seen[kept], new]),
-            seen_at=np.concatenate([state.seen_at[kept], np.full(len(new), scan.stamp)]),
+            scan_stamp=scan.stamp,
+            scan_points=np.concatenate([state.scan_points[kept], new]),
+            scan_points_at=np.concatenate([state.scan_points_at[kept], np.full(len(new), scan.stamp)]),
         )

@@ -1,4 +1,4 @@
-"""What the follower finds people with: our HOG, OpenCV's, or a network of the user's, behind one protocol."""
+"""The people detectors of the follower behind one protocol: our HOG, OpenCV's, or the user's network."""
 
 from __future__ import annotations
 
@@ -15,21 +15,19 @@ from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.follow.sense.region import Region
-from limo_hog.suppression import suppress
+from limo_hog.suppression import nms
 
 if TYPE_CHECKING:
     import cv2
 
 Image = NDArray[np.uint8]
 
-#: Followed people whose window is at least so high are searched for at half the size [px]; HOG's least is 128.
-_LARGE = 280
 #: Names `detector_named` knows; `onnx:FILE` is the fourth kind.
 NAMES = ("hog", "hog-half", "hog-iou", "hog-soft", "cv2")
 
 
 class DetectorError(LimoHogError):
-    """A people detector that is not to be had, or a network that is not one."""
+    """There is no such detector, or a file is not a network."""
 
 
 class Detector(Protocol):
@@ -56,26 +54,30 @@ def detector_named(name: str) -> Detector:
         raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}, onnx:FILE")
     from limo_hog.detector import PeopleDetector
 
-    if name == "hog-half":
-        return HalfSize(PeopleDetector())
     kinds: dict[str, Literal["group", "iou", "soft"]] = {"hog-iou": "iou", "hog-soft": "soft"}
-    return PeopleDetector(nms=kinds.get(name, "group"))
+    # Without enlarging, grouped: the rectangles of `cv2.HOGDescriptor`.
+    hog = PeopleDetector(min_height=None, nms=kinds.get(name, "group"))
+    return HalfSize(hog) if name == "hog-half" else hog
 
 
-def detect_in(detector: Detector, image: Image, region: Region | None) -> Detections:
-    """Search a region of an image, or all of it where `region` is None; boxes are in the whole image."""
+def detect_in(detector: Detector, image: Image, region: Region | None, half_from: float = 280) -> Detections:
+    """Search a region of an image, or all of it where `region` is None; boxes are in the whole image.
+
+    Where the expected window is at least `half_from` [px] high, the region is searched at half size: chosen above
+    twice HOG's 128, so that a person may be 9 % lower than expected.
+    """
     if region is None:
         return detector.detect(image)
     rows, columns = slice(region.y, region.y + region.height), slice(region.x, region.x + region.width)
-    if region.window_height >= _LARGE:
-        # The finest levels cost most, and could only hold people half as tall.
+    if region.window_height >= half_from:
+        # The finest levels cost most and hold only people half as tall.
         detector = HalfSize(detector)
     found = detector.detect(np.ascontiguousarray(image[rows, columns]))
     return Detections(found.boxes + np.array([region.x, region.y, 0, 0], np.int32), found.scores)
 
 
-def best_first(boxes: NDArray[Any], scores: NDArray[Any]) -> Detections:
-    """Return boxes (N, 4) and scores (N,) of any type as `Detections`, the surest first."""
+def by_score(boxes: NDArray[Any], scores: NDArray[Any]) -> Detections:
+    """Return boxes (N, 4) and scores (N,) of any type as `Detections`, the highest score first."""
     order = np.argsort(-scores, kind="stable")
     return Detections(boxes[order].astype(np.int32), scores[order].astype(np.float64))
 
@@ -102,7 +104,7 @@ class Cv2Detector:
     def detect(self, image: Image) -> Detections:
         """Find people, best first."""
         boxes, scores = self._hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)
-        return best_first(np.asarray(boxes).reshape(-1, 4), np.asarray(scores).reshape(-1))
+        return by_score(np.asarray(boxes).reshape(-1, 4), np.asarray(scores).reshape(-1))
 
     @cached_property
     def _hog(self) -> cv2.HOGDescriptor:
@@ -130,9 +132,10 @@ class OnnxDetector:
     size
         Side of the network's input [px].
     threshold
-        Least score of a person.
+        Least score of a person [0..1].
     overlap
-        Boxes with a larger intersection over union than this are the same person.
+        Boxes with a larger intersection over union than this are the same person [1]. Both are the defaults of YOLOv8's
+        own non-maximum suppression.
     """
 
     path: Path
@@ -141,7 +144,7 @@ class OnnxDetector:
     overlap: float = 0.45
 
     def __post_init__(self) -> None:
-        # A wrong file is told before the robot starts, not frame by frame.
+        # A wrong file is an error before the robot starts, not a fault of every frame.
         _ = self._network
 
     def detect(self, image: Image) -> Detections:
@@ -162,11 +165,11 @@ class OnnxDetector:
         x, y, w, h, score = output[0, :5]
         likely = score >= self.threshold
         boxes = np.stack([x - w / 2, y - h / 2, w, h], axis=1)[likely] / shrink
-        kept = suppress(boxes, score[likely], self.overlap)
-        # As an SVM's margin: 0 at the threshold, and without an upper end.
+        kept = nms(boxes, score[likely], self.overlap)
+        # Like an SVM's margin: 0 at the threshold, and without an upper limit.
         sure = np.clip(score[likely][kept], 1e-6, 1 - 1e-6).astype(np.float64)
         margin = np.log(sure / (1 - sure)) - math.log(self.threshold / (1 - self.threshold))
-        return best_first(np.rint(boxes[kept]), margin)
+        return by_score(np.rint(boxes[kept]), margin)
 
     @cached_property
     def _network(self) -> cv2.dnn.Net:

@@ -1,4 +1,4 @@
-"""What a follower knows at one instant: everything a controller may look at, and nothing else."""
+"""All that a controller may base a decision on: one camera frame's detections and the other sensors' readings."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class Scan:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Where the wheels say the robot is: pose in the start frame [m, rad] and speeds [m/s, rad/s].
+    """The robot's pose by its wheels, in the start frame [m, rad], and its speeds [m/s, rad/s].
 
-    `stamp` is when that was so [s], on the clock of `Observation.stamp`: a camera frame may be older.
+    `stamp` is on the clock of `Observation.stamp` [s]; a camera frame may be older.
     """
 
     stamp: float = 0.0
@@ -74,7 +74,7 @@ class Observation:
     odometry
         The newest odometry; None without wheel encoders.
     fault
-        Why the senses cannot be trusted this time, "" where they can; the robot then stands still.
+        Why the frame cannot be used, "" where it can; with a fault the robot stands still.
     clothes
         float64 (N, 2, 3): what the person in each detection wears, by `clothes_in`; None without a colour image.
     """
@@ -93,7 +93,7 @@ class Observation:
 
     @property
     def now(self) -> float:
-        """The newest stamp of all [s]: the camera frame may have taken its time to arrive."""
+        """The newest stamp of all sensors [s]: a camera frame may arrive late."""
         stamps = [self.stamp]
         if self.scan is not None:
             stamps.append(self.scan.stamp)
@@ -113,7 +113,7 @@ def observed(
     odometry: Odometry | None,
     fault: str = "",
 ) -> Observation:
-    """Return what one camera image, uint8 (H, W, 3) BGR, and the other sensors tell: its size and clothes filled in."""
+    """Return the observation of one camera image, uint8 (H, W, 3) BGR or (H, W): its size and clothes are filled in."""
     height, width = image.shape[:2]
     clothes = clothes_in(image, detections.boxes)
     return Observation(stamp, width, height, focal_px, detections, region, depth, scan, odometry, fault, clothes)

@@ -1,35 +1,9 @@
-"""How far a person is, and what that distance means to them."""
+"""How far away a person is, by the depth image."""
 
 from __future__ import annotations
 
-from enum import Enum
-
 import numpy as np
 from numpy.typing import NDArray
-
-
-class Zone(str, Enum):
-    """Hall's zones of personal space (The Hidden Dimension, 1966), nearest first."""
-
-    INTIMATE = "intimate"
-    PERSONAL = "personal"
-    SOCIAL = "social"
-    PUBLIC = "public"
-
-
-#: Where each zone but the last ends [m].
-ZONE_ENDS = {Zone.INTIMATE: 0.45, Zone.PERSONAL: 1.2, Zone.SOCIAL: 3.6}
-
-#: Side of the square at the centre of a box that the distance is read from [px].
-PATCH_PX = 20
-
-
-def zone_of(distance: float) -> Zone:
-    """Return the zone of a person `distance` [m] away."""
-    for zone, end in ZONE_ENDS.items():
-        if distance <= end:
-            return zone
-    return Zone.PUBLIC
 
 
 def box_centre(box: NDArray[np.int32]) -> tuple[int, int]:
@@ -38,11 +12,11 @@ def box_centre(box: NDArray[np.int32]) -> tuple[int, int]:
     return x + w // 2, y + h // 2
 
 
-def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int = PATCH_PX) -> float | None:
-    """Return how far away the person in a box is [m], None where the camera does not know.
+def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int = 20) -> float | None:
+    """Return how far away the person in a box is [m]; None where the camera does not know.
 
-    The median of the valid depths in a square at the centre of the box: it shrugs off the few pixels that see
-    past the person or nothing.
+    The median of the valid depths in a square at the centre of the box: pixels that see past the person, or nothing,
+    do not change it as long as they are less than half.
 
     Parameters
     ----------
@@ -51,7 +25,7 @@ def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int =
     box
         int32 (4,): x, y, w, h [px].
     side
-        Side of the square [px].
+        Side of the square [px]; the workshop's is 20.
     """
     x, y = box_centre(box)
     half = side // 2

@@ -1,4 +1,4 @@
-"""Looking only where the followed person should be: most of the detector's time goes into the rest."""
+"""The part of the next image to search: where the followed person is expected. The rest takes most of the time."""
 
 from __future__ import annotations
 
@@ -30,47 +30,62 @@ class Region:
         return self.x + margin <= column <= self.x + self.width - margin
 
 
-#: The region is so many expected windows wide and high: room for steps, for the gait, and for HOG's margin.
-_WIDTHS, _HEIGHTS = 2.0, 1.25
-#: Sides are multiples of this [px], so that few different sizes occur.
-_GRID = 16
+@dataclass(frozen=True, slots=True)
+class RegionSize:
+    """How large a region is around the expected window.
 
-
-def region_around(
-    bearing: float, distance: float, window: float, centre_y: float, focal_px: float, width: int, height: int
-) -> Region | None:
-    """Return where to look for somebody expected at a bearing [rad] and a distance [m].
-
-    Parameters
+    Attributes
     ----------
-    bearing, distance
-        As seen from the camera.
-    window
-        Height of the detection window times the distance [px m].
-    centre_y
-        Middle of the window above or below the image's middle, times the distance [px m]; down is positive.
-    focal_px, width, height
-        The camera.
-
-    Returns
-    -------
-    None where the expected place is not in the image, or the region would be most of it.
+    widths, heights
+        Sides, in expected window widths and heights [1]. Chosen: half a window to either side for a step and the
+        prediction's error, an eighth above and below for the gait.
+    grid
+        Sides are multiples of this [px], so that few different image sizes occur and buffers are used again.
+    most
+        A region larger than this share of the image is not worth it: all of the image is searched [1]. Chosen.
+    widest, nearest
+        Larger bearings are out of any image [rad]; a nearer person fills it [m].
     """
-    if abs(bearing) > 1.2 or distance < 0.3:
-        return None
-    expected = window / distance
-    x = width / 2 - focal_px * math.tan(bearing)
-    y = height / 2 + centre_y / distance
-    if not 0 <= x < width:
-        return None
-    left, right = _span(x, _WIDTHS * expected / 2, width)
-    top, bottom = _span(y, _HEIGHTS * expected, height)
-    if (right - left) * (bottom - top) > 0.7 * width * height:
-        return None
-    return Region(left, top, right - left, bottom - top, expected)
 
+    widths: float = 2.0
+    heights: float = 1.25
+    grid: int = 16
+    most: float = 0.7
+    widest: float = 1.2
+    nearest: float = 0.3
 
-def _span(middle: float, length: float, limit: int) -> tuple[int, int]:
-    low = max(0, math.floor((middle - length / 2) / _GRID) * _GRID)
-    high = min(limit, math.ceil((middle + length / 2) / _GRID) * _GRID)
-    return low, max(high, low)
+    def around(
+        self, bearing: float, distance: float, window: float, centre: float, focal_px: float, width: int, height: int
+    ) -> Region | None:
+        """Return where to look for a person expected at a bearing [rad] and a distance [m] from the camera.
+
+        Parameters
+        ----------
+        window
+            Height of the detection window times the distance [px m].
+        centre
+            Middle of the window below the image's middle, times the distance [px m]; above is negative.
+        focal_px, width, height
+            The camera's focal length and image size [px].
+
+        Returns
+        -------
+        None where the expected place is not in the image, or the region would be most of it.
+        """
+        if abs(bearing) > self.widest or distance < self.nearest:
+            return None
+        expected = window / distance
+        x = width / 2 - focal_px * math.tan(bearing)
+        y = height / 2 + centre / distance
+        if not 0 <= x < width:
+            return None
+        left, right = self._span(x, self.widths * expected / 2, width)
+        top, bottom = self._span(y, self.heights * expected, height)
+        if (right - left) * (bottom - top) > self.most * width * height:
+            return None
+        return Region(left, top, right - left, bottom - top, expected)
+
+    def _span(self, middle: float, length: float, limit: int) -> tuple[int, int]:
+        low = max(0, math.floor((middle - length / 2) / self.grid) * self.grid)
+        high = min(limit, math.ceil((middle + length / 2) / self.grid) * self.grid)
+        return low, max(high, low)

@@ -1,7 +1,7 @@
-"""Somebody's legs in the scan: what keeps a track alive where the camera is blind.
+"""A person's legs in the scan: they keep a track alive where the camera does not show the person.
 
-HOG needs room above the head: nearer than about 1.6 m, beside the image or between two frames, only the lidar tells
-where a person is. It cannot tell a person from a chair, so it may carry on a track, never begin one.
+HOG needs space above the head: nearer than about 1.6 m, beside the image or between two frames, only the lidar tells
+where a person is. It cannot tell a person from a chair, so it may continue a track and never begins one.
 """
 
 from __future__ import annotations
@@ -11,46 +11,73 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from limo_hog.follow.robot import Body
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
 from limo_hog.follow.sense.observation import Odometry, Scan
-from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predicted, updated
-
-#: Returns nearer than this to where a person should be are their legs [m].
-_STRIDE = 0.35
-#: Wider than this it is a wall or a piece of furniture [m].
-_WIDEST = 0.55
-#: Further away than this legs are too few beams wide to tell [m].
-_REACH = 2.2
-#: Standard deviation of the middle of two legs that walk [m].
-_SPREAD = 0.1
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update
 
 
 @dataclass(frozen=True, slots=True)
 class Returns:
-    """What a scan has hit, float64 (N, 2) [m] in the odometry frame, and where the robot was."""
+    """A scan's returns in the odometry frame.
+
+    Attributes
+    ----------
+    stamp
+        Of the scan [s].
+    points
+        float64 (N, 2) [m].
+    pose
+        Where the robot was.
+    """
 
     stamp: float
     points: Points
     pose: Odometry
 
 
-def returns_of(scan: Scan, pose: Odometry, body: Body) -> Returns:
+def returns_of(scan: Scan, pose: Odometry, robot: RobotGeometry) -> Returns:
     """Take a scan into the odometry frame; `pose` is where the robot was when it was taken."""
-    return Returns(scan.stamp, to_odometry(scan_points(scan, body), pose), pose)
+    return Returns(scan.stamp, to_odometry(scan_points(scan, robot), pose), pose)
 
 
-def felt(track: Track, returns: Returns, noise: Noise) -> Track | None:
-    """Return the track brought up to a scan and corrected by the legs in it; None where there are none."""
-    track = predicted(track, returns.stamp, noise)
-    pose = returns.pose
-    distance = bearing_range(track, pose)[1]
-    if distance > _REACH:
-        return None
-    legs = returns.points[np.hypot(*(returns.points - track.mean[:2]).T) < _STRIDE]
-    if len(legs) < 2 or np.hypot(*np.ptp(legs, axis=0)) > _WIDEST:
-        return None
-    dx, dy = legs.mean(axis=0) - (pose.x, pose.y)
-    spread = Noise(bearing=_SPREAD / max(distance, 0.3), range=_SPREAD)
-    bearing = math.atan2(dy, dx) - pose.yaw
-    return updated(track, innovation(track, bearing, math.hypot(dx, dy), pose, spread))
+@dataclass(frozen=True, slots=True)
+class Legs:
+    """Finds a tracked person's legs in a scan.
+
+    Attributes
+    ----------
+    radius
+        Returns nearer than this to the predicted position are taken for legs [m]. Chosen: half a stride of 0.75 m.
+    widest
+        A wider group is a wall or a piece of furniture [m]. Chosen: in mid-stride the shins of a 0.9 m person are .3 m
+        apart, an adult's .55 m.
+    reach
+        Further away legs are not looked for [m]. Chosen: at 2.2 m a shin of 5 cm is less than 2 of the Limo's beams.
+    sigma
+        Standard deviation of the middle of two walking legs from the person's axis [m]. Chosen: of one leg alone, where
+        it hides the other, the axis is up to .17 m off.
+    fewest
+        So many returns at least [1].
+    """
+
+    radius: float = 0.35
+    widest: float = 0.55
+    reach: float = 2.2
+    sigma: float = 0.1
+    fewest: int = 2
+
+    def update(self, track: Track, returns: Returns, noise: Noise) -> Track | None:
+        """Return the track predicted for the scan's stamp and corrected by its legs; None where there are none."""
+        track = predict(track, returns.stamp, noise)
+        pose = returns.pose
+        distance = bearing_range(track, pose)[1]
+        if distance > self.reach:
+            return None
+        legs = returns.points[np.hypot(*(returns.points - track.mean[:2]).T) < self.radius]
+        if len(legs) < self.fewest or np.hypot(*np.ptp(legs, axis=0)) > self.widest:
+            return None
+        dx, dy = legs.mean(axis=0) - (pose.x, pose.y)
+        legs_noise = Noise(bearing=self.sigma / max(distance, 0.3), range=self.sigma)
+        bearing = math.atan2(dy, dx) - pose.yaw
+        return update(track, innovation(track, bearing, math.hypot(dx, dy), pose, legs_noise))

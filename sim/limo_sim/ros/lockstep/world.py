@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow.decision import Mode
+from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.pipeline import CONTROL_PERIOD
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
 from limo_hog.ros2.messages import to_twist
@@ -26,7 +27,7 @@ from limo_sim.ros.interfaces import Message, from_wire
 from limo_sim.ros.lockstep.patience import Patience
 from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
-from limo_sim.run.episode import CONTROL_PERIOD, NOTHING, Episode, Moment, Step
+from limo_sim.run.episode import Episode, FrameRecord, Moment, Step
 from limo_sim.sensing.camera import Frame
 from limo_sim.world.scenario import Scenario
 
@@ -255,26 +256,18 @@ class World:
         if not fresh and self.time - self._logged < CONTROL_PERIOD - 0.01:
             return
         self._logged = self.time
+        record, target = None, None
         if frame is not None and fresh:
             self._logged_frame = frame.stamp
-        found = self._in_frame_pixels(frame) if frame is not None and fresh else NOTHING
+            found = self._in_frame_pixels(frame)
+            target = int(np.argmax(found.scores)) if len(found) else None
+            detect_ms = sum(found.ms for found in self.found)
+            record = FrameRecord(frame.truth, found, detect_ms=detect_ms, render_ms=self._render_ms)
         twist = self.commands[-1].twist if self.commands else Twist()
-        target = int(np.argmax(found.scores)) if len(found) else None
         mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
         self._seen_before |= target is not None
-        step = Step(
-            time=self.time,
-            truth=self.arena.truth(),
-            seen=frame.truth if frame is not None and fresh else None,
-            detections=found,
-            target=target,
-            region=None,
-            twist=twist,
-            mode=mode,
-            reason=f"as {self.script.name} says",
-            detect_ms=sum(found.ms for found in self.found) if fresh else 0.0,
-            render_ms=self._render_ms if fresh else 0.0,
-        )
+        decision = Decision(twist, None, mode, f"as {self.script.name} says", target)
+        step = Step(self.time, self.arena.truth(), decision, record)
         self._steps.append(step)
         if self.watch is not None:
             with self.patience.suspended():
@@ -296,4 +289,4 @@ class World:
             if abs(found.shape[1] * scale - width) <= scale:
                 boxes = np.rint(found.detections.boxes * scale).astype(np.int32)
                 return Detections(boxes, found.detections.scores)
-        return NOTHING
+        return Detections.none()

@@ -4,7 +4,8 @@
 const $ = (id) => document.getElementById(id);
 const WINDOW_S = 60; // what the plots show
 const KEPT = 6000; // control periods kept for the trails
-const [TIME, ERROR, DISTANCE, LINEAR, ANGULAR, X, Y, PERSON_X, PERSON_Y] = [...Array(9).keys()];
+// Columns of a row; from PEOPLE on x and y of each person, in the scenario's order.
+const [TIME, ERROR, DISTANCE, LINEAR, ANGULAR, MEASURED, X, Y, PEOPLE] = [...Array(9).keys()];
 
 let scene = null; // what stays the same: room, furniture, zones
 let now = null; // the newest state
@@ -50,6 +51,8 @@ function state(next, rows) {
   $("reason").textContent = now.reason;
   $("pause").textContent = now.paused ? "Go on" : "Pause";
   if (document.activeElement !== $("speed")) $("speed").value = String(now.speed);
+  put("measured", now.measured_m, 2, "m");
+  $("seen").textContent = seen();
   put("distance", now.distance_m, 2, "m");
   $("zone").textContent = now.distance_m === null ? "–" : zone(now.distance_m);
   put("error", now.error_px, 0, "px");
@@ -59,6 +62,11 @@ function state(next, rows) {
   if (now.detect_ms !== null) put("detect", now.detect_ms, 1, "ms");
   $("contacts").textContent = now.contacts.person + now.contacts.wall;
   redraw();
+}
+
+function seen() {
+  if (now.measured_m !== null) return `${number(now.measured_m, 2)} m by the depth image · ${zone(now.measured_m)}`;
+  return now.error_px === null ? "no box is followed in this image" : "the depth image does not tell how far";
 }
 
 function show(data) {
@@ -104,8 +112,10 @@ function notice(text) {
   $("notice").hidden = !text;
 }
 
+const element = (kind, properties) => Object.assign(document.createElement(kind), properties);
+
 function put(id, value, digits, unit) {
-  const small = Object.assign(document.createElement("small"), { textContent: unit });
+  const small = element("small", { textContent: unit });
   $(id).replaceChildren(...(value === null ? ["–"] : [`${number(value, digits)} `, small]));
 }
 
@@ -131,20 +141,24 @@ document.onkeydown = (event) => {
 };
 $("parameters").onsubmit = (event) => event.preventDefault();
 
-function parameters(values) {
-  $("parameters").hidden = !Object.keys(values).length;
-  $("fields").replaceChildren(
-    ...Object.entries(values).map(([name, value]) => {
-      const input = Object.assign(document.createElement("input"), { type: "number", step: "any", min: 0, name, value });
-      input.onchange = () => {
-        $("complaint").textContent = "";
-        wish({ set: name, value: input.valueAsNumber });
-      };
-      const label = document.createElement("label");
-      label.append(name.replaceAll("_", " "), input);
-      return label;
-    }),
-  );
+function parameters(all) {
+  $("parameters").hidden = !all.length;
+  $("fields").replaceChildren();
+  let group = "";
+  for (const { name, value, low, high, unit, tooltip, whole } of all) {
+    const [own, part = ""] = name.split(".").reverse();
+    if (part !== group) $("fields").append(element("h3", { textContent: part }));
+    group = part;
+    const input = element("input", { type: "number", step: whole ? 1 : "any", min: low, max: high, name, value });
+    const label = element("label", { title: `${tooltip} From ${low} to ${high}${unit && ` ${unit}`}.` });
+    label.append(element("span", { textContent: own.replaceAll("_", " ") }), input, element("small", { textContent: unit }));
+    input.onfocus = () => ($("about").textContent = label.title);
+    input.onchange = () => {
+      $("complaint").textContent = "";
+      wish({ set: name, value: input.valueAsNumber });
+    };
+    $("fields").append(label);
+  }
 }
 
 // Drawing
@@ -156,10 +170,11 @@ function redraw() {
     drawing = false;
     if (!now || !scene) return;
     drawMap();
+    drawScale();
     const seen = Math.max(...history.slice(-600).map((row) => Math.abs(row[ERROR] || 0)), 50);
     plot("plot-error", [[ERROR, "error"]], -seen * 1.1, seen * 1.1);
     const far = Math.max(...history.slice(-600).map((row) => row[DISTANCE] || 0), 4);
-    plot("plot-distance", [[DISTANCE, "distance"]], 0, far * 1.05, [0, ...scene.zones, far * 1.05]);
+    plot("plot-distance", [[DISTANCE, "distance"], [MEASURED, "measured"]], 0, far * 1.05, [0, ...scene.zones, far * 1.05]);
     const fast = Math.max(...history.slice(-600).map((row) => Math.max(Math.abs(row[LINEAR]), Math.abs(row[ANGULAR]))), 0.3);
     plot("plot-speed", [[LINEAR, "linear"], [ANGULAR, "angular"]], -fast * 1.1, fast * 1.1);
   });
@@ -253,6 +268,9 @@ function drawMap() {
     line(pen, [at(m, -scene.room), at(m, scene.room)]);
     line(pen, [at(-scene.room, m), at(scene.room, m)]);
   }
+  pen.fillStyle = colours.faint;
+  pen.textAlign = "center";
+  pen.fillText("1 m", ...at(0.5 - Math.floor(scene.room), 0.12 - scene.room));
   pen.strokeStyle = colours.faint;
   pen.lineWidth = 3;
   const side = 2 * scene.room * scale;
@@ -276,15 +294,17 @@ function drawMap() {
   pen.beginPath();
   pen.rect(...at(-scene.room, scene.room), side, side);
   pen.clip();
-  if (now.people.length) {
-    const [x, y] = now.people[0];
+  const [robotX, robotY, yaw] = now.robot;
+  const away = ([x, y]) => Math.hypot(x - robotX, y - robotY);
+  const middle = now.people[now.followed] || now.people.filter(Boolean).sort((a, b) => away(a) - away(b))[0];
+  if (middle) {
+    const [x, y] = middle;
     scene.zones.forEach((radius, i) => {
       disc(x, y, radius);
       pen.fillStyle = colours[`zone-${i}`];
       pen.fill();
     });
   }
-  const [robotX, robotY, yaw] = now.robot;
   pen.fillStyle = colours.robot;
   pen.globalAlpha = 0.1;
   pen.beginPath();
@@ -294,18 +314,22 @@ function drawMap() {
   pen.restore();
   pen.globalAlpha = 0.6;
   pen.lineWidth = 1.5;
-  for (const [column, colour] of [[X, "robot"], [PERSON_X, "person"]]) {
+  const trails = now.people.map((_, i) => [PEOPLE + 2 * i, i === now.followed ? "followed" : "other"]);
+  for (const [column, colour] of [[X, "robot"], ...trails]) {
     pen.strokeStyle = colours[colour];
     line(pen, history.filter((row) => row[column] !== null).slice(-1200).map((row) => at(row[column], row[column + 1])));
   }
   pen.globalAlpha = 1;
   pen.fillStyle = colours.scan;
   for (const [x, y] of now.scan) pen.fillRect(at(x, y)[0] - 1, at(x, y)[1] - 1, 2, 2);
-  pen.fillStyle = colours.person;
-  for (const [x, y] of now.people) {
-    disc(x, y, 0.15);
-    pen.fill();
-  }
+  pen.lineWidth = 2.5;
+  now.people.forEach((person, i) => {
+    if (!person) return;
+    disc(...person, 0.15);
+    pen.fillStyle = pen.strokeStyle = colours[i === now.followed ? "followed" : "other"];
+    if (i === now.followed) pen.fill();
+    else pen.stroke();
+  });
   pen.save();
   pen.translate(...at(robotX, robotY));
   pen.rotate(-yaw);
@@ -316,6 +340,29 @@ function drawMap() {
   pen.fillStyle = colours.card;
   pen.fillRect(0.06 * scale, -0.07 * scale, 0.05 * scale, 0.14 * scale);
   pen.restore();
+}
+
+function drawScale() {
+  const [pen, width] = sheet("scale");
+  const { far, colours: shades } = scene.depth;
+  const end = width - 76; // the rest is for black
+  const fill = pen.createLinearGradient(0, 0, end, 0);
+  shades.forEach((shade, i) => fill.addColorStop(i / (shades.length - 1), shade));
+  pen.fillStyle = fill;
+  pen.fillRect(0, 0, end, 12);
+  pen.fillStyle = "#000";
+  pen.fillRect(end + 10, 0, 66, 12);
+  pen.fillStyle = colours.faint;
+  pen.textBaseline = "top";
+  pen.textAlign = "center";
+  pen.fillText("unknown", end + 43, 17);
+  const step = nice(far / 5);
+  for (let m = 0; m <= far; m += step) {
+    const x = (m / far) * end;
+    pen.fillRect(Math.min(x, end - 1), 12, 1, 3);
+    pen.textAlign = m ? (m === far ? "right" : "center") : "left";
+    pen.fillText(m + step > far ? `${m} m` : m, x, 17);
+  }
 }
 
 function readColours() {

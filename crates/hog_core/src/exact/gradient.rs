@@ -1,0 +1,317 @@
+//! Stage 1: gamma, derivative, strongest channel, angle, and the two orientation votes of each pixel.
+//!
+//! The scalar form, equal to OpenCV 4.14's `computeGradient` to the last bit.
+
+use std::ops::Range;
+
+use crate::geometry::{Padding, Region, Size};
+use crate::image::{ImageView, reflect_101};
+use crate::params::HogSpec;
+
+use super::isa::{MulAdd, Work, run};
+use super::polar::polar;
+use super::tables::Tables;
+
+/// The gradient of an image as OpenCV returns it: of each pixel, two shares of its magnitude for two bins.
+#[derive(Debug, Clone, Default)]
+pub struct Gradient {
+    /// Row by row.
+    pub shares: Vec<[f32; 2]>,
+    /// The two neighbouring orientation bins, row by row.
+    pub bins: Vec<[u8; 2]>,
+}
+
+/// A pixel's two votes: `shares` for `bins`.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(16))]
+pub(super) struct Vote {
+    /// Gradient magnitude shared between the two bins.
+    pub shares: [f32; 2],
+    /// The two neighbouring orientation bins.
+    pub bins: [u8; 2],
+}
+
+/// The votes of the pixels of a region.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Votes {
+    /// Columns of the region.
+    pub width: usize,
+    /// Row by row.
+    pub pixels: Vec<Vote>,
+}
+
+/// OpenCV computes angles in runs of this many columns ...
+const POLAR_RUN: usize = 1024;
+/// ... and a run shorter than this (two vectors) with a differently rounded last step.
+const POLAR_VECTOR_MIN: usize = 16;
+
+/// The gradient of the whole padded image.
+pub fn gradient(image: ImageView, padding: Padding, spec: &HogSpec, tables: &Tables) -> Gradient {
+    let Size { width, height } = padding.size;
+    let mut out =
+        Gradient { shares: Vec::with_capacity(width * height), bins: Vec::with_capacity(width * height) };
+    let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
+        out.shares.extend(a.iter().zip(b).map(|(&a, &b)| [a, b]));
+        out.bins.extend(first.iter().zip(second).map(|(&first, &second)| [first, second]));
+    };
+    run(Rows { image, padding, region: Region { x: 0, y: 0, width, height }, spec, tables, put });
+    out
+}
+
+/// The votes of `region` of the padded image, as if the whole padded image had been computed.
+pub(super) fn votes(
+    image: ImageView,
+    padding: Padding,
+    region: Region,
+    spec: &HogSpec,
+    tables: &Tables,
+) -> Votes {
+    let mut pixels = Vec::with_capacity(region.width * region.height);
+    let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
+        let bins = first.iter().zip(second);
+        let votes = a.iter().zip(b).zip(bins);
+        pixels.extend(
+            votes.map(|((&a, &b), (&first, &second))| Vote { shares: [a, b], bins: [first, second] }),
+        );
+    };
+    run(Rows { image, padding, region, spec, tables, put });
+    Votes { width: region.width, pixels }
+}
+
+/// The votes of a row of pixels.
+struct Row {
+    /// What the two bins get.
+    shares: [Vec<f32>; 2],
+    /// Which bins these are.
+    bins: [Vec<u8>; 2],
+}
+
+/// Hands the votes of a region to `put`, row by row.
+struct Rows<'a, P> {
+    image: ImageView<'a>,
+    padding: Padding,
+    region: Region,
+    spec: &'a HogSpec,
+    tables: &'a Tables,
+    put: P,
+}
+
+impl<P: FnMut(&Row)> Work for Rows<'_, P> {
+    #[inline(always)]
+    fn run<M: MulAdd>(self) {
+        let Self { image, padding, region, spec, tables, mut put } = self;
+        if region.width == 0 {
+            return;
+        }
+        let source = Source::new(image, padding, region, tables);
+        let row = || vec![0.0f32; region.width];
+        let [mut dx, mut dy, mut magnitude, mut angle] = [(); 4].map(|()| row());
+        let bins = || vec![0u8; region.width];
+        let mut votes = Row { shares: [row(), row()], bins: [bins(), bins()] };
+        let mut rows = [(); 3].map(|()| vec![0.0; (region.width + 2) * image.channels()]);
+        source.fill(0, &mut rows[0]);
+        source.fill(1, &mut rows[1]);
+        for y in 0..region.height {
+            source.fill(y + 2, &mut rows[(y + 2) % 3]);
+            let neighbours = [y, y + 1, y + 2].map(|row| rows[row % 3].as_slice());
+            if image.channels() == 1 {
+                derive_gray(neighbours, &mut dx, &mut dy);
+            } else {
+                let first_of_tail = (padding.size.width / 4 * 4).saturating_sub(region.x).min(region.width);
+                derive_colour::<false>(neighbours, 0..first_of_tail, &mut dx, &mut dy);
+                derive_colour::<true>(neighbours, first_of_tail..region.width, &mut dx, &mut dy);
+            }
+            polar_row::<M>(region.x, padding.size.width, [&dx, &dy], [&mut magnitude, &mut angle]);
+            vote(spec, &magnitude, &angle, &mut votes);
+            put(&votes);
+        }
+    }
+}
+
+/// Rows of the padded image with gamma applied, one column and row wider than the region on every side.
+struct Source<'a> {
+    image: ImageView<'a>,
+    gamma: &'a [f32; 256],
+    /// Columns, and image row before mirroring, of the upper left corner.
+    width: usize,
+    left: i64,
+    top: i64,
+    /// Columns that lie in the image, and where the others read.
+    inside: Range<usize>,
+    mirrored: Vec<(usize, usize)>,
+}
+
+impl<'a> Source<'a> {
+    fn new(image: ImageView<'a>, padding: Padding, region: Region, tables: &'a Tables) -> Self {
+        let left = region.x as i64 - 1 - padding.left;
+        let width = region.width + 2;
+        let within = |x: i64| x.clamp(0, width as i64) as usize;
+        let inside = within(-left)..within(image.width() as i64 - left);
+        let outside = (0..inside.start).chain(inside.end..width);
+        Self {
+            image,
+            gamma: &tables.gamma,
+            width,
+            left,
+            top: region.y as i64 - 1 - padding.top,
+            mirrored: outside.map(|i| (i, reflect_101(left + i as i64, image.width()))).collect(),
+            inside,
+        }
+    }
+
+    /// Writes the channels of row `y`, one after the other.
+    #[inline(always)]
+    fn fill(&self, y: usize, out: &mut [f32]) {
+        let Self { image, gamma, width, .. } = self;
+        let row = image.row(reflect_101(self.top + y as i64, image.height()));
+        // (A region may lie beyond the image altogether.)
+        let first = (self.left + self.inside.start as i64).clamp(0, image.width() as i64) as usize;
+        if image.channels() == 1 {
+            for (value, &pixel) in out[self.inside.clone()].iter_mut().zip(&row[first..]) {
+                *value = gamma[pixel as usize];
+            }
+        } else {
+            let (blue, others) = out.split_at_mut(*width);
+            let (green, red) = others.split_at_mut(*width);
+            let [blue, green, red] = [blue, green, red].map(|plane| plane[self.inside.clone()].iter_mut());
+            for (((blue, green), red), pixel) in
+                blue.zip(green).zip(red).zip(row.as_chunks::<3>().0[first..].iter())
+            {
+                [*blue, *green, *red] = pixel.map(|value| gamma[value as usize]);
+            }
+        }
+        for (c, plane) in out.chunks_exact_mut(*width).enumerate() {
+            for &(to, from) in &self.mirrored {
+                plane[to] = gamma[row[from * image.channels() + c] as usize];
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn derive_gray([above, here, below]: [&[f32]; 3], dx: &mut [f32], dy: &mut [f32]) {
+    let horizontal = here.iter().zip(&here[2..]);
+    let vertical = above[1..].iter().zip(&below[1..]);
+    for ((dx, dy), ((left, right), (up, down))) in dx.iter_mut().zip(dy).zip(horizontal.zip(vertical)) {
+        (*dx, *dy) = (right - left, down - up);
+    }
+}
+
+/// Takes the channel with the largest squared magnitude (two products and a sum, no fused step). Among equals the
+/// lowest channel wins, but in the last `padded_width % 4` columns the highest.
+#[inline(always)]
+fn derive_colour<const HIGHEST_WINS: bool>(
+    [above, here, below]: [&[f32]; 3],
+    columns: Range<usize>,
+    dx: &mut [f32],
+    dy: &mut [f32],
+) {
+    let plane = here.len() / 3;
+    let (first, len) = (columns.start, columns.len());
+    let (dx, dy) = (&mut dx[columns.clone()], &mut dy[columns]);
+    let channels = [0, 1, 2].map(|c| {
+        let at = c * plane + first;
+        [&here[at..][..len], &here[at + 2..][..len], &above[at + 1..][..len], &below[at + 1..][..len]]
+    });
+    for i in 0..len {
+        let of_channel = |c: usize| {
+            let [left, right, up, down] = channels[c];
+            let (dx, dy) = (right[i] - left[i], down[i] - up[i]);
+            (dx * dx + dy * dy, dx, dy)
+        };
+        let mut best = of_channel(0);
+        for candidate in [of_channel(1), of_channel(2)] {
+            if candidate.0 > best.0 || (HIGHEST_WINS && candidate.0 == best.0) {
+                best = candidate;
+            }
+        }
+        (dx[i], dy[i]) = (best.1, best.2);
+    }
+}
+
+/// Magnitude and angle of a row, run by run as the whole padded row would be split.
+#[inline(always)]
+fn polar_row<M: MulAdd>(
+    first_column: usize,
+    padded_width: usize,
+    [dx, dy]: [&[f32]; 2],
+    [magnitude, angle]: [&mut [f32]; 2],
+) {
+    let end = first_column + dx.len();
+    let mut x = first_column;
+    while x < end {
+        let run_start = x / POLAR_RUN * POLAR_RUN;
+        let run_end = (run_start + POLAR_RUN).min(padded_width);
+        let part = x - first_column..run_end.min(end) - first_column;
+        polar::<M>(
+            &dx[part.clone()],
+            &dy[part.clone()],
+            run_end - run_start >= POLAR_VECTOR_MIN,
+            &mut magnitude[part.clone()],
+            &mut angle[part],
+        );
+        x = run_end;
+    }
+}
+
+/// Splits each gradient between the two bins whose centres are nearest.
+#[inline(always)]
+fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut Row) {
+    let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
+    let bins_per_radian = (spec.nbins as f64 / range) as f32;
+    let nbins = spec.nbins as f32;
+    let Row { shares: [near, far], bins: [firsts, seconds] } = votes;
+    let shares = near.iter_mut().zip(far);
+    let bins = firsts.iter_mut().zip(seconds);
+    for (((magnitude, angle), shares), bins) in magnitude.iter().zip(angle).zip(shares).zip(bins) {
+        let position = bins_per_radian * angle - 0.5;
+        let floor = position.floor();
+        let share = position - floor;
+        let turn = if floor < 0.0 { nbins } else { 0.0 } - if floor >= nbins { nbins } else { 0.0 };
+        let first = floor + turn;
+        let second = if first + 1.0 < nbins { first + 1.0 } else { 0.0 };
+        (*shares.0, *shares.1) = (magnitude * (1.0 - share), magnitude * share);
+        (*bins.0, *bins.1) = (byte(first), byte(second));
+    }
+}
+
+/// A whole number of 0..=255 as a byte. (A cast checks for other numbers and is not vectorised.)
+#[inline(always)]
+fn byte(whole: f32) -> u8 {
+    const LAST_BIT_IS_ONE: f32 = (1 << 23) as f32;
+    (whole + LAST_BIT_IS_ONE).to_bits() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::HogParams;
+
+    #[test]
+    fn a_region_votes_as_it_does_in_the_whole_image_also_beyond_a_narrow_one() {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let tables = Tables::new(&spec);
+        let data: Vec<u8> = (0..300).map(|i| (i * i % 251) as u8).collect();
+        for channels in [1, 3] {
+            for (width, height) in [(1, 1), (1, 9), (5, 3), (20, 5)] {
+                let image = ImageView::new(&data, width, height, channels, width * channels).unwrap();
+                let padding = Padding { left: 12, top: 3, size: Size::new(width + 30, height + 6) };
+                let Size { width, height } = padding.size;
+                let whole = votes(image, padding, Region { x: 0, y: 0, width, height }, &spec, &tables);
+                for x in 0..width {
+                    let part = votes(
+                        image,
+                        padding,
+                        Region { x, y: 2, width: width - x, height: 2 },
+                        &spec,
+                        &tables,
+                    );
+                    for (i, vote) in part.pixels.iter().enumerate() {
+                        let there = whole.pixels[(2 + i / part.width) * width + x + i % part.width];
+                        assert_eq!((vote.shares, vote.bins), (there.shares, there.bins));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Which instruction set the kernels use: chosen once, or forced by `LIMO_HOG_BACKEND`.
+
+use std::sync::OnceLock;
+
+use crate::error::{BackendError, Result};
+
+/// An instruction set that the kernels are compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Backend {
+    /// The architecture's baseline.
+    Scalar,
+    /// AVX2 and FMA.
+    Avx2,
+    /// AVX-512 F, BW, VL, DQ, VBMI and VNNI.
+    Avx512,
+    /// NEON.
+    Neon,
+}
+
+/// The variable that forces a backend.
+const VARIABLE: &str = "LIMO_HOG_BACKEND";
+
+impl Backend {
+    /// All of them, the fastest first.
+    pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
+
+    /// The name that `LIMO_HOG_BACKEND` knows it by.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+        }
+    }
+
+    /// Whether this CPU has it.
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                Self::Avx2.is_available()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vbmi")
+                    && is_x86_feature_detected!("avx512vnni")
+            }
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => true,
+            #[allow(unreachable_patterns, reason = "which are left depends on the architecture")]
+            _ => false,
+        }
+    }
+
+    /// The backend in force: the one `LIMO_HOG_BACKEND` names, else the fastest this CPU has. Read once.
+    ///
+    /// An unknown name, or one that this CPU does not have, is an error.
+    pub fn current() -> Result<Self> {
+        static CHOSEN: OnceLock<Result<Backend>> = OnceLock::new();
+        let choose = || {
+            let name = std::env::var_os(VARIABLE).unwrap_or_default();
+            Self::named(&name.to_string_lossy())
+        };
+        CHOSEN.get_or_init(choose).clone()
+    }
+
+    fn named(name: &str) -> Result<Self> {
+        let available = || Self::ALL.into_iter().filter(|backend| backend.is_available());
+        if name.is_empty() || name == "auto" {
+            return Ok(available().next().unwrap_or(Self::Scalar));
+        }
+        available().find(|backend| backend.name() == name).ok_or_else(|| {
+            let available = available().map(Self::name).collect();
+            BackendError::Unknown { variable: VARIABLE, name: name.to_owned(), available }.into()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn auto_takes_the_fastest_and_scalar_is_everywhere() {
+        assert!(Backend::named("auto").unwrap().is_available());
+        assert_eq!(Backend::named("").unwrap(), Backend::named("auto").unwrap());
+        assert_eq!(Backend::named("scalar").unwrap(), Backend::Scalar);
+    }
+
+    #[test]
+    fn an_unknown_or_missing_backend_is_refused_by_name() {
+        let text = Backend::named("sse9").unwrap_err().to_string();
+        assert!(text.contains("sse9") && text.contains("scalar"), "{text}");
+        let missing = if cfg!(target_arch = "aarch64") { "avx2" } else { "neon" };
+        assert!(Backend::named(missing).is_err());
+    }
+}

@@ -1,0 +1,137 @@
+//! Which kernels serve a call: every entry to the fast path, and the functions that enable an instruction set.
+
+use crate::exact::Svm;
+use crate::geometry::Size;
+use crate::image::ImageView;
+use crate::params::HogSpec;
+use crate::pyramid::Grid;
+
+use super::backend::Backend;
+#[cfg(target_arch = "x86_64")]
+use super::lane::Lane;
+#[cfg(target_arch = "aarch64")]
+use super::lane::neon::Neon;
+use super::lane::portable::Portable;
+#[cfg(target_arch = "x86_64")]
+use super::lane::{avx2::Avx2, avx512::Avx512};
+use super::level::{Scratch, Task, level};
+use super::plan::Plan;
+use super::rows::Planes;
+
+/// The plan of the fast path for this geometry and SVM, if the kernels can serve them.
+pub(crate) fn plan(backend: Backend, spec: &HogSpec, svm: &Svm) -> Option<Plan> {
+    Plan::new(spec, svm, sqrt_of_byte_is_exact(backend), backend != Backend::Avx2)
+}
+
+/// Whether the backend's estimated square root is right for every pixel value; CPUs differ in their estimates.
+fn sqrt_of_byte_is_exact(backend: Backend) -> bool {
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available.
+        Backend::Avx512 => unsafe { avx512_sqrt_of_byte_is_exact() },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Avx2 => unsafe { avx2_sqrt_of_byte_is_exact() },
+        _ => false,
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn is_exact<L: Lane>(l: L) -> bool {
+    (0..=255u8).all(|value| {
+        let value = f32::from(value);
+        l.first(l.sqrt_of_byte(l.splat(value))) == value.sqrt()
+    })
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
+fn avx512_sqrt_of_byte_is_exact() -> bool {
+    // SAFETY: this function's features are the tokens'; a level's last strip is AVX2's.
+    unsafe { is_exact(Avx512::new()) && is_exact(Avx2::new()) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2_sqrt_of_byte_is_exact() -> bool {
+    // SAFETY: this function's features are the token's.
+    unsafe { is_exact(Avx2::new()) }
+}
+
+/// Whether the kernels can serve windows of this stride.
+pub(crate) fn serves(grid: &Grid) -> bool {
+    grid.stride.width.is_multiple_of(4) && grid.stride.height.is_multiple_of(4)
+}
+
+/// Puts into `scratch.found` every window of `grid` whose exact score may be at least `threshold`, row by row: x, y in
+/// padded pixels.
+pub(crate) fn detect(
+    backend: Backend,
+    plan: &Plan,
+    source: &Planes,
+    size: Size,
+    grid: &Grid,
+    threshold: f64,
+    scratch: &mut Scratch,
+) {
+    scratch.found.clear();
+    if grid.is_empty() {
+        return;
+    }
+    let task = Task { plan, source, size, grid, threshold };
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available.
+        Backend::Avx512 => unsafe { avx512(task, scratch) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Avx2 => unsafe { avx2(task, scratch) },
+        #[cfg(target_arch = "aarch64")]
+        Backend::Neon => neon(task, scratch),
+        _ => level(Portable, Portable, task, scratch),
+    }
+    scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
+}
+
+/// Fills `planes` with the pixels of `image`.
+pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageView) {
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2.
+        Backend::Avx512 | Backend::Avx2 => unsafe { avx2_fill_planes(planes, image) },
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: as in `neon`.
+        Backend::Neon => planes.fill(unsafe { Neon::new() }, image),
+        _ => planes.fill(Portable, image),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2_fill_planes(planes: &mut Planes, image: ImageView) {
+    // SAFETY: this function's features are the token's.
+    planes.fill(unsafe { Avx2::new() }, image);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
+fn avx512(task: Task, scratch: &mut Scratch) {
+    // SAFETY: this function's features are the tokens'.
+    unsafe { level(Avx512::new(), Avx2::new(), task, scratch) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2(task: Task, scratch: &mut Scratch) {
+    // SAFETY: this function's features are the token's.
+    let l = unsafe { Avx2::new() };
+    level(l, l, task, scratch);
+}
+
+#[cfg(target_arch = "aarch64")]
+fn neon(task: Task, scratch: &mut Scratch) {
+    // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
+    let l = unsafe { Neon::new() };
+    level(l, l, task, scratch);
+}

@@ -1,0 +1,204 @@
+//! Pixels for the kernels: the image as planes, shrunk to a level, each row mirrored outwards.
+
+use crate::geometry::Size;
+use crate::image::{ImageView, reflect_101};
+use crate::pyramid::{Tap, taps};
+
+use super::lane::{Columns, Lane, RowPointers};
+use super::layout::{OVERREAD, SLACK, STEP};
+
+/// The image as one plane per channel, rows without gaps, every byte flipped by 0x80 (signed, as the resize wants it).
+#[derive(Debug, Default)]
+pub(crate) struct Planes {
+    data: Vec<u8>,
+    size: Size,
+    channels: usize,
+}
+
+impl Planes {
+    /// Copies the pixels of `image`.
+    #[inline(always)]
+    pub(super) fn fill<L: Lane>(&mut self, l: L, image: ImageView) {
+        let (width, height, channels) = (image.width(), image.height(), image.channels());
+        let plane = width * height;
+        self.size = Size::new(width, height);
+        self.channels = channels;
+        self.data.resize(plane * channels + SLACK, 0);
+        for y in 0..height {
+            let row = image.row(y);
+            if channels == 1 {
+                for (to, from) in self.data[y * width..][..width].iter_mut().zip(row) {
+                    *to = from ^ 0x80;
+                }
+            } else {
+                let (first, rest) = self.data.split_at_mut(plane);
+                let (second, third) = rest.split_at_mut(plane);
+                let to = [first, second, third].map(|plane| plane[y * width..][..width].as_mut_ptr());
+                // SAFETY: a row of the image and of each plane has `width` pixels.
+                unsafe { l.deinterleave(row.as_ptr(), to, width) };
+            }
+        }
+    }
+
+    pub(super) fn channels(&self) -> usize {
+        self.channels
+    }
+
+    fn row(&self, channel: usize, y: usize) -> &[u8] {
+        &self.data[(channel * self.size.height + y) * self.size.width..]
+    }
+}
+
+/// Rows of one level, each mirrored outwards by the padding and one pixel more: as many at a time as stay in the
+/// second-level cache.
+#[derive(Debug, Default)]
+pub(super) struct Band {
+    data: Vec<u8>,
+    size: Size,
+    pad: usize,
+    /// Bytes from row to row; the channels of a row lie one after the other.
+    pub stride: usize,
+    /// Bytes from channel to channel.
+    pub plane: usize,
+    /// Bytes before the first pixel of a row.
+    pub left: usize,
+    columns: Columns,
+    /// Which two rows of the image make a row of the level; none if the level is the image.
+    down: Vec<Tap>,
+}
+
+impl Band {
+    pub(super) fn pixels(&self) -> &[u8] {
+        &self.data
+    }
+
+    /// Prepares for rows of the level of `size` pixels, with room for `pad` pixels of border.
+    pub(super) fn begin(&mut self, source: &Planes, size: Size, pad: usize, group: usize, reach: usize) {
+        self.size = size;
+        self.pad = pad;
+        self.left = (pad + 17).next_multiple_of(64);
+        self.plane = (self.left + size.width + pad + OVERREAD + STEP).next_multiple_of(64);
+        self.stride = self.plane * source.channels;
+        self.down.clear();
+        if size != source.size {
+            self.columns.fill(source.size.width, size.width, group, reach);
+            self.down.extend(taps(source.size.height, size.height));
+        }
+    }
+
+    /// Makes the rows `from..from + count` of the level, mirrored where there are none.
+    #[inline(always)]
+    pub(super) fn fill<L: Lane, const C: usize>(&mut self, l: L, source: &Planes, from: i64, count: usize) {
+        if self.data.len() < count * self.stride {
+            self.data.resize(count * self.stride, 0);
+        }
+        let Size { width, height } = self.size;
+        for (i, all) in self.data.chunks_exact_mut(self.stride).take(count).enumerate() {
+            let y = reflect_101(from + i as i64, height);
+            if let Some(tap) = self.down.get(y) {
+                let rows = std::array::from_fn(|channel| RowPointers {
+                    upper: source.row(channel, tap.first).as_ptr(),
+                    lower: source.row(channel, tap.second).as_ptr(),
+                    to: all[channel * self.plane + self.left..][..width.next_multiple_of(STEP)].as_mut_ptr(),
+                });
+                // SAFETY: every tap lies in its row, behind which are SLACK bytes; there is room for all groups.
+                unsafe { l.resize_row::<C>(rows, tap.weight as i16, &self.columns) };
+            } else {
+                for channel in 0..C {
+                    let to = &mut all[channel * self.plane + self.left..][..width];
+                    for (to, from) in to.iter_mut().zip(source.row(channel, y)) {
+                        *to = from ^ 0x80;
+                    }
+                }
+            }
+            for row in all.chunks_exact_mut(self.plane) {
+                mirror(row, self.left, width, self.pad + 1);
+            }
+        }
+    }
+}
+
+/// Continues the `width` pixels at `left` by `count` mirrored ones (or some more) on both sides.
+#[inline(always)]
+fn mirror(row: &mut [u8], left: usize, width: usize, count: usize) {
+    const AT_ONCE: usize = 16;
+    if width <= count.next_multiple_of(AT_ONCE) {
+        for i in 0..count {
+            row[left - 1 - i] = row[left + reflect_101(-1 - i as i64, width)];
+            row[left + width + i] = row[left + reflect_101((width + i) as i64, width)];
+        }
+        return;
+    }
+    for i in (0..count).step_by(AT_ONCE) {
+        let (before, from) = row.split_at_mut(left);
+        let (inner, after) = from.split_at_mut(width);
+        let chunk = |at: usize| -> [u8; AT_ONCE] { std::array::from_fn(|k| inner[at + AT_ONCE - 1 - k]) };
+        before[left - i - AT_ONCE..][..AT_ONCE].copy_from_slice(&chunk(1 + i));
+        after[i..][..AT_ONCE].copy_from_slice(&chunk(width - 1 - i - AT_ONCE));
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail")]
+mod tests {
+    use super::super::lane::portable::Portable;
+    use super::*;
+    use crate::pyramid::resize;
+
+    /// Rows of a level, mirrored by `pad` pixels on all sides, against the exact resize.
+    fn assert_rows<L: Lane, const C: usize>(l: L, from: Size, to: Size, pad: usize) {
+        let data: Vec<u8> = (0..from.width * from.height * C).map(|i| (i * i / 7 + 13 * i) as u8).collect();
+        let image = ImageView::new(&data, from.width, from.height, C, from.width * C).unwrap();
+        let wanted = resize(image, to).unwrap();
+        let mut planes = Planes::default();
+        planes.fill(l, image);
+        let mut band = Band::default();
+        band.begin(&planes, to, pad, L::GROUP, L::REACH);
+        let count = to.height + 2 * pad;
+        band.fill::<L, C>(l, &planes, -(pad as i64), count);
+        for y in 0..count {
+            let wanted_y = reflect_101(y as i64 - pad as i64, to.height);
+            for x in 0..to.width + 2 * pad {
+                let wanted_x = reflect_101(x as i64 - pad as i64, to.width);
+                for channel in 0..C {
+                    let found = band.pixels()[y * band.stride + channel * band.plane + band.left + x - pad];
+                    let wanted = wanted[(wanted_y * to.width + wanted_x) * C + channel];
+                    assert_eq!(found, wanted, "{from:?} to {to:?}, {C} channels, ({x}, {y})");
+                }
+            }
+        }
+    }
+
+    fn assert_levels<L: Lane>(l: L) {
+        for width in [1, 2, 31, 32, 33, 64, 100, 129, 1000, 3000] {
+            for shrunk in [1.0, 1.05, 1.9, 2.0, 3.7, 4.1, 8.3, 17.0, 40.0, 100.0] {
+                let from = Size::new(width, 9);
+                let to = Size::new((width as f64 / shrunk).ceil() as usize, 4);
+                assert_rows::<L, 1>(l, from, to, 9);
+                assert_rows::<L, 3>(l, from, to, 40);
+            }
+        }
+        assert_rows::<L, 3>(l, Size::new(70, 50), Size::new(70, 50), 3);
+    }
+
+    #[test]
+    fn rows_are_those_of_the_exact_resize_however_much_the_image_shrinks() {
+        assert_levels(Portable);
+        #[cfg(target_arch = "x86_64")]
+        {
+            use super::super::backend::Backend;
+            use super::super::lane::{avx2::Avx2, avx512::Avx512};
+            if Backend::Avx2.is_available() {
+                // SAFETY: the CPU has it.
+                assert_levels(unsafe { Avx2::new() });
+            }
+            if Backend::Avx512.is_available() {
+                // SAFETY: the CPU has it.
+                assert_levels(unsafe { Avx512::new() });
+            }
+        }
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: every aarch64 CPU has it.
+        assert_levels(unsafe { super::super::lane::neon::Neon::new() });
+    }
+}

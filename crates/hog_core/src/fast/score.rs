@@ -1,0 +1,195 @@
+//! The SVM over a level's blocks: a quantised prefilter for every window, single precision for those that pass it.
+
+#![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
+
+use super::lane::Lane;
+use super::layout::{ACROSS, BLOCK, WORDS};
+use super::plan::Plan;
+
+/// Rows of windows that the prefilter scores at a time.
+const ROWS: usize = 8;
+
+/// The windows of a level's lattice and the blocks they are made of.
+pub(super) struct WindowGrid<'a> {
+    pub plan: &'a Plan,
+    pub blocks: *const f32,
+    pub bytes: *const u32,
+    /// Lanes of a row of blocks.
+    pub lanes: usize,
+    /// Windows along x and y.
+    pub width: usize,
+    pub height: usize,
+}
+
+/// Adds (x, y, score) to `found` for every window whose exact score may be at least `threshold`, row by row, and for
+/// some others.
+///
+/// `narrow` has at most [`ACROSS`] lanes.
+///
+/// # Safety
+/// `blocks` and `bytes` hold the blocks of all windows, and `lanes` is at least `width` rounded up to 32 plus the
+/// blocks of a window along x plus 16.
+#[inline(always)]
+pub(super) unsafe fn score<L: Lane, T: Lane>(
+    l: L,
+    narrow: T,
+    windows: &WindowGrid,
+    threshold: f64,
+    masks: &mut Vec<u32>,
+    found: &mut Vec<(usize, usize, f64)>,
+) {
+    let plan = windows.plan;
+    let groups = windows.width.div_ceil(L::LANES);
+    masks.clear();
+    masks.resize(groups * windows.height, u32::MAX);
+    let least = (threshold - plan.bias - plan.score_error_bound - plan.prefilter.bound) / plan.prefilter.unit;
+    let least = least.floor().clamp(f64::from(i32::MIN), f64::from(i32::MAX)) as i32;
+    let mut top = 0;
+    while L::PREFILTER_VECTORS > 0 && top < windows.height {
+        let rows = (windows.height - top).min(ROWS);
+        let mut group = 0;
+        while group < groups {
+            // SAFETY: the windows of these rows and lanes are the caller's promise.
+            unsafe {
+                if L::PREFILTER_VECTORS == 2 && group + 1 < groups {
+                    prefilter::<L, 2>(l, windows, least, top, rows, group, groups, masks);
+                    group += 2;
+                } else {
+                    prefilter::<L, 1>(l, windows, least, top, rows, group, groups, masks);
+                    group += 1;
+                }
+            }
+        }
+        top += rows;
+    }
+    for (index, &mask) in masks.iter().enumerate() {
+        let (y, x) = (index / groups, index % groups * L::LANES);
+        let inside = (windows.width - x).min(L::LANES);
+        let mut mask = mask & (((1u64 << inside) - 1) as u32);
+        if mask == 0 {
+            continue;
+        }
+        while mask != 0 {
+            let x = x + mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            // SAFETY: as above.
+            found.push((x, y, unsafe { score_window(narrow, windows, x, y) }));
+        }
+    }
+}
+
+/// The score of one window in single precision. Lanes are neighbouring blocks of the window.
+#[inline(always)]
+unsafe fn score_window<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) -> f64 {
+    let plan = windows.plan;
+    let padded = plan.blocks.width.next_multiple_of(ACROSS);
+    let mut score = plan.bias;
+    for (block_y, weights) in plan.weights.chunks_exact(BLOCK * padded).enumerate() {
+        // SAFETY: promised by the caller of `score`; lanes beyond the window's have the weight 0.
+        let blocks = unsafe { windows.blocks.add((y + block_y) * BLOCK * windows.lanes + x) };
+        for part in (0..plan.blocks.width).step_by(L::LANES) {
+            let mut sums = [l.splat(0.0); 4];
+            for (i, weights) in weights.chunks_exact(padded).enumerate() {
+                // SAFETY: as above; `padded` is a multiple of LANES.
+                let (value, weight) = unsafe {
+                    (l.load(blocks.add(i * windows.lanes + part)), l.load(weights.as_ptr().add(part)))
+                };
+                sums[i % 4] = l.mul_add(value, weight, sums[i % 4]);
+            }
+            let total = l.add(l.add(sums[0], sums[1]), l.add(sums[2], sums[3]));
+            let mut of_blocks = [0.0f32; ACROSS];
+            // SAFETY: LANES is at most ACROSS.
+            unsafe { l.store(of_blocks.as_mut_ptr(), total) };
+            for sum in &of_blocks[..L::LANES] {
+                score += f64::from(*sum);
+            }
+        }
+    }
+    score
+}
+
+/// Prefilters `rows` rows of `V` vectors of windows.
+#[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "a tile is named by all of them")]
+unsafe fn prefilter<L: Lane, const V: usize>(
+    l: L,
+    windows: &WindowGrid,
+    least: i32,
+    top: usize,
+    rows: usize,
+    group: usize,
+    groups: usize,
+    masks: &mut [u32],
+) {
+    let mut totals = [[l.no_sum(); V]; ROWS];
+    let height = windows.plan.blocks.height;
+    for y in 0..rows + height - 1 {
+        // Row y of blocks takes part in window rows from..to, as their block row y - window row.
+        let (from, to) = ((y + 1).saturating_sub(height), (y + 1).min(rows));
+        // SAFETY: promised by the caller of `score`.
+        let bytes = unsafe { windows.bytes.add((top + y) * WORDS * windows.lanes + group * L::LANES) };
+        macro_rules! step {
+            ($($from:literal $to:literal),*) => {
+                match (from, to) {
+                    // SAFETY: as above.
+                    $(($from, $to) => unsafe { block_row::<L, V, $from, $to>(l, windows, bytes, y, &mut totals) },)*
+                    _ => {}
+                }
+            };
+        }
+        step!(
+            0 1, 0 2, 0 3, 0 4, 0 5, 0 6, 0 7, 0 8, 1 2, 1 3, 1 4, 1 5, 1 6, 1 7, 1 8, 2 3, 2 4, 2 5, 2 6, 2 7, 2 8,
+            3 4, 3 5, 3 6, 3 7, 3 8, 4 5, 4 6, 4 7, 4 8, 5 6, 5 7, 5 8, 6 7, 6 8, 7 8
+        );
+    }
+    for (row, totals) in totals[..rows].iter().enumerate() {
+        for (v, &total) in totals.iter().enumerate() {
+            masks[(top + row) * groups + group + v] = l.at_least(total, least);
+        }
+    }
+}
+
+/// Adds one row of blocks to the totals of window rows `FROM..TO`.
+#[inline(always)]
+unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>(
+    l: L,
+    windows: &WindowGrid,
+    bytes: *const u32,
+    y: usize,
+    totals: &mut [[L::Sum; V]; ROWS],
+) {
+    let size = windows.plan.blocks;
+    let prefilter = &windows.plan.prefilter;
+    let mut total = *totals;
+    for block_x in 0..size.width {
+        let mut sum = total;
+        for row in FROM..TO {
+            for v in 0..V {
+                sum[row][v] = l.begin_block(total[row][v]);
+            }
+        }
+        for word in 0..WORDS {
+            let mut values = [l.splat_word(0); V];
+            for (v, value) in values.iter_mut().enumerate() {
+                // SAFETY: promised by the caller of `score`.
+                *value = unsafe { l.load_words(bytes.add(word * windows.lanes + block_x + v * L::LANES)) };
+            }
+            let weights = &prefilter.words[(block_x * WORDS + word) * size.height..][..size.height];
+            for row in FROM..TO {
+                // SAFETY: y - row is a block row of the window: the caller chose FROM and TO so. A check for each of
+                // these would cost as much as the sum.
+                let weight = l.splat_word(unsafe { *weights.get_unchecked(y - row) });
+                for v in 0..V {
+                    sum[row][v] = l.dot_bytes(sum[row][v], values[v], weight);
+                }
+            }
+        }
+        for row in FROM..TO {
+            let multiple = prefilter.multiples[block_x * size.height + y - row];
+            for v in 0..V {
+                total[row][v] = l.end_block(total[row][v], sum[row][v], multiple);
+            }
+        }
+    }
+    *totals = total;
+}

@@ -1,0 +1,379 @@
+//! One strip of a level, from pixels to normalised blocks. Lanes are neighbouring cells.
+//!
+//! Eight pixels lie between the same pixel of neighbouring cells: a vector holds pixel column `phase` (0..8) of
+//! `LANES` cells. Every stage then works lane by lane; only where a block joins two cells does a lane look at the next.
+//!
+//! The weight of a pixel in a cell of its block is a Gaussian times a bilinear share, both products of a function of x
+//! and one of y. So the votes of a column are first summed down the rows ([`spread`]), then across the columns
+//! ([`finish`]). A row of cells takes part in two rows of blocks and, per row of blocks, in two cells; a pixel row
+//! reaches three of these four sums.
+
+#![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
+
+use std::hint::black_box;
+use std::ops::Range;
+
+use super::lane::{Lane, ODD};
+use super::layout::{BINS, BLOCK, CARRY, CELL, Gamma};
+use super::plan::Plan;
+
+/// What the strips of a level read and write.
+pub(super) struct Job<'a> {
+    pub plan: &'a Plan,
+    /// The pixel above the first cell's upper left one, of each channel.
+    pub origin: [*const u8; 3],
+    /// Bytes from one row of pixels to the next.
+    pub stride: usize,
+    /// Rows of cells to be added to the blocks; those above them have been.
+    pub cells: Range<usize>,
+    /// Sums of the cells above, for the blocks that begin there: [`CARRY`] numbers for each lane.
+    pub carry: *mut f32,
+    /// Normalised blocks: `[block row][element][lane]`, and the same as bytes (1 stands for 255).
+    pub blocks: *mut f32,
+    pub bytes: *mut u32,
+    /// Lanes of a row of blocks.
+    pub lanes: usize,
+    /// For each row of blocks, the sums that the first cells of the strip to the right add to the blocks left of them.
+    pub edge: &'a mut [[f32; BLOCK]],
+}
+
+/// A gradient's two votes. Of two neighbouring bins one is even and one is odd, so each vote is kept by parity and a
+/// bin has to look at one of them only. Bins 8 and 0 are neighbours too: there the odd vote belongs to the other one.
+///
+/// Even bin b has slot b / 2, odd bin b has slot `ODD` + (b + 1) / 2; `ODD` stands for bin 8, `ODD` + 5 for bin 0.
+#[derive(Clone, Copy)]
+pub(super) struct LaneVotes<L: Lane> {
+    pub even: L::F,
+    pub odd: L::F,
+    pub slots: L::Slots,
+}
+
+/// Computes the blocks of the strip of cells that begins at lane `first`.
+///
+/// # Safety
+/// For every channel and row of `job`, the bytes from 8 before to 8 behind the strip's cells are readable; `blocks`
+/// and `bytes` have `cells_y - 1` rows of `lanes` lanes, the strip's among them.
+#[inline(always)]
+pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, first: usize) {
+    let zero = l.splat(0.0);
+    // Two rows from the cell above, eight of the cell, each with one neighbour on both sides. In colour only the last
+    // three are kept, in turn in three places: all would not leave room for the rest in the first-level cache.
+    let mut rows = [[[zero; CELL + 2]; CHANNELS]; CELL + 2];
+    let mut gradients = [[[zero; 2]; CELL]; CELL];
+    // SAFETY: aligned room for the strip's lanes is the caller's promise; any bits are numbers.
+    let carry = unsafe { &mut *job.carry.add(CARRY * first).cast::<[[[L::F; 2]; BINS]; CELL]>() };
+    if job.cells.start == 0 {
+        *carry = [[[zero; 2]; BINS]; CELL];
+    }
+    let mut sums = [[zero; CELL]; 2 * BINS];
+    let mut votes = [vote(l, [zero; 2]); CELL];
+    // SAFETY: promised by the caller.
+    unsafe {
+        fill(l, job, first, 0, &mut rows[0]);
+        fill(l, job, first, 1, &mut rows[1]);
+    }
+    for (i, cell_y) in job.cells.clone().enumerate() {
+        for y in 0..CELL {
+            let place = |y: usize| if CHANNELS > 1 { (CELL * i + y) % 3 } else { y };
+            // SAFETY: promised by the caller.
+            unsafe { fill(l, job, first, CELL * i + y + 2, &mut rows[place(y + 2)]) };
+            if CHANNELS > 1 {
+                let around = [&rows[place(y)], &rows[place(y + 1)], &rows[place(y + 2)]];
+                for phase in 0..CELL {
+                    gradients[phase][y] = strongest(l, around, phase);
+                }
+            }
+        }
+        for phase in 0..CELL {
+            for (y, votes) in votes.iter_mut().enumerate() {
+                let gradient = if CHANNELS > 1 {
+                    gradients[phase][y]
+                } else {
+                    strongest(l, [&rows[y], &rows[y + 1], &rows[y + 2]], phase)
+                };
+                *votes = vote(l, gradient);
+            }
+            spread_all(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
+        }
+        if CHANNELS == 1 {
+            rows.copy_within(CELL.., 0);
+        }
+        if cell_y > 0 {
+            // SAFETY: the strip's lanes of this row of blocks are the caller's promise.
+            unsafe { finish(l, job, &sums, cell_y - 1, first) };
+        }
+    }
+}
+
+/// The pixels of row `y` of the band, of every channel.
+#[inline(always)]
+pub(super) unsafe fn fill<L: Lane, const CHANNELS: usize>(
+    l: L,
+    job: &Job,
+    first: usize,
+    y: usize,
+    to: &mut [[L::F; CELL + 2]; CHANNELS],
+) {
+    for (channel, to) in to.iter_mut().enumerate() {
+        // SAFETY: promised by the caller of `strip`.
+        unsafe { row(l, job.plan, job.origin[channel].add(y * job.stride + CELL * first), to) };
+    }
+}
+
+/// One row of pixels as ten vectors: columns -1..=8 of every cell, after gamma.
+#[inline(always)]
+unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL + 2]) {
+    // SAFETY: the strip and 8 bytes on both sides are readable.
+    let (low, high, before, after) =
+        unsafe { (l.low_words(from), l.high_words(from), *from.sub(1), *from.add(CELL * L::LANES)) };
+    let mut columns = [
+        l.byte::<0>(low),
+        l.byte::<1>(low),
+        l.byte::<2>(low),
+        l.byte::<3>(low),
+        l.byte::<0>(high),
+        l.byte::<1>(high),
+        l.byte::<2>(high),
+        l.byte::<3>(high),
+    ];
+    match plan.gamma {
+        Gamma::Off => {}
+        Gamma::Estimated => {
+            for value in &mut columns {
+                *value = l.sqrt_of_byte(*value);
+            }
+        }
+        Gamma::Exact => {
+            for value in &mut columns {
+                *value = l.sqrt(*value);
+            }
+        }
+    }
+    to[1..=CELL].copy_from_slice(&columns);
+    // The neighbours are the same columns one cell on; only the outermost pixels are new.
+    to[0] = l.shift_up(columns[7], plan.table[usize::from(before)]);
+    to[CELL + 1] = l.shift_in(columns[0], plan.table[usize::from(after)]);
+}
+
+/// The gradient (dx, dy) of pixel column `phase` of every cell in its strongest channel, from the rows above, of and
+/// below the pixel.
+#[inline(always)]
+fn strongest<L: Lane, const CHANNELS: usize>(
+    l: L,
+    around: [&[[L::F; CELL + 2]; CHANNELS]; 3],
+    phase: usize,
+) -> [L::F; 2] {
+    let mut best = derive(l, around, 0, phase);
+    if CHANNELS > 1 {
+        let mut most = square(l, best);
+        for channel in 1..CHANNELS {
+            let other = derive(l, around, channel, phase);
+            let squared = square(l, other);
+            let stronger = l.less(most, squared);
+            best = [l.select(stronger, other[0], best[0]), l.select(stronger, other[1], best[1])];
+            most = l.max(most, squared);
+        }
+    }
+    best
+}
+
+/// dx and dy in one channel.
+#[inline(always)]
+fn derive<L: Lane, const CHANNELS: usize>(
+    l: L,
+    [above, own, below]: [&[[L::F; CELL + 2]; CHANNELS]; 3],
+    channel: usize,
+    phase: usize,
+) -> [L::F; 2] {
+    let dx = l.sub(own[channel][phase + 2], own[channel][phase]);
+    let dy = l.sub(below[channel][phase + 1], above[channel][phase + 1]);
+    [dx, dy]
+}
+
+/// dx² + dy², never fused: a fused step could choose another channel than OpenCV.
+#[inline(always)]
+fn square<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> L::F {
+    l.add(l.mul(dx, dx), l.mul(dy, dy))
+}
+
+/// The votes of one pixel of every cell.
+#[inline(always)]
+pub(super) fn vote<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> LaneVotes<L> {
+    let (xx, yy) = (l.mul(dx, dx), l.mul(dy, dy));
+    let squared = l.add(xx, yy);
+    let magnitude = l.sqrt_approx(squared);
+    // OpenCV's polynomial for the arctangent of 0..=1, in units of two bins.
+    let c = l.div_approx(l.min_abs(dx, dy), l.max_abs(dx, dy));
+    let cc = l.mul(c, c);
+    let p = l.mul_add(cc, l.splat(ARC[3]), l.splat(ARC[2]));
+    let p = l.mul_add(p, cc, l.splat(ARC[1]));
+    let p = l.mul_add(p, cc, l.splat(ARC[0]));
+    // The position along the bins is 2.5 ± (arc − 2.25) up to 45°, 2.5 ∓ arc beyond, where the signs of dx and dy
+    // are (not) equal; half a bin is added so that bin b lies around (b + 1) / 2.
+    let steep = l.less(xx, yy);
+    let arc = l.mul_add(p, l.negate_where(steep, c), l.zero_where(steep, l.splat(-2.25)));
+    let position = l.add(l.splat(2.5), l.flip_by_signs(arc, dx, dy));
+    // A triangle wave: how near the even bin is. Votes are halved here, the weights doubled.
+    let (share, slots) = l.slots(position);
+    let even = l.mul(magnitude, share);
+    LaneVotes { even, odd: l.mul_sub(magnitude, l.splat(0.5), even), slots }
+}
+
+/// The polynomial's coefficients: radians to units of two bins of π/9.
+const ARC: [f32; 4] = {
+    const UNIT: f64 = 4.5 / std::f64::consts::PI;
+    [
+        (0.9997878412794807 * UNIT) as f32,
+        (-0.3258083974640975 * UNIT) as f32,
+        (0.1555786518463281 * UNIT) as f32,
+        (-0.04432655554792128 * UNIT) as f32,
+    ]
+};
+
+/// Sums the votes of all bins, as many at a time as there are registers for.
+#[inline(always)]
+pub(super) fn spread_all<L: Lane>(
+    l: L,
+    weights: &[[f32; 3]; CELL],
+    votes: &[LaneVotes<L>; CELL],
+    carry: &mut [[L::F; 2]; BINS],
+    sums: &mut [[L::F; CELL]; 2 * BINS],
+    phase: usize,
+) {
+    if L::WIDE {
+        spread::<L, 1, 2, 4>(l, weights, votes, carry, sums, phase);
+        spread::<L, 0, 2, 5>(l, weights, votes, carry, sums, phase);
+    } else {
+        spread::<L, 1, 2, 2>(l, weights, votes, carry, sums, phase);
+        spread::<L, 5, 2, 2>(l, weights, votes, carry, sums, phase);
+        spread::<L, 0, 8, 2>(l, weights, votes, carry, sums, phase);
+        spread::<L, 2, 2, 3>(l, weights, votes, carry, sums, phase);
+    }
+}
+
+/// Sums the votes of `COUNT` bins, `STEP` apart, of one pixel column down a cell's rows, weighted.
+///
+/// `carry` holds the sums of the row of cells above for the row of blocks that begins there. This row of cells completes
+/// them: they go to `sums`, and the sums for the row of blocks that begins here go to `carry`.
+#[inline(always)]
+fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
+    l: L,
+    weights: &[[f32; 3]; CELL],
+    votes: &[LaneVotes<L>; CELL],
+    carry: &mut [[L::F; 2]; BINS],
+    sums: &mut [[L::F; CELL]; 2 * BINS],
+    phase: usize,
+) {
+    let zero = l.splat(0.0);
+    // Per bin: upper cell of the blocks that begin here; of the blocks that end here the upper (in the first four
+    // rows, then the lower cell of the blocks that begin here); the lower cell of the blocks that end here.
+    let mut acc = [[zero; 3]; COUNT];
+    for i in 0..COUNT {
+        acc[i] = [zero, carry[FROM + STEP * i][0], carry[FROM + STEP * i][1]];
+    }
+    for half in 0..2 {
+        // A length that the compiler cannot see keeps the loop rolled; unrolled, its sums spill.
+        let rows: (&[LaneVotes<L>], &[[f32; 3]]) =
+            black_box((&votes[CELL / 2 * half..][..CELL / 2], &weights[CELL / 2 * half..][..CELL / 2]));
+        for (votes, weights) in rows.0.iter().zip(rows.1) {
+            let w = [l.splat(weights[0]), l.splat(weights[1]), l.splat(weights[2])];
+            let vote = if FROM.is_multiple_of(2) { votes.even } else { votes.odd };
+            let products = [l.mul(vote, w[0]), l.mul(vote, w[1]), l.mul(vote, w[2])];
+            for i in 0..COUNT {
+                let bin = FROM + STEP * i;
+                let kept = of_bin(l, votes, bin);
+                for k in 0..3 {
+                    acc[i][k] = if bin.is_multiple_of(8) || (bin == 1 && k == 2) {
+                        l.mul_add_masked(kept, w[k], acc[i][k])
+                    } else {
+                        l.add_product(kept, products[k], w[k], acc[i][k])
+                    };
+                }
+            }
+        }
+        if half == 0 {
+            for i in 0..COUNT {
+                sums[FROM + STEP * i][phase] = acc[i][1];
+                acc[i][1] = zero;
+            }
+        }
+    }
+    for i in 0..COUNT {
+        carry[FROM + STEP * i] = [acc[i][0], acc[i][1]];
+        sums[BINS + FROM + STEP * i][phase] = acc[i][2];
+    }
+}
+
+/// The votes for `bin`.
+#[inline(always)]
+fn of_bin<L: Lane>(l: L, votes: &LaneVotes<L>, bin: usize) -> L::Masked {
+    match bin {
+        0 => l.keep_either(votes.slots, (votes.even, 0), (votes.odd, ODD + 5)),
+        8 => l.keep_either(votes.slots, (votes.even, 4), (votes.odd, ODD)),
+        _ if bin.is_multiple_of(2) => l.keep(votes.even, votes.slots, bin / 2),
+        _ => l.keep(votes.odd, votes.slots, ODD + bin.div_ceil(2)),
+    }
+}
+
+/// Sums across the columns of each block's two cells, normalises (L2-Hys) and stores the blocks of one row.
+#[inline(always)]
+pub(super) unsafe fn finish<L: Lane>(
+    l: L,
+    job: &mut Job,
+    sums: &[[L::F; CELL]; 2 * BINS],
+    block_y: usize,
+    first: usize,
+) {
+    let zero = l.splat(0.0);
+    let mut block = [zero; BLOCK];
+    let mut squares = [zero; 4];
+    let across = &job.plan.across;
+    let edge = &mut job.edge[block_y];
+    for (i, sums) in sums.iter().enumerate() {
+        // Left cell from this and the next column of cells, right cell likewise.
+        let [mut left, mut left_next, mut right, mut right_next] = [zero; 4];
+        for (x, &sum) in sums.iter().enumerate() {
+            left = l.mul_add(sum, l.splat(across[x][0]), left);
+            right_next = l.mul_add(sum, l.splat(across[x][2]), right_next);
+            if x < CELL / 2 {
+                left_next = l.mul_add(sum, l.splat(across[x][1]), left_next);
+            } else {
+                right = l.mul_add(sum, l.splat(across[x][1]), right);
+            }
+        }
+        for (k, (own, next)) in [(left, left_next), (right, right_next)].into_iter().enumerate() {
+            let at = k * 2 * BINS + i;
+            let value = l.add(own, l.shift_in(next, edge[at]));
+            edge[at] = l.first(next);
+            squares[2 * k + i % 2] = l.mul_add(value, value, squares[2 * k + i % 2]);
+            block[at] = value;
+        }
+    }
+    let total = l.add(l.add(squares[0], squares[1]), l.add(squares[2], squares[3]));
+    let scale = l.div(l.splat(1.0), l.add(l.sqrt(total), l.splat(BLOCK as f32 * 0.1)));
+    let limit = l.splat(job.plan.l2_hys_threshold);
+    let mut squares = [zero; 4];
+    for (i, value) in block.iter_mut().enumerate() {
+        *value = l.min(l.mul(*value, scale), limit);
+        squares[i % 4] = l.mul_add(*value, *value, squares[i % 4]);
+    }
+    let total = l.add(l.add(squares[0], squares[1]), l.add(squares[2], squares[3]));
+    let scale = l.div(l.splat(1.0), l.add(l.sqrt(total), l.splat(1e-3)));
+    let byte_scale = l.mul(scale, l.splat(255.0));
+    for (group, values) in block.as_chunks::<4>().0.iter().enumerate() {
+        for (i, &value) in values.iter().enumerate() {
+            let at = (block_y * BLOCK + 4 * group + i) * job.lanes + first;
+            // SAFETY: the strip's lanes of this row of blocks.
+            unsafe { l.store(job.blocks.add(at), l.mul(value, scale)) };
+        }
+        let at = (block_y * (BLOCK / 4) + group) * job.lanes + first;
+        let bytes = [
+            l.mul(values[0], byte_scale),
+            l.mul(values[1], byte_scale),
+            l.mul(values[2], byte_scale),
+            l.mul(values[3], byte_scale),
+        ];
+        // SAFETY: as above.
+        unsafe { l.store_bytes(job.bytes.add(at), bytes) };
+    }
+}

@@ -1,0 +1,87 @@
+//! Modes of the hits' density: OpenCV's `groupRectangles_meanshift`.
+
+use crate::geometry::Rect;
+
+use super::candidate::Candidate;
+
+/// A place in the space that mean-shift climbs: centre [px] and logarithm of the scale.
+type Place = [f64; 3];
+
+/// Bandwidth of the kernel at scale 1; ln 1.3 along the scale.
+fn bandwidth(log_scale: f64) -> Place {
+    [8.0 * log_scale.exp(), 16.0 * log_scale.exp(), 1.3_f64.ln()]
+}
+
+/// The modes of the candidates' density whose weight exceeds `threshold`, as rectangles of the window `win`.
+///
+/// Non-maximum suppression after Dalal's thesis (2006), chapter 5, with OpenCV's bandwidths and rounding.
+pub fn mean_shift(candidates: &[Candidate], threshold: f64, win: (i32, i32)) -> Vec<(Rect, f64)> {
+    let points: Vec<Point> = candidates.iter().map(Point::new).collect();
+    let mut modes: Vec<Place> = Vec::new();
+    for point in &points {
+        let mut place = shifted(&points, point.place);
+        for _ in 0..100 {
+            let previous = place;
+            place = shifted(&points, previous);
+            if distance(place, previous) <= 1e-5 {
+                break;
+            }
+        }
+        if !modes.iter().any(|&mode| distance(place, mode) < 1.0) {
+            modes.push(place);
+        }
+    }
+    let weighted = modes.into_iter().map(|mode| (mode, points.iter().map(|p| p.density(mode)).sum::<f64>()));
+    let kept = weighted.filter(|&(_, weight)| weight > threshold);
+    kept.map(|(mode, weight)| (mode_rect(mode, win), weight)).collect()
+}
+
+struct Point {
+    place: Place,
+    bandwidth: Place,
+    weight: f64,
+}
+
+impl Point {
+    fn new(candidate: &Candidate) -> Self {
+        let Rect { x, y, width, height } = candidate.rect;
+        let middle =
+            |start: i32, length: i32| ((2.0 * f64::from(start) + f64::from(length)) / 2.0).round_ties_even();
+        let log_scale = candidate.scale.ln();
+        Self {
+            place: [middle(x, width), middle(y, height), log_scale],
+            bandwidth: bandwidth(log_scale),
+            weight: candidate.weight,
+        }
+    }
+
+    fn density(&self, at: Place) -> f64 {
+        let squared: f64 = (0..3).map(|i| ((self.place[i] - at[i]) / self.bandwidth[i]).powi(2)).sum();
+        self.weight * (-0.5 * squared).exp() / self.bandwidth.iter().sum::<f64>().sqrt()
+    }
+}
+
+/// One mean-shift step from `at`.
+fn shifted(points: &[Point], at: Place) -> Place {
+    let (mut sum, mut total) = ([0.0; 3], [0.0; 3]);
+    for point in points {
+        let density = point.density(at);
+        for i in 0..3 {
+            sum[i] += density * point.place[i] / point.bandwidth[i];
+            total[i] += density / point.bandwidth[i];
+        }
+    }
+    std::array::from_fn(|i| sum[i] / total[i])
+}
+
+/// Squared distance of `a` from `b` in bandwidths at `b`.
+fn distance(a: Place, b: Place) -> f64 {
+    let bandwidth = bandwidth(b[2]);
+    (0..3).map(|i| ((b[i] - a[i]) / bandwidth[i]).powi(2)).sum()
+}
+
+fn mode_rect([x, y, log_scale]: Place, win: (i32, i32)) -> Rect {
+    let scale = log_scale.exp();
+    let (width, height) = ((f64::from(win.0) * scale) as i32, (f64::from(win.1) * scale) as i32);
+    Rect { x: (x - f64::from(width / 2)) as i32, y: (y - f64::from(height / 2)) as i32, width, height }
+}

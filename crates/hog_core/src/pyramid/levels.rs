@@ -1,0 +1,61 @@
+//! The levels of a pyramid: their scales and sizes, and windows back in the image.
+
+use crate::geometry::{Rect, Size};
+use crate::params::HogSpec;
+
+/// One level: the image shrunk by `scale`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// How many image pixels a level pixel spans.
+    pub scale: f64,
+    /// Size of the level's image [px].
+    pub size: Size,
+}
+
+/// The levels of an image: scale 1, then `step` times more each, while the window still fits.
+///
+/// A step that does not shrink (≤ 1, NaN, infinite) leaves level 0 alone. Level 0 is there even if the image is
+/// smaller than the window.
+pub fn levels(image: Size, step: f64, spec: &HogSpec) -> Vec<Level> {
+    let mut levels = vec![Level { scale: 1.0, size: image }];
+    let mut scale = 1.0;
+    while step > 1.0 && levels.len() < spec.nlevels {
+        scale *= step;
+        let width = (image.width as f64 / scale).round_ties_even();
+        let height = (image.height as f64 / scale).round_ties_even();
+        if !(width >= spec.win.width as f64 && height >= spec.win.height as f64) {
+            break;
+        }
+        levels.push(Level { scale, size: Size::new(width as usize, height as usize) });
+    }
+    levels
+}
+
+/// The window at (`x`, `y`) of a level, in image pixels.
+pub fn to_image(x: i64, y: i64, scale: f64, spec: &HogSpec) -> Rect {
+    let back = |value: f64| (value * scale).round_ties_even() as i32;
+    Rect {
+        x: back(x as f64),
+        y: back(y as f64),
+        width: back(spec.win.width as f64),
+        height: back(spec.win.height as f64),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::HogParams;
+
+    #[test]
+    fn levels_shrink_until_the_window_no_longer_fits() {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let of = |w, h, step| levels(Size::new(w, h), step, &spec);
+        assert_eq!(of(640, 480, 1.05).len(), 28);
+        assert_eq!(of(640, 480, 1.0).len(), 1);
+        assert_eq!(of(640, 480, f64::NAN).len(), 1);
+        assert_eq!(of(640, 480, f64::INFINITY).len(), 1);
+        assert_eq!(of(10, 10, 1.05).len(), 1);
+        assert_eq!(of(64, 128, 1.001).len(), 4); // 128 / 1.001³ still rounds to 128, 127.5 no longer
+    }
+}

@@ -1,0 +1,115 @@
+//! Images and the exact path's answers, for the tests of the fast path.
+#![allow(dead_code, reason = "each test binary uses a part")]
+
+use hog_core::exact::{self, Svm, Tables};
+use hog_core::pyramid::{Grid, Steps};
+use hog_core::{Backend, Hit, HogParams, HogSpec, ImageView, Search, Size, model};
+
+/// The backends of this CPU.
+pub fn available() -> impl Iterator<Item = Backend> {
+    Backend::ALL.into_iter().filter(|backend| backend.is_available())
+}
+
+/// A repeatable image with edges, texture and flat parts.
+pub struct Picture {
+    pub width: usize,
+    pub height: usize,
+    pub channels: usize,
+    pub data: Vec<u8>,
+}
+
+impl Picture {
+    pub fn new(width: usize, height: usize, channels: usize, seed: u32) -> Self {
+        let mut state = seed.wrapping_mul(2_654_435_761) | 1;
+        let mut noise = move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            state >> 24
+        };
+        let mut data = Vec::with_capacity(width * height * channels);
+        for y in 0..height {
+            for x in 0..width {
+                let shape =
+                    if (x / 13 + y / 29) % 3 == 0 { 170 } else { 40 + (x as u32 * 3 + y as u32) % 90 };
+                for channel in 0..channels as u32 {
+                    let texture = if (x / 40 + y / 40) % 2 == 0 { noise() / 5 } else { 0 };
+                    data.push((shape + texture + 7 * channel) as u8);
+                }
+            }
+        }
+        Self { width, height, channels, data }
+    }
+
+    pub fn view(&self) -> ImageView<'_> {
+        ImageView::new(&self.data, self.width, self.height, self.channels, self.width * self.channels)
+            .unwrap()
+    }
+}
+
+/// A geometry with a linear SVM that fits it.
+#[derive(Clone)]
+pub struct Detector {
+    pub params: HogParams,
+    pub coefficients: Vec<f32>,
+}
+
+impl Detector {
+    pub fn people() -> Self {
+        Self { params: HogParams::default(), coefficients: model::default_people().to_vec() }
+    }
+
+    pub fn daimler() -> Self {
+        let params = HogParams { win_size: (48, 96), gamma_correction: false, ..HogParams::default() };
+        Self { params, coefficients: model::daimler_people().to_vec() }
+    }
+
+    pub fn spec(&self) -> HogSpec {
+        HogSpec::new(&self.params).unwrap()
+    }
+
+    /// Every window of `image` with its score, by the exact path alone, row by row.
+    pub fn every_window(&self, image: ImageView, search: &Search) -> Vec<Hit> {
+        let spec = self.spec();
+        let svm = Svm::new(&self.coefficients, &spec).unwrap();
+        let grid = self.grid(image, search);
+        let scores = exact::scores(image, &grid, &spec, &Tables::new(&spec), &svm);
+        assert_eq!(scores.len(), grid.windows.width * grid.windows.height);
+        let hit = |(index, weight): (usize, f64)| {
+            let (column, row) = (index % grid.windows.width, index / grid.windows.width);
+            let (x, y) = grid.to_image(column * grid.stride.width, row * grid.stride.height);
+            Hit { x, y, weight }
+        };
+        scores.into_iter().enumerate().map(hit).collect()
+    }
+
+    pub fn grid(&self, image: ImageView, search: &Search) -> Grid {
+        let spec = self.spec();
+        let steps = Steps::new(search.win_stride, search.padding, spec.cell, &spec).unwrap();
+        steps.grid(Size::new(image.width(), image.height()), &spec)
+    }
+
+    /// The largest rounding error of a fast score that a test lets pass: half the bound that the crate relies on, which
+    /// is a share of Σ‖w‖ over the SVM's blocks.
+    pub fn rounding(&self) -> f64 {
+        let spec = self.spec();
+        let blocks = self.coefficients[..spec.descriptor_len()].chunks_exact(spec.block_len);
+        let norm = |block: &[f32]| block.iter().map(|&w| f64::from(w).powi(2)).sum::<f64>().sqrt();
+        blocks.map(norm).sum::<f64>() * 4e-7 * 0.5
+    }
+}
+
+/// The score that `share` (0 to 1) of the windows reach.
+pub fn reached_by(windows: &[Hit], share: f64) -> f64 {
+    let mut weights: Vec<f64> = windows.iter().map(|hit| hit.weight).collect();
+    weights.sort_by(|a, b| b.total_cmp(a));
+    weights[((weights.len() - 1) as f64 * share) as usize]
+}
+
+/// Asserts that both hold the same windows, with scores at most `tolerance` apart.
+pub fn assert_same(found: &[Hit], wanted: &[Hit], tolerance: f64, what: &str) {
+    let places = |hits: &[Hit]| hits.iter().map(|hit| (hit.x, hit.y)).collect::<Vec<_>>();
+    assert_eq!(places(found), places(wanted), "{what}");
+    for (found, wanted) in found.iter().zip(wanted) {
+        let off = (found.weight - wanted.weight).abs();
+        assert!(off <= tolerance, "{what}: {wanted:?} is off by {off:e}");
+    }
+}

@@ -1,0 +1,210 @@
+"""All tracked people from frame to frame: predict, associate, update, initiate, forget."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from limo_hog.follow.robot import LIMO, RobotGeometry
+from limo_hog.follow.sense.appearance import Clothes
+from limo_hog.follow.sense.measurement import Measurement, measure
+from limo_hog.follow.sense.observation import Observation, Odometry
+from limo_hog.follow.sense.visibility import Visibility
+from limo_hog.follow.tracks import kalman
+from limo_hog.follow.tracks.association import Association
+from limo_hog.follow.tracks.kalman import Noise, bearing_range, innovation
+from limo_hog.follow.tracks.legs import Legs, Returns, returns_of
+from limo_hog.follow.tracks.person import Person, initiate, predict
+from limo_hog.follow.tracks.poses import pose_at
+from limo_hog.follow.tracks.trust import Trust
+
+
+@dataclass(frozen=True, slots=True)
+class Tracks:
+    """What is known about people and the robot's recent past.
+
+    Attributes
+    ----------
+    people
+        Everyone tracked.
+    next_number
+        Number of the next new person.
+    poses, scans
+        Where the robot was and what the lidar hit lately, oldest first.
+    stamp, period
+        Stamp of the last frame, None before the first, and the time between the last two [s].
+    """
+
+    people: tuple[Person, ...] = ()
+    next_number: int = 1
+    poses: tuple[Odometry, ...] = ()
+    scans: tuple[Returns, ...] = ()
+    stamp: float | None = None
+    period: float = 0.1
+
+    def person(self, number: int | None) -> Person | None:
+        """Return the person of a number, if they are tracked."""
+        return next((one for one in self.people if one.number == number), None)
+
+    @property
+    def in_view(self) -> list[Person]:
+        """People found in the last frame."""
+        return [one for one in self.people if one.seen == self.stamp]
+
+
+@dataclass(frozen=True, slots=True)
+class Tracker:
+    """Keeps the tracks of all people.
+
+    Attributes
+    ----------
+    noise, association, trust, legs, visibility
+        The parts, each with its parameters.
+    forget_s
+        An unmeasured person is forgotten after so long [s]. Chosen: the time the
+        workshop's person takes for one side of the patrol.
+    legs_only_s
+        A person not found by HOG is followed by their legs alone for so long [s]. Chosen: a chair's legs may have been
+        taken for theirs, so not as long as `forget_s`.
+    max_misses
+        Legs are not believed after so many frames in which HOG should have found the person and did not [1]. Chosen:
+        at one miss in ten, four in a row happen to 1 person in 10,000.
+    restart_s
+        A person measured again after so long has a new track: the old velocity tells nothing [s]. Chosen: people turn
+        within a second.
+    size_rate
+        Share by which one box moves a person's known size [1]. Chosen: a time constant of five frames, half a second.
+    turn_speed
+        Standard deviation added to each component of the velocity of a person whose box is outside the gate [m/s], and
+        `association.same_place` to the position's. Chosen: a sharp turn at 0.75 m/s changes the velocity by 1.06 m/s.
+    poses_s, scans_s
+        How long odometry and scans are kept [s]: a camera image may be as late as this.
+    scan_period_s
+        A scan may be so much older than the image it is used with [s]: the lidar's period of 0.125 s at 8 Hz.
+    min_period_s, max_period_s
+        Limits of the time between two frames as it is used to predict the next [s]. Chosen: 2 to 50 Hz.
+    robot
+        Where camera and lidar sit.
+    """
+
+    noise: Noise = field(default_factory=Noise)
+    association: Association = field(default_factory=Association)
+    trust: Trust = field(default_factory=Trust)
+    legs: Legs = field(default_factory=Legs)
+    visibility: Visibility = field(default_factory=Visibility)
+    forget_s: float = 8.0
+    legs_only_s: float = 4.0
+    max_misses: int = 3
+    restart_s: float = 1.0
+    size_rate: float = 0.2
+    turn_speed: float = 1.0
+    poses_s: float = 2.0
+    scans_s: float = 1.0
+    scan_period_s: float = 0.13
+    min_period_s: float = 0.02
+    max_period_s: float = 0.5
+    robot: RobotGeometry = LIMO
+
+    def update(self, observation: Observation, tracks: Tracks) -> tuple[Tracks, dict[int, int]]:
+        """Bring all tracks up to a frame.
+
+        Returns the new tracks, and number -> index of the box of each person found.
+        """
+        tracks = self._remember(observation, tracks)
+        stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
+        known = [predict(one, stamp, self.noise) for one in tracks.people if stamp - one.measured < self.forget_s]
+        measured = measure(observation, self.robot)
+        pairs = self.association.pair(known, measured, pose, self.noise)
+        people: list[Person] = []
+        for who, person in enumerate(known):
+            if who in pairs:
+                people.append(self.correct(person, measured[pairs[who]], pose))
+            elif self._expected(person, pose, observation):
+                people.append(self.trust.update_trust(person, 0.0))
+            else:
+                people.append(person)
+        boxes = {people[who].number: which for who, which in pairs.items()}
+        number = tracks.next_number
+        for which, seen in enumerate(measured):
+            if which not in boxes.values() and self.association.is_new(seen, people, pose):
+                people.append(initiate(number, seen, stamp, pose, self.noise, self.association.unknown))
+                boxes[number] = which
+                number += 1
+        return replace(tracks, people=tuple(people), next_number=number), boxes
+
+    def correct(self, person: Person, seen: Measurement, pose: Odometry) -> Person:
+        """Update a person by their box; the track is at the box's stamp."""
+        window, centre = person.window, person.centre
+        if seen.range is not None and (seen.range > self.visibility.near or not person.confirmed):
+            # A range that contradicts the size counts too: the size may have been wrong from the beginning.
+            window += self.size_rate * (seen.height * seen.range - window)
+            centre += self.size_rate * (seen.centre * seen.range - centre)
+        clothes = self._clothes(person, seen)
+        seen = self.association.without_bad_range(person, seen)
+        track = person.track
+        if seen.range is not None and track.stamp - person.measured > self.restart_s:
+            track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, self.noise)
+        fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
+        if fit.distance2 > self.association.gate:
+            place = self.association.same_place**2
+            loose = track.covariance + np.diag([place, place, self.turn_speed**2, self.turn_speed**2])
+            track = replace(track, covariance=loose)
+            fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
+        return replace(
+            self.trust.update_trust(person, self.trust.evidence(seen.score, person)),
+            track=kalman.update(track, fit),
+            seen=track.stamp,
+            window=window,
+            centre=centre,
+            clothes=clothes,
+        )
+
+    def follow_legs(self, person: Person, tracks: Tracks) -> tuple[Person, Tracks]:
+        """Bring a person up to the newest scan, if their legs are in it.
+
+        Returns the person at the newest scan's stamp, and the tracks. There, a person found in the last frame stays at
+        the frame's stamp, since the next frame may be older than the scans.
+        """
+        if tracks.stamp is None:
+            return person, tracks
+        unseen = tracks.stamp - person.seen
+        if not person.confirmed or person.misses > self.max_misses or unseen > self.legs_only_s:
+            return person, tracks
+        now = person
+        for returns in tracks.scans:
+            # The track of an unseen person already contains the scans up to `felt`: each may count only once.
+            if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
+                track = self.legs.update(now.track, returns, self.noise)
+                now = now if track is None else replace(now, track=track, felt=returns.stamp)
+        kept = now if unseen > 0 else replace(person, felt=now.felt)
+        people = tuple(kept if one.number == person.number else one for one in tracks.people)
+        return now, replace(tracks, people=people)
+
+    def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
+        poses, odometry = tracks.poses, observation.odometry
+        if odometry is not None:
+            poses = (*(pose for pose in poses if odometry.stamp - pose.stamp < self.poses_s), odometry)
+        scans, scan = tracks.scans, observation.scan
+        if scan is not None and (not scans or scan.stamp > scans[-1].stamp):
+            young = (one for one in scans if scan.stamp - one.stamp < self.scans_s)
+            scans = (*young, returns_of(scan, pose_at(poses, scan.stamp), self.robot))
+        period = tracks.period if tracks.stamp is None else observation.stamp - tracks.stamp
+        period = min(max(period, self.min_period_s), self.max_period_s)
+        return replace(tracks, poses=poses, scans=scans, stamp=observation.stamp, period=period)
+
+    def _expected(self, person: Person, pose: Odometry, observation: Observation) -> bool:
+        bearing, distance = bearing_range(person.track, pose)
+        return self.visibility.expected(
+            bearing, distance, person.window, person.centre, observation, confirmed=person.confirmed
+        )
+
+    def _clothes(self, person: Person, seen: Measurement) -> Clothes | None:
+        """Return a person's clothes after one more box: the mean until they are confirmed, then slowly learnt."""
+        if seen.clothes is None or not self.association.fits_size(person, seen):
+            return person.clothes
+        if person.clothes is None:
+            return seen.clothes
+        if person.confirmed:
+            return self.association.appearance.learn(person.clothes, seen.clothes)
+        return person.clothes + (seen.clothes - person.clothes) / (person.age + 1)

@@ -1,0 +1,104 @@
+"""The newest reading of every sensor, from ROS 2 messages: what belongs to one camera image, live or recorded."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.pipeline import Sensors
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.ros2 import messages
+from limo_hog.ros2.messages import MessageError
+
+#: A depth image belongs to a camera image if their stamps differ by no more than this [s]: half the period of the
+#: workshop's cameras, so that the depth image of the frame before, 0.1 s older, is never taken for it.
+SLOP = 0.05
+#: So many depth images are kept [1]: at 30 Hz a camera image may be 0.3 s late and still find its own.
+_DEPTHS = 10
+
+#: Encodings of a depth image: metres as float32, millimetres as uint16.
+DEPTH_ENCODINGS = ("32FC1", "16UC1")
+
+
+class Senses:
+    """Takes in sensor messages and tells what was known when a camera image was taken.
+
+    Attributes
+    ----------
+    focal_px
+        Focal length of the camera [px]; None until its calibration has come.
+    scan, odometry
+        The newest; None before the first.
+    """
+
+    def __init__(self) -> None:
+        self.focal_px: float | None = None
+        self.scan: Scan | None = None
+        self.odometry: Odometry | None = None
+        self._depths: deque[tuple[float, NDArray[np.float32]]] = deque(maxlen=_DEPTHS)
+
+    def take(self, message: Any) -> None:
+        """Take in a CameraInfo, LaserScan, Odometry or depth Image; other types are left alone.
+
+        Raises
+        ------
+        MessageError
+            The message contradicts itself, or an Image is not a depth image.
+        """
+        kind = message.__msgtype__
+        if kind == "sensor_msgs/msg/CameraInfo":
+            focal_px = float(message.k[0])
+            # An uncalibrated driver publishes zeros.
+            if math.isfinite(focal_px) and focal_px > 0:
+                self.focal_px = focal_px
+        elif kind == "sensor_msgs/msg/LaserScan":
+            self.scan = messages.to_scan(message)
+        elif kind == "nav_msgs/msg/Odometry":
+            self.odometry = messages.to_odometry(message)
+        elif kind == "sensor_msgs/msg/Image":
+            self._depths.append((messages.to_seconds(message.header.stamp), _metres(message)))
+
+    def at(self, stamp: float, image: NDArray[np.uint8]) -> Sensors:
+        """Return what belongs to a camera image.
+
+        Parameters
+        ----------
+        stamp
+            When it was taken [s]. The depth image whose stamp is nearest goes with it, if it is of the same size
+            and its stamp differs by at most `SLOP`.
+        image
+            uint8 (H, W, 3) or (H, W).
+        """
+        fitting = [(abs(at - stamp), depth) for at, depth in self._depths if depth.shape == image.shape[:2]]
+        gap, depth = min(fitting, key=lambda pair: pair[0], default=(math.inf, None))
+        focal_px = LIMO.focal_px(image.shape[1]) if self.focal_px is None else self.focal_px
+        return Sensors(focal_px, depth if gap <= SLOP else None, self.scan, self.odometry)
+
+
+def picture_of(message: Any) -> NDArray[np.uint8]:
+    """Return the pixels of a camera's Image or CompressedImage, uint8 (H, W, 3) BGR; gray is given three channels.
+
+    Raises
+    ------
+    MessageError
+        The message contradicts itself, or holds no 8-bit gray or colour picture.
+    """
+    compressed = message.__msgtype__ == "sensor_msgs/msg/CompressedImage"
+    pixels = messages.decompressed(message) if compressed else messages.pixels_of(message)
+    if pixels.dtype != np.uint8 or pixels.shape[2:] not in ((), (3,)):
+        raise MessageError(f"a camera image of {pixels.dtype} {pixels.shape} is not read: want rgb8, bgr8 or mono8")
+    if pixels.ndim == 2:
+        return np.repeat(pixels[..., None], 3, axis=2)
+    return np.ascontiguousarray(pixels[..., ::-1] if not compressed and message.encoding == "rgb8" else pixels)
+
+
+def _metres(message: Any) -> NDArray[np.float32]:
+    if message.encoding not in DEPTH_ENCODINGS:
+        raise MessageError(f"a depth image of {message.encoding!r} is not read: want {' or '.join(DEPTH_ENCODINGS)}")
+    depth = messages.pixels_of(message)
+    return (depth / 1000.0 if depth.dtype.kind == "u" else depth).astype(np.float32, copy=False)

@@ -1,0 +1,61 @@
+"""The Markdown pages of the repository, and what is in them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+#: Where README.md and sim/README.md link to: they are shown on package pages too, where a relative link leads nowhere.
+REPOSITORY = "https://github.com/limo-hog/limo-hog/blob/main/"
+PICTURES = "https://raw.githubusercontent.com/limo-hog/limo-hog/main/"
+
+_FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_LINK = re.compile(r"(!?)\[[^\]]*\]\(([^)\s]+)\)")
+
+
+@dataclass(frozen=True)
+class Page:
+    """A Markdown file."""
+
+    path: Path
+
+    def __str__(self) -> str:
+        return self.path.relative_to(ROOT).as_posix()
+
+    @property
+    def text(self) -> str:
+        return self.path.read_text(encoding="utf-8")
+
+    @property
+    def python(self) -> list[str]:
+        """The Python blocks, top to bottom."""
+        return [body for language, body in _FENCE.findall(self.text) if language == "python"]
+
+    @property
+    def links(self) -> list[str]:
+        """Every target of a link or a picture."""
+        return [target for _, target in _LINK.findall(_FENCE.sub("", self.text))]
+
+    @property
+    def anchors(self) -> set[str]:
+        """What `#…` may lead to: each heading in small letters, hyphens for spaces, without punctuation."""
+        headings = re.findall(r"^#+ (.*)$", _FENCE.sub("", self.text), re.MULTILINE)
+        return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def pages() -> list[Page]:
+    """Every page that is written for readers of the repository."""
+    return [Page(path) for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "sim" / "README.md"])]
+
+
+def file_of(page: Page, link: str) -> Path | None:
+    """The file in the repository that a link leads to; None for other places on the web."""
+    target = link.partition("#")[0]
+    for prefix in (REPOSITORY, PICTURES):
+        if target.startswith(prefix):
+            return ROOT / target.removeprefix(prefix)
+    if "://" in target or target.startswith("mailto:"):
+        return None
+    return (page.path.parent / target).resolve() if target else page.path

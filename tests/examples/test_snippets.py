@@ -1,0 +1,110 @@
+"""The Python blocks of both READMEs and of docs/coming-from.md run, and do what the pages say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2 as typed_cv2
+import numpy as np
+import pytest
+from tests.examples.pages import ROOT, Page
+
+import limo_hog
+from limo_hog.cli.support.scene import street
+from limo_hog.imaging.writing import write_image
+
+cv2: Any = typed_cv2  # its types do not know `ml`
+
+#: Left top corners of windows in the drawn street: on its person of 144 px, and where nobody is.
+PERSON, NOBODY = (529, 186), [(x, y) for x in range(420, 460, 4) for y in range(0, 120, 12)]
+
+
+def crop(image: Any, x: int, y: int) -> Any:
+    return np.ascontiguousarray(image[y : y + 128, x : x + 64])
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder that docs/coming-from.md describes, as the working directory."""
+    rng, scene = np.random.default_rng(12), street(640, 480, 3)
+    write_image(tmp_path / "street.jpg", scene)
+    for i in range(30):
+        dx, dy = rng.integers(-2, 3, 2)
+        write_image(tmp_path / "people" / f"{i}.png", crop(scene, PERSON[0] + dx, PERSON[1] + dy))
+    for i, (x, y) in enumerate(NOBODY):
+        write_image(tmp_path / "background" / f"{i}.png", crop(scene, x, y))
+    write_image(tmp_path / "empty" / "0.png", scene[::-1])  # nobody stands on their head
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def saved_svm(path: Path, kind: int, negative: int) -> tuple[Any, Any]:
+    """Let OpenCV 4 train and save a linear SVM; return it and the descriptors."""
+    hog = cv2.HOGDescriptor()
+    paths = sorted(path.glob("people/*")) + sorted(path.glob("background/*"))
+    features = np.stack([hog.compute(cv2.imread(str(name))) for name in paths])
+    labels = np.array([1 if name.parent.name == "people" else negative for name in paths])
+    svm = cv2.ml.SVM_create()
+    svm.setType(kind)
+    svm.setKernel(cv2.ml.SVM_LINEAR)
+    svm.setC(0.01)
+    svm.setP(0.1)
+    svm.train(features, cv2.ml.ROW_SAMPLE, labels.astype(np.float32 if kind == cv2.ml.SVM_EPS_SVR else np.int32))
+    svm.save(str(path / "svm.xml"))
+    return svm, features
+
+
+def run(page: str) -> dict[str, Any]:
+    """Run the blocks of a page, one after another, and return what they leave behind."""
+    names: dict[str, Any] = {}
+    for i, block in enumerate(Page(ROOT / page).python):
+        exec(compile(block, f"{page}, block {i}", "exec"), names)
+    return names
+
+
+def test_the_readme_finds_people(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = run("README.md")
+    assert capsys.readouterr().out.count("a person at") >= 2
+    assert len(names["boxes"]) >= 2
+
+
+def test_the_arenas_readme_follows_a_person(capsys: pytest.CaptureFixture[str]) -> None:
+    episode = run("sim/README.md")["episode"]
+    assert episode.seconds == 20
+    assert "ScoreCard(" in capsys.readouterr().out
+
+
+def kinds() -> list[tuple[int, int]]:
+    return [(cv2.ml.SVM_C_SVC, -1), (cv2.ml.SVM_C_SVC, 0), (cv2.ml.SVM_EPS_SVR, -1)]
+
+
+@pytest.mark.parametrize(("kind", "negative"), kinds(), ids=["classifier -1/1", "classifier 0/1", "regression"])
+def test_coming_from_other_libraries(folder: Path, kind: int, negative: int) -> None:
+    svm, features = saved_svm(folder, kind, negative)
+    names = run("docs/coming-from.md")
+
+    # scikit-image: the same shape, and alike, as the page says.
+    theirs, ours = names["theirs"], names["ours"]
+    assert theirs.shape == ours.shape
+    assert 0.7 < np.corrcoef(theirs.ravel(), ours.ravel())[0, 1] < 0.9
+
+    # dlib: inclusive corners, best first.
+    assert len(names["corners"]) >= 2
+    assert all(right > left and bottom > top for left, top, right, bottom, _ in names["corners"])
+
+    # cv2.ml: the coefficients that were read decide as the SVM does, and people are positive.
+    coefficients = names["coefficients"]
+    margins = features @ coefficients[:-1] + coefficients[-1]
+    said = svm.predict(features)[1].ravel()
+    assert np.array_equal(margins > 0, said > (1 + negative) / 2)
+    assert (margins[:30] > 0).all()
+    assert np.allclose(names["mine"].svmDetector, coefficients.astype(np.float32))
+
+    # scikit-learn: mined negatives were added, and the file that was written finds the person it was trained on.
+    assert len(names["others"]) > len(NOBODY)
+    best = names["boxes"][int(np.argmax(names["weights"]))]
+    assert np.abs(best[:2] - PERSON).max() < 16
+    again = cv2.HOGDescriptor()
+    assert again.load(str(folder / "mine.yml"))
+    assert np.array_equal(again.svmDetector, limo_hog.HOGDescriptor("mine.yml").svmDetector)

@@ -1,0 +1,82 @@
+"""Clothes are told apart by their colours, in whatever light, and not by how a box happens to sit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.follow.views import BLUE, GREEN, RED, dressed
+
+from limo_hog.follow.sense.appearance import Appearance, clothes_in
+
+APPEARANCE = Appearance()
+OTHER_CLOTHES = APPEARANCE.other
+BOX = (200, 100, 120, 240)
+
+
+def worn(image: NDArray[np.uint8], box: tuple[int, int, int, int] = BOX) -> NDArray[np.float64]:
+    clothes: NDArray[np.float64] = clothes_in(image, np.array([box], np.int32))[0]
+    return clothes
+
+
+def test_other_clothes_are_told_and_the_same_are_known_again() -> None:
+    one, other = worn(dressed(BOX, RED, BLUE)), worn(dressed(BOX, GREEN, BLUE))
+    assert APPEARANCE.cost(one, one) == 0
+    assert APPEARANCE.cost(one, other) > OTHER_CLOTHES
+
+
+@pytest.mark.parametrize("light", [0.5, 0.7, 1.3])
+def test_light_and_noise_make_no_other_clothes(light: float) -> None:
+    image = dressed(BOX, RED, BLUE)
+    noise = np.random.default_rng(1).normal(0, 3, image.shape)
+    other = np.clip(image * light + noise, 0, 255).astype(np.uint8)
+    assert APPEARANCE.cost(worn(image), worn(other)) < OTHER_CLOTHES / 2
+
+
+def test_black_and_white_are_told_apart_though_neither_has_a_hue() -> None:
+    assert (
+        APPEARANCE.cost(worn(dressed(BOX, (15, 15, 15), BLUE)), worn(dressed(BOX, (240, 240, 240), BLUE)))
+        > OTHER_CLOTHES
+    )
+
+
+def test_a_box_that_slipped_down_to_the_trousers_shows_no_other_shirt() -> None:
+    image = dressed(BOX, RED, BLUE)
+    x, y, w, h = BOX
+    assert APPEARANCE.cost(worn(image), worn(image, (x, y + 60, w, h))) < OTHER_CLOTHES
+
+
+def test_a_hand_before_the_trousers_is_not_enough_for_somebody_else() -> None:
+    one, other = worn(dressed(BOX, RED, BLUE)), worn(dressed(BOX, RED, (140, 170, 220)))
+    assert 0 < APPEARANCE.cost(one, other) < OTHER_CLOTHES
+
+
+def test_what_is_unknown_is_not_unlike() -> None:
+    one = worn(dressed(BOX, RED, BLUE))
+    assert APPEARANCE.cost(None, one) == APPEARANCE.cost(one, None) == 0
+
+
+def test_slow_change_is_learnt_and_another_shirt_is_not() -> None:
+    red, blue, green = (worn(dressed(BOX, shirt, BLUE)) for shirt in (RED, BLUE, GREEN))
+    dusk = worn((dressed(BOX, RED, BLUE) * 0.6).astype(np.uint8))
+    quick = Appearance(rate=0.5)
+    assert APPEARANCE.cost(quick.learn(red, dusk), dusk) < APPEARANCE.cost(red, dusk)
+    assert np.array_equal(quick.learn(red, green)[0], red[0])
+    assert quick.learn(red, red) == pytest.approx(red)
+    assert np.array_equal(quick.learn(red, blue)[0], red[0])
+
+
+@pytest.mark.parametrize("box", [(900, 100, 60, 120), (200, -300, 60, 120), (0, 0, 0, 0), (-400, 0, 100, 200)])
+def test_clothes_out_of_the_image_are_not_known(box: tuple[int, int, int, int]) -> None:
+    assert not np.isfinite(worn(dressed(BOX, RED, BLUE), box)).any()
+
+
+def test_no_boxes_have_no_clothes_and_what_are_no_boxes_none_known() -> None:
+    image = dressed(BOX, RED, BLUE)
+    assert clothes_in(image, np.empty((0, 4), np.int32)).shape == (0, 2, 3)
+    assert np.isnan(clothes_in(image, np.ones((2, 3), np.int32))).all()
+
+
+def test_in_a_grey_image_clothes_are_light_or_dark() -> None:
+    light, dark = (worn(dressed(BOX, (grey, grey, grey), RED)[..., 2]) for grey in (230, 15))
+    assert APPEARANCE.cost(light, dark) > OTHER_CLOTHES

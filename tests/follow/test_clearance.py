@@ -1,0 +1,97 @@
+"""Free space: what is counted as an obstacle, how far the robot may drive, and how fast."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.follow.views import flat, scan
+
+from limo_hog.follow.control.detour import Detour
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.clearance import DepthGrid, Margin, room_ahead, room_behind, scan_points, speed_within
+
+MARGIN = Margin(0.5, 0.2)
+
+
+def wall(x: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """A wall across the way."""
+    y = np.linspace(-3, 3, 121)
+    return np.stack([np.full_like(y, x), y], axis=1)
+
+
+def test_an_obstacle_beside_the_way_is_passed_and_one_in_it_is_not() -> None:
+    assert room_ahead(np.array([[1.0, 0.4]]), MARGIN, LIMO) == math.inf
+    assert room_ahead(np.array([[1.0, 0.0]]), MARGIN, LIMO) == pytest.approx(1.0 - 0.145 - 0.5)
+
+
+def test_towards_the_side_the_margin_is_an_ellipse() -> None:
+    # Half the margin to the side: cos of 30 degrees of the margin ahead.
+    assert room_ahead(np.array([[1.0, 0.11 + 0.1]]), MARGIN, LIMO) == pytest.approx(0.855 - 0.5 * math.sqrt(0.75))
+
+
+def test_what_is_behind_is_not_in_the_way_ahead_nor_the_other_way_round() -> None:
+    assert room_ahead(np.array([[-0.3, 0.0]]), MARGIN, LIMO) == math.inf
+    assert room_behind(np.array([[0.3, 0.0]]), MARGIN, LIMO) == math.inf
+    assert room_behind(np.array([[-1.0, 0.0]]), MARGIN, LIMO) == pytest.approx(0.355)
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.3, 0.7, 1.4])
+@pytest.mark.parametrize("braking", [0.3, 0.5, 2.0])
+def test_at_the_allowed_speed_the_robot_stops_within_its_room(speed: float, braking: float) -> None:
+    reaction = 0.25
+    stopping = speed * reaction + speed**2 / (2 * braking)
+    assert speed_within(stopping, braking, reaction) == pytest.approx(speed)
+
+
+def test_without_room_the_robot_stands_and_without_obstacle_nothing_limits_it() -> None:
+    assert speed_within(0.0, 0.5, 0.25) == speed_within(-0.2, 0.5, 0.25) == 0.0
+    assert speed_within(math.inf, 0.5, 0.25) == math.inf
+
+
+def test_a_scan_becomes_points_counter_clockwise_from_the_first_beam() -> None:
+    (point,) = scan_points(scan(np.array([np.inf, np.inf, 1.0], np.float32)), LIMO)
+    assert point == pytest.approx([0.103 + np.cos(2.0), np.sin(2.0)])
+
+
+def test_ranges_beyond_the_lidars_limits_are_no_points() -> None:
+    assert len(scan_points(scan(np.array([0.05, 9.0, np.nan, np.inf], np.float32)), LIMO)) == 0
+
+
+def test_the_floor_is_no_obstacle() -> None:
+    rows = np.arange(480, dtype=np.float32)[:, None] + 0.5 - 240
+    floor = np.where(rows > 0, 0.175 * 448.6 / np.maximum(rows, 0.5), np.inf).astype(np.float32)
+    assert len(DepthGrid().points(np.broadcast_to(floor, (480, 640)), 448.6, 1.8, LIMO)) == 0
+
+
+def test_a_depth_pixel_becomes_a_point_of_the_base_frame() -> None:
+    depth = flat(np.nan)
+    depth[100, 500] = 1.2
+    (point,) = DepthGrid(step=1).points(depth, 448.6, 1.8, LIMO)
+    assert point == pytest.approx([0.084 + 1.2, (320 - 500.5) / 448.6 * 1.2], abs=1e-6)
+    assert len(DepthGrid(step=1).points(depth, 448.6, 1.1, LIMO)) == 0
+
+
+def test_a_way_that_is_free_half_as_far_is_taken_and_a_shorter_one_is_not() -> None:
+    # Wanted: 1.2 m free. Room to a wall is its distance less .145 m of robot and .65 m of margin.
+    detour = Detour()
+    assert detour.heading(wall(1.5), 0.0, 4.0, 0.0, LIMO) == 0.0
+    assert detour.heading(wall(1.1), 0.0, 4.0, 0.0, LIMO) is None
+
+
+def test_of_two_ways_around_the_preferred_one_is_taken() -> None:
+    post = np.array([[1.2, 0.0]])
+    left, right = (Detour().heading(post, 0.0, 4.0, side, LIMO) for side in (0.3, -0.3))
+    assert left is not None
+    assert right is not None
+    assert left > 0.2
+    assert right == pytest.approx(-left)
+
+
+def test_only_what_is_nearer_than_the_person_and_on_the_line_of_sight_hides_them() -> None:
+    detour = Detour()
+    assert detour.hides(np.array([[1.0, 0.05]]), 0.0, 3.0)
+    assert not detour.hides(np.array([[1.0, 0.2], [2.8, 0.0], [-1.0, 0.0]]), 0.0, 3.0)
+    legs = np.array([[2.9, 0.3], [2.0, 0.0]])
+    assert detour.obstacles(legs, 0.0, 3.0).tolist() == [[2.0, 0.0]]

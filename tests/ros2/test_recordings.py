@@ -1,0 +1,307 @@
+"""A recording that is damaged, cut off or made to do harm ends in one line, or in what was whole."""
+
+from __future__ import annotations
+
+import random
+import struct
+import time
+import tracemalloc
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zstandard
+from mcap.writer import CompressionType, Writer
+from rosbags.highlevel import AnyReader
+
+from limo_hog.cli.main import main
+from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.twist import Twist
+from limo_hog.ros2 import messages
+from limo_hog.ros2.bag import BagError, bag_writer, detections_message, read_bag
+from limo_hog.ros2.mcap_reading import MAX_RECORD, mcap_messages
+from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
+from limo_hog.ros2.replay import replay
+
+HEIGHT, WIDTH = 144, 96
+DETECTOR = PeopleDetector()
+
+
+def _told() -> Iterator[tuple[str, float, Any]]:
+    """Three control periods of a small camera, as a run records them."""
+    rng = np.random.default_rng(0)
+    for i in range(3):
+        now = 0.1 * i
+        scan = Scan(now, np.full(40, 3.0, np.float32), -2.0, 2.0, 0.1, 8.0)
+        yield SCAN, now, messages.laser_scan(scan)
+        yield ODOMETRY, now, messages.odometry(Odometry(now, 0.1 * i, 0.0, 0.0, 0.1, 0.0))
+        yield CAMERA_INFO, now, messages.camera_info(now, WIDTH, HEIGHT, 90.0)
+        yield DEPTH, now, messages.image(now, np.full((HEIGHT, WIDTH), 2.0, np.float32))
+        yield IMAGE, now, messages.image(now, rng.integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8))
+        found = Detections(np.array([[10, 8, 64, 128]], np.int32), np.array([0.7]))
+        yield "/limo_camera/detections", now, detections_message(now, found, "depth_link")
+        yield COMMAND, now, messages.twist(Twist(0.1, 0.0))
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """As --record writes it."""
+    path = tmp_path_factory.mktemp("recording") / "run.mcap"
+    with bag_writer(path) as write:
+        for one in _told():
+            write(*one)
+    return path.read_bytes()
+
+
+def _written(path: Path, compression: CompressionType, crcs: bool, chunked: bool = True) -> bytes:
+    with path.open("wb") as file:
+        writer = Writer(file, compression=compression, enable_crcs=crcs, use_chunking=chunked, chunk_size=100_000)
+        writer.start(profile="ros2", library="test")
+        channels: dict[str, int] = {}
+        for topic, now, message in _told():
+            if topic not in channels:
+                text, _ = messages.typestore().generate_msgdef(message.__msgtype__, ros_version=2)
+                schema = writer.register_schema(message.__msgtype__, "ros2msg", text.encode())
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            nanoseconds = round(now * 1e9)
+            writer.add_message(channels[topic], nanoseconds, messages.serialize(message), nanoseconds)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+@pytest.mark.parametrize("chunked", [True, False])
+def test_every_form_of_mcap_file_reads_as_rosbags_reads_it(
+    compression: CompressionType, chunked: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    _written(path, compression, crcs=True, chunked=chunked)
+    with AnyReader([path]) as reader:
+        theirs = [(c.topic, stamp, reader.deserialize(data, c.msgtype)) for c, stamp, data in reader.messages()]
+    ours = list(read_bag(path))
+    assert len(ours) == 21
+    # Of one instant, rosbags gives the topics in another order than they were written in.
+    key = lambda one: (one[1], one[0])  # noqa: E731
+    for (topic, stamp, theirs_), (topic_, seconds, ours_) in zip(
+        sorted(theirs, key=key), sorted(ours, key=key), strict=True
+    ):
+        assert (topic, stamp * 1e-9) == (topic_, seconds)
+        assert repr(theirs_) == repr(ours_)
+
+
+def test_the_parts_of_a_folder_are_read_by_number(recording: bytes, tmp_path: Path) -> None:
+    for number in (10, 9, 0):
+        (tmp_path / f"bag_{number}.mcap").write_bytes(recording if number != 9 else recording[:-40])
+    read: list[str] = []
+
+    def note(path: Path) -> Iterator[tuple[str, int, Any]]:
+        read.append(path.name)
+        return mcap_messages(path)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("limo_hog.ros2.bag.mcap_messages", note)
+        assert len(list(read_bag(tmp_path))) == 63
+    assert read == ["bag_0.mcap", "bag_9.mcap", "bag_10.mcap"]
+
+
+def test_what_was_recorded_before_a_cut_is_given(recording: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    whole = _written(path, CompressionType.NONE, crcs=True, chunked=False)
+    path.write_bytes(whole[: len(whole) // 2])
+    records = read_bag(path)
+    seen = [next(records) for _ in range(8)]
+    with pytest.raises(BagError, match=r"run\.mcap: .*cut off in the record at byte \d+"):
+        seen.extend(records)
+    assert 3 < len(seen) < 21
+
+
+# Damage by a seed.
+
+
+def _mutated(data: bytes, seed: int) -> bytes:
+    """Change a few bytes of a file: flipped, overwritten by extremes, cut, taken out, put in twice."""
+    rng = random.Random(seed)
+    changed = bytearray(data)
+    for _ in range(rng.choice((1, 1, 1, 4, 16))):
+        # Half of the damage where the structure is: at the beginning and at the end.
+        reach = rng.choice((60, 3000, len(changed), len(changed)))
+        at = rng.randrange(min(reach, len(changed)) or 1)
+        at = at if rng.random() < 0.7 else max(len(changed) - 1 - at, 0)
+        kind = rng.randrange(6)
+        if not changed:
+            break
+        if kind <= 1:
+            changed[at] ^= 1 << rng.randrange(8)
+        elif kind == 2:
+            width = rng.choice("BHIQ")
+            value = rng.choice((0, 1, 1 << 7, (1 << 31) - 1, (1 << 32) - 1, 1 << 40, (1 << 63) - 1, (1 << 64) - 1))
+            field = struct.pack("<Q", value)[: struct.calcsize(width)]
+            changed[at : at + len(field)] = field
+        elif kind == 3:
+            del changed[max(at, 1) :]
+        elif kind == 4:
+            del changed[at : at + rng.randrange(1, 64)]
+        else:
+            changed[at:at] = changed[at : at + rng.randrange(1, 64)]
+    return bytes(changed)
+
+
+def _ends_named_or_fine(path: Path) -> str:
+    began = time.monotonic()
+    try:
+        frames = list(replay(read_bag(path), controller_named("tracking", None), DETECTOR))
+        outcome = f"{len(frames)} frames"
+    except (LimoHogError, OSError) as error:
+        outcome = type(error).__name__
+        assert "\n" not in str(error)
+        assert len(str(error)) < 600
+    assert time.monotonic() - began < 10
+    return outcome
+
+
+def _forms(recording: bytes, tmp_path: Path) -> list[bytes]:
+    """As we write it, and without the checksums that find every damage."""
+    bare = _written(tmp_path / "bare.mcap", CompressionType.NONE, crcs=False, chunked=False)
+    chunked = _written(tmp_path / "chunked.mcap", CompressionType.LZ4, crcs=False)
+    return [recording, bare, chunked]
+
+
+def _all_end_named_or_fine(seeds: range, recording: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    outcomes = set()
+    for form in _forms(recording, tmp_path):
+        for seed in seeds:
+            path.write_bytes(_mutated(form, seed))
+            outcomes.add(_ends_named_or_fine(path))
+    # The damage is neither always found nor always harmless.
+    assert {"BagError", "3 frames"} <= outcomes
+
+
+@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
+def test_damaged_recordings_end_named_or_fine(recording: bytes, tmp_path: Path) -> None:
+    _all_end_named_or_fine(range(150), recording, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
+def test_ten_thousand_damaged_recordings_end_named_or_fine(recording: bytes, tmp_path: Path) -> None:
+    _all_end_named_or_fine(range(1000, 4400), recording, tmp_path)
+
+
+# Damage on purpose.
+
+
+def _record(opcode: int, data: bytes) -> bytes:
+    return struct.pack("<BQ", opcode, len(data)) + data
+
+
+def _string(text: bytes) -> bytes:
+    return struct.pack("<I", len(text)) + text
+
+
+def _chunk(data: bytes, size: int, compression: bytes, crc: int = 0) -> bytes:
+    head = struct.pack("<QQQI", 0, 0, size, crc) + _string(compression)
+    return _record(6, head + struct.pack("<Q", len(data)) + data)
+
+
+BEGIN = b"\x89MCAP0\r\n" + _record(1, _string(b"ros2") + _string(b""))
+ZEROS = zstandard.compress(bytes(1 << 30))
+MESSAGE = _record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"\0\1\0\0")
+
+
+def _schema(text: bytes, encoding: bytes = b"ros2msg") -> bytes:
+    return _record(3, struct.pack("<H", 1) + _string(b"a/msg/B") + _string(encoding) + _string(text))
+
+
+def _channel(encoding: bytes = b"cdr") -> bytes:
+    return _record(4, struct.pack("<HH", 1, 1) + _string(b"/b") + _string(encoding) + struct.pack("<I", 0))
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "does not begin"),
+        (b"\x89MCAP0\r\n", "cut off at byte 8"),
+        (b"\x89MCAP0\r\n" + _record(1, _string(b"ros1") + _string(b"")), "profile is 'ros1'"),
+        (BEGIN, "cut off at byte"),
+        (BEGIN + b"\x05\x01", "cut off in the record at byte"),
+        (BEGIN + struct.pack("<BQ", 5, 1 << 62), f"a record of {1 << 62} bytes"),
+        (BEGIN + _record(0, b""), "a record of no kind"),
+        (BEGIN + _chunk(ZEROS, 1 << 20, b"zstd"), "not 1048576 bytes long"),
+        (BEGIN + _chunk(ZEROS, 1 << 30, b"zstd"), f"{MAX_RECORD} are read at most"),
+        (BEGIN + _chunk(zstandard.compress(b"x") * 2, 2, b"zstd"), "not 2 bytes long"),
+        (BEGIN + _chunk(b"x" * 9, 9, b"zip"), "compressed by 'zip'"),
+        (BEGIN + _chunk(b"nonsense", 9, b"zstd"), "at byte"),
+        (BEGIN + _chunk(b"nonsense", 9, b"lz4"), "at byte"),
+        (BEGIN + _chunk(b"\x05" + bytes(8), 9, b"", crc=zlib.crc32(b"x")), "checksum is wrong"),
+        (BEGIN + _chunk(MESSAGE[:-1], len(MESSAGE) - 1, b""), "cut off in the record at byte 0 of the chunk"),
+        (BEGIN + MESSAGE, "at byte"),
+        (BEGIN + _channel(), "at byte"),
+        (BEGIN + _schema(b"int32 x\n") + _channel(b"json"), "encoded as 'json'"),
+        (BEGIN + _schema(b"int32 x\n") + _channel() + MESSAGE, "at byte"),
+        (BEGIN + _schema(b"x" * 200_000), "a definition of 200000 bytes"),
+        (BEGIN + _schema(b"(" * 100_000), "at byte"),
+        (BEGIN + _schema(b"c/D d\n") + _channel() + MESSAGE, "at byte"),
+        (BEGIN + _schema(b"a/B b\n") + _channel() + MESSAGE, "at byte"),
+        (BEGIN + _schema(b"module a {" * 5_000, b"ros2idl"), "at byte"),
+        (BEGIN + _schema(b"{}", b"jsonschema"), "known are ros2msg and ros2idl"),
+        (BEGIN + _schema(b"\xff"), "at byte"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_file_made_to_do_harm_is_refused_in_one_line_within_bounds(
+    data: bytes, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "evil.mcap"
+    path.write_bytes(data)
+    began = time.monotonic()
+    tracemalloc.start()
+    try:
+        assert main(["replay", str(path)]) == 1
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1
+    assert f"{path}: no ROS 2 recording" in complaint
+    assert said in complaint
+    assert time.monotonic() - began < 10
+    assert peak < 100e6
+
+
+@pytest.mark.parametrize(
+    ("suffix", "make"),
+    [
+        (".db3", lambda path: path.write_bytes(b"SQLite format 3\0" + bytes(100))),
+        (".db3", lambda path: path.write_bytes(b"")),
+        (".bag", lambda path: path.write_bytes(b"#ROSBAG V2.0\n" + bytes(100))),
+        (".txt", lambda path: path.write_text("hello")),
+        ("", lambda path: path.mkdir()),
+        ("", lambda path: path.mkdir() or (path / "metadata.yaml").write_text("rosbag2_bagfile_information: 1")),
+        ("", lambda path: path.mkdir() or (path / "metadata.yaml").write_text("a: [" * 5000)),
+        ("", lambda path: path.mkdir() or (path / "a.mcap").write_bytes(b"")),
+    ],
+)
+def test_what_is_no_recording_is_one_line(
+    suffix: str, make: Callable[[Path], object], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / f"bag{suffix}"
+    make(path)
+    assert main(["replay", str(path)]) == 1
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1
+    assert str(path) in complaint
+
+
+def test_a_recording_that_may_not_be_read_is_an_error_of_the_system(tmp_path: Path) -> None:
+    (tmp_path / "folder.mcap").mkdir()
+    (tmp_path / "folder.mcap" / "part.mcap").mkdir()
+    with pytest.raises(IsADirectoryError):
+        list(read_bag(tmp_path / "folder.mcap"))

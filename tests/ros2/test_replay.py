@@ -1,0 +1,143 @@
+"""A replay goes by the robot's rules: which depth image belongs to a picture, and what a failing detector means."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_hog.cli import replay as command
+from limo_hog.cli.main import main
+from limo_hog.detector import Detections
+from limo_hog.follow import Decision, Mode, Observation, Twist
+from limo_hog.ros2 import messages, names
+from limo_hog.ros2.bag import Record, bag_writer
+from limo_hog.ros2.messages import MessageError
+from limo_hog.ros2.replay import replay
+from limo_hog.ros2.senses import Senses, picture_of
+
+PICTURE = np.zeros((48, 64, 3), np.uint8)
+
+
+@dataclass
+class Driver:
+    """Drives on, and notes what it is told."""
+
+    told: list[Observation] = field(default_factory=list)
+
+    def start(self) -> None:
+        return None
+
+    def step(self, observation: Observation, state: None) -> Decision[None]:
+        del state
+        self.told.append(observation)
+        return Decision(Twist(0.2, 0.0), None, Mode.FOLLOW, "because")
+
+
+class Empty:
+    """Finds nobody."""
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        del image
+        return Detections.none()
+
+
+class Failing:
+    """Fails in the second picture."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        del image
+        self.calls += 1
+        if self.calls == 2:
+            raise RuntimeError("out of memory")
+        return Detections.none()
+
+
+def depth(metres: float) -> NDArray[np.float32]:
+    return np.full((48, 64), metres, np.float32)
+
+
+def records(*depths: tuple[float, NDArray[Any]], stamp: float = 1.0) -> Iterator[Record]:
+    """A camera's calibration, depth images at their stamps, a picture, and the command that answered it."""
+    yield Record(names.CAMERA_INFO, 0.0, messages.camera_info(0.0, 64, 48, 50.0))
+    for at, pixels in depths:
+        yield Record(names.DEPTH, at, messages.image(at, pixels))
+    yield Record(names.IMAGE, stamp, messages.image(stamp, PICTURE))
+    yield Record(names.COMMAND, stamp, messages.twist(Twist()))
+
+
+def told_depth(*depths: tuple[float, NDArray[Any]]) -> float | None:
+    """Which depth a controller is told for the picture at 1.0 s."""
+    driver = Driver()
+    assert len(list(replay(records(*depths), driver, Empty()))) == 1
+    told = driver.told[0].depth
+    return None if told is None else float(told[0, 0])
+
+
+def test_a_depth_image_belongs_to_a_picture_of_its_time_alone() -> None:
+    assert told_depth((1.0, depth(2.0))) == 2.0
+    assert told_depth((0.96, depth(2.0))) == 2.0
+    assert told_depth((0.94, depth(2.0))) is None
+    assert told_depth((1.06, depth(2.0))) is None
+
+
+def test_of_several_depth_images_the_nearest_in_time_counts_not_the_newest() -> None:
+    assert told_depth((0.9, depth(1.0)), (0.98, depth(2.0)), (1.04, depth(3.0))) == 2.0
+
+
+def test_a_depth_image_in_millimetres_is_read_and_one_of_another_size_is_not_the_pictures() -> None:
+    assert told_depth((1.0, np.full((48, 64), 2500, np.uint16))) == 2.5
+    assert told_depth((1.0, np.ones((24, 32), np.float32))) is None
+
+
+def test_until_the_calibration_comes_the_limos_own_focal_length_is_taken() -> None:
+    senses = Senses()
+    assert senses.at(0.0, np.zeros((480, 640, 3), np.uint8)).focal_px == pytest.approx(448.6, abs=0.05)
+    assert senses.at(0.0, np.zeros((240, 320, 3), np.uint8)).focal_px == pytest.approx(224.3, abs=0.05)
+    senses.take(messages.camera_info(0.0, 640, 480, 0.0))
+    assert senses.focal_px is None
+    senses.take(messages.camera_info(0.0, 640, 480, 500.0))
+    assert senses.at(0.0, PICTURE).focal_px == 500.0
+
+
+def test_what_is_no_depth_image_and_no_picture_is_named() -> None:
+    with pytest.raises(MessageError, match="depth image of 'bgr8' is not read: want 32FC1 or 16UC1"):
+        Senses().take(messages.image(0.0, PICTURE))
+    with pytest.raises(MessageError, match=r"camera image of float32 \(48, 64\) is not read"):
+        picture_of(messages.image(0.0, depth(1.0)))
+
+
+def frames(count: int) -> Iterator[Record]:
+    yield Record(names.CAMERA_INFO, 0.0, messages.camera_info(0.0, 64, 48, 50.0))
+    for k in range(count):
+        yield Record(names.IMAGE, 0.1 * k, messages.image(0.1 * k, PICTURE))
+
+
+def test_a_detector_that_raises_is_a_fault_of_that_frame_and_the_replay_goes_on() -> None:
+    done = list(replay(frames(3), Driver(), Failing()))
+    assert [frame.sighting.failure for frame in done] == ["", "the detector failed: out of memory", ""]
+    assert [frame.sighting.decision.twist.linear for frame in done] == [0.2, 0.0, 0.2]
+    assert done[1].sighting.decision.mode is Mode.BLOCKED
+
+
+def test_the_command_line_counts_the_failures_and_says_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with bag_writer(tmp_path / "run.mcap") as write:
+        for record in frames(3):
+            write(record.topic, record.time, record.message)
+    monkeypatch.setattr(command, "detector_named", lambda _name: Failing())
+    assert main(["replay", str(tmp_path / "run.mcap"), "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    card = json.loads(out)
+    assert (card["frames"], card["detector_failures"]) == (3, 1)
+    assert "1 of 3 frames: the detector failed: out of memory" in err

@@ -1,0 +1,121 @@
+"""Clients that stop reading cost a run nothing: they are dropped, and the run ends on time."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+
+import aiohttp
+import numpy as np
+import pytest
+from tests.sim.stalled import HANDSHAKE, stalled
+
+from limo_hog.detector import PeopleDetector
+from limo_hog.follow.control.naming import controller_named
+from limo_sim.run.episode import Moment, run_episode
+from limo_sim.view.pace import Pace
+from limo_sim.view.server import View
+from limo_sim.world.scenario import Scenario
+
+WORKSHOP = Scenario.load("workshop")
+
+
+@pytest.fixture(scope="module")
+def moments() -> list[Moment]:
+    """Moments whose pictures are noise: 300 kB each, so that a stalled client's buffers are full at once."""
+    seen: list[Moment] = []
+    run_episode(WORKSHOP, controller_named("tracking", None), PeopleDetector(scale=1.2), 0.5, 0, watch=seen.append)
+    rng = np.random.default_rng(0)
+    return [
+        dataclasses.replace(
+            moment,
+            frame=dataclasses.replace(moment.frame, image=rng.integers(0, 256, (480, 640, 3), dtype=np.uint8)),
+        )
+        for moment in seen
+        if moment.frame is not None
+    ]
+
+
+@contextmanager
+def showing(view: View, moments: list[Moment]) -> Iterator[None]:
+    """Show the moments over and over, 50 a second, in a thread of their own."""
+    over = threading.Event()
+
+    def show() -> None:
+        while not over.is_set():
+            for moment in moments:
+                view.watch(moment)
+                time.sleep(0.02)
+
+    thread = threading.Thread(target=show)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [HANDSHAKE, "", "GET /live HTTP/1.1\r\nHost: ", "GET / HTTP/1.1\r\nHost: {host}\r\nContent-Length: 9\r\n\r\n"],
+    ids=["never reads", "never asks", "asks half", "never sends its body"],
+)
+def test_a_run_ends_within_2_s_with_50_stalled_clients(request_: str, moments: list[Moment]) -> None:
+    with ExitStack() as served:
+        view = served.enter_context(View(WORKSHOP, pace=Pace(0)))
+        with stalled(view.url, 50, request_):
+            with showing(view, moments):
+                time.sleep(3)
+            began = time.monotonic()
+            view.end({"in_view": 1.0})
+            served.close()
+            assert time.monotonic() - began < 2
+
+
+def test_a_client_that_does_not_read_is_dropped_and_one_that_does_is_served(
+    moments: list[Moment], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("limo_sim.view.server.STALL_S", 1.0)
+
+    async def pictures(view: View, seconds: float) -> int:
+        async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live", max_msg_size=0) as page:
+            count, until = 0, time.monotonic() + seconds
+            while time.monotonic() < until:
+                count += (await page.receive(timeout=5)).type is aiohttp.WSMsgType.BINARY
+            return count
+
+    with View(WORKSHOP, pace=Pace(0)) as view, stalled(view.url, 5) as clients, showing(view, moments):
+        assert asyncio.run(pictures(view, 4)) > 10
+        for client in clients:
+            # What was under way when it was dropped, then the end.
+            with suppress(ConnectionResetError):
+                while client.recv(1 << 20):
+                    pass
+
+
+def test_ten_pages_share_their_pictures(moments: list[Moment], monkeypatch: pytest.MonkeyPatch) -> None:
+    encoded: list[Moment] = []
+
+    def count(_: View, moment: Moment) -> list[bytes]:
+        encoded.append(moment)
+        return [b"c"]
+
+    monkeypatch.setattr(View, "_pictures", count)
+
+    async def look(view: View) -> None:
+        async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live", max_msg_size=0) as page:
+            while (await page.receive(timeout=5)).type is not aiohttp.WSMsgType.BINARY:
+                pass
+
+    async def all_look(view: View) -> None:
+        await asyncio.gather(*(look(view) for _ in range(10)))
+
+    with View(WORKSHOP, pace=Pace(0)) as view:
+        view.watch(moments[0])
+        asyncio.run(all_look(view))
+    assert encoded == [moments[0]]

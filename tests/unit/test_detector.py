@@ -1,0 +1,418 @@
+"""PeopleDetector: its arguments, the boxes it gives, and their agreement with OpenCV where it asks for OpenCV's."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import FrozenInstanceError, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import limo_hog
+from limo_hog import Detections, HOGDescriptor, PeopleDetector
+from limo_hog.cli.support.scene import street
+from limo_hog.models import Calibration, PersonBox
+from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
+
+PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
+Image = NDArray[np.uint8]
+
+
+@cache
+def picture() -> Image:
+    return street(640, 480, 3)
+
+
+def opencv_boxes(image: Image, model: str) -> list[list[int]]:
+    if model == "daimler":
+        hog = cv2.HOGDescriptor((48, 96), (16, 16), (8, 8), (8, 8), 9)
+        hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDaimlerPeopleDetector()))
+    else:
+        hog = cv2.HOGDescriptor()
+        hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
+    return sorted(np.reshape(hog.detectMultiScale(image, padding=(4, 4))[0], (-1, 4)).tolist())
+
+
+def assert_opencvs(image: Image, model: str) -> int:
+    found = PeopleDetector(model=model, min_height=None, nms="group").detect(image)
+    assert sorted(found.boxes.tolist()) == opencv_boxes(image, model)
+    return len(found)
+
+
+# Agreement with OpenCV.
+
+
+@pytest.mark.parametrize("model", ["opencv", "default", "daimler"])
+def test_grouped_and_at_the_images_own_size_the_boxes_are_opencvs(model: str) -> None:
+    assert assert_opencvs(picture(), model) + assert_opencvs(street(800, 600, 1), model) > 0
+
+
+@pytest.mark.skipif(not PHOTOGRAPHS.exists(), reason="needs ../shared/data/real")
+def test_on_photographs_daimlers_boxes_are_opencvs() -> None:
+    paths = sorted(path for path in PHOTOGRAPHS.iterdir() if path.suffix in (".jpg", ".png"))
+    assert len(paths) == 12
+    assert sum(assert_opencvs(np.asarray(cv2.imread(str(path)), np.uint8), "daimler") for path in paths) > 0
+
+
+# Sizes of people.
+
+
+def test_people_of_the_height_asked_for_are_found() -> None:
+    image = np.asarray(cv2.resize(picture(), None, fx=0.2, fy=0.2, interpolation=cv2.INTER_AREA), np.uint8)
+    assert len(PeopleDetector(min_height=None).detect(image)) == 0
+    found = PeopleDetector(min_height=40).detect(image)
+    assert len(found) > 0
+    assert found.person_boxes[:, 3].min() >= 40 - 1
+    assert (found.boxes[:, :2] >= 0).all()
+    assert (found.boxes[:, :2] + found.boxes[:, 2:] <= image.shape[1::-1]).all()
+
+
+def test_searching_at_half_the_size_finds_what_a_half_size_image_holds() -> None:
+    half = np.asarray(cv2.resize(picture(), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_LINEAR_EXACT), np.uint8)
+    expected = PeopleDetector(min_height=None).detect(half)
+    found = PeopleDetector(min_height=2 * 0.78 * 128).detect(picture())
+    assert len(found) > 0
+    np.testing.assert_array_equal(found.boxes, 2 * expected.boxes)
+    np.testing.assert_array_equal(found.scores, expected.scores)
+
+
+def test_the_height_of_a_window_without_enlarging_is_the_models_own() -> None:
+    own, asked = PeopleDetector(min_height=None), PeopleDetector(min_height=0.78 * 128)
+    np.testing.assert_array_equal(own.detect(picture()).boxes, asked.detect(picture()).boxes)
+
+
+def test_boxes_of_an_enlarged_image_are_in_pixels_of_the_image_itself() -> None:
+    larger = np.asarray(cv2.resize(picture(), (998, 749), interpolation=cv2.INTER_LINEAR_EXACT), np.uint8)
+    expected = PeopleDetector(min_height=None).detect(larger)
+    found = PeopleDetector(min_height=64).detect(picture())
+    zoom = np.array([998 / 640, 749 / 480] * 2)
+    np.testing.assert_array_equal(found.boxes, np.rint(expected.boxes / zoom))
+    np.testing.assert_array_equal(found.scores, expected.scores)
+
+
+def test_people_taller_than_asked_for_are_left_out() -> None:
+    all_of_them = PeopleDetector().detect(picture())
+    heights = np.unique(all_of_them.person_boxes[:, 3])
+    limits = (heights[:-1] + heights[1:])[np.diff(heights) > 4] / 2
+    assert len(limits) > 1
+    for limit in limits.tolist():
+        found = PeopleDetector(max_height=limit).detect(picture())
+        low = all_of_them[all_of_them.person_boxes[:, 3] < limit]
+        np.testing.assert_array_equal(found.boxes, low.boxes)
+        np.testing.assert_array_equal(found.scores, low.scores)
+
+
+def test_people_of_exactly_the_greatest_height_are_reported() -> None:
+    every_window = PeopleDetector(threshold=-9.0, nms="iou", overlap=1)
+    for max_height, window_height in ((64, 82), (66, 82), (67, 86)):  # 64 / 0.78, and 1.05 times that
+        found = replace(every_window, max_height=max_height).detect(picture()[200:360, 300:400])
+        assert found.boxes[:, 3].max() == window_height
+
+
+def test_more_than_64_levels_are_searched_where_the_scale_is_fine() -> None:
+    # 1.01**64 is 1.9: the tallest person, 384 px, is beyond.
+    found = PeopleDetector(min_height=None, scale=1.01).detect(picture())
+    assert found.person_boxes[:, 3].max() > 300
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 1000, 3), (127, 63), (60, 40, 1), (128, 64, 3)])
+def test_images_of_any_size_are_searched(shape: tuple[int, ...]) -> None:
+    for min_height in (8, 64, None, 500):
+        found = PeopleDetector(min_height=min_height).detect(np.zeros(shape, np.uint8))
+        assert found.boxes.shape == (0, 4) and found.boxes.dtype == np.int32
+        assert found.scores.shape == (0,) and found.scores.dtype == np.float64
+
+
+def test_an_image_that_would_be_enlarged_beyond_memory_is_refused() -> None:
+    with pytest.raises(limo_hog.ImageError, match=r"6000 x 4000 px, would be 74880 x 49920 px.*raise min_height"):
+        PeopleDetector(min_height=8).detect(np.broadcast_to(np.uint8(0), (4000, 6000)))
+
+
+# One box a person.
+
+
+def test_every_way_to_suppress_is_applied_to_all_hits_with_its_own_limit() -> None:
+    detector = PeopleDetector(min_height=None, threshold=-0.7, nms="group", group_threshold=0)
+    hits = detector.detect(picture())
+    by_overlap = nms(hits.boxes, hits.scores, 0.65, intersection_over_smaller)
+    by_iou = nms(hits.boxes, hits.scores, 0.3)
+    softly, lowered = soft_nms(hits.boxes, hits.scores, 0.3**2, -0.7)
+    ways: list[tuple[Any, Any, Any]] = [
+        ("overlap", by_overlap, hits.scores[by_overlap]),
+        ("iou", by_iou, hits.scores[by_iou]),
+        ("soft", softly, lowered),
+    ]
+    assert len({len(kept) for _, kept, _ in ways}) == 3, "the picture does not tell the ways apart"
+    for way, kept, scores in ways:
+        found = replace(detector, nms=way, group_threshold=None).detect(picture())
+        assert sorted(map(tuple, found.boxes.tolist())) == sorted(map(tuple, hits.boxes[kept].tolist()))
+        np.testing.assert_allclose(found.scores, scores)
+        assert (np.diff(found.scores) <= 0).all()
+
+
+def test_the_limit_of_overlap_can_be_chosen() -> None:
+    hits = PeopleDetector(nms="group", group_threshold=0).detect(picture())
+    assert len(PeopleDetector(nms="iou", overlap=1).detect(picture())) == len(hits)
+    counts = [len(PeopleDetector(threshold=-0.7, overlap=limit).detect(picture())) for limit in (0.1, 0.65, 0.95)]
+    assert 0 < counts[0] < counts[1] < counts[2]
+
+
+def test_a_threshold_below_minus_one_gives_more_and_surest_first() -> None:
+    few, many = PeopleDetector().detect(picture()), PeopleDetector(threshold=-1.2).detect(picture())
+    assert len(many) > len(few)
+    assert -1.2 <= many.scores.min() < 0
+    assert (np.diff(many.scores) <= 0).all()
+
+
+# What a detector is.
+
+
+def test_a_detector_cannot_be_changed() -> None:
+    detector: Any = PeopleDetector()
+    with pytest.raises(FrozenInstanceError):
+        detector.threshold = 1.0
+    with pytest.raises(TypeError):
+        untyped.PeopleDetector("opencv")
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda d: pickle.loads(pickle.dumps(d)), replace])
+def test_a_copy_is_equal_and_finds_the_same(again: Any) -> None:
+    detector = PeopleDetector(model="daimler", threshold=0.5, win_stride=(8, 16), nms="iou", overlap=0.4)
+    detector.detect(picture())
+    twin = again(detector)
+    assert twin == detector and hash(twin) == hash(detector) and repr(twin) == repr(detector)
+    np.testing.assert_array_equal(twin.detect(picture()).boxes, detector.detect(picture()).boxes)
+
+
+def test_threads_share_a_detector() -> None:
+    detector = PeopleDetector()
+    alone = detector.detect(picture())
+    with ThreadPoolExecutor(4) as pool:
+        for found in pool.map(detector.detect, [picture()] * 8):
+            np.testing.assert_array_equal(found.boxes, alone.boxes)
+            np.testing.assert_array_equal(found.scores, alone.scores)
+
+
+# Arguments.
+
+#: Without its types, so that they can be wrong.
+untyped: Any = limo_hog
+
+WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
+    ({"model": "bogus"}, ValueError, "model is 'bogus'; opencv, default, daimler or the path"),
+    ({"model": 7}, TypeError, "model is 7"),
+    ({"model": None}, TypeError, "model is None"),
+    ({"min_height": 0}, ValueError, "min_height is 0; 8 or more is wanted"),
+    ({"min_height": -64}, ValueError, "min_height is -64"),
+    ({"min_height": float("nan")}, ValueError, "min_height is nan"),
+    ({"min_height": "64"}, TypeError, "min_height is '64'; a number is wanted"),
+    ({"min_height": 300, "max_height": 100}, ValueError, "max_height is 100; at least 300"),
+    ({"min_height": None, "max_height": 90}, ValueError, "max_height is 90; at least 99.84"),
+    ({"max_height": float("inf")}, ValueError, "max_height is inf"),
+    ({"threshold": float("nan")}, ValueError, "threshold is nan; a finite number is wanted"),
+    ({"threshold": float("inf")}, ValueError, "threshold is inf"),
+    ({"threshold": 10**400}, ValueError, r"threshold is 1000.*… is wanted|threshold is 10000"),
+    ({"threshold": 10**5000}, ValueError, "threshold is int of thousands of digits"),
+    ({"threshold": True}, TypeError, "threshold is True"),
+    ({"threshold": np.zeros(3)}, TypeError, "threshold is array"),
+    ({"nms": "bogus"}, ValueError, "nms is 'bogus'; one of overlap, iou, soft, group is wanted"),
+    ({"nms": None}, TypeError, "nms is None"),
+    ({"nms": ["iou"]}, TypeError, r"nms is \['iou'\]"),
+    ({"overlap": 7}, ValueError, "overlap is 7; 0 to 1 is wanted"),
+    ({"overlap": -0.1}, ValueError, "overlap is -0.1"),
+    ({"overlap": 0, "nms": "soft"}, ValueError, "overlap is 0; above 0"),
+    ({"overlap": 0.5, "nms": "group"}, ValueError, "overlap has no meaning"),
+    ({"group_threshold": -2, "nms": "group"}, ValueError, "group_threshold is -2; 0 or more"),
+    ({"group_threshold": 1.5, "nms": "group"}, TypeError, "group_threshold is 1.5"),
+    ({"group_threshold": 0}, ValueError, 'group_threshold has no meaning for nms="overlap"'),
+    ({"win_stride": (0, 8)}, ValueError, r"win_stride is \(0, 8\)"),
+    ({"win_stride": (-8, 8)}, ValueError, r"win_stride is \(-8, 8\)"),
+    ({"win_stride": 8}, TypeError, r"win_stride is 8; two integers \(x, y\) are wanted"),
+    ({"win_stride": ()}, ValueError, r"win_stride is \(\)"),
+    ({"win_stride": (8.0, 8)}, TypeError, "win_stride is"),
+    ({"padding": -1}, TypeError, "padding is -1; two integers"),
+    ({"padding": (-1, 0)}, ValueError, r"padding is \(-1, 0\)"),
+    ({"padding": (65, 0)}, ValueError, r"padding is \(65, 0\).*\(64, 128\)"),
+    ({"padding": (10**400, 0)}, ValueError, "padding is"),
+    ({"scale": 0.5}, ValueError, "scale is 0.5; 1.005 or more"),
+    ({"scale": 1}, ValueError, "scale is 1;"),
+    ({"scale": float("nan")}, ValueError, "scale is nan"),
+    ({"scale": None}, TypeError, "scale is None"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "kind", "told"), WRONG)
+def test_a_wrong_argument_is_named_when_the_detector_is_made(
+    arguments: dict[str, Any], kind: type[Exception], told: str
+) -> None:
+    with pytest.raises(limo_hog.ParameterError, match=told) as caught:
+        untyped.PeopleDetector(**arguments)
+    assert isinstance(caught.value, kind)
+    assert len(str(caught.value)) < 250
+
+
+def test_numbers_of_numpy_and_lists_are_arguments_like_others() -> None:
+    detector = untyped.PeopleDetector(
+        threshold=np.float32(0.5), win_stride=[8, 8], padding=np.array([4, 4]), min_height=np.int64(64), overlap=1
+    )
+    assert detector == PeopleDetector(threshold=0.5, overlap=1.0)
+    assert hash(detector) == hash(PeopleDetector(threshold=0.5, overlap=1.0))
+
+
+# Models in files.
+
+
+def saved(path: Path, card: Any = None) -> Path:
+    hog = HOGDescriptor()
+    hog.setSVMDetector(hog.getDefaultPeopleDetector())
+    hog.save(path)
+    if card is not None:
+        path.with_name(path.name + ".json").write_text(json.dumps(card))
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".yml", ".xml.gz", ".json"])
+def test_a_model_that_opencv_wrote_finds_the_same(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"people{suffix}"
+    theirs = cv2.HOGDescriptor()
+    theirs.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
+    theirs.save(str(path))
+    expected = PeopleDetector().detect(picture())
+    for name in (path, str(path)):
+        np.testing.assert_array_equal(PeopleDetector(model=name).detect(picture()).boxes, expected.boxes)
+
+
+def test_a_models_card_gives_its_person_box_threshold_and_calibration(tmp_path: Path) -> None:
+    card = {
+        "person_box": [0.1, 0.2, 0.5, 0.5],
+        "threshold": 0.75,
+        "calibration": {"slope": 2, "offset": -1},
+        "recipe": "ours",
+    }
+    detector = PeopleDetector(model=saved(tmp_path / "m.yml", card), min_height=64)
+    found = detector.detect(picture())
+    assert len(found) > 0 and found.scores.min() >= 0.75
+    x, y, w, h = found.boxes[0].tolist()
+    assert found.person_boxes[0].tolist() == [round(x + 0.1 * w), round(y + 0.2 * h), round(0.5 * w), round(0.5 * h)]
+    np.testing.assert_allclose(found.probabilities, 1 / (1 + np.exp(-(2 * found.scores - 1))))
+    assert replace(detector, threshold=-1.0).detect(picture()).scores.min() < 0.75
+
+
+@pytest.mark.parametrize(
+    ("card", "told"),
+    [
+        ([1], "a JSON object is wanted"),
+        ({"person_box": [0.1, 0.1, 1.0, 0.5]}, "person_box"),
+        ({"person_box": [0.1, 0.1, 0.5]}, "4 finite numbers"),
+        ({"person_box": "0.1"}, "person_box is '0.1'"),
+        ({"threshold": float("nan")}, "threshold"),
+        ({"threshold": 10**400}, "threshold"),
+        ({"calibration": {"slope": 1}}, "slope"),
+        ({"calibration": {"slope": "1", "offset": 0}}, "calibration"),
+    ],
+)
+def test_a_damaged_card_is_named(tmp_path: Path, card: Any, told: str) -> None:
+    with pytest.raises(limo_hog.ModelFormatError, match=rf"m\.yml\.json.*{told}"):
+        PeopleDetector(model=saved(tmp_path / "m.yml", card))
+
+
+def test_a_card_that_is_no_json_is_named(tmp_path: Path) -> None:
+    path = saved(tmp_path / "m.yml")
+    for text in ("{", "[" * 100_000):
+        Path(f"{path}.json").write_text(text)
+        with pytest.raises(limo_hog.ModelFormatError, match=r"m\.yml\.json is no model card"):
+            PeopleDetector(model=path)
+
+
+def test_a_file_without_an_svm_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bare.yml"
+    HOGDescriptor().save(path)
+    with pytest.raises(limo_hog.ModelFormatError, match=r"bare\.yml holds a geometry without an SVM"):
+        PeopleDetector(model=path)
+
+
+# Detections.
+
+
+def some() -> Detections:
+    boxes = np.array([[0, 0, 64, 128], [100, 50, 128, 256], [10, 10, 100, 200]], np.int32)
+    return Detections(boxes, np.array([2.0, 0.5, -1.0]))
+
+
+def test_the_person_is_two_tenths_in_from_the_side_and_one_from_the_top() -> None:
+    assert some().person_boxes.tolist() == [[13, 13, 38, 100], [126, 76, 77, 200], [30, 30, 60, 156]]
+    assert some().person_boxes.dtype == np.int32
+
+
+def test_detections_are_indexed_as_they_are_iterated() -> None:
+    found = some()
+    for index, (box, score) in enumerate(found):
+        np.testing.assert_array_equal(found[index][0], box)
+        assert found[index][1] == score
+    assert found[-1][1] == -1.0
+    with pytest.raises(IndexError):
+        found[3]
+
+
+def test_a_slice_or_mask_of_detections_is_detections() -> None:
+    found = replace(some(), person_box=PersonBox(0, 0, 1, 1), calibration=Calibration(1, 0))
+    for part in (found[:2], found[found.scores > 0], found[np.array([0, 1])]):
+        assert isinstance(part, Detections)
+        assert part.boxes.tolist() == found.boxes[:2].tolist() and part.scores.tolist() == [2.0, 0.5]
+        assert (part.person_box, part.calibration) == (found.person_box, found.calibration)
+    assert len(found[5:]) == 0
+
+
+def test_no_detections_are_empty_arrays() -> None:
+    none = Detections.none()
+    assert none.boxes.shape == (0, 4) and none.boxes.dtype == np.int32 and none.scores.shape == (0,)
+    assert len(none) == 0 and list(none) == [] and none.person_boxes.shape == (0, 4)
+
+
+def test_opencvs_models_have_a_calibration_in_which_surer_is_likelier() -> None:
+    for model, even in (("opencv", 0.19), ("daimler", 1.41)):
+        found = replace(PeopleDetector(model=model).detect(picture()), scores=np.array([3.0, even, -1.0]))
+        assert found.probabilities == pytest.approx([1.0, 0.5, 0.0], abs=0.05)
+
+
+def test_probabilities_need_a_calibration() -> None:
+    with pytest.raises(limo_hog.HogError, match="no calibration"):
+        _ = some().probabilities
+    found = replace(some(), calibration=Calibration(500.0, 0.0))
+    assert found.probabilities.tolist() == [1.0, 1.0, 0.0]
+
+
+def test_the_people_are_drawn_into_a_copy() -> None:
+    for shape in ((480, 640, 3), (480, 640), (480, 640, 1)):
+        image = np.full(shape, 128, np.uint8)
+        drawn = some().draw(image)
+        assert drawn.shape == (480, 640, 3)
+        assert (image == 128).all()
+        assert (drawn[76 + 100, 126] != 128).any()
+        assert (drawn[300:, 300:] == 128).all()
+
+
+def test_drawing_without_opencv_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "cv2", None)
+    monkeypatch.delitem(__import__("sys").modules, "limo_hog.imaging.drawing", raising=False)
+    with pytest.raises(limo_hog.MissingExtraError, match=r"pip install 'limo-hog\[cv\]'"):
+        some().draw(picture())
+
+
+def test_detecting_and_enlarging_need_no_opencv() -> None:
+    import subprocess
+    import sys
+
+    code = (
+        "import sys; sys.modules['cv2'] = None; import numpy as np, limo_hog;"
+        "limo_hog.PeopleDetector().detect(np.zeros((200, 200, 3), np.uint8))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,23 @@
+"""Pictures are resized as OpenCV's exact linear resize does it, without OpenCV."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from limo_hog.imaging.resize import resize
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (9, 1, 3), (48, 64), (48, 64, 1), (37, 53, 3), (480, 640, 3)])
+@pytest.mark.parametrize("to", [(1, 1), (3, 2), (64, 48), (100, 75), (53, 37), (997, 311)])
+def test_every_pixel_is_opencvs(shape: tuple[int, ...], to: tuple[int, int]) -> None:
+    image = np.random.default_rng(0).integers(0, 256, shape, dtype=np.uint8)
+    theirs = cv2.resize(image, to, interpolation=cv2.INTER_LINEAR_EXACT)
+    np.testing.assert_array_equal(resize(image, *to), np.reshape(theirs, (to[1], to[0], *shape[2:])))
+
+
+def test_memory_layout_does_not_matter() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (40, 30, 3), dtype=np.uint8)
+    for view in (image[::2, ::-1], image.transpose(1, 0, 2), np.asfortranarray(image)):
+        np.testing.assert_array_equal(resize(view, 50, 60), resize(np.ascontiguousarray(view), 50, 60))

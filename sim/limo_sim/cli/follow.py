@@ -36,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run one episode and show how it went."""
+    """Run one episode and show its score card."""
     from limo_sim.run.catalogue import load
     from limo_sim.run.episode import run_episode
     from limo_sim.run.score import score

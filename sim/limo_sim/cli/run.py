@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class ScriptError(LimoHogError):
-    """The node failed; its own traceback has been shown before."""
+    """The node failed; its traceback has been printed before."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -46,7 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the node and show how it went."""
+    """Run the node and show its score card."""
     if args.real:
         from limo_sim.cli.real import run_real
 

@@ -28,7 +28,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     actions = parser.add_subparsers(dest="action", metavar="new|check|solution", required=True)
     for action, words in (
         ("new", "write the template to begin with"),
-        ("check", "run a node and say which checkpoints hold"),
+        ("check", "run a node and show which checkpoints hold"),
         ("solution", "write the model solution; - is standard output"),
     ):
         one = actions.add_parser(action, help=words, description=words.capitalize() + ".")

@@ -1,4 +1,4 @@
-"""The arena in real time, on ROS 2's network: others drive it."""
+"""The arena in real time on ROS 2's network, driven by /cmd_vel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from limo_sim.run.arena import Arena
 from limo_sim.run.episode import FrameRecord, Moment, Step
 from limo_sim.world.scenario import Scenario
 
-#: Time that is made up for after a hold-up [s]; what is more is lost.
+#: After a delay the arena runs faster until this much is made up for [s]; more is dropped. Chosen: two camera frames.
 _CATCH_UP = 0.2
 
 
@@ -27,16 +27,16 @@ def run_live(
     bus: Bus | None,
     watch: Callable[[Moment], None] | None = None,
 ) -> Arena:
-    """Let the arena go on with the wall's clock, its topics on the bus, driven by /cmd_vel.
+    """Run the arena in real time, with its topics on the bus.
 
     Parameters
     ----------
     scenario, seed
         The arena and its random numbers.
     seconds
-        How long; inf until interrupted.
+        Duration [s]; inf until interrupted.
     bus
-        Where the topics are; None for an arena that nobody drives.
+        Carries the topics; None for an arena without ROS.
     watch
         Called with every camera frame.
     """
@@ -66,7 +66,7 @@ def run_live(
         if late < 0:
             time.sleep(-late)
         elif late > _CATCH_UP:
-            # A machine that is too slow runs slower than the wall's clock, and does not hurry for ever after.
+            # On a machine that is too slow the arena runs slower than real time, instead of falling behind without end.
             began += late - _CATCH_UP
     return arena
 

@@ -21,7 +21,9 @@ _LIBRARIES = {
     "mcap": ("mcap", "record"),
     "rerun": ("Rerun", "viz"),
     "rosbags": ("rosbags", "record"),
+    "scipy": ("SciPy", "train"),
     "sklearn": ("scikit-learn", "train"),
+    "threadpoolctl": ("threadpoolctl", "train"),
 }
 
 

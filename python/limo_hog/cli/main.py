@@ -26,6 +26,8 @@ ENTRY_POINTS = "limo_hog.commands"
 #: Commands of this package and their line in `limo-hog --help`.
 BUILT_IN = {
     "detect": "find people in photographs, folders and videos",
+    "train": "train a detector from labelled pictures or crops",
+    "evaluate": "measure detectors on labelled pictures",
     "bench": "time this detector against OpenCV's, with parity checked in the same run",
     "replay": "run the detector and the follower on a recording",
     "topic": "look at ROS 2 topics, as `ros2 topic` does",

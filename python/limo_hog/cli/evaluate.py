@@ -1,0 +1,140 @@
+"""`limo-hog evaluate`: how good detectors are on labelled pictures."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limo_hog.cli.support.arguments import number
+from limo_hog.cli.support.output import STDOUT, write_json
+
+if TYPE_CHECKING:
+    from limo_hog.learn.evaluation import Evaluation, EvaluationParameters, Rival
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `evaluate`."""
+    parser = subparsers.add_parser(
+        "evaluate",
+        description="Measure a detector on labelled pictures: log-average miss rate, recall, average precision, time; "
+        "with intervals, and against others on the same pictures.",
+    )
+    parser.add_argument("model", metavar="MODEL", help="opencv, daimler, limo, or the file of a trained detector")
+    parser.add_argument(
+        "data",
+        type=Path,
+        metavar="DATA",
+        help="labels: a folder of VOC XML or YOLO text files, a COCO JSON, CVAT XML or imglab XML file, or boxes.json",
+    )
+    parser.add_argument("--against", nargs="+", default=[], metavar="MODEL", help="other detectors, for comparison")
+    parser.add_argument("--label", metavar="NAME", help="which label is sought, where there are several")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="where the pictures lie, if not beside the labels")
+    parser.add_argument(
+        "--min-height",
+        type=_min_height,
+        nargs="+",
+        metavar="PX",
+        help="height of the smallest person sought, or `none` for pictures as they are; several are compared",
+    )
+    parser.add_argument(
+        "--least-score",
+        type=_score,
+        default=-1.2,
+        metavar="T",
+        help="where the curve ends: no surer hit is left out (%(default)s)",
+    )
+    parser.add_argument("--report", type=Path, metavar="DIR", help="write a page with the curve and the worst mistakes")
+    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - is standard output")
+
+
+def _min_height(text: str) -> float | None:
+    return None if text == "none" else number(text, 8, 10_000, "height in pixels")
+
+
+def _score(text: str) -> float:
+    return number(text, -100, 100, "score")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure, print a table and, if asked, write JSON and a page."""
+    from limo_hog.cli.support.progress import progress
+    from limo_hog.cli.support.warned import warnings_in_one_line
+    from limo_hog.learn.evaluation import EvaluationParameters, as_json, evaluate
+    from limo_hog.learn.formats import read_labels
+    from limo_hog.learn.labels import choose
+
+    if args.report:
+        # What it lacks is said before the work, not after.
+        from limo_hog.learn.report import write_report
+    how = EvaluationParameters()
+    rivals = _rivals(args)
+    with warnings_in_one_line():
+        pictures = choose(read_labels(args.data, args.pictures), args.label)
+        with progress("pictures") as bar:
+            task = bar.add_task("evaluating", total=len(pictures))
+            used, evaluations = evaluate(rivals, pictures, how, lambda: bar.advance(task))
+    if args.json:
+        write_json(args.json, as_json(used, evaluations, how))
+    if args.json != STDOUT:
+        objects = sum(not box.ignored for picture in used for box in picture.boxes)
+        _print(f"{len(used)} pictures with {objects} objects", evaluations, how)
+    if args.report:
+        page = write_report(args.report, used, evaluations, how)
+        if args.json != STDOUT:
+            print(page)
+    return 0
+
+
+def _rivals(args: argparse.Namespace) -> list[Rival]:
+    """Make every model at every height."""
+    from dataclasses import replace
+
+    from limo_hog.detector import PeopleDetector
+    from limo_hog.learn.evaluation import Rival
+
+    rivals = []
+    for model in dict.fromkeys([args.model, *args.against]):
+        for height in args.min_height or ["default"]:
+            detector = PeopleDetector(model=model)
+            name = model
+            if height != "default":
+                detector = replace(detector, min_height=height)
+                name = f"{model} {'as is' if height is None else f'{height:g} px'}"
+            rivals.append(Rival(name, replace(detector, threshold=args.least_score), detector))
+    return rivals
+
+
+def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from limo_hog.learn.evaluation import compare
+
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    for column in ("model", "LAMR", f"{how.confidence:.0%}", "R at .1", "R at 1", "AP", "T at .1", "ms"):
+        table.add_column(column, justify="left" if column == "model" else "right")
+    for one in evaluations:
+        low, high = one.intervals["lamr"]
+        figures = (f"{value:.3f}" for value in one.figures[1:])
+        table.add_row(
+            one.name,
+            f"{one.figures.lamr:.3f}",
+            f"{low:.2f}..{high:.2f}",
+            *figures,
+            f"{one.threshold_01:.2f}",
+            f"{one.ms:.1f}",
+        )
+    console = Console()
+    console.print(table)
+    for other in evaluations[1:]:
+        lamr = compare(evaluations[0], other, how)[0]
+        low, high = lamr.interval
+        sure = "" if low <= 0 <= high else ", more than the choice of pictures"
+        names = f"{evaluations[0].name} minus {other.name}"
+        console.print(
+            f"LAMR of {names}: {lamr.difference:+.3f} ({low:+.3f} to {high:+.3f}){sure}",
+            soft_wrap=True,
+            highlight=False,
+        )

@@ -1,0 +1,22 @@
+"""Warnings in one line on standard error, as errors are."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+@contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Print every warning raised inside as `limo-hog: warning: ...`, once."""
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        print(f"limo-hog: warning: {' '.join(str(message).split())}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        warnings.showwarning = show
+        yield

@@ -1,0 +1,162 @@
+"""`limo-hog train`: labelled boxes or crops in, a detector out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limo_hog.cli.support.arguments import count, file_ending, number, seed, size
+from limo_hog.cli.support.output import UsageError
+
+if TYPE_CHECKING:
+    from limo_hog.learn.sources import TrainingData
+    from limo_hog.learn.training import Round, State, TrainingParameters
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `train`."""
+    parser = subparsers.add_parser(
+        "train",
+        description="Train a detector of people or of anything else that looks alike from the same side: from labelled "
+        "pictures, or from crops and pictures that show no such object. Ctrl-C keeps the last round.",
+    )
+    parser.add_argument(
+        "data",
+        nargs="+",
+        type=Path,
+        metavar="DATA",
+        help="labels (VOC, YOLO, COCO, CVAT, imglab, boxes.json), or folders of crops, each filling a window",
+    )
+    parser.add_argument(
+        "--out",
+        required=True,
+        type=file_ending(".yml", ".yaml", ".xml", ".json"),
+        metavar="MODEL.yml",
+        help="the detector, as OpenCV has it; its card MODEL.yml.json beside it",
+    )
+    parser.add_argument(
+        "--negatives", nargs="+", type=Path, default=[], metavar="DIR", help="pictures without the object"
+    )
+    parser.add_argument(
+        "--validate", type=Path, metavar="DATA", help="labels to measure on, instead of a share of DATA held out"
+    )
+    parser.add_argument("--held-out", type=_share, default=0.2, metavar="SHARE", help="share held out (%(default)s)")
+    parser.add_argument("--label", metavar="NAME", help="which label is meant, where there are several")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="where the pictures lie, if not beside the labels")
+    parser.add_argument(
+        "--window", type=size, metavar="WxH", help="window size [px], multiples of 8 (chosen from DATA)"
+    )
+    parser.add_argument(
+        "--object-box",
+        type=_share,
+        nargs=4,
+        metavar=("X", "Y", "W", "H"),
+        help="where the object stands in a crop, as shares of it (0.2 0.1 0.6 0.78, a person)",
+    )
+    parser.add_argument("--no-mirror", action="store_true", help="do not learn mirrored objects: left is not right")
+    parser.add_argument(
+        "--rounds", type=count, default=3, metavar="N", help="rounds of hard-negative mining (%(default)s)"
+    )
+    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all that is drawn (%(default)s)")
+    parser.add_argument("--resume", action="store_true", help="go on where a run with the same arguments was stopped")
+
+
+def _share(text: str) -> float:
+    return number(text, 0, 0.99, "share")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Train, and write the detector and its card after every round."""
+    from limo_hog.cli.support.environment import cores
+    from limo_hog.cli.support.progress import progress
+    from limo_hog.cli.support.warned import warnings_in_one_line
+    from limo_hog.learn.sources import Wanted, gather
+    from limo_hog.learn.training import State, TrainingParameters, fingerprint, train
+    from limo_hog.models import PersonBox
+
+    if args.window and (args.window[0] % 8 or args.window[1] % 8 or min(args.window) < 16):
+        raise UsageError(f"--window {args.window[0]}x{args.window[1]}: multiples of 8 from 16 on are wanted")
+    box = None if args.object_box is None else PersonBox(*args.object_box)
+    if box and not (box.width > 0 < box.height and box.x + box.width <= 1 and box.y + box.height <= 1):
+        raise UsageError(f"--object-box {' '.join(f'{share:g}' for share in box)}: it must lie inside of the crop")
+    how = TrainingParameters(rounds=args.rounds, mirror=not args.no_mirror, held_out=args.held_out, seed=args.seed)
+    wanted = Wanted(
+        tuple(args.data),
+        tuple(args.negatives),
+        args.validate,
+        args.label,
+        args.pictures,
+        args.window,
+        box,
+        args.held_out,
+        args.seed,
+    )
+    state_path = args.out.with_name(f".{args.out.name}.state.npz")
+    with warnings_in_one_line(), progress("pictures") as bar:
+        bar.add_task("reading", total=None)
+        data = gather(wanted)
+        # A folder that cannot be made is told before the work, not after.
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        mark = fingerprint(data, how)
+        state = State.load(state_path, mark) if args.resume else State(mark)
+        tasks = {bar.task_ids[0]: "reading"}
+
+        def step(stage: str, steps: int | None) -> None:
+            task = next(iter(tasks))
+            if tasks[task] != stage:
+                bar.remove_task(task)
+                tasks.clear()
+                task = bar.add_task(stage, total=steps)
+                tasks[task] = stage
+            bar.advance(task)
+
+        try:
+            for done in train(data, how, state, cores(), step):
+                line = _keep(done, args.out, state_path, state, data, how)
+                bar.console.print(line, highlight=False, soft_wrap=True)
+        except KeyboardInterrupt:
+            if state.records:
+                last = state.records[-1]["round"]
+                print(f"limo-hog: {args.out} is round {last}; --resume goes on from it", file=sys.stderr)
+            raise
+    state_path.unlink(missing_ok=True)
+    print(args.out)
+    return 0
+
+
+def _keep(
+    done: Round,
+    out: Path,
+    state_path: Path,
+    state: State,
+    data: TrainingData,
+    how: TrainingParameters,
+) -> str:
+    """Measure and write a round's detector; return what is said of it."""
+    from limo_hog.cli.support.environment import cores
+    from limo_hog.learn.card import make_card, measure, write_model
+    from limo_hog.learn.training import as_json
+
+    measured = measure(done, data, cores(), final=done.number == how.rounds)
+    figures = measured["figures"]
+    state.records.append(
+        as_json(done) | {name: figures[name] for name in ("lamr", "ap", "crops_found") if name in figures}
+    )
+    write_model(out, done.coefficients, data.shape, make_card(measured, state.records, data, how))
+    state.save(state_path)
+    words = [
+        f"round {done.number}: {done.objects} objects, {done.negatives} negatives",
+        f"{done.descriptor_bytes / 2**20:.0f} MB of descriptors",
+        f"{done.seconds:.0f} s",
+    ]
+    if done.number:
+        words[0] += f" ({done.new} new, {done.left_out} left out for memory)" if done.left_out else f" ({done.new} new)"
+    if "lamr" in figures:
+        words.insert(
+            1, f"LAMR {figures['lamr']:.3f}, AP {figures['ap']:.3f} on {figures['pictures']} pictures held out"
+        )
+    elif figures["crops_found"] is not None:
+        words.insert(1, f"{figures['crops_found']:.1%} of {figures['crops']} crops held out found at 0.1 FPPI")
+    return "; ".join(words)

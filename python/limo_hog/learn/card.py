@@ -1,0 +1,186 @@
+"""A trained detector on disk: the file that OpenCV loads, and its card with what the numbers mean and where from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.atomic import about, whole_file
+from limo_hog.cv2_api import model_files
+from limo_hog.cv2_api.geometry import Geometry
+from limo_hog.detector import PeopleDetector
+from limo_hog.learn.evaluation import Evaluation, EvaluationParameters, Rival, evaluate
+from limo_hog.learn.mining import in_order, readable
+from limo_hog.learn.sources import TrainingData
+from limo_hog.learn.training import Round, TrainingParameters
+from limo_hog.learn.windows import WindowShape
+from limo_hog.models import Calibration
+
+#: Where the curve of a trained detector ends; its margins are a little smaller than those of OpenCV's.
+LEAST_SCORE = -1.2
+#: False positives per image at the threshold of the card.
+_FPPI = 0.1
+#: Newton's steps of the calibration, and the least change that is worth one more.
+_STEPS, _SETTLED = 50, 1e-10
+#: Bins of the calibration error.
+_BINS = 10
+
+
+def card_path(model: Path) -> Path:
+    """Return the name of a model's card: the model's with `.json` after it."""
+    return model.with_name(f"{model.name}.json")
+
+
+def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShape, card: dict[str, Any]) -> None:
+    """Write a detector and its card.
+
+    Raises
+    ------
+    OSError
+        A file cannot be written; no part of it is left behind.
+    """
+    model_files.save(path, Geometry(winSize=shape.size), coefficients.astype(np.float32))
+    with whole_file(card_path(path)) as part, about(card_path(path)):
+        part.write_text(json.dumps(card, indent=2) + "\n", "utf-8")
+
+
+def measure(done: Round, data: TrainingData, workers: int, final: bool) -> dict[str, Any]:
+    """Measure a round's detector on what was held out.
+
+    Returns
+    -------
+    `threshold`, `calibration` and `figures` of a card. With labelled pictures: LAMR, recall, AP. With crops only: the
+    share of the crops held back that are found, false alarms being counted on pictures of the negatives.
+    """
+    with TemporaryDirectory(prefix="limo-hog-") as folder:
+        path = Path(folder) / "model.yml"
+        write_model(path, done.coefficients, data.shape, {"person_box": list(data.shape.object_box)})
+        detector = PeopleDetector(model=path, min_height=data.min_height, threshold=LEAST_SCORE)
+    if data.validation:
+        how = EvaluationParameters(draws=1000 if final else 1)
+        _, (evaluation,) = evaluate([Rival("trained", detector)], data.validation, how)
+        return _measured(evaluation, data)
+    return _measured_on_crops(done, detector, data, workers)
+
+
+def _measured(evaluation: Evaluation, data: TrainingData) -> dict[str, Any]:
+    outcomes = evaluation.outcomes
+    calibration = calibrate(outcomes.scores, outcomes.right)
+    probabilities = _probabilities(calibration, outcomes.scores)
+    figures = {name: round(value, 4) for name, value in evaluation.figures._asdict().items()}
+    return {
+        "threshold": _rounded(evaluation.threshold_01),
+        "calibration": calibration._asdict(),
+        "figures": {
+            "pictures": len(data.validation),
+            "objects": int(outcomes.objects.sum()),
+            "min_height": data.min_height,
+            **figures,
+            "lamr_interval": [round(end, 4) for end in evaluation.intervals["lamr"]],
+            "calibration_error": round(calibration_error(probabilities, outcomes.right), 4),
+        },
+    }
+
+
+def _measured_on_crops(done: Round, detector: PeopleDetector, data: TrainingData, workers: int) -> dict[str, Any]:
+    # Every tenth negative: enough for the threshold, although it was learnt from.
+    paths = data.negatives.paths[::10]
+
+    def work(path: Path) -> NDArray[np.float64]:
+        image = readable(path)
+        return np.empty(0) if image is None else detector.detect(image).scores
+
+    alarms = np.sort(np.concatenate([np.empty(0), *in_order(work, paths, workers)]))[::-1]
+    allowed = int(_FPPI * len(paths))
+    threshold = float(alarms[allowed]) + 1e-6 if allowed < len(alarms) else LEAST_SCORE
+    scores = np.append(done.held_out_margins, alarms)
+    right = np.arange(len(scores)) < len(done.held_out_margins)
+    return {
+        "threshold": _rounded(threshold),
+        "calibration": calibrate(scores, right)._asdict(),
+        "figures": {
+            "crops": len(done.held_out_margins),
+            "crops_found": round(float((done.held_out_margins >= threshold).mean()), 4) if right.any() else None,
+        },
+    }
+
+
+def _rounded(threshold: float) -> float:
+    """Return a threshold that a card can hold: none but infinity means no detection at all, which 100 does as well."""
+    return round(threshold, 4) if np.isfinite(threshold) else 100.0
+
+
+def calibrate(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Calibration:
+    """Fit P(right | score) = 1 / (1 + exp(−(slope · score + offset))) by maximum likelihood (Platt 1999).
+
+    Platt's targets keep the slope finite where scores part right from wrong wholly: (n₊ + 1) / (n₊ + 2) and
+    1 / (n₋ + 2). Newton's method with halved steps (Lin, Lin and Weng 2007).
+
+    Parameters
+    ----------
+    scores, right
+        float64 and bool (N,).
+    """
+    count = int(right.sum())
+    targets = np.where(right, (count + 1) / (count + 2), 1 / (len(right) - count + 2))
+    features = np.stack([scores, np.ones(len(scores))], axis=1)
+    found = np.zeros(2)
+
+    def loss(at: NDArray[np.float64]) -> float:
+        margins = features @ at
+        return float((np.logaddexp(0, margins) - targets * margins).sum() + 0.5e-6 * (at @ at))
+
+    for _ in range(_STEPS):
+        p = 1 / (1 + np.exp(-np.clip(features @ found, -500, 500)))
+        slope = features.T @ (p - targets) + 1e-6 * found
+        step = np.linalg.solve((features.T * (p * (1 - p))) @ features + 1e-6 * np.eye(2), slope)
+        size = 1.0
+        while loss(found - size * step) > loss(found) and size > 1e-6:
+            size /= 2
+        found = found - size * step
+        if float(np.abs(size * step).max()) < _SETTLED:
+            break
+    return Calibration(round(float(found[0]), 4), round(float(found[1]), 4))
+
+
+def _probabilities(calibration: Calibration, scores: NDArray[np.float64]) -> NDArray[np.float64]:
+    probabilities: NDArray[np.float64] = 1 / (1 + np.exp(-(calibration.slope * scores + calibration.offset)))
+    return probabilities
+
+
+def calibration_error(probabilities: NDArray[np.float64], right: NDArray[np.bool_]) -> float:
+    """Return the mean distance of probability and share that is right over ten bins, weighted by what is in them."""
+    bins = np.minimum((probabilities * _BINS).astype(int), _BINS - 1)
+    gaps = [
+        abs(float(probabilities[bins == i].mean() - right[bins == i].mean())) * int((bins == i).sum())
+        for i in range(_BINS)
+        if (bins == i).any()
+    ]
+    return sum(gaps) / max(1, len(right))
+
+
+def make_card(
+    measured: dict[str, Any], rounds: Sequence[dict[str, Any]], data: TrainingData, how: TrainingParameters
+) -> dict[str, Any]:
+    """Return the whole card: what `PeopleDetector` reads, figures, and what the detector was made of.
+
+    It holds no date and no time, so that the same run writes the same card.
+    """
+    return {
+        "made_by": f"limo-hog {version('limo-hog')}",
+        "window": list(data.shape.size),
+        "person_box": [round(share, 6) for share in data.shape.object_box],
+        "min_height": data.min_height,
+        **measured,
+        "rounds": list(rounds),
+        "data": [asdict(source) for source in data.sources],
+        "parameters": asdict(how),
+    }

@@ -1,0 +1,254 @@
+"""Detectors run on labelled pictures, and the figures that say how good each is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.detector import Detections
+from limo_hog.learn.curve import (
+    Curve,
+    Figures,
+    Match,
+    Outcomes,
+    bootstrap,
+    collect,
+    curve,
+    figures,
+    threshold_at,
+)
+from limo_hog.learn.labels import Picture, inside
+
+
+class Detector(Protocol):
+    """What can be evaluated."""
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        """Find people, best first."""
+        ...
+
+
+@dataclass(frozen=True)
+class EvaluationParameters:
+    """How detectors are measured.
+
+    Attributes
+    ----------
+    min_iou
+        Intersection over union from which a box is found (PASCAL VOC, Caltech).
+    draws
+        Sets of pictures for an interval; 1000 settle its ends to about .005.
+    confidence
+        Share of the sets inside an interval.
+    seed
+        Of the draws.
+    height_edges
+        Heights [px] that part the rows by height.
+    """
+
+    min_iou: float = 0.5
+    draws: int = 1000
+    confidence: float = 0.95
+    seed: int = 0
+    height_edges: tuple[float, ...] = (64, 96, 144, 216)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A detector under its name.
+
+    Attributes
+    ----------
+    search
+        Returns every hit that the curve is to have, however unsure.
+    timed
+        The same with the threshold that a user would set: its time is taken. None: `search` is timed.
+    """
+
+    name: str
+    search: Detector
+    timed: Detector | None = None
+
+
+@dataclass(frozen=True)
+class HeightRow:
+    """How many objects from `low` to below `high` [px] there are, and the shares found at 0.1 and 1 FPPI."""
+
+    low: float
+    high: float
+    objects: int
+    recall_01: float
+    recall_1: float
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One detector's figures.
+
+    Attributes
+    ----------
+    intervals
+        Of each figure, its lower and upper end.
+    threshold_01, threshold_1
+        Least score with an FPPI of 0.1 or 1 at most.
+    ms
+        Median time of a picture [ms], the detectors taking turns on each.
+    """
+
+    name: str
+    figures: Figures
+    intervals: dict[str, tuple[float, float]]
+    threshold_01: float
+    threshold_1: float
+    ms: float
+    by_height: tuple[HeightRow, ...]
+    curve: Curve = field(repr=False)
+    outcomes: Outcomes = field(repr=False)
+    found: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = field(repr=False)
+    matches: list[Match] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How much a figure of the first detector is above another's, on the same draws of pictures.
+
+    Attributes
+    ----------
+    interval
+        The difference's; where it does not hold 0, the difference is more than the choice of pictures.
+    """
+
+    name: str
+    figure: str
+    difference: float
+    interval: tuple[float, float]
+
+
+def evaluate(
+    rivals: Sequence[Rival],
+    pictures: Sequence[Picture],
+    parameters: EvaluationParameters | None = None,
+    done: Callable[[], None] = lambda: None,
+) -> tuple[list[Picture], list[Evaluation]]:
+    """Run every detector on every picture and return the pictures as used, and each detector's figures.
+
+    Parameters
+    ----------
+    done
+        Called after each picture.
+
+    Raises
+    ------
+    ReadError, OSError
+        A picture cannot be read: figures over the rest would be those of another set.
+    """
+    how = parameters or EvaluationParameters()
+    used: list[Picture] = []
+    found: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in rivals]
+    times: list[list[float]] = [[] for _ in rivals]
+    for picture in pictures:
+        image = picture.read()
+        used.append(inside(picture, (image.shape[1], image.shape[0])))
+        for i, rival in enumerate(rivals):
+            detections, ms = _timed(rival.search, image)
+            if rival.timed is not None:
+                _, ms = _timed(rival.timed, image)
+            times[i].append(ms)
+            found[i].append((detections.person_boxes.astype(np.float64), detections.scores))
+        done()
+    labelled = [picture.arrays() for picture in used]
+    return used, [
+        _evaluation(rival.name, hits, labelled, float(np.median(ms)), how)
+        for rival, hits, ms in zip(rivals, found, times, strict=True)
+    ]
+
+
+def _timed(detector: Detector, image: NDArray[np.uint8]) -> tuple[Detections, float]:
+    start = time.perf_counter()
+    detections = detector.detect(image)
+    return detections, 1e3 * (time.perf_counter() - start)
+
+
+def _evaluation(
+    name: str,
+    found: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    labelled: list[tuple[NDArray[np.float64], NDArray[np.bool_]]],
+    ms: float,
+    how: EvaluationParameters,
+) -> Evaluation:
+    outcomes, matches = collect(found, labelled, how.min_iou)
+    points = curve(outcomes)
+    tails = [50 * (1 - how.confidence), 50 * (1 + how.confidence)]
+    ends = np.nanpercentile(bootstrap(outcomes, how.draws, how.seed), tails, axis=0).T.tolist()
+    thresholds = threshold_at(points, 0.1), threshold_at(points, 1.0)
+    return Evaluation(
+        name,
+        figures(outcomes),
+        {figure: (low, high) for figure, (low, high) in zip(Figures._fields, ends, strict=True)},
+        *thresholds,
+        ms,
+        _by_height(outcomes, thresholds, how.height_edges),
+        points,
+        outcomes,
+        found,
+        matches,
+    )
+
+
+def _by_height(outcomes: Outcomes, thresholds: tuple[float, float], edges: tuple[float, ...]) -> tuple[HeightRow, ...]:
+    rows = []
+    for low, high in zip((0.0, *edges), (*edges, float("inf")), strict=True):
+        at = outcomes.found_at[(low <= outcomes.heights) & (outcomes.heights < high)]
+        if len(at):
+            rows.append(HeightRow(low, high, len(at), *(float((at >= t).mean()) for t in thresholds)))
+    return tuple(rows)
+
+
+def compare(first: Evaluation, other: Evaluation, parameters: EvaluationParameters | None = None) -> list[Difference]:
+    """Return how much the first detector's figures are above another's, with paired intervals."""
+    how = parameters or EvaluationParameters()
+    draws = [bootstrap(one.outcomes, how.draws, how.seed) for one in (first, other)]
+    tails = [50 * (1 - how.confidence), 50 * (1 + how.confidence)]
+    ends = np.nanpercentile(draws[0] - draws[1], tails, axis=0).T.tolist()
+    return [
+        Difference(other.name, figure, a - b, (low, high))
+        for figure, a, b, (low, high) in zip(Figures._fields, first.figures, other.figures, ends, strict=True)
+    ]
+
+
+def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation], how: EvaluationParameters) -> dict[str, Any]:
+    """Return all figures as plain values; null where there is no threshold."""
+    return {
+        "pictures": len(used),
+        "objects": sum(not box.ignored for picture in used for box in picture.boxes),
+        "min_iou": how.min_iou,
+        "confidence": how.confidence,
+        "models": [_model_json(one) for one in evaluations],
+        "differences": [
+            {"model": d.name, "figure": d.figure, "difference": d.difference, "interval": list(d.interval)}
+            for other in evaluations[1:]
+            for d in compare(evaluations[0], other, how)
+        ],
+    }
+
+
+def _model_json(one: Evaluation) -> dict[str, Any]:
+    return {
+        "model": one.name,
+        **one.figures._asdict(),
+        "intervals": {figure: list(ends) for figure, ends in one.intervals.items()},
+        "threshold_01": _finite(one.threshold_01),
+        "threshold_1": _finite(one.threshold_1),
+        "ms": round(one.ms, 3),
+        "by_height": [vars(row) | {"high": _finite(row.high)} for row in one.by_height],
+        "curve": {name: values.tolist() for name, values in one.curve._asdict().items()},
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

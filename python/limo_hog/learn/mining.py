@@ -1,0 +1,279 @@
+"""Pictures to learn from: descriptors of their objects, and of what a detector takes for one (hard negatives)."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog import _core
+from limo_hog.exceptions import ImageError
+from limo_hog.imaging.reading import ReadError
+from limo_hog.imaging.resize import resize
+from limo_hog.learn.labels import LabelWarning
+from limo_hog.learn.windows import (
+    Jitter,
+    Region,
+    WindowShape,
+    cut,
+    positive_crops,
+    random_boxes,
+    read_gray,
+)
+from limo_hog.suppression import intersection_over_union, nms
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+#: Jobs that are under way at once, for each core: enough that none waits, few enough to hold their pictures.
+_AHEAD = 4
+
+
+@dataclass(frozen=True)
+class MiningParameters:
+    """How negatives are found; with these, 3000 photographs gave the weights that are shipped.
+
+    Attributes
+    ----------
+    random_windows
+        Most windows drawn at random, from all negatives together, before there is a detector.
+    random_per_picture
+        Most of them of one picture: more would show the same again.
+    above
+        Least SVM margin of a hard negative: -1 is where the squared hinge begins to count.
+    per_picture
+        Most hard negatives of one picture and round.
+    scale
+        Ratio of neighbouring levels of the search.
+    surest
+        Hits of a picture that are looked at; the first detectors have thousands.
+    max_iou
+        Of two hits that overlap more, the surer is taken.
+    enlarged
+        Share of the pictures that are also searched at twice their size.
+    clear_of_objects
+        Most intersection over union of a negative with a labelled box.
+    """
+
+    random_windows: int = 20_000
+    random_per_picture: int = 40
+    above: float = -1.0
+    per_picture: int = 6
+    scale: float = 1.1
+    surest: int = 500
+    max_iou: float = 0.5
+    enlarged: float = 0.15
+    clear_of_objects: float = 0.3
+
+
+@dataclass(frozen=True)
+class Negatives:
+    """Pictures to take negatives from.
+
+    Attributes
+    ----------
+    paths
+        The pictures.
+    objects
+        Of the pictures that do show objects, their boxes [px], float64 (N, 4).
+    """
+
+    paths: tuple[Path, ...]
+    objects: dict[Path, NDArray[np.float64]] = field(default_factory=dict)
+
+
+def in_order(work: Callable[[Item], Result], items: Iterable[Item], workers: int) -> Iterator[Result]:
+    """Do `work` on several cores and yield its results in the items' order, with few of them waiting at a time."""
+    with ThreadPoolExecutor(workers) as pool:
+        waiting = []
+        try:
+            for item in items:
+                waiting.append(pool.submit(work, item))
+                if len(waiting) >= _AHEAD * workers:
+                    yield waiting.pop(0).result()
+            while waiting:
+                yield waiting.pop(0).result()
+        finally:
+            for job in waiting:
+                job.cancel()
+
+
+def hog_of(shape: WindowShape, coefficients: NDArray[np.float64] | None = None) -> _core.Hog:
+    """Make the descriptor of a window, OpenCV's default in all but its size; with an SVM, a detector."""
+    svm = None if coefficients is None else coefficients.astype(np.float32)
+    return _core.Hog(shape.size, (16, 16), (8, 8), (8, 8), 9, -1.0, 0.2, True, 64, False, svm)
+
+
+def describe(hog: _core.Hog, crops: Sequence[NDArray[np.uint8]]) -> NDArray[np.float32]:
+    """Return the descriptors of crops of the window's size: float32 (N, D)."""
+    descriptors = np.empty((len(crops), hog.descriptor_len), np.float32)
+    for row, crop in zip(descriptors, crops, strict=True):
+        row[:] = hog.compute(np.ascontiguousarray(crop), (8, 8), (0, 0), None)
+    return descriptors
+
+
+def readable(path: Path) -> NDArray[np.uint8] | None:
+    """Read a gray picture; None, with a warning, where it cannot be read.
+
+    Warns
+    -----
+    LabelWarning
+        The file is left out.
+    """
+    try:
+        return read_gray(path)
+    except (ReadError, ImageError, OSError) as error:
+        warnings.warn(f"left out: {error}", LabelWarning, stacklevel=2)
+        return None
+
+
+def describe_objects(
+    regions: Sequence[Region], shape: WindowShape, jitter: Jitter, mirror: bool, seed: int, workers: int
+) -> Iterator[NDArray[np.float32]]:
+    """Yield the descriptors of each object: float32 (n, D), the plain one first, then jittered and mirrored ones.
+
+    An object that came before, or whose mirror image did, has none (0, D): some collections of crops hold both. So has
+    one whose picture cannot be read.
+    """
+    hog = hog_of(shape)
+    seen: set[bytes] = set()
+
+    def work(job: tuple[int, Region]) -> tuple[list[bytes], NDArray[np.float32]]:
+        number, region = job
+        image = readable(region.path)
+        if image is None:
+            return [], describe(hog, [])
+        # A box without width is the whole picture.
+        box = region.box if region.box[2] > 0 else (0.0, 0.0, float(image.shape[1]), float(image.shape[0]))
+        # A generator for each object: what is drawn for one does not depend on the others.
+        crops = positive_crops(image, box, shape.size, jitter, mirror, np.random.default_rng([seed, 1, number]))
+        ways = [crops[0], crops[0][:, ::-1]] if mirror else [crops[0]]
+        return [hashlib.sha256(way.tobytes()).digest() for way in ways], describe(hog, crops)
+
+    for marks, descriptors in in_order(work, enumerate(regions), workers):
+        known = not seen.isdisjoint(marks)
+        seen.update(marks[:1])
+        yield descriptors[:0] if known else descriptors
+
+
+@dataclass(frozen=True, slots=True)
+class Mined:
+    """Negatives of one picture: its index, their boxes float64 (n, 4) [px], margins (n,), descriptors (n, D)."""
+
+    picture: int
+    boxes: NDArray[np.float64]
+    margins: NDArray[np.float64]
+    descriptors: NDArray[np.float32]
+
+
+def random_negatives(
+    negatives: Negatives, shape: WindowShape, parameters: MiningParameters, seed: int, workers: int
+) -> Iterator[Mined]:
+    """Yield windows drawn at random, of every picture about as many; a picture of a window's size gives itself."""
+    hog = hog_of(shape)
+    share = min(parameters.random_per_picture, parameters.random_windows / max(1, len(negatives.paths)))
+
+    def work(number: int) -> Mined:
+        image = readable(negatives.paths[number])
+        if image is None:
+            return _nothing(number, hog)
+        rng = np.random.default_rng([seed, 2, number])
+        count = int(share) + int(rng.random() < share % 1)
+        height, width = image.shape
+        if (width, height) == shape.size:
+            boxes = [(0.0, 0.0, float(width), float(height))]
+        else:
+            boxes = random_boxes((width, height), shape.size, count, rng)
+        return _cut_out(
+            image, number, np.array(boxes, np.float64).reshape(-1, 4), None, negatives, shape, parameters, hog
+        )
+
+    return in_order(work, range(len(negatives.paths)), workers)
+
+
+def hard_negatives(
+    coefficients: NDArray[np.float64],
+    negatives: Negatives,
+    known: dict[int, set[tuple[float, ...]]],
+    shape: WindowShape,
+    parameters: MiningParameters,
+    seed: int,
+    workers: int,
+) -> Iterator[Mined]:
+    """Search every picture and yield what the detector takes for an object and is not `known`: boxes by picture."""
+    detector, hog = hog_of(shape, coefficients), hog_of(shape)
+
+    def work(number: int) -> Mined:
+        image = readable(negatives.paths[number])
+        if image is None:
+            return _nothing(number, hog)
+        boxes, margins = _search(detector, image, parameters)
+        if np.random.default_rng([seed, 3, number]).random() < parameters.enlarged:
+            twice = resize(image, 2 * image.shape[1], 2 * image.shape[0])
+            more_boxes, more_margins = _search(detector, twice, parameters)
+            boxes, margins = np.concatenate([boxes, more_boxes / 2]), np.concatenate([margins, more_margins])
+        surest = np.argsort(-margins, kind="stable")[: parameters.surest]
+        boxes, margins = boxes[surest], margins[surest]
+        kept = nms(boxes, margins, parameters.max_iou)
+        fresh = [tuple(box) not in known.get(number, ()) for box in boxes[kept].tolist()]
+        kept = kept[np.array(fresh, np.bool_)]
+        return _cut_out(image, number, boxes[kept], margins[kept], negatives, shape, parameters, hog)
+
+    return in_order(work, range(len(negatives.paths)), workers)
+
+
+def _nothing(number: int, hog: _core.Hog) -> Mined:
+    return Mined(number, np.empty((0, 4)), np.empty(0), describe(hog, []))
+
+
+def cut_again(
+    kept: dict[int, NDArray[np.float64]], negatives: Negatives, shape: WindowShape, workers: int
+) -> Iterator[Mined]:
+    """Yield known boxes of pictures again, to go on where an earlier run stopped."""
+    hog = hog_of(shape)
+
+    def work(number: int) -> Mined:
+        image, boxes = read_gray(negatives.paths[number]), kept[number]
+        crops = [cut(image, box, shape.size) for box in boxes]
+        return Mined(number, boxes, np.zeros(len(boxes)), describe(hog, crops))
+
+    return in_order(work, kept, workers)
+
+
+def _search(
+    detector: _core.Hog, image: NDArray[np.uint8], parameters: MiningParameters
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    # No padding: a window beyond the edge would learn what mirroring looks like.
+    boxes, margins = detector.detect_multi_scale(image, parameters.above, (8, 8), (0, 0), parameters.scale, 0, False)
+    return boxes.astype(np.float64), margins
+
+
+def _cut_out(
+    image: NDArray[np.uint8],
+    number: int,
+    boxes: NDArray[np.float64],
+    margins: NDArray[np.float64] | None,
+    negatives: Negatives,
+    shape: WindowShape,
+    parameters: MiningParameters,
+    hog: _core.Hog,
+) -> Mined:
+    """Cut out the windows that are clear of labelled objects, of hard ones the surest few."""
+    objects = negatives.objects.get(negatives.paths[number])
+    if objects is not None and len(objects) and len(boxes):
+        clear = (
+            intersection_over_union(shape.object_box.inside(boxes), objects).max(axis=1) <= parameters.clear_of_objects
+        )
+        boxes = boxes[clear]
+        margins = None if margins is None else margins[clear]
+    if margins is None:
+        margins = np.zeros(len(boxes))
+    else:
+        boxes, margins = boxes[: parameters.per_picture], margins[: parameters.per_picture]
+    return Mined(number, boxes, margins, describe(hog, [cut(image, box, shape.size) for box in boxes]))

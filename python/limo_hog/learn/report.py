@@ -1,0 +1,146 @@
+"""An evaluation as a page: the DET curve, the figures and the worst mistakes."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limo_hog.atomic import about, whole_file
+from limo_hog.extras import needed
+from limo_hog.imaging.writing import write_image
+from limo_hog.learn.evaluation import Evaluation, EvaluationParameters, as_json, compare
+from limo_hog.learn.labels import Picture
+from limo_hog.learn.mistakes import draw_sheet, worst_mistakes
+
+with needed(by="--report", what="matplotlib", install="'limo-hog[plot]'"):
+    from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Miss rates and FPPI that the plot shows.
+_LEAST_MISS_RATE, _FPPI = 0.02, (10**-2.3, 10**1.2)
+_STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#1d2733}
+table{border-collapse:collapse;margin:1rem 0}
+td,th{padding:.25rem .8rem;border-bottom:1px solid #d7dde4;text-align:right}
+td:first-child,th:first-child{text-align:left}small{color:#66727f}img{max-width:100%}"""
+
+
+def write_report(
+    folder: Path, pictures: Sequence[Picture], evaluations: Sequence[Evaluation], how: EvaluationParameters
+) -> Path:
+    """Write `index.html`, `det.png`, `mistakes.png` (of the first detector) and `figures.json`; return the page.
+
+    Raises
+    ------
+    OSError
+        A file cannot be written; no part of it is left behind.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    _plot(folder / "det.png", evaluations)
+    mistakes = worst_mistakes(evaluations[0], pictures)
+    if mistakes:
+        write_image(folder / "mistakes.png", draw_sheet(mistakes))
+    figures = as_json(pictures, evaluations, how)
+    figures["mistakes"] = [
+        {"kind": m.kind, "picture": str(m.path), "box": list(m.box), "score": m.score} for m in mistakes
+    ]
+    _write(folder / "figures.json", json.dumps(figures, indent=2) + "\n")
+    page = folder / "index.html"
+    _write(page, _page(figures["pictures"], figures["objects"], evaluations, how, bool(mistakes)))
+    return page
+
+
+def _write(path: Path, text: str) -> None:
+    with whole_file(path) as part, about(path):
+        part.write_text(text, "utf-8")
+
+
+def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:
+    figure = Figure(figsize=(7, 5), dpi=120, layout="constrained")
+    axes: Axes = figure.add_subplot()
+    for one in evaluations:
+        miss = np.maximum(1 - one.curve.recall, _LEAST_MISS_RATE / 2)
+        axes.step(one.curve.fppi, miss, where="post", label=f"{one.figures.lamr:.3f}  {one.name}")
+    axes.set(xscale="log", yscale="log", xlim=_FPPI, ylim=(_LEAST_MISS_RATE, 1.02))
+    axes.set(xlabel="false positives per image", ylabel="miss rate")
+    ticks = [0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0]
+    axes.set_yticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.grid(alpha=0.3)
+    axes.legend(title="log-average miss rate", loc="lower left")
+    with whole_file(path) as part, about(path):
+        figure.savefig(part)
+
+
+def _page(
+    pictures: int, objects: int, evaluations: Sequence[Evaluation], how: EvaluationParameters, mistakes: bool
+) -> str:
+    share = f"{how.confidence:.0%}"
+    rows = [
+        (
+            one.name,
+            *(_with_interval(one, figure) for figure in ("lamr", "recall_01", "recall_1", "ap")),
+            f"{one.threshold_01:.2f}",
+            f"{one.ms:.1f}",
+        )
+        for one in evaluations
+    ]
+    heights = [
+        (f"{one.name}, {_range(row.low, row.high)}", row.objects, f"{row.recall_01:.2f}", f"{row.recall_1:.2f}")
+        for one in evaluations
+        for row in one.by_height
+    ]
+    differences = [
+        (f"{evaluations[0].name} − {d.name}", d.figure, f"{d.difference:+.3f}", _interval(d.interval, "+.3f"))
+        for other in evaluations[1:]
+        for d in compare(evaluations[0], other, how)
+    ]
+    title = f"{evaluations[0].name} on {pictures} pictures with {objects} objects"
+    recalls = ("recall at 0.1 FPPI", "at 1")
+    parts = [
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>',
+        f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1>",
+        '<img src="det.png" alt="Miss rate over false positives per image">',
+        _table(("model", "LAMR", *recalls, "AP", "threshold at 0.1 FPPI", "ms a picture"), rows),
+        "<p><small>LAMR: log-average miss rate over 10⁻²…10⁰ false positives per image (FPPI), lower is better. "
+        f"A box is found from an IoU of {how.min_iou:g} on. Intervals: {share} of {how.draws} draws of the pictures."
+        "</small></p>",
+    ]
+    if differences:
+        note = "An interval without 0: more than the choice of pictures."
+        parts += [
+            "<h2>Differences, paired</h2>",
+            _table(("models", "figure", "difference", "interval"), differences),
+            f"<p><small>{note}</small></p>",
+        ]
+    parts += ["<h2>By height</h2>", _table(("objects", "how many", *recalls), heights)]
+    if mistakes:
+        alt = "False alarms in red with their score, missed people in green with their height"
+        parts += [f"<h2>The worst mistakes of {html.escape(evaluations[0].name)}</h2>", f"<p><small>{alt}</small></p>"]
+        parts += [f'<img src="mistakes.png" alt="{alt}">']
+    return "\n".join([*parts, "</html>", ""])
+
+
+def _with_interval(one: Evaluation, figure: str) -> str:
+    return f"{getattr(one.figures, figure):.3f} {_interval(one.intervals[figure], '.2f')}"
+
+
+def _interval(ends: tuple[float, float], form: str) -> str:
+    return f"[{ends[0]:{form}}, {ends[1]:{form}}]"
+
+
+def _range(low: float, high: float) -> str:
+    return f"{low:g}–{high:g} px" if np.isfinite(high) else f"from {low:g} px"
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    def line(cells: Iterable[object], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in cells) + "</tr>"
+
+    return "\n".join(["<table>", line(head, "th"), *(line(row, "td") for row in rows), "</table>"])

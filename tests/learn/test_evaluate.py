@@ -1,0 +1,130 @@
+"""`limo-hog evaluate` measures detectors on labelled pictures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from limo_hog.cli.main import main
+from limo_hog.cli.support.scene import street
+from limo_hog.detector import PeopleDetector
+from limo_hog.imaging.writing import write_image
+from limo_hog.learn.evaluation import Rival, compare, evaluate
+from limo_hog.learn.formats import read_labels
+
+USC = Path(__file__).parents[3] / "shared" / "data" / "eval" / "usc-c"
+needs_photographs = pytest.mark.skipif(not USC.is_dir(), reason="the photographs of ../shared are not here")
+
+
+@pytest.fixture
+def streets(tmp_path: Path) -> Path:
+    """Drawn streets whose labels are what the detector itself finds, but for one person and one dog."""
+    boxes = {}
+    for i, size in enumerate([(192, 256), (256, 192), (64, 64)]):
+        picture = street(*size, 3)
+        write_image(tmp_path / "data" / f"{i}.png", picture)
+        boxes[f"{i}.png"] = PeopleDetector().detect(picture).person_boxes.tolist()
+    assert sum(map(len, boxes.values())) >= 2
+    boxes["2.png"].append([10, 5, 15, 40])
+    (tmp_path / "data" / "boxes.json").write_text(json.dumps(boxes))
+    return tmp_path / "data"
+
+
+def _figures(text: str) -> dict[str, Any]:
+    figures = json.loads(text)
+    assert isinstance(figures, dict)
+    return figures
+
+
+def test_figures_come_as_json(streets: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    objects = sum(map(len, json.loads((streets / "boxes.json").read_text()).values()))
+    assert main(["evaluate", "opencv", str(streets), "--json", "-"]) == 0
+    result = _figures(capsys.readouterr().out)
+    assert (result["pictures"], result["objects"]) == (3, objects)
+    (model,) = result["models"]
+    found = (objects - 1) / objects
+    assert model["recall_1"] == pytest.approx(found)
+    low, high = model["intervals"]["recall_1"]
+    assert low <= found <= high
+    assert low < high
+    assert sum(row["objects"] for row in model["by_height"]) == objects
+    assert model["ms"] > 0
+    assert result["differences"] == []
+
+
+def test_others_are_compared_on_the_same_draws(streets: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", "opencv", str(streets), "--against", "daimler", "--json", "-"]) == 0
+    result = _figures(capsys.readouterr().out)
+    first, other = result["models"]
+    lamr = next(d for d in result["differences"] if d["figure"] == "lamr")
+    assert (lamr["model"], lamr["difference"]) == ("daimler", pytest.approx(first["lamr"] - other["lamr"]))
+
+
+def test_a_detector_differs_from_itself_by_nothing(streets: Path) -> None:
+    detector = PeopleDetector(threshold=-1)
+    _, (one, same) = evaluate([Rival("a", detector), Rival("b", detector)], read_labels(streets))
+    for difference in compare(one, same):
+        assert (difference.difference, *difference.interval) == (0, 0, 0)
+
+
+def test_the_report_is_a_page_with_the_curve_and_the_mistakes(
+    streets: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "report"
+    command = ["evaluate", "opencv", str(streets), "--min-height", "64", "none", "--report", str(out)]
+    assert main(command) == 0
+    assert str(out / "index.html") in capsys.readouterr().out
+    assert sorted(path.name for path in out.iterdir()) == ["det.png", "figures.json", "index.html", "mistakes.png"]
+    page = (out / "index.html").read_text("utf-8")
+    assert "opencv 64 px" in page
+    assert "opencv as is" in page
+    mistakes = _figures((out / "figures.json").read_text())["mistakes"]
+    missed = [m for m in mistakes if m["kind"] == "missed"]
+    assert [m["box"] for m in missed] == [[10, 5, 15, 40]]
+    sheet = np.asarray(cv2.imread(str(out / "mistakes.png")))
+    assert sheet.std() > 10
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda folder: (folder / "0.png").unlink(), "1 of which are not there, 0.png for one"),
+        (lambda folder: (folder / "0.png").write_bytes(b"no"), "0.png: not an image"),
+        (lambda folder: (folder / "boxes.json").write_text('{"0.png": []}'), "no labelled box in 1 pictures"),
+    ],
+)
+def test_bad_data_is_named_in_one_line(
+    change: Any, complaint: str, streets: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change(streets)
+    out = tmp_path / "report"
+    assert main(["evaluate", "opencv", str(streets), "--report", str(out), "--json", str(tmp_path / "x.json")]) == 1
+    shown = capsys.readouterr().err.strip()
+    assert complaint in shown
+    assert "\n" not in shown
+    assert not out.exists()
+    assert not (tmp_path / "x.json").exists()
+
+
+def test_boxes_left_out_are_told_as_warnings(streets: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    boxes = json.loads((streets / "boxes.json").read_text())
+    boxes["0.png"] += [[500, 5, 20, 40], [5, 5, 0, 40]]
+    (streets / "boxes.json").write_text(json.dumps(boxes))
+    assert main(["evaluate", "opencv", str(streets)]) == 0
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert lines[0] == "limo-hog: warning: 1 boxes without area are left out"
+    assert lines[1].endswith("0.png: 1 boxes outside of its 192 x 256 pixels are left out")
+    assert len(lines) == 2
+
+
+@needs_photographs
+def test_opencvs_model_finds_people_on_the_validation_photographs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", "opencv", str(USC), "--json", "-"]) == 0
+    result = _figures(capsys.readouterr().out)
+    assert (result["pictures"], result["objects"]) == (100, 232)
+    assert result["models"][0]["lamr"] == pytest.approx(0.298, abs=0.01)

@@ -1,0 +1,91 @@
+"""Our own weights: two windows, each for its sizes, whose margins mean the same."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_hog import PeopleDetector
+from limo_hog.cli.main import main
+from limo_hog.cli.support.scene import street
+from limo_hog.models import load_model
+
+WEIGHTS = Path(str(files("limo_hog") / "weights"))
+LARGE, SMALL = WEIGHTS / "limo_64x128.yml", WEIGHTS / "limo_48x96.yml"
+USC = Path(__file__).parents[3] / "shared" / "data" / "eval" / "usc-c"
+
+
+def people_of(height: float) -> NDArray[np.uint8]:
+    """A drawn street, made so large that its smallest people are about this tall [px]."""
+    picture = street(640, 480, 1)
+    least = int(PeopleDetector(model=LARGE).detect(picture).person_boxes[:, 3].min())
+    return np.asarray(cv2.resize(picture, None, fx=height / least, fy=height / least), np.uint8)
+
+
+def test_the_small_windows_margins_are_on_the_scale_of_the_large_ones() -> None:
+    small, limo = load_model(SMALL), load_model("limo")
+    assert limo.smaller is not None and limo.calibration is not None and small.calibration is not None
+    descriptor = np.random.default_rng(0).random(len(small.coefficients) - 1).astype(np.float32)
+    own = float(descriptor @ small.coefficients[:-1] + small.coefficients[-1])
+    mapped = float(descriptor @ limo.smaller.coefficients[:-1] + limo.smaller.coefficients[-1])
+    slope, offset = small.calibration
+    assert limo.calibration.slope * mapped + limo.calibration.offset == pytest.approx(slope * own + offset, abs=1e-3)
+
+
+def test_people_too_small_for_the_large_window_are_found_by_the_small_one() -> None:
+    picture = people_of(84)
+    limo, large = (PeopleDetector(model=model, min_height=None).detect(picture) for model in ("limo", LARGE))
+    assert limo.person_boxes[:, 3].min() < 95
+    assert len(large) == 0 or large.person_boxes[:, 3].min() >= 99
+    assert len(limo) > len(large)
+
+
+@pytest.mark.parametrize("min_height", [64, 96, 200])
+def test_from_64_px_on_the_large_window_alone_is_used(min_height: float) -> None:
+    picture = street(640, 480, 3)
+    limo, large = (PeopleDetector(model=model, min_height=min_height).detect(picture) for model in ("limo", LARGE))
+    assert len(limo) > 0
+    assert limo.boxes.tolist() == large.boxes.tolist()
+    assert limo.scores.tolist() == large.scores.tolist()
+
+
+def test_opencvs_grouping_knows_one_window() -> None:
+    picture = street(640, 480, 3)
+    limo, large = (
+        PeopleDetector(model=model, min_height=None, nms="group").detect(picture) for model in ("limo", LARGE)
+    )
+    assert len(limo) > 0
+    assert limo.boxes.tolist() == large.boxes.tolist()
+
+
+def test_people_of_48_px_are_found() -> None:
+    picture = people_of(52)
+    found = PeopleDetector(model="limo", min_height=48).detect(picture)
+    assert 46 <= found.person_boxes[:, 3].min() < 62
+    assert (np.diff(found.scores) <= 0).all()
+
+
+def test_the_cards_say_where_the_weights_come_from() -> None:
+    for model in (LARGE, SMALL):
+        card = json.loads(model.with_name(f"{model.name}.json").read_text())
+        assert [source["files"] for source in card["data"]] == [2416, 924, 4146, 3019]
+        assert all(len(source["sha256"]) == 64 for source in card["data"])
+        assert load_model(model).threshold == card["threshold"]
+    assert sum(path.stat().st_size for path in WEIGHTS.iterdir()) < 120_000
+
+
+@pytest.mark.skipif(not USC.is_dir(), reason="the photographs of ../shared are not here")
+def test_on_the_validation_photographs_our_weights_miss_fewer_people_than_opencvs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["evaluate", "limo", str(USC), "--against", "opencv", "--json", "-"]) == 0
+    limo, opencv = json.loads(capsys.readouterr().out)["models"]
+    assert limo["lamr"] <= 0.30
+    assert limo["lamr"] == pytest.approx(0.268, abs=0.01)
+    assert opencv["lamr"] <= 0.35

@@ -1,0 +1,152 @@
+"""`limo-hog train` makes a detector that OpenCV loads, and leaves nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from tests.learn.bollards import EXAMPLE, example
+
+import limo_hog
+from limo_hog.cli.main import main
+from limo_hog.imaging.writing import write_image
+from limo_hog.models import load_model
+
+LIMO_HOG = Path(sys.executable).with_name("limo-hog")
+
+
+@pytest.fixture(scope="module")
+def bollards(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bollards")
+    example().write(folder, pictures=16, seed=0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def trained(bollards: Path) -> Path:
+    model = bollards.parent / "models" / "bollard.yml"
+    assert main(["train", str(bollards), "--out", str(model), "--rounds", "1"]) == 0
+    return model
+
+
+def test_opencv_loads_the_detector_and_finds_the_same_rectangles(trained: Path, bollards: Path) -> None:
+    image = np.asarray(cv2.imread(str(bollards / "0003.png")), np.uint8)
+    theirs, ours = cv2.HOGDescriptor(), limo_hog.HOGDescriptor()
+    assert theirs.load(str(trained)) and ours.load(str(trained))
+    options: dict[str, Any] = {
+        "hitThreshold": -0.5,
+        "winStride": (8, 8),
+        "padding": (4, 4),
+        "scale": 1.05,
+        "groupThreshold": 0,
+    }
+    expected, weights = theirs.detectMultiScale(image, **options)
+    found, scores = ours.detectMultiScale(image, **options)
+    assert len(expected) > 0
+    assert sorted(map(tuple, np.asarray(found).tolist())) == sorted(map(tuple, np.asarray(expected).tolist()))
+    assert np.sort(np.ravel(scores)) == pytest.approx(np.sort(np.ravel(weights)), abs=1e-5)
+
+
+def test_the_card_says_what_the_detector_is_and_was_made_of(trained: Path, bollards: Path) -> None:
+    card = json.loads(trained.with_name("bollard.yml.json").read_text())
+    assert card["window"][0] % 8 == 0
+    assert [row["round"] for row in card["rounds"]] == [0, 1]
+    assert card["data"][0]["files"] == 16
+    assert len(card["data"][0]["sha256"]) == 64
+    assert card["figures"]["pictures"] == 3
+    assert str(bollards.parent) not in json.dumps(card)
+    model = load_model(trained)
+    assert model.person_box == tuple(card["person_box"])
+    assert model.threshold == card["threshold"]
+    assert model.calibration is not None and model.calibration.slope > 0
+    assert sorted(path.name for path in trained.parent.iterdir()) == ["bollard.yml", "bollard.yml.json"]
+
+
+def test_the_detector_finds_what_it_was_trained_on(trained: Path, bollards: Path) -> None:
+    boxes = json.loads((bollards / "boxes.json").read_text())
+    image = np.asarray(cv2.imread(str(bollards / "0000.png")), np.uint8)
+    found = limo_hog.PeopleDetector(model=trained, min_height=48).detect(image)
+    assert len(found) > 0
+    x, y, _, h = found.person_boxes[0].tolist()
+    assert any(abs(x - bx) < 10 and abs(y + h - by - bh) < 15 for bx, by, bw, bh in boxes["0000.png"])
+    assert found.probabilities[0] > 0.5
+
+
+def test_the_same_command_writes_the_same_bytes(trained: Path, bollards: Path, tmp_path: Path) -> None:
+    again = tmp_path / "bollard.yml"
+    assert main(["train", str(bollards), "--out", str(again), "--rounds", "1"]) == 0
+    for name in ("bollard.yml", "bollard.yml.json"):
+        assert (tmp_path / name).read_bytes() == trained.with_name(name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "complaint"),
+    [
+        (["missing"], 1, "missing: no such file"),
+        (["{crops}"], 1, "there are crops only"),
+        (["{empty}", "--negatives", "{crops}"], 1, "no image or video in this folder"),
+        (["{data}", "--label", "cow"], 1, "no box has the label 'cow'"),
+        (["{data}", "--window", "60x60"], 2, "multiples of 8"),
+        (["{data}", "--object-box", ".5", ".1", ".6", ".5"], 2, "inside of the crop"),
+        (["{data}", "--resume"], 1, "no stopped run to resume"),
+    ],
+)
+def test_bad_data_is_named_in_one_line_and_nothing_is_written(
+    arguments: list[str],
+    code: int,
+    complaint: str,
+    bollards: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    write_image(tmp_path / "crops" / "a.png", np.zeros((64, 64), np.uint8))
+    (tmp_path / "empty").mkdir()
+    places = {"data": bollards, "crops": tmp_path / "crops", "empty": tmp_path / "empty"}
+    given = [argument.format(**places) for argument in arguments]
+    out = tmp_path / "out" / "model.yml"
+    assert main(["train", *given, "--out", str(out)]) == code
+    (error,) = [line for line in capsys.readouterr().err.splitlines() if "warning:" not in line]
+    assert error.startswith("limo-hog: ") and complaint in error
+    assert not out.exists() and not out.with_name("model.yml.json").exists()
+
+
+def test_ctrl_c_keeps_the_last_round_and_the_run_goes_on(trained: Path, bollards: Path, tmp_path: Path) -> None:
+    out = tmp_path / "bollard.yml"
+    command = [str(LIMO_HOG), "train", str(bollards), "--out", str(out), "--rounds", "1"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("round 0"):
+                process.send_signal(signal.SIGINT)
+                break
+        rest = process.stderr.read()
+        assert process.wait(60) == 130
+    assert f"{out} is round 0; --resume goes on from it" in rest
+    assert [row["round"] for row in json.loads(out.with_name("bollard.yml.json").read_text())["rounds"]] == [0]
+    assert main([*command[1:], "--resume"]) == 0
+    for name in ("bollard.yml", "bollard.yml.json"):
+        assert (tmp_path / name).read_bytes() == trained.with_name(name).read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bollard.yml", "bollard.yml.json"]
+
+
+@pytest.mark.slow
+def test_the_example_reaches_an_average_precision_of_95_on_unseen_bollards(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, seed in (("a", "0"), ("b", "1")):
+        subprocess.run([sys.executable, str(EXAMPLE), str(tmp_path / name), "--seed", seed], check=True)
+    start = time.perf_counter()
+    assert main(["train", str(tmp_path / "a"), "--out", str(tmp_path / "m.yml")]) == 0
+    assert time.perf_counter() - start < 280
+    capsys.readouterr()
+    command = ["evaluate", str(tmp_path / "m.yml"), str(tmp_path / "b"), "--min-height", "48", "--json", "-"]
+    assert main(command) == 0
+    assert json.loads(capsys.readouterr().out)["models"][0]["ap"] >= 0.95

@@ -1,6 +1,6 @@
 """What the live page costs the run it shows: `uv run python benches/view.py`.
 
-The same run as fast as it can: alone, with the page served and nobody there, and with the page open (a process that
+The same run as fast as it can: alone, with the page served and not open, and with the page open (a process that
 takes all it is sent, as a browser does). Rounds are interleaved, and the least of each counts.
 """
 

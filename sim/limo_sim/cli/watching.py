@@ -90,7 +90,7 @@ class Watching:
             self.view.watch(moment)
 
     def end(self, episode: Episode, card: ScoreCard) -> None:
-        """Draw the figure, and say goodbye to those who watch."""
+        """Draw the figure, and tell the pages that the run is over."""
         if self.plot is not None:
             from limo_sim.view.plot import plot
 
@@ -136,9 +136,5 @@ def watching(
             yield all_
         except KeyboardInterrupt as error:
             stopped = error
-        opened = stack.pop_all()
-    # Another signal does not interrupt the closing.
-    with held():
-        opened.close()
     if stopped is not None:
         raise stopped

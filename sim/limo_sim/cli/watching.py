@@ -136,9 +136,5 @@ def watching(
             yield all_
         except KeyboardInterrupt as error:
             stopped = error
-        opened = stack.pop_all()
-    # Another signal does not interrupt the closing.
-    with held():
-        opened.close()
     if stopped is not None:
         raise stopped

@@ -59,8 +59,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader has closed the pipe; Python must not complain again when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (LimoHogError, OSError, MemoryError, ModuleNotFoundError) as error:
-        if isinstance(error, ModuleNotFoundError):
+    except (LimoHogError, OSError, MemoryError, ImportError) as error:
+        if isinstance(error, ImportError) and not isinstance(error, LimoHogError):
             error = missing_extra(f"limo-hog {arguments[0]}", error)
         if "--debug" in arguments:
             raise
@@ -141,7 +141,7 @@ def _module_of(command: str, arguments: list[str]) -> ModuleType | None:
         module: ModuleType = offered[command].load()
         return module
     if command in ARENA:
-        raise MissingExtraError(f"limo-hog {command} needs the simulator: pip install limo-sim")
+        raise MissingExtraError(f"limo-hog {command} needs the arena: pip install 'limo-hog[sim]'")
     return None
 
 

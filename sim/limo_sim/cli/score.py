@@ -5,19 +5,18 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from limo_hog.cli.support.arguments import count, metres, seconds
+from limo_hog.cli.support.arguments import count, file_ending, metres, output_file, seconds
 from limo_hog.cli.support.environment import cores
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
-from limo_hog.follow.control.naming import CONTROLLERS
-from limo_hog.follow.sense.detectors import NAMES
+from limo_hog.follow.control.naming import CONTROLLERS, controller_named
+from limo_hog.follow.sense.detectors import NAMES, detector_named
 
 if TYPE_CHECKING:
     from limo_sim.run.sweep import Estimate, Summary
@@ -52,8 +51,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="the people detector (%(default)s)"
     )
     parser.add_argument("--workers", type=count, metavar="N", help="processes (one for each core)")
-    parser.add_argument("--json", metavar="FILE", help="write every score card and the summary; - is standard output")
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the comparison")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write every score card and the summary; - is standard output"
+    )
+    parser.add_argument(
+        "--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help="draw the comparison"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -66,8 +69,12 @@ def run(args: argparse.Namespace) -> int:
         # A missing library is named before the work, not after.
         from limo_sim.view.sweep_plot import plot
     scenarios = args.scenario or Scenario.names()
+    # What is wrong with a name is told before the work, too.
     for name in scenarios:
         load(name)
+    detector_named(args.detector)
+    for name in args.controller:
+        controller_named(name, args.target)
     runs = [
         Run(scenario, controller, args.detector, seed, args.seconds, args.target)
         for scenario in scenarios

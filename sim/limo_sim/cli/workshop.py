@@ -23,7 +23,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add `workshop`."""
     parser = subparsers.add_parser(
         "workshop",
-        description="Write a ROS 2 node that finds a person and follows them, task by task: docs/workshop/ has it all.",
+        description="Write a ROS 2 node that finds a person and follows them, task by task. The tasks are at "
+        "https://github.com/limo-hog/limo-hog/blob/main/docs/workshop/README.md",
     )
     actions = parser.add_subparsers(dest="action", metavar="new|check|solution", required=True)
     for action, words in (

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from statistics import NormalDist, fmean, stdev
 
-import cv2
-
 import limo_hog
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
@@ -75,6 +73,8 @@ class Summary:
 
 def play(run: Run) -> ScoreCard:
     """Play a run in this process, on one core."""
+    import cv2  # there already: the arena's camera needs it
+
     limo_hog.set_num_threads(1)
     cv2.setNumThreads(1)
     controller = controller_named(run.controller, run.target)

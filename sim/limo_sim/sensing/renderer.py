@@ -11,10 +11,10 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, MOUNT_HEIGHT, WIDTH, CameraPose
 from limo_sim.sensing.solids import (
     BAND,
@@ -35,6 +35,9 @@ from limo_sim.sensing.solids import (
 from limo_sim.world.furniture import KINDS, Box, Frustum
 from limo_sim.world.person import Pose, body
 from limo_sim.world.scenario import ROOM_HALF, WALL_HEIGHT, Furniture, Scenario
+
+with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
 
 U8 = NDArray[np.uint8]
 U32 = NDArray[np.uint32]

@@ -20,7 +20,6 @@ from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from typing import Any
 
-import cv2
 import numpy as np
 from aiohttp import WSMsgType, web
 from numpy.typing import NDArray
@@ -29,6 +28,7 @@ from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.zones import ZONE_ENDS
+from limo_hog.imaging.writing import jpeg
 from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FIELD
 from limo_sim.sensing.lidar import MOUNT_AHEAD
@@ -54,7 +54,6 @@ STALL_S = 5.0
 _CLOSE_S = 1.0
 #: What the system keeps for a page that does not read [bytes]: about two pictures, so that what it shows is new.
 _SEND_BUFFER = 1 << 17
-_JPEG = [cv2.IMWRITE_JPEG_QUALITY, 80]
 
 
 class ServeError(LimoHogError):
@@ -342,11 +341,10 @@ class View:
             return []
         depth = depth_picture(moment.frame.depth[::2, ::2], self._scenario.depth.far_m)
         pictures = {b"c": annotated(moment.frame, moment.step, caption=False), b"d": depth}
-        encoded = [letter + cv2.imencode(".jpg", p, _JPEG)[1].tobytes() for letter, p in pictures.items()]
+        encoded = [letter + jpeg(p) for letter, p in pictures.items()]
         # A window's name stands between its letter and its picture, ended by a line feed.
         return encoded + [
-            b"w" + " ".join(name.split()).encode() + b"\n" + cv2.imencode(".jpg", p, _JPEG)[1].tobytes()
-            for name, p in moment.windows.items()
+            b"w" + " ".join(name.split()).encode() + b"\n" + jpeg(p) for name, p in moment.windows.items()
         ]
 
 

@@ -201,7 +201,7 @@ class Scenario:
         try:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError) as error:
-            raise ScenarioError(f"{path}: cannot be read: {error}") from error
+            raise ScenarioError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError(f"{path}: not TOML: {error}") from error
         scenario = build(Scenario, {"name": path.stem, **table}, f"{path.name}: ")

@@ -10,13 +10,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.cv2_api.install import install_into_cv2
 from limo_hog.detector import Detections
+from limo_hog.extras import needed
 from limo_sim.ros.lockstep.world import Found, World
+
+with needed(by="limo-hog run", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
 
 _MISSING = object()
 

@@ -58,7 +58,9 @@ class _Refuser(importlib.abc.MetaPathFinder):
         top = fullname.partition(".")[0]
         if top in _ROS_TOPS or top.endswith(("_msgs", "_srvs", "_interfaces")):
             raise NotOfferedError(
-                f"limo-hog run does not offer {fullname}; see docs/ros2.md for what of ROS 2 it does", name=fullname
+                f"limo-hog run does not offer {fullname}; what of ROS 2 it offers is listed at "
+                "https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
+                name=fullname,
             )
         return None
 

@@ -21,6 +21,7 @@ _LIBRARIES = {
     "mcap": ("mcap", "record"),
     "rerun": ("Rerun", "viz"),
     "rosbags": ("rosbags", "record"),
+    "shtab": ("shtab", "completion"),
     "sklearn": ("scikit-learn", "train"),
 }
 

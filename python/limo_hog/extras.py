@@ -22,6 +22,7 @@ _LIBRARIES = {
     "rerun": ("Rerun", "viz"),
     "rosbags": ("rosbags", "record"),
     "scipy": ("SciPy", "train"),
+    "shtab": ("shtab", "completion"),
     "sklearn": ("scikit-learn", "train"),
     "threadpoolctl": ("threadpoolctl", "train"),
 }

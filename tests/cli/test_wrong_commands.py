@@ -58,6 +58,7 @@ WRONG_ARGUMENTS = [
     ("workshop new there.txt", "there.txt is there already; give another name"),
     ("replay", "the following arguments are required: FILE"),
     ("topic", "the following arguments are required"),
+    ("completion fish", "invalid choice: 'fish' (choose from"),
 ]
 #: What cannot be done, which ends with 1: what is typed, and a part of the only line of the answer.
 IMPOSSIBLE = [
@@ -131,6 +132,7 @@ MISSING = [
     ("cyclonedds", "follow --ros2", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
     ("cyclonedds", "arena --ros2", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
     ("cyclonedds", "topic list", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
+    ("shtab", "completion bash", "limo-hog completion needs shtab: pip install 'limo-hog[completion]'"),
     ("aiohttp", "follow --view", "needs the module aiohttp, which is not installed: install limo-hog anew"),
 ]
 

@@ -137,6 +137,27 @@ def test_ctrl_c_keeps_the_last_round_and_the_run_goes_on(trained: Path, bollards
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bollard.yml", "bollard.yml.json"]
 
 
+def test_ten_crops_and_a_damaged_negative_make_a_detector_with_warnings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = example()
+    for i in range(10):
+        image, boxes = module.draw(np.random.default_rng(i))
+        x, y, w, h = map(round, boxes[0])
+        write_image(
+            tmp_path / "crops" / f"{i}.png",
+            np.pad(image, ((30, 30), (30, 30), (0, 0)), "edge")[y : y + h + 60, x : x + w + 60],
+        )
+        write_image(tmp_path / "free" / f"{i}.png", np.random.default_rng(i).integers(0, 256, (200, 200), np.uint8))
+    (tmp_path / "free" / "bad.png").write_bytes(b"no")
+    out = tmp_path / "m.yml"
+    assert main(["train", str(tmp_path / "crops"), "--negatives", str(tmp_path / "free"), "--out", str(out)]) == 0
+    warned = [line for line in capsys.readouterr().err.splitlines() if "warning:" in line]
+    assert [line.split("warning: ")[1].partition(":")[0] for line in warned] == ["10 objects only", "left out"]
+    assert json.loads(out.with_name("m.yml.json").read_text())["figures"]["crops"] == 2
+    assert load_model(out).person_box.height == 0.78
+
+
 @pytest.mark.slow
 def test_the_example_reaches_an_average_precision_of_95_on_unseen_bollards(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -137,6 +137,7 @@ def test_crops_are_learnt_from_once_each(crops: Path) -> None:
     how = replace(SMALL, rounds=0, held_out=0.25)
     (done,) = train(data, how, State(fingerprint(data, how)), 2)
     count = len(data.regions) - 1
+    assert len(data.held_negatives) == 1 and data.held_negatives[0] not in data.negatives.paths
     assert done.objects + len(done.held_out_margins) == count
     assert len(done.held_out_margins) == round(0.25 * count)
     assert (done.held_out_margins > 0).mean() > 0.8

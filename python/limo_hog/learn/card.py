@@ -91,8 +91,8 @@ def _measured(evaluation: Evaluation, data: TrainingData) -> dict[str, Any]:
 
 
 def _measured_on_crops(done: Round, detector: PeopleDetector, data: TrainingData, workers: int) -> dict[str, Any]:
-    # Every tenth negative: enough for the threshold, although it was learnt from.
-    paths = data.negatives.paths[::10]
+    # Where there is one negative only, it is learnt from and measured on.
+    paths = data.held_negatives or data.negatives.paths
 
     def work(path: Path) -> NDArray[np.float64]:
         image = readable(path)

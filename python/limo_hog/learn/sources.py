@@ -44,6 +44,8 @@ class TrainingData:
         Pictures to take negatives from.
     validation
         Labelled pictures that are not learnt from; empty where there are only crops.
+    held_negatives
+        Pictures without objects that are not learnt from, where there are only crops: false alarms are counted on them.
     min_height
         Height [px] from which objects are sought when the detector is measured.
     sources
@@ -54,6 +56,7 @@ class TrainingData:
     regions: tuple[Region, ...]
     negatives: Negatives
     validation: tuple[Picture, ...]
+    held_negatives: tuple[Path, ...]
     min_height: float
     sources: tuple[Source, ...]
 
@@ -121,13 +124,20 @@ def gather(wanted: Wanted) -> TrainingData:
         )
     if len(regions) < _FEW:
         warnings.warn(f"{len(regions)} objects only: a detector wants {_FEW} or more", LabelWarning, stacklevel=2)
+    held: set[Path] = set()
+    if not validation:
+        count = min(round(wanted.held_out * len(free)), len(free) - 1)
+        held = [
+            free[i] for i in sorted(np.random.default_rng([wanted.seed, 6]).permutation(len(free))[: max(0, count)])
+        ]
     objects = {picture.path: picture.arrays()[0] for picture in training}
     sources = [_source(path, crops, labelled, free) for path in (*wanted.data, *wanted.negatives)]
     return TrainingData(
         shape,
         regions,
-        Negatives((*free, *objects), objects),
+        Negatives((*(path for path in free if path not in held), *objects), objects),
         tuple(validation),
+        tuple(path for path in free if path in held),
         _min_height(training, shape),
         tuple(sources),
     )

@@ -67,7 +67,7 @@ class TrainingParameters:
     bias_feature: float = 10.0
     rounds: int = 3
     mirror: bool = True
-    held_out: float = 0.1
+    held_out: float = 0.2
     most_bytes: int = 2**31
     seed: int = 0
     jitter: Jitter = field(default_factory=Jitter)

@@ -12,11 +12,15 @@ from typing import Any
 @contextmanager
 def warnings_in_one_line() -> Iterator[None]:
     """Print every warning raised inside as `limo-hog: warning: ...`, once."""
+    shown: set[str] = set()
 
     def show(message: Warning | str, *_: Any, **__: Any) -> None:
-        print(f"limo-hog: warning: {' '.join(str(message).split())}", file=sys.stderr)
+        line = " ".join(str(message).split())
+        if line not in shown:
+            shown.add(line)
+            print(f"limo-hog: warning: {line}", file=sys.stderr)
 
     with warnings.catch_warnings():
-        warnings.simplefilter("default")
+        warnings.simplefilter("always")
         warnings.showwarning = show
         yield

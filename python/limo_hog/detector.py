@@ -5,19 +5,23 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog import _core
 from limo_hog.cv2_api.arguments import integer, pair, pixels, real, shown
-from limo_hog.exceptions import HogError, ImageError, ParameterError, ParameterTypeError
+from limo_hog.exceptions import HogError, ImageError, LimoHogError, ParameterError, ParameterTypeError
 from limo_hog.models import PERSON_BOX, Calibration, Model, PersonBox, load_model
 from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
+
+if TYPE_CHECKING:
+    from PIL.Image import Image as PilImage
 
 #: Ways to make one box of a person's many hits, and the default `overlap` of each.
 #: 0.65 and 0.3: chosen on street photographs, where 0.5 to 0.75 and 0.2 to 0.4 hardly differ.
@@ -38,6 +42,7 @@ class Detections:
     """People found in one image, best first.
 
     `len(d)` counts them, iterating and `d[i]` give (box, score), a slice, mask or array of indices gives `Detections`.
+    Jupyter shows a table, and the picture as long as the program holds it, or its file is there.
 
     Attributes
     ----------
@@ -55,6 +60,8 @@ class Detections:
     scores: NDArray[np.float64]
     person_box: PersonBox = PERSON_BOX
     calibration: Calibration | None = None
+    #: What was searched, for `_repr_html_`: a file's name, or a reference that keeps no image alive.
+    _searched: Any = field(default=None, repr=False, compare=False)
 
     @classmethod
     def none(cls) -> Detections:
@@ -120,6 +127,39 @@ class Detections:
         from limo_hog.imaging.drawing import annotate
 
         return annotate(pixels(image), self.person_boxes, [f"{score:.1f}" for score in self.scores])
+
+    def _repr_html_(self) -> str:
+        # Imported here: only notebooks need it.
+        from limo_hog.imaging.notebook import shown
+
+        name = self._searched if isinstance(self._searched, str) else ""
+        caption = f"{len(self)} {'person' if len(self) == 1 else 'people'}{name and f' in {name}'}"
+        rows = [
+            [str(i), *map(str, box), f"{score:.2f}"]
+            for i, (box, score) in enumerate(zip(self.person_boxes.tolist(), self.scores, strict=True))
+        ]
+        return shown(caption, ("", "x", "y", "width", "height", "margin"), rows, self._jpeg())
+
+    def _jpeg(self) -> bytes | None:
+        """Return the small picture with the boxes; None where it is gone, or OpenCV is not installed."""
+        from limo_hog.imaging.inputs import as_array
+        from limo_hog.imaging.notebook import reduced
+
+        searched = self._searched() if isinstance(self._searched, weakref.ref) else self._searched
+        if searched is None:
+            return None
+        try:
+            from limo_hog.imaging.writing import jpeg
+
+            image, divisor = reduced(pixels(as_array(searched)))
+            small = dataclasses.replace(self, boxes=np.asarray(self.boxes // divisor, np.int32))
+            return jpeg(small.draw(image))
+        except (LimoHogError, OSError):
+            return None
+
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
+        # A copy in another process does not know the image.
+        return Detections, (self.boxes, self.scores, self.person_box, self.calibration)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,19 +289,29 @@ class PeopleDetector:
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
+    def detect(self, image: NDArray[np.uint8] | str | os.PathLike[str] | PilImage) -> Detections:
         """People in `image`, best first.
 
         Parameters
         ----------
         image
-            uint8 (H, W), (H, W, 1) or (H, W, 3), colours in any order.
+            uint8 (H, W), (H, W, 1) or (H, W, 3), colours in any order; the name of a picture's file; or a PIL image.
 
         Raises
         ------
         ImageError
-            The array is not such an image, or would be too large at the size that `min_height` asks for.
+            It is no such image, or would be too large at the size that `min_height` asks for.
+        MissingExtraError
+            A file is to be read, and neither OpenCV nor Pillow is installed.
+        OSError
+            The file cannot be read.
         """
+        searched = _remembered(image)
+        if not isinstance(image, np.ndarray):
+            # Imported here, as programs that read pictures themselves do not need it.
+            from limo_hog.imaging.inputs import as_array
+
+            image = as_array(image)
         image = pixels(image)
         seen = self._at_search_size(image)
         threshold = self._model.threshold if self.threshold is None else self.threshold
@@ -280,7 +330,7 @@ class PeopleDetector:
             low = self._model.person_box.height * found[:, 3] <= self.max_height + 0.5
             found, scores = found[low], scores[low]
         boxes = np.rint(found).astype(np.int32)
-        return Detections(boxes, scores, self._model.person_box, self._model.calibration)
+        return Detections(boxes, scores, self._model.person_box, self._model.calibration, searched)
 
     def _at_search_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the image at the size at which the smallest person fills the model's window."""
@@ -319,6 +369,16 @@ class PeopleDetector:
         # Copies and pickles are made anew of the arguments: the compiled detector cannot be pickled.
         arguments = {name.name: getattr(self, name.name) for name in dataclasses.fields(self) if name.init}
         return partial(type(self), **arguments), ()
+
+
+def _remembered(image: Any) -> Any:
+    """Return what finds an image again without keeping it alive: its file's name, or a weak reference."""
+    if isinstance(image, (str, os.PathLike)):
+        return os.fspath(image)
+    try:
+        return weakref.ref(image)
+    except TypeError:
+        return None
 
 
 def _number(name: str, value: Any, low: float, high: float) -> float:

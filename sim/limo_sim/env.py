@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import gymnasium
 import numpy as np
 from gymnasium import spaces
@@ -139,7 +138,7 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._arena
 
     def _image(self) -> NDArray[np.uint8]:
-        return cv2.cvtColor(self._running().frame().image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+        return np.ascontiguousarray(self._running().frame().image[..., ::-1])
 
     def _observe(self) -> Observation:
         arena = self._running()

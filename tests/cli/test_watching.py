@@ -183,7 +183,15 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(option: str, file: str, room
 def _started(folder: Path, *options: str) -> tuple[subprocess.Popen[str], Path, Path]:
     film, bag = folder / "run.mp4", folder / "run.mcap"
     command = [str(LIMO_HOG), "follow", "--seconds", "3600", "--video", str(film), "--record", str(bag), *options]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True), film, bag
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=_as_in_a_terminal
+    )
+    return process, film, bag
+
+
+def _as_in_a_terminal() -> None:
+    """A shell's background jobs, which tests may be, ignore Ctrl-C; their children would, too."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
@@ -213,8 +221,11 @@ def _stop_at_random(seed: int, folder: Path) -> None:
     for _ in range(rng.randint(1, 3)):
         process.send_signal(rng.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
         time.sleep(rng.choice((0.0, 0.01, 0.1)))
-    said = process.communicate(timeout=60)[1]
-    assert {path.name for path in folder.iterdir()} <= {"run.mp4", "run.mcap"}, said
+    try:
+        said = process.communicate(timeout=60)[1]
+    finally:
+        process.kill()
+    assert {path.name for path in folder.iterdir()} <= {"run.mp4", "run.mcap"}, (process.returncode, said)
     if film.exists():
         with av.open(film) as container:
             assert list(container.decode(video=0))
@@ -261,7 +272,9 @@ async def _text(page: Any) -> str:
 
 def test_ctrl_c_ends_a_run_that_is_paused_on_its_page() -> None:
     command = [str(LIMO_HOG), "follow", "--seconds", "3600", "--view", "0"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=_as_in_a_terminal
+    )
     assert process.stderr is not None
     url = process.stderr.readline().split()[-1]
 

@@ -118,7 +118,8 @@ def test_memory_is_bounded_by_the_least_hard_negatives(data: TrainingData) -> No
     assert bounded[1].new == 10
     assert bounded[1].left_out == free[1].new - 10
     assert bounded[-1].descriptor_bytes <= room
-    kept = [margins[(picture, *box)] for picture, boxes in state.mined[0].items() for box in boxes.tolist()]
+    places = [(picture, *box) for picture, boxes in state.mined[0].items() for box in boxes.tolist()]
+    kept = [margins[where] for where in places]
     assert sorted(kept) == sorted(margins.values())[-10:]
 
 

@@ -147,3 +147,32 @@ def test_camera_info_holds_the_focal_length_where_ros_wants_it() -> None:
     assert info.k.tolist() == [448.6, 0, 319.5, 0, 448.6, 239.5, 0, 0, 1]
     assert info.p.reshape(3, 4)[:, :3].reshape(-1).tolist() == info.k.tolist()
     messages.serialize(info)
+
+
+@pytest.mark.parametrize("data", [b"", b"no picture", b"\xff\xd8\xff"])
+def test_compressed_data_that_are_no_picture_are_refused(data: bytes) -> None:
+    pytest.importorskip("cv2")
+    message = messages.default_message("sensor_msgs/msg/CompressedImage")
+    message.format, message.data = "jpeg", np.frombuffer(data, np.uint8)
+    with pytest.raises(messages.MessageError, match=f"{len(data)} bytes of 'jpeg' are no picture"):
+        messages.decompressed(message)
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "float32"])
+@pytest.mark.parametrize("shape", [(0, 4), (4, 0), (0, 0)])
+def test_an_image_without_pixels_comes_back_empty(shape: tuple[int, int], dtype: str) -> None:
+    empty = messages.image(0.0, np.zeros(shape, dtype))
+    assert (empty.height, empty.width, len(empty.data)) == (*shape, 0)
+    assert messages.pixels_of(empty).shape == shape
+
+
+def test_an_imu_sample_says_that_it_has_no_orientation() -> None:
+    message = messages.imu(2.5, (0.1, 0.2, 0.3), (1.0, 2.0, 9.8))
+    # REP 145: -1 in the first element of the covariance
+    assert message.orientation_covariance.tolist() == [-1.0] + 8 * [0.0]
+    assert message.angular_velocity_covariance.tolist() == 9 * [0.0]
+    assert message.linear_acceleration_covariance.tolist() == 9 * [0.0]
+    assert (message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z) == (0.1, 0.2, 0.3)
+    assert (message.linear_acceleration.x, message.linear_acceleration.z) == (1.0, 9.8)
+    assert message.header.frame_id == "imu_link"
+    messages.serialize(message)

@@ -216,8 +216,8 @@ ZEROS = zstandard.compress(bytes(1 << 30))
 MESSAGE = _record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"\0\1\0\0")
 
 
-def _schema(text: bytes, encoding: bytes = b"ros2msg") -> bytes:
-    return _record(3, struct.pack("<H", 1) + _string(b"a/msg/B") + _string(encoding) + _string(text))
+def _schema(text: bytes, encoding: bytes = b"ros2msg", name: bytes = b"a/msg/B") -> bytes:
+    return _record(3, struct.pack("<H", 1) + _string(name) + _string(encoding) + _string(text))
 
 
 def _channel(encoding: bytes = b"cdr") -> bytes:
@@ -253,6 +253,7 @@ def _channel(encoding: bytes = b"cdr") -> bytes:
         (BEGIN + _schema(b"module a {" * 5_000, b"ros2idl"), "at byte"),
         (BEGIN + _schema(b"{}", b"jsonschema"), "known are ros2msg and ros2idl"),
         (BEGIN + _schema(b"\xff"), "at byte"),
+        (BEGIN + _schema(b"string x\n", name=b"geometry_msgs/msg/Twist"), "Twist has other fields than that of ROS 2"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

@@ -20,13 +20,13 @@ MISTAKES = {
     "no stop": (
         "            self.commands.publish(Twist())\n            self.show",
         "            self.show",
-        "the robot stands while nobody is seen",
+        "the robot stands while no person is found",
         "no box, and no command",
     ),
     "drives on": (
         "            self.commands.publish(Twist())\n            self.show",
         "            twist = Twist(); twist.linear.x = 0.2; self.commands.publish(twist)\n            self.show",
-        "the robot stands while nobody is seen",
+        "the robot stands while no person is found",
         "no box, yet the command is linear.x 0.20",
     ),
     "sign of the turn": ("middle - cx", "cx - middle", "the robot turns towards the person", "px to the left"),

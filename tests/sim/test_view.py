@@ -1,4 +1,4 @@
-"""Those who watch a run can hold it, hurry it and turn its knobs, and others cannot."""
+"""The live page's pace, parameters and numbers."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_paused_run_goes_on_one_step_at_a_time() -> None:
     assert len(ticks) == 100
 
 
-def test_a_knob_changes_the_controller_and_keeps_its_kind() -> None:
+def test_a_parameter_changes_the_controller_and_keeps_its_kind() -> None:
     tunable: Tunable[Any] = Tunable(controller_named("tracking", None))
     tunable.set("target_distance", 2)
     tunable.set("full_every", 5.0)
@@ -74,7 +74,7 @@ def test_a_knob_changes_the_controller_and_keeps_its_kind() -> None:
 @pytest.mark.parametrize(
     ("name", "value"), [("nonsense", 1.0), ("target_distance", float("nan")), ("target_distance", -1.0)]
 )
-def test_a_knob_that_is_none_or_turned_too_far_is_refused(name: str, value: float) -> None:
+def test_a_parameter_that_is_none_or_out_of_bounds_is_refused(name: str, value: float) -> None:
     with pytest.raises(ParameterError, match=name):
         Tunable(controller_named("tracking", None)).set(name, value)
 

@@ -100,7 +100,7 @@ async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
     await tab.value("document.querySelector('#step').click()")
     await tab.until(f"now.time > {stood}")
     assert await tab.value("now.time") - stood == pytest.approx(0.1, abs=0.03)
-    # The pictures that are kept show somebody who is followed.
+    # The pictures that are kept show a followed person.
     while await tab.value("now.error_px") is None:
         stood = await tab.value("now.time")
         await tab.value("document.querySelector('#step').click()")

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import io
 import sys
+import threading
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import cv2
@@ -135,3 +139,44 @@ def test_standard_input_holds_an_image_or_a_video(suffix: str, tmp_path: Path, m
             with open_video(source) as video:
                 assert len(list(video.frames())) == 20
     assert not source.path.exists()
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[str]:
+    """The address of a web server on `tmp_path`."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(tmp_path))) as http:
+        thread = threading.Thread(target=http.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{http.server_port}"
+        http.shutdown()
+        thread.join()
+
+
+def test_a_video_is_read_from_its_address(server: str, tmp_path: Path) -> None:
+    writer = cv2.VideoWriter(str(tmp_path / "film.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 10, (64, 48))
+    for i in range(12):
+        writer.write(np.full((48, 64, 3), 10 * i, np.uint8))
+    writer.release()
+    (source,) = find_sources(f"{server}/film.avi?token=1")
+    assert (source.kind, source.path) == (Kind.STREAM, Path("film.avi"))
+    with open_video(source) as video:
+        means = [float(image.mean()) for _, image in video.frames()]
+    np.testing.assert_allclose(means, 10 * np.arange(12), atol=3)
+
+
+@pytest.mark.parametrize("place", ["{server}/none.mp4", "http://127.0.0.1:9/a.mp4", "rtsp://127.0.0.1:9/live", "x://y"])
+def test_an_address_without_a_video_is_named(place: str, server: str) -> None:
+    name = place.format(server=server)
+    with pytest.raises(ReadError) as told, open_video(find_sources(name)[0]):
+        pass
+    assert str(told.value).startswith(f"{name}: OpenCV found no video there within 10 s; wanted is the address")
+
+
+def test_what_is_no_address_is_named() -> None:
+    with pytest.raises(ReadError, match=r"^http://\[1: not an address"):
+        find_sources("http://[1")

@@ -23,7 +23,7 @@ pub struct Hog {
     backend: Backend,
 }
 
-/// The image as the fast path wants it, shared by all levels of a call.
+/// The image in planes for the fast path, shared by all levels of a call.
 static PLANES: Pool<Planes> = Pool::new();
 
 /// Where the fast path's scores may be further off than this, it only finds the hits: the exact path weighs them all.

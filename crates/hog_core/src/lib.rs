@@ -1,7 +1,7 @@
 //! OpenCV's HOG people detector: the same rectangles as `cv2.HOGDescriptor` 4.14.
 //!
 //! 1. [`params`] checks what the user asks for, once.
-//! 2. [`pyramid`] shrinks the image to levels, and tells which windows each level has.
+//! 2. [`pyramid`] shrinks the image to levels, and lists the windows of each level.
 //! 3. [`exact`] computes the gradients, blocks and scores of a level, in OpenCV's order of sums: the specification.
 //! 4. `fast` does the same in vector kernels, with scores up to a few millionths off.
 //! 5. `rescore` takes the hits from `fast`, and lets `exact` decide those that are too close to the threshold.

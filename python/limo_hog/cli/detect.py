@@ -1,4 +1,4 @@
-"""`limo-hog detect`: people in photographs, folders, videos, a camera, standard input."""
+"""`limo-hog detect`: people in photographs, folders, videos, a camera, a stream, standard input."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add `detect`."""
     parser = subparsers.add_parser(
         "detect",
-        description="Find people in photographs, folders, globs, videos, a camera (its index) or standard input (-). "
-        "What cannot be read is named, the rest is done, and the exit code is 1 then.",
+        description="Find people in photographs, folders, globs, videos, a camera (its index), a stream (rtsp://…, "
+        "http://…) or standard input (-). What cannot be read is named, the rest is done, and the exit code is 1 then.",
     )
     parser.add_argument("inputs", nargs="+", metavar="INPUT")
     parser.add_argument("--out", type=Path, metavar="DIR", help="write annotated copies of pictures and videos (MP4)")

@@ -8,7 +8,7 @@ import sys
 import time
 from typing import Any
 
-from limo_hog.cli.support.arguments import add_follower, seconds
+from limo_hog.cli.support.arguments import add_follower, output_file, seconds
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
@@ -28,7 +28,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_follower(parser)
     parser.add_argument("--seconds", type=seconds, default=60.0, metavar="S", help="stop after this time (60)")
-    parser.add_argument("--json", metavar="FILE", help="write what happened as JSON; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write what happened as JSON; - is standard output"
+    )
     parser.add_argument("--ros2", action="store_true", help="follow on a ROS 2 robot instead of in the arena")
 
 

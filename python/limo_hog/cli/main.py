@@ -14,7 +14,8 @@ import signal
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from types import ModuleType
+from functools import partial
+from types import ModuleType, SimpleNamespace
 
 from limo_hog.cli.support.output import UsageError, one_line
 from limo_hog.cli.support.signals import stopping
@@ -32,6 +33,7 @@ BUILT_IN = {
     "replay": "run the detector and the follower on a recording",
     "topic": "look at ROS 2 topics, as `ros2 topic` does",
     "info": "versions, CPU features, chosen backend, and what OpenCV is installed",
+    "completion": "print the completion of commands and options for a shell",
 }
 #: Commands of the distribution limo-sim and their line in `limo-hog --help`.
 ARENA = {
@@ -59,8 +61,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader has closed the pipe; Python must not complain again when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (LimoHogError, OSError, MemoryError, ModuleNotFoundError) as error:
-        if isinstance(error, ModuleNotFoundError):
+    except (LimoHogError, OSError, MemoryError, ImportError) as error:
+        if isinstance(error, ImportError) and not isinstance(error, LimoHogError):
             error = missing_extra(f"limo-hog {arguments[0]}", error)
         if "--debug" in arguments:
             raise
@@ -112,6 +114,19 @@ def _run(arguments: list[str]) -> int:
     return int(module.run(args))
 
 
+def whole_parser() -> argparse.ArgumentParser:
+    """Return a parser that knows the options of every installed command."""
+    parser = argparse.ArgumentParser(prog="limo-hog")
+    commands = parser.add_subparsers(metavar="COMMAND")
+    for name, line in (ARENA | BUILT_IN).items():
+        with suppress(MissingExtraError):
+            module = _module_of(name, [])
+            if module is not None:
+                # A command has no line of its own in the help; completion leaves out those without.
+                module.add_parser(SimpleNamespace(add_parser=partial(commands.add_parser, help=line)))
+    return parser
+
+
 def _likely(word: str, known: Iterable[str]) -> str:
     """Return the question whether another word was meant; nothing where none is like it."""
     # Imported here: only a mistyped word needs it.
@@ -141,7 +156,7 @@ def _module_of(command: str, arguments: list[str]) -> ModuleType | None:
         module: ModuleType = offered[command].load()
         return module
     if command in ARENA:
-        raise MissingExtraError(f"limo-hog {command} needs the simulator: pip install limo-sim")
+        raise MissingExtraError(f"limo-hog {command} needs the arena: pip install 'limo-hog[sim]'")
     return None
 
 

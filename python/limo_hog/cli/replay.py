@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from limo_hog.cli.support.arguments import file_ending
+from limo_hog.cli.support.arguments import file_ending, output_file
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
@@ -36,7 +36,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="detector (hog)")
     parser.add_argument("--image", metavar="TOPIC", help="topic of the camera (/limo_camera/image)")
     parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="video of the detections (H.264)")
-    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write the figures as JSON; - is standard output"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""Pictures from files, folders, globs, a camera or standard input."""
+"""Pictures from files, folders, globs, a camera, an address or standard input."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ VIDEO_SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".ts"
 
 #: The input that stands for standard input.
 STDIN = "-"
+#: How long a stream may take to open, or to send its next frame [s]; cameras on a network take one or two.
+STREAM_TIMEOUT_S = 10
 
 
 class ReadError(LimoHogError):
@@ -38,11 +41,15 @@ class Kind(Enum):
     IMAGE = "image"
     VIDEO = "video"
     CAMERA = "camera"
+    STREAM = "stream"
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One picture, video or camera: its name as the user gave it, and where to read it."""
+    """One picture, video, camera or stream: its name as the user gave it, and where to read it.
+
+    The path of a stream is that part of its address, without folders, which a copy of it is named after.
+    """
 
     name: str
     path: Path
@@ -58,6 +65,12 @@ def find_sources(name: str) -> list[Source]:
         If it stands for nothing.
     """
     path = Path(name)
+    if "://" in name:
+        try:
+            address = urlsplit(name)
+        except ValueError as error:
+            raise ReadError(f"{name}: not an address: {error}") from error
+        return [Source(name, Path(Path(address.path).name or address.hostname or "stream"), Kind.STREAM)]
     if name == STDIN:
         return [Source(name, path, Kind.IMAGE)]
     if path.is_dir():
@@ -116,7 +129,7 @@ def read_image(source: Source) -> NDArray[np.uint8]:
 
 @dataclass(frozen=True, slots=True)
 class Video:
-    """An open video file or camera.
+    """An open video file, camera or stream.
 
     Attributes
     ----------
@@ -154,7 +167,7 @@ class Video:
 
 @contextmanager
 def open_video(source: Source) -> Iterator[Video]:
-    """Open a video file or a camera.
+    """Open a video file, a camera, or a stream such as rtsp://… or http://….
 
     Raises
     ------
@@ -163,6 +176,14 @@ def open_video(source: Source) -> Iterator[Video]:
     """
     if source.kind is Kind.CAMERA:
         capture, wanted = cv2.VideoCapture(int(source.name)), "no camera with this index"
+    elif source.kind is Kind.STREAM:
+        limits = (cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, cv2.CAP_PROP_READ_TIMEOUT_MSEC)
+        timeouts = [word for limit in limits for word in (limit, 1000 * STREAM_TIMEOUT_S)]
+        capture = cv2.VideoCapture(source.name, cv2.CAP_ANY, timeouts)
+        wanted = (
+            f"OpenCV found no video there within {STREAM_TIMEOUT_S} s; wanted is the address of a stream or a video, "
+            "such as rtsp://HOST/PATH"
+        )
     elif source.path.stat().st_size == 0:
         raise ReadError(f"{source.name}: the file is empty")
     else:

@@ -43,6 +43,11 @@ def write_image(path: Path, image: NDArray[np.uint8]) -> None:
         part.write_bytes(data.tobytes())
 
 
+def jpeg(image: NDArray[np.uint8], quality: int = 80) -> bytes:
+    """Return uint8 BGR or gray as the bytes of a JPEG file; quality 0..100, 80 hardly differs on a screen."""
+    return cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+
+
 @contextmanager
 def video_writer(path: Path, fps: float) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
     """Give a function that appends one uint8 (height, width, 3) BGR frame to an H.264 video.

@@ -14,15 +14,14 @@ from limo_hog.atomic import about, whole_file
 from limo_hog.detector import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
-from limo_hog.ros2.mcap_reading import mcap_messages
+from limo_hog.ros2.mcap_reading import check_type, mcap_messages
 from limo_hog.ros2.messages import default_message, serialize, to_time, typestore
+from limo_hog.ros2.names import DETECTIONS_TYPE
 
 with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
     from mcap.writer import CompressionType, Writer
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import get_types_from_msg
-
-DETECTIONS = "vision_msgs/msg/Detection2DArray"
 
 #: The parts of vision_msgs that hold boxes: name -> definition (ROS 2 Humble on). rosbags does not bring them.
 _VISION = {
@@ -37,7 +36,7 @@ _VISION = {
         "std_msgs/Header header\nvision_msgs/ObjectHypothesisWithPose[] results\n"
         "vision_msgs/BoundingBox2D bbox\nstring id"
     ),
-    DETECTIONS: "std_msgs/Header header\nvision_msgs/Detection2D[] detections",
+    DETECTIONS_TYPE: "std_msgs/Header header\nvision_msgs/Detection2D[] detections",
 }
 
 
@@ -63,7 +62,7 @@ def _with_vision() -> None:
 def detections_message(stamp: float, found: Detections, frame: str) -> Any:
     """Return boxes as vision_msgs/Detection2DArray: centre and size [px], score as the SVM gave it."""
     _with_vision()
-    array = default_message(DETECTIONS)
+    array = default_message(DETECTIONS_TYPE)
     array.header.stamp, array.header.frame_id = to_time(stamp), frame
     for box, score in found:
         one = default_message("vision_msgs/msg/Detection2D")
@@ -87,7 +86,7 @@ def to_detections(message: Any) -> Detections:
         If a box has no score.
     """
     if not all(one.results for one in message.detections):
-        raise BagError(f"a {DETECTIONS} has a box without a hypothesis: its score is missing")
+        raise BagError(f"a {DETECTIONS_TYPE} has a box without a hypothesis: its score is missing")
     boxes = [
         (
             one.bbox.center.position.x - one.bbox.size_x / 2,
@@ -173,5 +172,7 @@ def _messages(path: Path) -> Iterator[tuple[str, int, Any]]:
             yield from mcap_messages(part)
         return
     with AnyReader([path], default_typestore=typestore()) as reader:
+        for connection in reader.connections:
+            check_type(reader.typestore, connection.msgtype)
         for connection, nanoseconds, data in reader.messages():
             yield connection.topic, nanoseconds, reader.deserialize(data, connection.msgtype)

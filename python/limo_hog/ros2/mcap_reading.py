@@ -17,6 +17,7 @@ from typing import Any, BinaryIO, NamedTuple
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.ros2.messages import typestore
+from limo_hog.ros2.names import DETECTIONS_TYPE, TYPES
 
 with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
     import lz4.frame
@@ -31,6 +32,8 @@ with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record
 MAX_RECORD = 1 << 28
 #: The longest message definition that is read [bytes]; the longest of ROS 2's own has 12 000.
 MAX_DEFINITION = 1 << 17
+#: Types whose fields are read: a recording must mean by them what ROS 2 Humble and Jazzy mean.
+_READ = {*TYPES.values(), DETECTIONS_TYPE}
 _MAGIC = b"\x89MCAP0\r\n"
 
 
@@ -162,4 +165,17 @@ def _definitions(name: str, encoding: str, data: bytes) -> Typestore:
             store.register(get_types_from_idl(part.partition("\n")[2] if part.startswith("IDL: ") else part))
     else:
         raise DamagedError(f"a definition in {encoding!r}; known are ros2msg and ros2idl")
+    check_type(store, name)
     return store
+
+
+def check_type(store: Typestore, name: str) -> None:
+    """Compare a type that is read with our definition of it, by its hash (REP-2016).
+
+    Raises
+    ------
+    DamagedError
+        It has other fields.
+    """
+    if name in _READ and store.hash_rihs01(name) != typestore().hash_rihs01(name):
+        raise DamagedError(f"its {name} has other fields than that of ROS 2 Humble")

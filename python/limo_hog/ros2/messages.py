@@ -153,7 +153,7 @@ def image(stamp: float, pixels: NDArray[Any], frame: str = CAMERA_FRAME) -> Imag
         width=pixels.shape[1],
         encoding=encoding,
         is_bigendian=0,
-        step=pixels.strides[0] if pixels.size else 0,
+        step=math.prod(pixels.shape[1:]) * pixels.itemsize,
         data=pixels.view(np.uint8).reshape(-1),
     )
 

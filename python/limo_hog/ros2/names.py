@@ -28,3 +28,6 @@ TYPES = {
     COMMAND: "geometry_msgs/msg/Twist",
     CLOCK: "rosgraph_msgs/msg/Clock",
 }
+
+#: Boxes, in recordings alone.
+DETECTIONS_TYPE = "vision_msgs/msg/Detection2DArray"

@@ -16,8 +16,8 @@ from limo_hog.follow.pipeline import Follower, Sighting
 from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
-from limo_hog.ros2.bag import DETECTIONS, Record, to_detections
-from limo_hog.ros2.names import IMAGE
+from limo_hog.ros2.bag import Record, to_detections
+from limo_hog.ros2.names import DETECTIONS_TYPE, IMAGE
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
 
 S = TypeVar("S")
@@ -89,7 +89,7 @@ def replay(
             follower.recheck(time, senses.scan, senses.odometry)
         if is_image:
             waiting = message
-        elif kind == DETECTIONS:
+        elif kind == DETECTIONS_TYPE:
             recorded = to_detections(message)
         elif kind != "sensor_msgs/msg/Image" or message.encoding in DEPTH_ENCODINGS:
             senses.take(message)

@@ -19,18 +19,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add `arena`."""
     parser = subparsers.add_parser(
         "arena",
-        description="Let the arena go on in real time, until Ctrl-C. With --ros2 its sensors are ROS 2 topics, and "
-        "whatever publishes /cmd_vel drives the robot: Humble, Jazzy, or limo-hog follow --ros2.",
+        description="Run the arena in real time, until Ctrl-C. With --ros2 its sensors are ROS 2 topics, and "
+        "every publisher of /cmd_vel drives the robot: Humble, Jazzy, or limo-hog follow --ros2.",
     )
-    parser.add_argument("--ros2", action="store_true", help="speak ROS 2 over DDS, on this machine alone")
-    add_scenario(parser, math.inf, "stop after so long")
+    parser.add_argument(
+        "--ros2", action="store_true", help="publish and subscribe to ROS 2 topics over DDS, on this machine alone"
+    )
+    add_scenario(parser, math.inf, "simulated time after which to stop (never)")
     add_watching(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the arena."""
     if not args.ros2 and not any((args.view, args.video, args.record)):
-        raise UsageError("an arena that nobody sees: give --ros2, --view, --video or --record")
+        raise UsageError("an arena without any output: give --ros2, --view, --video or --record")
     from limo_sim.ros.live import run_live
     from limo_sim.run.catalogue import load
 

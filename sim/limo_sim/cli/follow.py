@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import add_follower
+from limo_hog.cli.support.arguments import add_follower, output_file
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
@@ -26,7 +26,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_follower(parser)
     add_scenario(parser, 60.0, "simulated time (60)")
-    parser.add_argument("--json", metavar="FILE", help="write the score card as JSON; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write the score card as JSON; - is standard output"
+    )
     parser.add_argument(
         "--ros2",
         action="store_true",
@@ -36,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run one episode and show how it went."""
+    """Run one episode and show its score card."""
     from limo_sim.run.catalogue import load
     from limo_sim.run.episode import run_episode
     from limo_sim.run.score import score

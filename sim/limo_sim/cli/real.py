@@ -16,7 +16,7 @@ from limo_hog.extras import MissingExtraError
 
 
 def run_real(args: argparse.Namespace) -> int:
-    """Run the arena beside the script until its time is up; there is no score card, as nobody sees into the script."""
+    """Run the arena beside the script until its time is up; no score card, since its detections are not known."""
     if args.json:
         raise UsageError("--json and --real: a script on the network is not scored")
     if importlib.util.find_spec("rclpy") is None:

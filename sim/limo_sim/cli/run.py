@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from limo_hog.cli.support.arguments import output_file
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ScriptError(LimoHogError):
-    """The node failed; its own traceback has been shown before."""
+    """The node failed; its traceback has been printed before."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -29,11 +30,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "run",
         description="Run an rclpy script against the arena, in one process and in lock step: time passes only while "
         "the node waits, so the same file, scenario and seed give the same run. Ends with the score card of `follow`.",
-        epilog="docs/ros2.md lists what of ROS 2's Python API is offered.",
+        epilog="What of ROS 2's Python API is offered: https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
     )
     parser.add_argument("node", metavar="NODE.py", type=Path, help="the script")
     add_scenario(parser, 60.0, "simulated time (60)")
-    parser.add_argument("--json", metavar="FILE", help="write the score card as JSON; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write the score card as JSON; - is standard output"
+    )
     parser.add_argument("--real", action="store_true", help="with this computer's own rclpy: in real time, no score")
     add_watching(parser)
     parser.add_argument(
@@ -46,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the node and show how it went."""
+    """Run the node and show its score card."""
     if args.real:
         from limo_sim.cli.real import run_real
 

@@ -1,23 +1,22 @@
-"""`limo-hog score`: many seeds of scenarios and controllers on all cores, and what they say together."""
+"""`limo-hog score`: many seeds of scenarios and controllers on all cores, and their statistics."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from limo_hog.cli.support.arguments import count, metres, seconds
+from limo_hog.cli.support.arguments import count, file_ending, metres, output_file, seconds
 from limo_hog.cli.support.environment import cores
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
-from limo_hog.follow.control.naming import CONTROLLERS
-from limo_hog.follow.sense.detectors import NAMES
+from limo_hog.follow.control.naming import CONTROLLERS, controller_named
+from limo_hog.follow.sense.detectors import NAMES, detector_named
 
 if TYPE_CHECKING:
     from limo_sim.run.sweep import Estimate, Summary
@@ -32,7 +31,7 @@ _COLUMNS = (
     ("follows_first", "same\nperson", "%", ".1f"),
     ("clearance_min_m", "least\nclear", "m", ".2f"),
     ("contacts_person", "con-\ntacts", "", ".2g"),
-    ("path_wrong_m", "led\naway", "m", ".2f"),
+    ("path_wrong_m", "path\nwrong", "m", ".2f"),
 )
 
 
@@ -49,11 +48,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--seconds", type=seconds, default=60.0, metavar="S", help="simulated time of a run (60)")
     parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
     parser.add_argument(
-        "--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="who finds people (%(default)s)"
+        "--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="the people detector (%(default)s)"
     )
     parser.add_argument("--workers", type=count, metavar="N", help="processes (one for each core)")
-    parser.add_argument("--json", metavar="FILE", help="write every score card and the summary; - is standard output")
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the comparison")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write every score card and the summary; - is standard output"
+    )
+    parser.add_argument(
+        "--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help="draw the comparison"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -63,25 +66,28 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.world.scenario import Scenario
 
     if args.plot:
-        # A missing library is told before the work, not after.
+        # A missing library is named before the work, not after.
         from limo_sim.view.sweep_plot import plot
     scenarios = args.scenario or Scenario.names()
+    # What is wrong with a name is told before the work, too.
     for name in scenarios:
         load(name)
+    detector_named(args.detector)
+    for name in args.controller:
+        controller_named(name, args.target)
     runs = [
         Run(scenario, controller, args.detector, seed, args.seconds, args.target)
         for scenario in scenarios
         for controller in args.controller
         for seed in range(args.seeds)
     ]
-    cards = []
+    card_of = {}
     with progress("runs") as bar:
         task = bar.add_task("playing", total=len(runs))
-        for card in play_all(runs, args.workers or cores()):
-            cards.append(card)
+        for played, card in play_all(runs, args.workers or cores()):
+            card_of[played] = card
             bar.advance(task)
-    order = {(Path(run.scenario).stem, run.controller, run.seed): place for place, run in enumerate(runs)}
-    cards.sort(key=lambda card: order[card.scenario, card.controller, card.seed])
+    cards = [card_of[run] for run in runs]
     summaries = summarise(cards)
     if args.json:
         result = {"runs": [card.to_json() for card in cards], "summary": [asdict(one) for one in summaries]}

@@ -1,4 +1,4 @@
-"""What `follow`, `run` and `arena` offer to watch a run and to keep it: --view, --video, --record, --plot, --rerun."""
+"""The options of `follow`, `run` and `arena` that show or record a run: --view, --video, --record, --plot, --rerun."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PORT = 8488
 
 def add_watching(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    group = parser.add_argument_group("to watch it, and to keep it")
+    group = parser.add_argument_group("to show and to record the run")
     group.add_argument(
         "--view",
         nargs="?",
@@ -47,7 +47,7 @@ def add_watching(parser: argparse.ArgumentParser) -> None:
         "--plot",
         type=file_ending(".png", ".svg", ".pdf"),
         metavar="FILE.png",
-        help="draw path, error, distance and speed in one figure",
+        help="draw path, pixel error, distance and speed in one figure",
     )
     group.add_argument("--rerun", type=file_ending(".rrd"), metavar="FILE.rrd", help="log the run for the Rerun viewer")
 
@@ -61,7 +61,7 @@ def _address(text: str) -> tuple[str, int]:
 
 @dataclass
 class Watching:
-    """All that looks on at one run: hand `watch` to it, and call `end` when it is over.
+    """The watchers of one run: pass `watch` to the run, and call `end` after it.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Watching:
             self.view.watch(moment)
 
     def end(self, episode: Episode, card: ScoreCard) -> None:
-        """Draw the figure, and say goodbye to those who watch."""
+        """Draw the figure, and show the score card on the live page."""
         if self.plot is not None:
             from limo_sim.view.plot import plot
 
@@ -103,15 +103,15 @@ class Watching:
 def watching(
     args: argparse.Namespace, scenario: Scenario, controller: Tunable[Any] | None = None
 ) -> Iterator[Watching]:
-    """Open what was asked for: what cannot be had is said before the run. Files are whole, also on Ctrl-C or SIGTERM.
+    """Open every output that was asked for; a missing library is named first. Ctrl-C and SIGTERM leave whole files.
 
-    `controller` is whose parameters the page may set.
+    `controller` is the one whose parameters the page may set.
     """
     stopped: KeyboardInterrupt | None = None
     with ExitStack() as stack:
         all_ = Watching()
         if args.plot is not None:
-            # Drawn at the end; what is missing for it is said now.
+            # Drawn at the end; a missing library is named now.
             import limo_sim.view.plot  # noqa: F401
 
             all_.plot = args.plot
@@ -136,9 +136,5 @@ def watching(
             yield all_
         except KeyboardInterrupt as error:
             stopped = error
-        opened = stack.pop_all()
-    # Another signal does not interrupt the closing.
-    with held():
-        opened.close()
     if stopped is not None:
         raise stopped

@@ -23,12 +23,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add `workshop`."""
     parser = subparsers.add_parser(
         "workshop",
-        description="Write a ROS 2 node that finds a person and follows them, task by task: docs/workshop/ has it all.",
+        description="Write a ROS 2 node that finds a person and follows them, task by task. The tasks are at "
+        "https://github.com/limo-hog/limo-hog/blob/main/docs/workshop/README.md",
     )
     actions = parser.add_subparsers(dest="action", metavar="new|check|solution", required=True)
     for action, words in (
         ("new", "write the template to begin with"),
-        ("check", "run a node and say which checkpoints hold"),
+        ("check", "run a node and show which checkpoints hold"),
         ("solution", "write the model solution; - is standard output"),
     ):
         one = actions.add_parser(action, help=words, description=words.capitalize() + ".")

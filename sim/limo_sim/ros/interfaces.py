@@ -1,4 +1,4 @@
-"""Message classes as rclpy's scripts know them, made from rosbags' definitions.
+"""Message classes with rclpy's behaviour, made from rosbags' definitions.
 
 They behave as in ROS 2 Humble: every field has a default, constructors take keywords alone, and a value of the wrong
 type is refused at the assignment. Unbounded sequences of numbers are `array.array`, fixed ones numpy arrays.
@@ -133,7 +133,7 @@ class Field:
 
 
 class Message:
-    """What all message classes have in common."""
+    """The base of all message classes."""
 
     __slots__ = ()
     _fields: ClassVar[dict[str, Field]] = {}
@@ -210,7 +210,7 @@ _EMPTY = "structure_needs_at_least_one_member"
 
 
 def from_wire(message: Any) -> Message:
-    """Return a rosbags message as a script knows it, nothing shared."""
+    """Return a rosbags message as one of these classes; no data are shared."""
     made = message_class(message.__msgtype__)
     new = made.__new__(made)
     for name, field in made._fields.items():

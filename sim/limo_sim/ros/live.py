@@ -1,22 +1,24 @@
-"""The arena in real time, on ROS 2's network: others drive it."""
+"""The arena in real time on ROS 2's network, driven by /cmd_vel."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from limo_hog.detector import Detections
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
-from limo_hog.ros2.dds import Bus
-from limo_hog.ros2.messages import to_twist
-from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import FrameRecord, Moment, Step
 from limo_sim.world.scenario import Scenario
 
-#: Time that is made up for after a hold-up [s]; what is more is lost.
+if TYPE_CHECKING:
+    from limo_hog.ros2.dds import Bus
+    from limo_sim.ros.outlet import Outlet
+
+#: After a delay the arena runs faster until this much is made up for [s]; more is dropped. Chosen: two camera frames.
 _CATCH_UP = 0.2
 
 
@@ -27,24 +29,29 @@ def run_live(
     bus: Bus | None,
     watch: Callable[[Moment], None] | None = None,
 ) -> Arena:
-    """Let the arena go on with the wall's clock, its topics on the bus, driven by /cmd_vel.
+    """Run the arena in real time, with its topics on the bus.
 
     Parameters
     ----------
     scenario, seed
         The arena and its random numbers.
     seconds
-        How long; inf until interrupted.
+        Duration [s]; inf until interrupted.
     bus
-        Where the topics are; None for an arena that nobody drives.
+        Carries the topics; None for an arena without ROS.
     watch
         Called with every camera frame.
     """
     arena = Arena(scenario, seed)
-    outlet = Outlet(arena)
+    outlet: Outlet | None = None
     writers = {}
     commands = None
     if bus is not None:
+        # An arena that is only watched needs neither DDS nor messages.
+        from limo_hog.ros2.messages import to_twist
+        from limo_sim.ros.outlet import Outlet
+
+        outlet = Outlet(arena)
         spoken = [topic for topic in names.TYPES if topic not in (names.COMMAND, names.ANNOTATED)]
         writers = {topic: bus.publisher(topic, names.TYPES[topic]) for topic in spoken}
         commands = bus.subscription(names.COMMAND, names.TYPES[names.COMMAND])
@@ -54,7 +61,7 @@ def run_live(
         for message in commands.take() if commands is not None else ():
             twist = to_twist(message)
             arena.command(twist)
-        for topic, make in outlet.new():
+        for topic, make in outlet.new() if outlet is not None else ():
             writer = writers.get(topic)
             if writer is not None and writer.has_readers:
                 writer.publish(make())
@@ -66,7 +73,7 @@ def run_live(
         if late < 0:
             time.sleep(-late)
         elif late > _CATCH_UP:
-            # A machine that is too slow runs slower than the wall's clock, and does not hurry for ever after.
+            # On a machine that is too slow the arena runs slower than real time, instead of falling behind without end.
             began += late - _CATCH_UP
     return arena
 

@@ -12,19 +12,19 @@ from limo_sim.run.arena import Arena
 from limo_sim.sensing.camera import FOCAL_PX, HEIGHT, WIDTH
 from limo_sim.sensing.imu import ImuReading
 
-#: A topic and how to make its message: made only where somebody listens.
+#: A topic, and a function that makes its message: called only where the topic has readers.
 Outgoing = tuple[str, Callable[[], Any]]
 
 
 class Outlet:
-    """Tells what is new since it was last asked."""
+    """Collects the readings that have arrived since the last call."""
 
     def __init__(self, arena: Arena) -> None:
         self._arena = arena
         self._camera = self._lidar = self._wheels = -math.inf
 
     def new(self) -> list[Outgoing]:
-        """Return what has arrived: the clock first, then depth before colour, so that colour makes the pair."""
+        """Return the new messages: the clock first, depth before colour, so that a colour image finds its depth."""
         arena = self._arena
         out: list[Outgoing] = [(names.CLOCK, lambda: messages.clock(arena.time))]
         out += [(names.IMU, partial(_imu, reading)) for reading in arena.imu()]

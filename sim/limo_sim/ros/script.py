@@ -1,4 +1,4 @@
-"""Runs a script against the arena, and sees to it that a bad one ends in its traceback and a robot that stands."""
+"""Runs a script against the arena; a script that fails ends with its traceback and a robot that stands."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from limo_sim.run.episode import Episode, Moment
 from limo_sim.run.score import ScoreCard, score
 from limo_sim.world.scenario import Scenario
 
-#: After the script failed, so much time is left for the watchdog to stop the robot [s].
+#: Simulated time after a script's failure, in which the watchdog stops the robot [s]: 0.5 s and 1 m/s over 1 m/s².
 _AFTERMATH = 2.0
 
 _HERE = Path(__file__).parent
@@ -34,9 +34,9 @@ class Outcome:
     world
         The run, with its log, commands and windows.
     episode
-        What the score is made of.
+        The log that is scored.
     failure
-        One line on what was wrong; "" where nothing was.
+        One line that names the fault; "" without one.
     traceback
         The script's part of the traceback; "" without an exception.
     """
@@ -70,11 +70,11 @@ def run_script(
     arguments
         Command line of the script; what follows --ros-args is ROS's.
     log
-        Takes what the script's loggers say.
+        Called with every line that the script logs.
     watch
         Called with every control period.
     patience
-        So long may the script take without letting simulated time pass [s of the wall's time].
+        Wall time that the script may take without letting simulated time pass [s].
     made
         Called with the world before the script runs.
 
@@ -108,12 +108,12 @@ def run_script(
         finally:
             sys.argv, sys.path[:] = argv, path
     if isinstance(world.fault, KeyboardInterrupt):
-        # Ctrl-C in a callback is the user's, even if the script makes a good end of it.
+        # Ctrl-C in a callback ends the run, even if the script catches it.
         raise world.fault
     if world.fault is not None:
         failed_at = world.time
         world.seconds = failed_at + _AFTERMATH
-    # A script that has ended sends nothing any more: the arena goes on without it.
+    # After the script's end the arena goes on without commands until the time is up.
     while not world.over:
         world.advance()
     failure = _failure(world, failed_at)
@@ -122,7 +122,7 @@ def run_script(
 
 
 def score_of(outcome: Outcome) -> ScoreCard:
-    """Measure a run; what hangs on detections is None where the script's detector is not one that can be watched."""
+    """Measure a run; figures of detections are None where the script does not use cv2's HOG detector."""
     card = score(outcome.episode)
     if outcome.world.asked:
         return card

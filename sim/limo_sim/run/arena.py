@@ -1,7 +1,7 @@
-"""The world: walls, furniture, people who walk and a robot that is driven, in fixed steps of 1/50 s.
+"""The arena: walls, furniture, walking people and a driven robot, in fixed steps of 1/50 s.
 
 Everything depends on the scenario, the seed and the commands alone. Each sensor draws its noise from its own
-stream by the number of the reading, so that it does not matter which sensors are read, or when.
+stream by the number of the reading, so that reading one sensor changes no other.
 """
 
 from __future__ import annotations
@@ -29,14 +29,17 @@ STEPS_PER_SECOND = 50
 STEP_S = 1 / STEPS_PER_SECOND
 
 _ROBOT, _OBSTACLE, _PERSON = 1, 2, 3
-_WALL_HALF = 0.1
-_SAME_CONTACT = STEPS_PER_SECOND // 2  # touching again within half a second is the same contact
+_WALL_HALF = 0.1  # half of the walls' thickness [m]
+_SAME_CONTACT = STEPS_PER_SECOND // 2  # touching again within half a second is the same contact; chosen
+_SLOP = 0.001  # how deep bodies may overlap before pymunk parts them [m]; its default, 0.1, is for pixels
+_MASS = 4.2  # of the robot [kg]; without effect, since everything it can touch is immovable
+_FRICTION = 0.3  # of every surface; chosen, the outcome of a contact hardly depends on it
 _CAMERA_STREAM, _LIDAR_STREAM, _IMU_STREAM, _DROP_STREAM, _SLIP_STREAM, _PATTERN_STREAM = range(6)
 
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """The robot at the end of a step: its pose, how it moves, and what its wheels say."""
+    """The robot at the end of a step: pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry, contacts."""
 
     step: int
     x: float
@@ -72,7 +75,7 @@ class Arena:
         self._touched = {_OBSTACLE: -STEPS_PER_SECOND, _PERSON: -STEPS_PER_SECOND}
         self._contacts = {_OBSTACLE: 0, _PERSON: 0}
         self._space = pymunk.Space()
-        self._space.collision_slop = 0.001
+        self._space.collision_slop = _SLOP
         self._robot = self._add_robot()
         self._add_obstacles()
         self._people: list[pymunk.Body | None] = [None] * len(scenario.people)
@@ -119,15 +122,15 @@ class Arena:
 
     @property
     def watchdog_stops(self) -> int:
-        """How often the robot was stopped because no command came."""
+        """How often the watchdog stopped the robot."""
         return self._drive.watchdog_stops
 
     def command(self, twist: Twist) -> None:
-        """Drive like this until the next command, or until the watchdog bites."""
+        """Drive with these speeds until the next command, or until the watchdog stops the robot."""
         self._drive.command(twist, self.time)
 
     def step(self) -> None:
-        """Go on by one fiftieth of a second."""
+        """Advance by 1/50 s."""
         before = self._state
         self._drive.advance(before.time, STEP_S)
         step = before.step + 1
@@ -161,7 +164,7 @@ class Arena:
                 self._poses(exposure.state.time),
                 self._stream(_CAMERA_STREAM, exposure),
             )
-            self._frame = Frame(exposure.state.time, image, depth, self._tell(exposure.state, seen))
+            self._frame = Frame(exposure.state.time, image, depth, self._truth_at(exposure.state, seen))
         return self._frame
 
     def scan(self) -> Scan:
@@ -201,11 +204,11 @@ class Arena:
         )
 
     def truth(self) -> Truth:
-        """How things are now; a frame's own truth tells how they were when it was taken."""
+        """Return the truth now (`Frame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
         seen = self._render().look(_camera_at(self._state), self._poses(self.time))
-        return self._tell(self._state, seen)
+        return self._truth_at(self._state, seen)
 
     def _render(self) -> Renderer:
         if self._renderer is None:
@@ -218,7 +221,7 @@ class Arena:
     def _poses(self, time: float) -> list[Pose | None]:
         return [walk.pose(time) for walk in self._walks]
 
-    def _tell(self, state: _State, seen: list[Seen]) -> Truth:
+    def _truth_at(self, state: _State, seen: list[Seen]) -> Truth:
         camera = _camera_at(state)
         people: list[PersonTruth | None] = []
         for person, pose, (visible, box) in zip(self.scenario.people, self._poses(state.time), seen, strict=True):
@@ -235,17 +238,17 @@ class Arena:
     def _add_robot(self) -> pymunk.Body:
         settings = self.scenario.robot
         size = (2 * LIMO.half_length, 2 * LIMO.half_width)
-        robot = pymunk.Body(mass=4.2, moment=pymunk.moment_for_box(4.2, size))
+        robot = pymunk.Body(mass=_MASS, moment=pymunk.moment_for_box(_MASS, size))
         robot.position = settings.x, settings.y
         robot.angle = settings.yaw
         robot.velocity_func = self._roll
         shape = pymunk.Poly.create_box(robot, size)
-        shape.friction, shape.collision_type = 0.3, _ROBOT
+        shape.friction, shape.collision_type = _FRICTION, _ROBOT
         self._space.add(robot, shape)
         return robot
 
     def _roll(self, robot: pymunk.Body, _gravity: tuple[float, float], _damping: float, _dt: float) -> None:
-        """Let the wheels set the velocity; contacts then take away what they must."""
+        """Set the velocity from the wheels; the solver then reduces it where there is contact."""
         twist = self._drive.twist
         robot.velocity = twist.linear * math.cos(robot.angle), twist.linear * math.sin(robot.angle)
         robot.angular_velocity = twist.angular
@@ -265,11 +268,11 @@ class Arena:
                 turned = pymunk.Transform.translation(footprint.x, footprint.y).rotated(footprint.yaw)
                 x, y = footprint.half_x, footprint.half_y
                 shape = pymunk.Poly(ground, [(-x, -y), (x, -y), (x, y), (-x, y)], turned)
-            shape.friction, shape.collision_type = 0.3, _OBSTACLE
+            shape.friction, shape.collision_type = _FRICTION, _OBSTACLE
             self._space.add(shape)
 
     def _place_people(self, time: float) -> None:
-        """Give everybody the velocity that takes them where they will be at `time`."""
+        """Give each person the velocity that leads to their place at `time` [s]."""
         for index, pose in enumerate(self._poses(time)):
             if pose is None:
                 continue
@@ -278,7 +281,7 @@ class Arena:
                 person = self._people[index] = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
                 person.position = pose.x, pose.y
                 shape = pymunk.Circle(person, self.scenario.people[index].radius)
-                shape.friction, shape.collision_type = 0.3, _PERSON
+                shape.friction, shape.collision_type = _FRICTION, _PERSON
                 self._space.add(person, shape)
             x, y = person.position
             person.velocity = (pose.x - x) / STEP_S, (pose.y - y) / STEP_S

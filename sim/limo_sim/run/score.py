@@ -1,7 +1,7 @@
 """How well a robot followed: pure functions of an episode's log.
 
-The card is about one person, the subject: the first person in the scenario whom the follower chose as its target, or
-the scenario's first person where it never chose one. The indices of people are those of the scenario; `NO_PERSON`
+The card is about one person, the subject: the first person that the follower chose as its target, or the
+scenario's first person where it never chose one. The indices of people are those of the scenario; `NO_PERSON`
 stands for a box on none of them.
 """
 
@@ -79,7 +79,7 @@ class ScoreCard:
         Distance that the controller holds [m]; None for one that holds none, such as `approach`.
     success
         Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
-        view for more than 10 s after being first in view; None where nobody ever was in the arena.
+        view for more than 10 s after being first in view; None where no person ever was in the arena.
     frames
         Camera frames worked on.
     first_detection_s

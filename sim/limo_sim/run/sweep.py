@@ -1,4 +1,4 @@
-"""Many runs on all cores, and what they say together."""
+"""Many runs on all cores, and the statistics of their score cards."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
 from statistics import NormalDist, fmean, stdev
-
-import cv2
 
 import limo_hog
 from limo_hog.follow.control.naming import controller_named
@@ -43,7 +41,7 @@ MEASURES = (
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One episode to play: everything by name, so that it can be sent to another process."""
+    """One run, with everything by name, so that it can be sent to another process."""
 
     scenario: str
     controller: str
@@ -65,7 +63,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What the seeds of one scenario and controller say together; None where no run had anything to measure."""
+    """The statistics of one scenario and controller over seeds; None where no run had anything to measure."""
 
     scenario: str
     controller: str
@@ -75,6 +73,8 @@ class Summary:
 
 def play(run: Run) -> ScoreCard:
     """Play a run in this process, on one core."""
+    import cv2  # there already: the arena's camera needs it
+
     limo_hog.set_num_threads(1)
     cv2.setNumThreads(1)
     controller = controller_named(run.controller, run.target)
@@ -83,13 +83,14 @@ def play(run: Run) -> ScoreCard:
     return score(run_episode(scenario, controller, detector, run.seconds, run.seed, names=names))
 
 
-def play_all(runs: Sequence[Run], workers: int) -> Iterator[ScoreCard]:
-    """Play runs on `workers` processes; cards come as they are done."""
+def play_all(runs: Sequence[Run], workers: int) -> Iterator[tuple[Run, ScoreCard]]:
+    """Play runs on `workers` processes; yields each run with its card, in the order in which they end."""
     # Fresh processes: threads of the detector do not survive a fork.
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         try:
-            for done in as_completed([pool.submit(play, run) for run in runs]):
-                yield done.result()
+            runs_of = {pool.submit(play, run): run for run in runs}
+            for done in as_completed(runs_of):
+                yield runs_of[done], done.result()
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise

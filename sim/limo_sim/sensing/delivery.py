@@ -1,4 +1,4 @@
-"""How readings travel from a sensor to whoever asks: taken at a rate, late by a latency, sometimes lost."""
+"""Delivery of readings from a sensor: taken at a rate, delayed by a latency, sometimes lost."""
 
 from __future__ import annotations
 
@@ -10,19 +10,22 @@ import numpy as np
 
 S = TypeVar("S")
 
+#: Added to a number of readings before it is rounded down, against the rounding of rates such as 0.2 a step.
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True, slots=True)
 class Exposure(Generic[S]):
-    """The state a sensor saw, and the running number of the reading."""
+    """The state in which a reading is taken, and the reading's running number."""
 
     index: int
     state: S
 
 
 class Channel(Generic[S]):
-    """A sensor's way to its reader; `newest` is the last exposure that has arrived.
+    """The delivery of one sensor's readings; `newest` is the last exposure that has been delivered.
 
-    The first exposure is there at once, so that there is always one to read.
+    The first exposure is delivered at once, so that there always is one.
     """
 
     def __init__(
@@ -39,17 +42,17 @@ class Channel(Generic[S]):
         self._late = round(latency_s * steps_per_second)
         self._drop_probability = drop_probability
         self._drops = drops
-        self._underway: deque[tuple[int, Exposure[S]]] = deque()
+        self._pending: deque[tuple[int, Exposure[S]]] = deque()
         self._index = 0
         self.newest = Exposure(0, first)
 
     def advance(self, step: int, state: S) -> None:
-        """Expose when it is time, and let arrive what is due."""
-        index = int(step * self._rate + 1e-9)
+        """Take a reading when one is due, and deliver those whose latency has passed."""
+        index = int(step * self._rate + _ROUNDING)
         if index > self._index:
             self._index = index
             lost = self._drops is not None and self._drops.random() < self._drop_probability
             if not lost:
-                self._underway.append((step + self._late, Exposure(index, state)))
-        while self._underway and self._underway[0][0] <= step:
-            self.newest = self._underway.popleft()[1]
+                self._pending.append((step + self._late, Exposure(index, state)))
+        while self._pending and self._pending[0][0] <= step:
+            self.newest = self._pending.popleft()[1]

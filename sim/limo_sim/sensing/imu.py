@@ -1,4 +1,4 @@
-"""The inertial unit: turn rate and acceleration in the robot's frame, 100 times a second."""
+"""The inertial measurement unit: turn rates and accelerations in the robot's frame at 100 Hz."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 from limo_sim.world.scenario import Imu
 
 RATE_HZ = 100.0
+"""As on the Limo."""
 GRAVITY = 9.80665
+"""Standard gravity [m/s²] (CGPM 1901)."""
 
 
 @dataclass(frozen=True, slots=True)

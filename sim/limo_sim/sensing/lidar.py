@@ -1,4 +1,4 @@
-"""The planar lidar: rays against the walls, the furniture and the legs of people, all at once."""
+"""The planar lidar: all rays at once against the walls, the furniture and people's legs."""
 
 from __future__ import annotations
 

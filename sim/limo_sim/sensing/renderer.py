@@ -1,4 +1,4 @@
-"""Draws what the camera sees: colour and depth from the same rays, then the sensor's noise.
+"""The camera's images: colour and depth from the same rays, then the sensor's noise.
 
 The room is cast column by column, people and furniture pixel by pixel, far objects first; an object's pixel
 is drawn where it is nearer than all that is there already.
@@ -11,10 +11,10 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, MOUNT_HEIGHT, WIDTH, CameraPose
 from limo_sim.sensing.solids import (
     BAND,
@@ -36,16 +36,19 @@ from limo_sim.world.furniture import KINDS, Box, Frustum
 from limo_sim.world.person import Pose, body
 from limo_sim.world.scenario import ROOM_HALF, WALL_HEIGHT, Furniture, Scenario
 
+with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
+
 U8 = NDArray[np.uint8]
 U32 = NDArray[np.uint32]
 Seen = tuple[float, tuple[int, int, int, int] | None]
 """Visible share of a silhouette, and its box [px]."""
 
-_SHADOW = 0.35  # how much darker the floor is right under somebody
-_BANK_MARGIN = 64  # the noise patterns are so much larger than a frame, which takes a window of them
-_NOBODY = -1
+_SHADOW = 0.35  # share of the floor's brightness that is lost right under a person or a piece of furniture; by eye
+_BANK_MARGIN = 64  # by how much the noise patterns are larger than a frame, which takes a window of them [px]
+_NO_PERSON = -1
 _LEVELS = 128  # of brightness, from black to the full colour
-_COARSE = 64  # what the image's edge cuts off a silhouette is measured on about so many rows of the whole
+_COARSE = 64  # rows of the grid on which the part of a silhouette outside the image is measured
 
 _COLUMNS = ((np.arange(WIDTH) - CENTRE_X) / FOCAL_PX).astype(np.float32)
 _ROWS = ((np.arange(HEIGHT) - CENTRE_Y) / FOCAL_PX).astype(np.float32)[:, None]
@@ -82,7 +85,7 @@ class Renderer:
 
         Returns
         -------
-        uint8 (480, 640, 3) BGR; float32 (480, 640) depth [m]; per person how much of them is seen, and where.
+        uint8 (480, 640, 3) BGR; float32 (480, 640) depth [m]; per person the visible share and the box.
         """
         depth, seen = self._draw(self._colours, camera, people)
         image = cv2.cvtColor(_bytes(self._colours), cv2.COLOR_BGRA2BGR).astype(np.uint8, copy=False)
@@ -100,11 +103,11 @@ class Renderer:
         return image, depth, seen
 
     def look(self, camera: CameraPose, people: Sequence[Pose | None]) -> list[Seen]:
-        """How much of each person a frame would show, and where; no frame is exposed."""
+        """Return each person's visible share and box, without drawing colours."""
         return self._draw(None, camera, people)[1]
 
     def _draw(self, image: U32 | None, camera: CameraPose, people: Sequence[Pose | None]) -> tuple[F32, list[Seen]]:
-        """Depth and what is seen of people; the colours go into `image`, if there is one."""
+        """Return depth and what is visible of people; colours go into `image`, if there is one."""
         scenario, sun = self._scenario, self._sun.seen_from(camera)
         room = self._backdrop.copy() if image is not None else None
         depth = self._draw_room(room, camera)
@@ -124,7 +127,7 @@ class Renderer:
                 _shade_floor(room, depth, camera, (piece.x, piece.y), 0.25)
         if image is not None and room is not None:
             cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=_bytes(image))
-        self._owner.fill(_NOBODY)
+        self._owner.fill(_NO_PERSON)
         seen: list[Seen] = [(0.0, None)] * len(people)
         drawn: list[tuple[int, Window, float]] = []
         for _, thing in sorted(order, key=lambda entry: -entry[0]):
@@ -192,10 +195,10 @@ class Renderer:
                 cast_box(canvas, solid, camera, self._sun, part)
             else:
                 cast_frustum(canvas, solid, camera, seen_sun, part)
-        self._blend(image, depth, canvas, palette, _NOBODY)
+        self._blend(image, depth, canvas, palette, _NO_PERSON)
 
-    def _blend(self, image: U32 | None, depth: F32, canvas: Canvas, palette: U32, who: int) -> None:
-        """Lay an object over the picture wherever it is nearer than what is there."""
+    def _blend(self, image: U32 | None, depth: F32, canvas: Canvas, palette: U32, owner: int) -> None:
+        """Draw an object wherever it is nearer than what has been drawn; `owner` is its number in the map of people."""
         left, top, right, bottom = canvas.window
         step = max(1, BAND // (right - left))
         for row in range(top, bottom, step):
@@ -219,7 +222,7 @@ class Renderer:
                     patch[where] = cv2.blendLinear(over, under, share, 1.0 - share).view(np.uint32)[:, 0, 0]
             nearer &= cover >= 0.5
             cv2.copyTo(new, nearer.view(np.uint8), there)
-            self._owner[at][nearer] = who
+            self._owner[at][nearer] = owner
 
     def _make_backdrop(self) -> U8:
         """Sky above, floor below, each a little brighter towards the horizon."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import threading
 import time
 
-#: How often somebody who waits looks up, so that Ctrl-C is heard everywhere [s].
-_LOOK_UP = 0.5
+#: How often a waiting run wakes, so that Ctrl-C works on every system [s].
+_WAKE_S = 0.5
 
 
 class Pace:
-    """Holds a run back as those who watch it wish; set from any thread.
+    """Slows, pauses and steps a run; set from any thread.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Pace:
                     if self._steps:
                         self._steps -= 1
                         return
-                    left = _LOOK_UP
+                    left = _WAKE_S
                 elif not self._speed:
                     return
                 else:
@@ -78,7 +78,7 @@ class Pace:
                     then, wall = self._since
                     left = wall + (now - then) / self._speed - time.monotonic()
                     if left <= 0:
-                        # Who falls behind does not hurry later.
+                        # Time lost is not made up for later.
                         self._since = now, time.monotonic()
                         return
-                self._changed.wait(min(left, _LOOK_UP))
+                self._changed.wait(min(left, _WAKE_S))

@@ -77,10 +77,10 @@ def _path(axes: Axes, scenario: Scenario, steps: Sequence[Step]) -> None:
             cos, sin = np.cos(shape.yaw), np.sin(shape.yaw)
             axes.add_patch(Polygon(corners @ [[cos, sin], [-sin, cos]] + (shape.x, shape.y), color=_FAINT))
     robot = np.array([step.truth.robot for step in steps]).reshape(-1, 3)
-    for who in range(len(scenario.people)):
-        walk = [(p.x, p.y) for step in steps if (p := step.truth.people[who]) is not None]
+    for index in range(len(scenario.people)):
+        walk = [(p.x, p.y) for step in steps if (p := step.truth.people[index]) is not None]
         people = np.array(walk).reshape(-1, 2)
-        axes.plot(*people.T, color=_PERSON, linewidth=1.2, alpha=0.8, label="person" if who == 0 else None)
+        axes.plot(*people.T, color=_PERSON, linewidth=1.2, alpha=0.8, label="person" if index == 0 else None)
         axes.plot(*people[-1:].T, "o", color=_PERSON)
     axes.plot(robot[:, 0], robot[:, 1], color=_ROBOT, linewidth=1.8, label="robot")
     every = max(1, len(robot) // 12)

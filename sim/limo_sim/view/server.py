@@ -1,7 +1,7 @@
-"""The live page: an HTTP server beside the run, which shows its newest moment and takes wishes.
+"""The live page: an HTTP server beside the run, which shows its newest moment and applies the page's control messages.
 
 The run only leaves its newest moment here; pictures are made in the server's thread, at most some times a second
-and only while somebody looks.
+and only while a page is open.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from typing import Any
 
-import cv2
 import numpy as np
 from aiohttp import WSMsgType, web
 from numpy.typing import NDArray
@@ -29,14 +28,15 @@ from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.zones import ZONE_ENDS
+from limo_hog.imaging.writing import jpeg
 from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FIELD
 from limo_sim.sensing.lidar import MOUNT_AHEAD
-from limo_sim.view.door import HEADERS, Door, QuietLogger
+from limo_sim.view.access import HEADERS, Access, QuietLogger
+from limo_sim.view.controls import MAX_BYTES, apply
 from limo_sim.view.pace import Pace
 from limo_sim.view.reading import annotated, depth_colours, depth_picture, followed_person, measured_m, reading
 from limo_sim.view.tuning import Tunable
-from limo_sim.view.wishes import MAX_BYTES, obey
 from limo_sim.world.furniture import Disc
 from limo_sim.world.scenario import ROOM_HALF, Scenario
 
@@ -51,10 +51,9 @@ _REMEMBERED = 3000
 #: quiet for two or three.
 STALL_S = 5.0
 #: How long a page may take to hear that the run is over and to close [s]; a run ends within 2 s.
-_GOODBYE_S = 1.0
+_CLOSE_S = 1.0
 #: What the system keeps for a page that does not read [bytes]: about two pictures, so that what it shows is new.
 _SEND_BUFFER = 1 << 17
-_JPEG = [cv2.IMWRITE_JPEG_QUALITY, 80]
 
 
 class ServeError(LimoHogError):
@@ -70,7 +69,7 @@ class _Page:
     client, transport
         Its connection, twice: what is sent through, and what can be cut.
     complaints
-        What was wrong with its wishes, not told yet.
+        What was wrong with its control messages, not told yet.
     """
 
     client: web.WebSocketResponse
@@ -138,11 +137,11 @@ class View:
         # Time and pose of the last control periods: a scan is as old as it is.
         self._poses: deque[tuple[float, float, float, float]] = deque(maxlen=32)
         self._ended: Mapping[str, Any] | None = None
-        # Who looks, and the task that shows them the run; the newest pictures, encoded once for all of them.
+        # Open pages, each with the task that shows it the run; the newest pictures, encoded once for all of them.
         self._pages: dict[_Page, asyncio.Task[None]] = {}
         self._encoded: tuple[Moment, asyncio.Future[list[bytes]]] | None = None
         self._over = asyncio.Event()
-        self._door = Door(host, loopback=True)
+        self._access = Access(host, loopback=True)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="limo-hog view", daemon=True)
         self._runner: web.AppRunner | None = None
@@ -171,9 +170,9 @@ class View:
         self.pace.wait(moment.step.time)
 
     def end(self, card: Mapping[str, Any]) -> None:
-        """Tell everybody that the run is over, with its score card."""
+        """Tell all pages that the run is over, with its score card."""
         self._ended = card
-        asyncio.run_coroutine_threadsafe(self._say_goodbye(), self._loop).result()
+        asyncio.run_coroutine_threadsafe(self._close_pages(), self._loop).result()
 
     def __enter__(self) -> View:  # noqa: PYI034
         self._thread.start()
@@ -217,11 +216,11 @@ class View:
             raise
         addresses = self._runner.addresses
         self._port = addresses[0][1]
-        self._door = Door.at(self._host, [address[0] for address in addresses])
+        self._access = Access.at(self._host, [address[0] for address in addresses])
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        if self._door.admits(request.headers.get("Host"), request.headers.get("Origin")):
+        if self._access.admits(request.headers.get("Host"), request.headers.get("Origin")):
             return await handler(request)
         raise web.HTTPForbidden(
             text="This page answers to this machine's own addresses, and to no other site.\n"
@@ -229,20 +228,20 @@ class View:
         )
 
     async def _stop(self) -> None:
-        await self._say_goodbye()
+        await self._close_pages()
         if self._runner is not None:
             await self._runner.cleanup()
 
-    async def _say_goodbye(self) -> None:
+    async def _close_pages(self) -> None:
         """Let every page hear that it is over, and drop those that do not."""
         self._over.set()
         if self._pages:
-            await asyncio.wait(self._pages.values(), timeout=_GOODBYE_S)
+            await asyncio.wait(self._pages.values(), timeout=_CLOSE_S)
         for page in self._pages:
             page.abort()
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
-        client = web.WebSocketResponse(heartbeat=20, compress=False, max_msg_size=MAX_BYTES, timeout=_GOODBYE_S)
+        client = web.WebSocketResponse(heartbeat=20, compress=False, max_msg_size=MAX_BYTES, timeout=_CLOSE_S)
         await client.prepare(request)
         if request.transport is None:
             return client
@@ -253,9 +252,9 @@ class View:
         try:
             async for message in client:
                 if message.type is WSMsgType.ERROR:
-                    break  # longer than any wish, or not of the protocol
-                wish = message.data if message.type is WSMsgType.TEXT else ""
-                complaint = obey(wish, self.pace, self._controller)
+                    break  # longer than any control message, or against the protocol
+                text = message.data if message.type is WSMsgType.TEXT else ""
+                complaint = apply(text, self.pace, self._controller)
                 if complaint:
                     page.complaints.append(complaint)
         finally:
@@ -307,7 +306,7 @@ class View:
                     await page.send({"ended": _finite(self._ended or {})})
                     await page.client.close()
                     return
-                # A run that hurries has no time to lose on pictures nobody can follow.
+                # At full speed ten pictures a second are too fast to follow, and take time from the run.
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(self._over.wait(), PERIOD if self.pace.speed else 2 * PERIOD)
 
@@ -342,11 +341,10 @@ class View:
             return []
         depth = depth_picture(moment.frame.depth[::2, ::2], self._scenario.depth.far_m)
         pictures = {b"c": annotated(moment.frame, moment.step, caption=False), b"d": depth}
-        encoded = [letter + cv2.imencode(".jpg", p, _JPEG)[1].tobytes() for letter, p in pictures.items()]
+        encoded = [letter + jpeg(p) for letter, p in pictures.items()]
         # A window's name stands between its letter and its picture, ended by a line feed.
         return encoded + [
-            b"w" + " ".join(name.split()).encode() + b"\n" + cv2.imencode(".jpg", p, _JPEG)[1].tobytes()
-            for name, p in moment.windows.items()
+            b"w" + " ".join(name.split()).encode() + b"\n" + jpeg(p) for name, p in moment.windows.items()
         ]
 
 

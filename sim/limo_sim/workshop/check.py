@@ -1,4 +1,4 @@
-"""The workshop's checkpoints: each holds or not, with the frame, the boxes and the command that show it."""
+"""The workshop's checkpoints: whether each holds, with the frame, the boxes and the command as evidence."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GREEN, RED, BLUE = (0, 255, 0), (0, 0, 255), (255, 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a checkpoint holds; None where it could not be tried, and `evidence` says why."""
+    """Whether a checkpoint holds; None where it could not be tried, for the reason in `evidence`."""
 
     task: int
     checkpoint: str
@@ -37,7 +37,7 @@ Check = Callable[[Sequence[Take]], tuple[bool | None, str]]
 
 
 def check(script: Path, node: str = "follower", patience: float = 20.0) -> list[Verdict]:
-    """Try a node in the workshop's scenes, and when all is well there, in a walk of 20 s."""
+    """Try a node in the workshop's scenes, and if all checkpoints hold there, with a walking person for 20 s."""
     takes: list[Take] = []
     for scene in FOLLOWER_SCENES if node == "follower" else PROXEMIC_SCENES:
         takes.append(play(script, scene, patience))
@@ -50,7 +50,7 @@ def check(script: Path, node: str = "follower", patience: float = 20.0) -> list[
     if all(verdict.holds for verdict in verdicts):
         verdicts.append(Verdict(checks[-1][0], name, *_walk(script)))
     else:
-        verdicts.append(Verdict(checks[-1][0], name, None, "tried when all of the above holds"))
+        verdicts.append(Verdict(checks[-1][0], name, None, "tried when all checkpoints above hold"))
     return verdicts
 
 
@@ -202,8 +202,8 @@ def _dead_band(takes: Sequence[Take]) -> tuple[bool | None, str]:
 def _drives(takes: Sequence[Take]) -> tuple[bool | None, str]:
     for where, look in _seeing(takes):
         if look.commands and look.commands[-1].linear <= 0:
-            return False, f"{where}: somebody is there; the command is {_command(look)}"
-    return True, "whoever is seen is driven to"
+            return False, f"{where}: a person is in view; the command is {_command(look)}"
+    return True, "every frame with a person is answered with a forward command"
 
 
 def _speaks(takes: Sequence[Take]) -> tuple[bool | None, str]:
@@ -218,7 +218,7 @@ def _speaks(takes: Sequence[Take]) -> tuple[bool | None, str]:
                 False,
                 f"{take.scene.words}: no command for {gap:.1f} s after {at:.1f} s; the watchdog stops the robot",
             )
-    return True, f"never silent for more than {SILENCE} s while somebody is there"
+    return True, f"never more than {SILENCE} s without a command while a person is in view"
 
 
 def _returns(takes: Sequence[Take]) -> tuple[bool | None, str]:
@@ -230,7 +230,7 @@ def _returns(takes: Sequence[Take]) -> tuple[bool | None, str]:
 
 
 def _blocked(take: Take) -> str:
-    """Say which callback took longer than the watchdog's patience, "" if none did."""
+    """Return which callback took longer than the watchdog's time, "" if none did."""
     for call in take.outcome.world.callbacks if take.outcome else ():
         if call.slept > SILENCE - 1e-6:
             return f"the callback at {call.time:.1f} s slept for {call.slept:.1f} s"
@@ -246,7 +246,7 @@ def _keeps(takes: Sequence[Take]) -> tuple[bool | None, str]:
                 how = "back" if wanted < 0 else "forward"
                 where = f"{take.scene.words} ({' '.join(take.scene.arguments)}), frame at {look.time:.1f} s"
                 return False, f"{where}: wanted is to drive {how}; the command is {_command(look)}"
-    return True, "drives forward to who is too far, back from who is too near"
+    return True, "drives forward when the person is too far, back when too near"
 
 
 def _limits(takes: Sequence[Take]) -> tuple[bool | None, str]:
@@ -307,7 +307,7 @@ _FIRST: tuple[tuple[int, str, Check], ...] = (
     (2, "people are found", _found),
     (2, "the number of boxes is logged", _logged),
     (2, "boxes are in the camera's pixels", _scaled_back),
-    (3, "the robot stands while nobody is seen", _stands),
+    (3, "the robot stands while no person is found", _stands),
     (3, "the surest box is chosen and drawn", _best),
     (4, "the robot turns towards the person", _turns),
 )

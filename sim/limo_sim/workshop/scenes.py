@@ -1,4 +1,4 @@
-"""The scenes a student's node is tried in, and what it did in each frame."""
+"""The scenes in which a student's node is tried, and the node's outputs for each frame."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from limo_sim.world.scenario import Person, Scenario
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """An arena for a second or so: what is there, in words, and ROS arguments for the node."""
+    """A short run: the scenario, its description in words, and ROS arguments for the node."""
 
     name: str
     words: str
@@ -31,14 +31,18 @@ def _standing(*places: tuple[float, float]) -> Scenario:
     return Scenario(name="workshop check", people=tuple(Person(route=((x, y, 3600.0),), facing=0.0) for x, y in places))
 
 
-LEFT = Scene("left", "somebody stands on the left", _standing((2.1, 0.6)))
-RIGHT = Scene("right", "somebody stands on the right", _standing((2.1, -0.6)))
-AHEAD = Scene("ahead", "somebody stands straight ahead", _standing((2.2, 0.0)))
-NOBODY = Scene("nobody", "nobody is there", _standing())
+LEFT = Scene("left", "a person stands on the left", _standing((2.1, 0.6)))
+RIGHT = Scene("right", "a person stands on the right", _standing((2.1, -0.6)))
+AHEAD = Scene("ahead", "a person stands straight ahead", _standing((2.2, 0.0)))
+NOBODY = Scene("nobody", "the room is empty", _standing())
 #: Two people, of whom OpenCV's detector lists the less sure one first.
 TWO = Scene("two", "two people stand there", _standing((2.2, 0.7), (3.4, -1.0)), 0.6)
-NEAR = Scene("near", "somebody is nearer than wanted", _standing((2.0, 0.0)), 1.0, ("-p", "target_distance:=2.5"))
-FAR = Scene("far", "somebody is further than wanted", _standing((3.2, 0.0)), 1.0, ("-p", "target_distance:=1.5"))
+NEAR = Scene(
+    "near", "a person is nearer than the target distance", _standing((2.0, 0.0)), 1.0, ("-p", "target_distance:=2.5")
+)
+FAR = Scene(
+    "far", "a person is farther than the target distance", _standing((3.2, 0.0)), 1.0, ("-p", "target_distance:=1.5")
+)
 
 FOLLOWER_SCENES = (LEFT, RIGHT, AHEAD, NOBODY, TWO)
 PROXEMIC_SCENES = (LEFT, RIGHT, NOBODY, TWO, NEAR, FAR)
@@ -46,7 +50,7 @@ PROXEMIC_SCENES = (LEFT, RIGHT, NOBODY, TWO, NEAR, FAR)
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """One camera frame, and what the node made of it before the next.
+    """One camera frame, and the node's outputs before the next one.
 
     Attributes
     ----------
@@ -57,7 +61,7 @@ class Look:
     found
         Boxes in the camera's pixels.
     raw
-        What the detector said, in pixels of the image it was given; None where it was not asked.
+        The detector's result, in pixels of the image it was given; None where it was not called.
     commands
         What was published on /cmd_vel.
     windows
@@ -85,7 +89,7 @@ class Take:
 
 
 def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
-    """Run a node in a scene and note what it does with each frame."""
+    """Run a node in a scene and note its outputs for each frame."""
     take = Take(scene)
     worlds: list[World] = []
     said: list[str] = []

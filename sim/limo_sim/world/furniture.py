@@ -1,4 +1,4 @@
-"""What stands in the arena: each kind as solids to look at, and as a footprint to drive against and to scan.
+"""Furniture: each kind as solids for the camera, a footprint for collisions, and shapes for the lidar.
 
 Lengths are metres; a piece's own frame is x forward, y left, z up from the floor.
 """
@@ -60,7 +60,7 @@ class Rectangle:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A kind of furniture: what the camera sees, what the robot bumps into, what the lidar plane cuts."""
+    """A kind of furniture: solids for the camera, the footprint for collisions, shapes for the lidar."""
 
     solids: tuple[Frustum | Box, ...]
     footprint: Disc | Rectangle
@@ -89,7 +89,7 @@ KINDS: dict[str, Piece] = {
         footprint=Rectangle(0, 0, 0.2, 0.2),
         scanned=(Disc(0, 0, 0.163),),
     ),
-    # more like a person to HOG than the others: head, neck and trunk
+    # of all kinds the most like a person to HOG: head, neck and trunk
     "bollard": Piece(
         solids=(
             Frustum(0, 0, 0.0, 0.70, 0.13, 0.13, _STONE),

@@ -1,4 +1,4 @@
-"""A walking person: the route, the gait and the body, all pure functions of time.
+"""A walking person: route, gait and body as pure functions of time.
 
 The gait is tied to the distance walked, so feet do not slide however slow the person is. Body lengths are
 fractions of the stature; the body's own frame is x forward, y left, z up from the floor between the feet.
@@ -20,10 +20,12 @@ Point = tuple[float, float, float]
 Capsule = tuple[Point, Point, float, float, str]
 Ellipsoid = tuple[Point, Point, float, str]
 
-_STRIDE = 0.75 / 0.9  # length of a gait cycle, two steps
-_TURN_S = 0.5
-_EASE_S = 0.25
+# Length of a gait cycle (two steps) in statures: 0.75 m for the workshop's person of 0.9 m.
+_STRIDE = 0.75 / 0.9
+# A turn at a corner takes this long, and the limbs start or stop swinging within the second [s]. Chosen by eye.
+_TURN_S, _EASE_S = 0.5, 0.25
 
+# Lengths of the limbs in statures; the whole body was chosen so that OpenCV's HOG model finds it from every side.
 _THIGH = _SHIN = 0.245
 _UPPER_ARM, _FOREARM = 0.165, 0.145
 # Half axes of the ellipse that a trunk is to the depth camera. Measured: median depth at the middle of HOG's box, 8
@@ -34,7 +36,7 @@ _TRUNK_HALF_DEPTH, _TRUNK_HALF_BREADTH = 0.052, 0.090
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where somebody is and how the limbs are held.
+    """Where a person is, and the phase of the gait.
 
     Attributes
     ----------
@@ -54,8 +56,20 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True)
-class _Leg:
-    """The way from one corner of a route to the next, and the pauses at both."""
+class _RouteLeg:
+    """The way from one corner of a route to the next, and the pauses at both.
+
+    Attributes
+    ----------
+    begins, duration
+        When the leg begins within a lap, and how long the walk takes [s].
+    walked, length
+        Way walked in the lap before, and on this leg [m].
+    heading
+        Direction of the walk [rad].
+    pause_before, pause_after
+        Time spent standing at either end [s].
+    """
 
     begins: float
     duration: float
@@ -71,14 +85,14 @@ class Walk:
 
     def __init__(self, person: Person) -> None:
         self.person = person
-        self._legs: list[_Leg] = []
+        self._legs: list[_RouteLeg] = []
         clock = walked = 0.0
         corners = person.route
         for (x, y, pause), (next_x, next_y, next_pause) in zip(corners, corners[1:] + corners[:1], strict=True):
             length = math.hypot(next_x - x, next_y - y)
             heading = math.atan2(next_y - y, next_x - x) if length else person.facing
             duration = length / person.speed
-            self._legs.append(_Leg(clock, duration, walked, length, heading, pause, next_pause))
+            self._legs.append(_RouteLeg(clock, duration, walked, length, heading, pause, next_pause))
             clock += duration + next_pause
             walked += length
         self._begins = [leg.begins for leg in self._legs]
@@ -119,7 +133,7 @@ class Walk:
         return leg.heading
 
 
-def _swing(leg: _Leg, clock: float) -> float:
+def _swing(leg: _RouteLeg, clock: float) -> float:
     """How much the limbs swing: eased in after a pause and out before one."""
     rise = clock / _EASE_S if leg.pause_before > 0 else 1.0
     fall = (leg.duration - clock) / _EASE_S if leg.pause_after > 0 else 1.0
@@ -163,7 +177,7 @@ class BodyMesh:
     colours: NDArray[np.float64]
 
 
-def _leg(phase: float, swing: float) -> tuple[float, float, float]:
+def _limb_angles(phase: float, swing: float) -> tuple[float, float, float]:
     """Hip, shin and foot angle from the vertical or the floor [rad], forward and toes-up positive."""
     hip = swing * 0.40 * math.sin(phase)
     knee = 0.03 + swing * (0.04 + 0.85 * max(0.0, math.cos(phase + 0.25)) ** 2)
@@ -179,7 +193,7 @@ def _legs(pose: Pose) -> tuple[list[Capsule], float]:
     capsules: list[Capsule] = []
     soles = []
     for side, phase in ((1, pose.phase), (-1, pose.phase + math.pi)):
-        hip, shin, foot = _leg(phase, pose.swing)
+        hip, shin, foot = _limb_angles(phase, pose.swing)
         y = side * 0.05
         knee = (_THIGH * math.sin(hip), y, -_THIGH * math.cos(hip))
         ankle = (knee[0] + _SHIN * math.sin(shin), y, knee[2] - _SHIN * math.cos(shin))
@@ -251,7 +265,7 @@ def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
 
 
 def body(person: Person, pose: Pose) -> BodyMesh:
-    """Build somebody's body in a pose; the lowest foot touches the floor."""
+    """Build a person's body in a pose; the lower foot touches the floor."""
     capsules, ellipsoids = _skeleton(pose)
     palette = {
         "shirt": person.shirt,
@@ -299,7 +313,7 @@ def trunk_radius(person: Person, pose: Pose, direction: float) -> float:
 
 
 def legs_at(person: Person, pose: Pose, height: float) -> list[Disc]:
-    """Cut somebody's legs with a level plane at a height [m] below the hands."""
+    """Cut a person's legs with a horizontal plane at a height [m] below the hands."""
     cut = []
     cos, sin = person.height * math.cos(pose.yaw), person.height * math.sin(pose.yaw)
     level = height / person.height

@@ -1,4 +1,4 @@
-"""The Limo: a differential drive with wheels that can only speed up so fast, and a watchdog that stops it."""
+"""The Limo's differential drive: limits of its wheels' speed and acceleration, and a watchdog that stops it."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Drive:
     wheel_speed, wheel_acceleration
         Limits of each wheel [m/s, m/s²].
     watchdog_s
-        The robot stops when no command came for so long [s]; the next command arms it again.
+        The robot stops when no command has come for this long [s]; the next command arms the watchdog again.
     left, right
         Speeds of the wheels' rims [m/s].
     rejected, watchdog_stops
-        How many commands were not numbers, and how often the watchdog stopped the robot.
+        How many commands were not finite, and how often the watchdog stopped the robot.
     """
 
     wheel_speed: float
@@ -61,7 +61,7 @@ class Drive:
 
     @property
     def twist(self) -> Twist:
-        """How fast the wheels move the robot when they do not slip."""
+        """The robot's speeds while the wheels do not slip."""
         return twist_of(self.left, self.right)
 
 

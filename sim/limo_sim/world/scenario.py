@@ -1,4 +1,4 @@
-"""Scenarios: who walks where, what stands around, and how good the sensors are; data, checked when read.
+"""Scenarios: the people and their routes, the furniture, the robot and the errors of the sensors; checked when read.
 
 x forward, y left, yaw counter-clockwise [rad], metres, seconds; the arena's centre is the origin.
 """
@@ -20,18 +20,24 @@ else:
     import tomli as tomllib  # type: ignore[import-not-found]
 
 ROOM_HALF = 4.9
-"""The walls' inner faces stand at ± this [m] (0.2 m thick, centred on ± 5 m)."""
+"""The walls' inner faces stand at ± this [m]: 0.2 m thick, centred on ± 5 m, as in the workshop's `hri_world.world`."""
 WALL_HEIGHT = 1.0
+"""Of the walls [m], as in `hri_world.world`."""
 ROBOT_RADIUS = 0.19
 """The circle about the base centre that holds the robot's 0.29 × 0.22 m body [m]."""
+# Corners of routes lie within ± this [m]. Chosen: the widest person's cylinder, 0.22 m, and 0.38 m to the wall, the
+# robot's diameter, so that a person does not press the robot against a wall.
 _ROUTE_HALF = 4.3
+# Routes keep this distance from furniture [m]. Chosen: arms swing beyond the cylinder that stands for the body.
 _CLEARANCE = 0.2
+# Distances from routes to furniture are taken at points this far apart [m]: right to within half of it.
+_ROUTE_STEP = 0.02
 _FOLDER = Path(__file__).parents[1] / "scenarios"
 
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Somebody who walks a route, around and around.
+    """A person who walks a closed route again and again.
 
     Attributes
     ----------
@@ -43,11 +49,11 @@ class Person:
     height
         Stature [m]; the whole body scales with it.
     girth
-        Breadth of limbs and trunk relative to the recipe's.
+        Breadth of limbs and trunk, relative to that of `person.body`.
     arrives_s
-        Nobody is there before this time [s].
+        The person is not in the arena before this time [s].
     facing
-        Where somebody with a single corner looks [rad].
+        Direction in which a person whose route has a single corner faces [rad].
     shirt, trousers, skin, hair
         Colours, red, green, blue, 0 … 255.
     """
@@ -86,7 +92,7 @@ class Furniture:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """Where the Limo starts, and what its drive can do."""
+    """The Limo's start [m, m, rad], its wheels' limits [m/s, m/s²], and the watchdog's time [s]."""
 
     x: float = within(0.0, -4.6, 4.6)
     y: float = within(0.0, -4.6, 4.6)
@@ -144,7 +150,7 @@ class Imu:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """The sun and the grey things it falls on: direction it shines in, strengths, brightness 0 … 1."""
+    """The sun's direction and strengths, and the brightness of sky, floor and walls, 0 … 1."""
 
     sun: tuple[float, float, float] = within((-0.5, 0.1, -0.9), -1.0, 1.0)
     diffuse: float = within(0.8, 0.0, 1.2)
@@ -179,7 +185,7 @@ class Scenario:
     def load(name_or_path: str | Path) -> Scenario:
         """Read one of `Scenario.names()`, or a TOML file.
 
-        `limo_sim.run.catalogue.load` knows scenarios drawn from a seed as well.
+        `limo_sim.run.catalogue.load` also returns scenarios that are drawn from a seed.
 
         Raises
         ------
@@ -195,7 +201,7 @@ class Scenario:
         try:
             table = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError) as error:
-            raise ScenarioError(f"{path}: cannot be read: {error}") from error
+            raise ScenarioError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError(f"{path}: not TOML: {error}") from error
         scenario = build(Scenario, {"name": path.stem, **table}, f"{path.name}: ")
@@ -225,7 +231,7 @@ class Scenario:
         for index, (x, y, pause) in enumerate(person.route):
             if max(abs(x), abs(y)) > _ROUTE_HALF:
                 raise ScenarioError(
-                    f"{where}.route[{index}]: ({x:g}, {y:g}) goes through a wall or too near one, "
+                    f"{where}.route[{index}]: ({x:g}, {y:g}) is in a wall or too near one, "
                     f"want x and y in {-_ROUTE_HALF:g} … {_ROUTE_HALF:g}"
                 )
             if pause < 0:
@@ -247,7 +253,7 @@ class Scenario:
 
 def _gap(start: tuple[float, float, float], end: tuple[float, float, float], shape: Disc | Rectangle) -> float:
     """Smallest distance [m] from the straight way between two corners to a shape, to within a centimetre."""
-    steps = max(1, math.ceil(math.dist(start[:2], end[:2]) / 0.02))
+    steps = max(1, math.ceil(math.dist(start[:2], end[:2]) / _ROUTE_STEP))
     ways = (index / steps for index in range(steps + 1))
     return min(
         distance_to(shape, start[0] + way * (end[0] - start[0]), start[1] + way * (end[1] - start[1])) for way in ways

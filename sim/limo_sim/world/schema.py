@@ -1,4 +1,4 @@
-"""From a TOML table to a frozen dataclass; what does not belong there is refused by name."""
+"""From a TOML table to a frozen dataclass; an unknown key, a wrong type or a value out of range is refused by name."""
 
 from __future__ import annotations
 

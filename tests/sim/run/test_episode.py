@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
-from limo_hog.follow import Decision, Mode, Observation, ProxemicController, TrackingController, Twist, controller_named
+from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.follow import (
+    ApproachController,
+    Decision,
+    Mode,
+    Observation,
+    ProxemicController,
+    TrackingController,
+    Twist,
+    controller_named,
+)
 from limo_hog.follow.control.tracking import TrackingState
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.episode import Episode, run_episode
 from limo_sim.run.score import score
+from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
 
 WALL_CLOCK = {"detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor"}
@@ -46,6 +57,59 @@ def test_the_same_seed_gives_the_same_score_but_for_the_wall_clock() -> None:
         assert one.pop(name) is not None
         two.pop(name)
     assert one == two
+
+
+def test_the_clock_figures_are_those_of_the_wall() -> None:
+    class Slow:
+        """Takes 20 ms and finds nobody."""
+
+        def detect(self, image: NDArray[np.uint8]) -> Detections:
+            del image
+            time.sleep(0.02)
+            return Detections(np.empty((0, 4), np.int32), np.empty(0))
+
+    began = time.perf_counter()
+    episode = run("standing", 1.0, ProxemicController(), Slow())
+    took = time.perf_counter() - began
+    result = score(episode)
+    assert result.detect_ms_p50 is not None
+    assert result.render_ms_p50 is not None
+    assert 20.0 <= result.detect_ms_p50 < 1e3 * took / 10
+    # between a tenth of a frame's usual 1.5 … 3 ms and all the time there was
+    assert 0.15 < result.render_ms_p50 < 1e3 * took / 10 - 20.0
+    assert 10 * 0.02 < episode.wall_seconds <= took
+    assert result.real_time_factor == pytest.approx(1.0 / episode.wall_seconds)
+
+
+@pytest.mark.parametrize(
+    ("controller", "target"),
+    [(ProxemicController(), 1.5), (TrackingController(target_distance=2.2), 2.2), (ApproachController(), None)],
+)
+def test_the_card_tells_the_distance_that_the_controller_holds(controller: Any, target: float | None) -> None:
+    result = score(run("standing", 0.2, controller))
+    assert result.target_m == target
+    assert (result.distance_rms_error_m is None) == (target is None)
+
+
+def test_a_parameter_set_while_the_robot_drives_is_the_target_of_the_card() -> None:
+    controller = Tunable(ProxemicController())
+    controller.set("target_distance", 2.4)
+    assert score(run("standing", 0.2, controller)).target_m == 2.4
+    assert score(run("standing", 0.2, Tunable(ApproachController()))).target_m is None
+
+
+@pytest.mark.parametrize("target", [1.6, 2.2])
+def test_a_controller_that_holds_its_distance_has_little_error(target: float) -> None:
+    scenario = Scenario.load("standing")
+    # where the follower wants to be: camera, trunk seen from the front
+    x = target + 0.084 + 0.052 * scenario.people[0].height
+    there = dataclasses.replace(scenario.people[0], route=((x, 0.0, 0.0),))
+    held = run_episode(
+        dataclasses.replace(scenario, people=(there,)), ProxemicController(target), PeopleDetector(), 6.0, 0
+    )
+    error = score(held).distance_rms_error_m
+    assert error is not None
+    assert error < 0.03
 
 
 def test_the_tracking_controller_closes_in_on_somebody_who_stands() -> None:

@@ -62,7 +62,7 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
         ("[[people]]\nroute = [[1, 2, -1]]", "mine.toml: people[0].route[0]: pause -1 s, want 0 … 3600"),
         (
             "[[people]]\nroute = [[2, 0, 0], [6, 0, 0]]",
-            "mine.toml: people[0].route[1]: (6, 0) goes through a wall or too near one, want x and y in -4.3 … 4.3",
+            "mine.toml: people[0].route[1]: (6, 0) is in a wall or too near one, want x and y in -4.3 … 4.3",
         ),
         (
             "[[people]]\nroute = [[0.1, 0, 0], [3, 0, 0]]",

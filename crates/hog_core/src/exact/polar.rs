@@ -14,7 +14,7 @@ const RADIANS: f32 = (std::f64::consts::PI / 180.0) as f32;
 
 /// `magnitude` and `angle` [0, 2π] of (`dx`, `dy`); all four of one length.
 ///
-/// `vector_rule` tells how angles beyond 45° are rounded: as OpenCV's vector code does, or as its scalar code does.
+/// `vector_rule` says how angles beyond 45° are rounded: as OpenCV's vector code does, or as its scalar code does.
 #[inline(always)]
 pub(super) fn polar<M: MulAdd>(
     dx: &[f32],

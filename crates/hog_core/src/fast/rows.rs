@@ -7,7 +7,7 @@ use crate::pyramid::{Tap, taps};
 use super::lane::{Columns, Lane, RowPointers};
 use super::layout::{OVERREAD, SLACK, STEP};
 
-/// The image as one plane per channel, rows without gaps, every byte flipped by 0x80 (signed, as the resize wants it).
+/// The image as one plane per channel, rows without gaps, every byte flipped by 0x80 (signed, for the resize).
 #[derive(Debug, Default)]
 pub(crate) struct Planes {
     data: Vec<u8>,

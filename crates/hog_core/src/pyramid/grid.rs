@@ -71,7 +71,7 @@ impl Steps {
 }
 
 impl Grid {
-    /// The padding as the gradient wants it.
+    /// The padding in the form that the gradient takes.
     pub fn padding(&self) -> Padding {
         Padding { left: self.pad.width as i64, top: self.pad.height as i64, size: self.padded }
     }

@@ -43,14 +43,13 @@ class Extra(NamedTuple):
 
 
 def extras() -> list[Extra]:
-    """List the package's extras and the simulator, as the package's metadata has them."""
+    """List the package's extras, as its metadata has them."""
     wanted: dict[str, list[str]] = {}
     for line in requires("limo-hog") or []:
         found = re.match(r"([\w.-]+).*\bextra == ['\"]([\w-]+)['\"]", line)
         if found and found[1] != "limo-hog":
             wanted.setdefault(found[2], []).append(found[1])
-    listed = [_extra(name, libraries, f"'limo-hog[{name}]'") for name, libraries in sorted(wanted.items())]
-    return [*listed, _extra("simulator", ["limo-sim"], "limo-sim")]
+    return [_extra(name, libraries, f"'limo-hog[{name}]'") for name, libraries in sorted(wanted.items())]
 
 
 def _extra(name: str, libraries: list[str], install: str) -> Extra:

@@ -203,8 +203,8 @@ class Run:
                         self._keep(found)
                     self._bar.advance(self._task)
             except KeyboardInterrupt:
-                # Ctrl-C is how a camera's run ends: its copy is complete.
-                if source.kind is not Kind.CAMERA:
+                # Ctrl-C is how a camera's or a stream's run ends: its copy is complete.
+                if source.kind not in (Kind.CAMERA, Kind.STREAM):
                     raise
 
     def _find(self, source: Source, frame: int, image: Image) -> tuple[Found, Image | None]:

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 #: A terminal that closes and a service manager stop a program as Ctrl-C does; Windows has no SIGHUP.
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+#: Signals that come sooner than this after the first are one request to stop: a terminal that closes sends two or
+#: three, and files take less to close [s]. One that comes later interrupts the closing.
+IMPATIENT_S = 3.0
 
 
 class Stopped(KeyboardInterrupt):
@@ -26,11 +32,12 @@ class Stopped(KeyboardInterrupt):
         self.signal = signal_
 
 
-class _Held:
-    """How many blocks hold signals back at present, and the first signal that came meanwhile."""
+class _State:
+    """How many blocks hold signals back at present, and the signal that came first with its time [s]."""
 
     depth = 0
     came: int | None = None
+    when = 0.0
 
 
 @contextmanager
@@ -39,6 +46,7 @@ def stopping() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    _State.came = None
     before = {one: signal.getsignal(one) for one in _SIGNALS}
     for one, handler in before.items():
         if handler is not signal.SIG_IGN:
@@ -52,22 +60,26 @@ def stopping() -> Iterator[None]:
 
 @contextmanager
 def held() -> Iterator[None]:
-    """Let a signal that comes in this block raise only after it: a write is not left half done."""
+    """Let a signal that comes in this block raise only after it: a write is not left half done.
+
+    One that came before and was swallowed, as some libraries do while they are imported, raises again.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    _Held.depth += 1
+    _State.depth += 1
     try:
         yield
     finally:
-        _Held.depth -= 1
-        if not _Held.depth and _Held.came is not None:
-            came, _Held.came = _Held.came, None
-            raise Stopped(came)
+        _State.depth -= 1
+    if not _State.depth and _State.came is not None:
+        raise Stopped(_State.came)
 
 
 def _stop(number: int, _: FrameType | None) -> None:
-    if _Held.depth:
-        _Held.came = _Held.came or number
-    else:
+    now = time.monotonic()
+    if _State.came is not None and now - _State.when < IMPATIENT_S:
+        return
+    _State.came, _State.when = number, now
+    if not _State.depth:
         raise Stopped(number)

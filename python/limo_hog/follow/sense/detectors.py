@@ -99,7 +99,17 @@ class HalfSize:
 
 @dataclass(frozen=True)
 class Cv2Detector:
-    """OpenCV's own HOG with the workshop's parameters, where the installed OpenCV has one."""
+    """OpenCV's own HOG with the workshop's parameters, where the installed OpenCV has one.
+
+    Raises
+    ------
+    MissingExtraError, DetectorError
+        There is no OpenCV, or it has no HOG.
+    """
+
+    def __post_init__(self) -> None:
+        # An OpenCV without HOG is an error before the robot starts, not a fault of every frame.
+        _ = self._hog
 
     def detect(self, image: Image) -> Detections:
         """Find people, best first."""
@@ -111,7 +121,7 @@ class Cv2Detector:
         with needed(by="the detector cv2", what="OpenCV", install="'limo-hog[cv]'"):
             import cv2
         if not hasattr(cv2, "HOGDescriptor"):
-            raise DetectorError(f"OpenCV {cv2.__version__} has no HOGDescriptor: use --detector hog, or OpenCV 4")
+            raise DetectorError(f"OpenCV {cv2.__version__} has no HOGDescriptor: use the detector hog, or OpenCV 4")
         hog = cv2.HOGDescriptor()
         hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
         return hog

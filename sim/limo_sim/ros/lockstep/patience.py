@@ -1,4 +1,4 @@
-"""Interrupts a script that hangs: one that lets no simulated time pass for too long of the wall's."""
+"""Interrupts a script that hangs: one that lets no simulated time pass for too much wall time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class HungError(BaseException):
 
 
 class Patience:
-    """A timer that is wound up again whenever time passes.
+    """A timer that starts again whenever simulated time passes.
 
     It needs the main thread and a system with interval timers; elsewhere (Windows) a hanging script must be stopped
     with Ctrl-C.
@@ -25,7 +25,7 @@ class Patience:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Raise `HungError` inside when nothing moves for too long."""
+        """Raise `HungError` inside when no simulated time passes for too long."""
         if not hasattr(signal, "setitimer"):
             yield
             return
@@ -41,14 +41,14 @@ class Patience:
 
     @contextmanager
     def suspended(self) -> Iterator[None]:
-        """Let others take their time: a paused live view is not the script's fault."""
+        """Stop the timer, for example while the live view is paused."""
         if self._running:
             signal.setitimer(signal.ITIMER_REAL, 0)
         yield
         self.progress()
 
     def progress(self) -> None:
-        """Time has passed."""
+        """Start the timer again: simulated time has passed."""
         if self._running:
             signal.setitimer(signal.ITIMER_REAL, self.seconds)
 

@@ -1,6 +1,6 @@
-"""What a script does with OpenCV, seen from outside: its windows, and what its HOG detector finds.
+"""Replacements in `cv2` for one run: windows without a display, and a HOG detector whose results are logged.
 
-Windows need no display: the last picture of each is kept for who watches the run.
+The last picture of each window is kept for the live view.
 """
 
 from __future__ import annotations
@@ -10,20 +10,23 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.cv2_api.install import install_into_cv2
 from limo_hog.detector import Detections
+from limo_hog.extras import needed
 from limo_sim.ros.lockstep.world import Found, World
+
+with needed(by="limo-hog run", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
 
 _MISSING = object()
 
 
 @contextmanager
 def watched_cv2(world: World) -> Iterator[None]:
-    """Put windows that need no display and a detector that is watched into cv2, for one run."""
+    """Put the replacements into `cv2`, for one run."""
     # OpenCV 5 has no HOG: for this run, ours takes its place.
     installed = install_into_cv2()
     replacements = {**_windows(world), "HOGDescriptor": _watched(cv2.HOGDescriptor, world)}
@@ -89,7 +92,7 @@ def _as_shown(picture: NDArray[Any]) -> NDArray[np.uint8]:
 
 def _watched(base: Any, world: World) -> Any:
     class HOGDescriptor:
-        """OpenCV's or limo-hog's own, with an eye on what it finds.
+        """OpenCV's or limo-hog's descriptor; what `detectMultiScale` finds is noted in the run.
 
         It holds the descriptor: a Python class derived from one of cv2's crashes the garbage collector.
         """

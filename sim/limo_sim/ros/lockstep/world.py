@@ -36,7 +36,7 @@ Log = Callable[[float, str, str, str], None]
 
 
 class StubError(LimoHogError):
-    """A script asks for something that `limo-hog run` does not offer, or says something a robot cannot do."""
+    """A script uses something that `limo-hog run` does not offer, or sends a command that is not finite."""
 
 
 class RunOver(KeyboardInterrupt):
@@ -72,7 +72,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Callback:
-    """When a callback began, how long it slept [s of the arena's time], and how long it worked [s of the wall's]."""
+    """When a callback began [s], how long it slept [s of simulated time], and how long it took [s of wall time]."""
 
     time: float
     slept: float
@@ -80,7 +80,7 @@ class Callback:
 
 
 class World:
-    """One run: the arena, who listens, and the log that the score is made of.
+    """One run: the arena, the subscriptions, and the log that is scored.
 
     Attributes
     ----------
@@ -89,13 +89,13 @@ class World:
     found
         What the script's detector found since the last camera frame.
     asked
-        What the detector was asked to look at in the run, as "uint8 (480, 640, 3)", each once.
+        Types and shapes of the images given to the detector, as "uint8 (480, 640, 3)", each once.
     callbacks
         How long each callback took.
     parameters
         The newest values of the nodes' parameters, by name.
     fault
-        What went wrong first in the script, even if the script hid it.
+        The first exception in the script, even if the script caught it.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class World:
         return self.arena.time >= self.seconds - 1e-9
 
     def advance(self) -> None:
-        """Let the arena go on by one step; what the sensors have to say is offered to those who listen.
+        """Advance the arena by one step; new readings are offered to the subscriptions.
 
         Raises
         ------
@@ -161,13 +161,13 @@ class World:
         self.patience.progress()
 
     def sleep(self, seconds: float) -> None:
-        """Let simulated time pass, as a script's `time.sleep`: nothing is delivered meanwhile, only queued."""
+        """Let simulated time pass, as a script's `time.sleep` does: messages are queued, callbacks wait."""
         until = self.time + seconds
         while self.time < until - 1e-9:
             self.advance()
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Call back into the script, and remember how that went wrong."""
+        """Call back into the script; an exception is kept in `fault`."""
         began, since = time.perf_counter(), self.time
         try:
             function(*arguments)
@@ -188,7 +188,7 @@ class World:
         self.found.append(found)
 
     def publish(self, topic: str, message: Message) -> None:
-        """Take a message from the script: a command drives the robot, others go to the script's own readers.
+        """Take a message from the script: a command drives the robot, and the script's own subscriptions get it.
 
         Raises
         ------
@@ -250,7 +250,7 @@ class World:
                     reader.offer(from_wire(message))
 
     def _log(self) -> None:
-        """Note the period that ends now: what was seen, and what the script made of it."""
+        """Log the control period that ends now."""
         frame = self._frame
         fresh = frame is not None and frame.stamp > self._logged_frame
         if not fresh and self.time - self._logged < CONTROL_PERIOD - 0.01:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import array
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.extras import needed
 from limo_hog.ros2.messages import ENCODINGS, MessageError, decompressed, pixels_of
 from limo_sim.ros.interfaces import Message, message_class
+
+with needed(by="cv_bridge", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
 
 
 class CvBridgeError(TypeError):

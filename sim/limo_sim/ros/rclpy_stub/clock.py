@@ -11,7 +11,7 @@ from limo_sim.ros.rclpy_stub.context import current
 
 
 class ClockType(IntEnum):
-    """Which clock; all of them tell the arena's time here."""
+    """Kinds of clocks; all of them show the arena's time here."""
 
     ROS_TIME = 1
     SYSTEM_TIME = 2

@@ -1,4 +1,4 @@
-"""Which run a script belongs to, and what its command line says."""
+"""The run a script belongs to, and the ROS arguments of its command line."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ _current: Context | None = None
 
 
 def enter(context: Context | None) -> None:
-    """Make a run the one scripts belong to; None when it is over."""
+    """Set the run that scripts belong to; None when it is over."""
     global _current
     _current = context
 

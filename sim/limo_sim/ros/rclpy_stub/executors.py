@@ -1,4 +1,4 @@
-"""Executors: they let the arena go on until something is to be done, and do it, one thing at a time."""
+"""Executors: they advance the arena until a callback is due, and call one at a time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from limo_sim.ros.rclpy_stub.node import Node
 
 
 class ExternalShutdownException(Exception):  # noqa: N818 — rclpy's name
-    """The context was shut down while somebody waited."""
+    """The context was shut down during a wait."""
 
 
 class Executor:
@@ -23,14 +23,14 @@ class Executor:
         self._is_shutdown = False
 
     def add_node(self, node: Node) -> bool:
-        """Take a node in."""
+        """Add a node; False if it was added before."""
         if node in self._nodes:
             return False
         self._nodes.append(node)
         return True
 
     def remove_node(self, node: Node) -> None:
-        """Let a node go."""
+        """Remove a node."""
         if node in self._nodes:
             self._nodes.remove(node)
 
@@ -39,7 +39,7 @@ class Executor:
         return list(self._nodes)
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:  # noqa: ARG002 — rclpy's signature
-        """Spin no more."""
+        """End `spin`."""
         self._is_shutdown = True
         return True
 
@@ -95,7 +95,7 @@ class SingleThreadedExecutor(Executor):
 
 
 class MultiThreadedExecutor(Executor):
-    """One callback at a time here, too: lock step knows no threads."""
+    """One callback at a time here, too: lock step has no threads."""
 
 
 def spin(node: Node, executor: Executor | None = None) -> None:

@@ -1,4 +1,4 @@
-"""Puts the offered part of ROS 2's Python API in front, for one run; what is not offered says so."""
+"""Puts ROS 2's Python API into `sys.modules` for one run; a name that is not offered raises an error."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from limo_sim.ros.rclpy_stub import bridge, clock, context, executors, filters, 
 
 
 class NotOfferedError(StubError, ImportError):
-    """A name of ROS 2 that limo-hog has not got."""
+    """A name of ROS 2 that limo-hog does not have."""
 
 
 class _Module(ModuleType):
-    """A module that names what it has not got."""
+    """A module whose error for a missing name lists what it has."""
 
     def __init__(self, name: str, content: dict[str, Any]) -> None:
         super().__init__(name, f"Part of ROS 2's {name.partition('.')[0]}, as `limo-hog run` offers it.")
@@ -47,7 +47,7 @@ _ROS_TOPS = (
 
 
 class _Refuser(importlib.abc.MetaPathFinder):
-    """The last to be asked for a module: for one of ROS 2's, it says what is offered."""
+    """The last finder of modules: for one of ROS 2's, the error names what is offered."""
 
     def find_spec(
         self,
@@ -58,7 +58,9 @@ class _Refuser(importlib.abc.MetaPathFinder):
         top = fullname.partition(".")[0]
         if top in _ROS_TOPS or top.endswith(("_msgs", "_srvs", "_interfaces")):
             raise NotOfferedError(
-                f"limo-hog run does not offer {fullname}; see docs/ros2.md for what of ROS 2 it does", name=fullname
+                f"limo-hog run does not offer {fullname}; what of ROS 2 it offers is listed at "
+                "https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
+                name=fullname,
             )
         return None
 
@@ -69,7 +71,7 @@ def in_front(world: World) -> Iterator[None]:
     run = context.Context(world)
     modules = _modules(run)
     tops = {name.partition(".")[0] for name in modules}
-    # A real rclpy that was imported before steps back for the run.
+    # A real rclpy that was imported before is put aside for the run.
     hidden = {name: module for name, module in sys.modules.items() if name.partition(".")[0] in tops}
     for name in hidden:
         del sys.modules[name]
@@ -79,7 +81,7 @@ def in_front(world: World) -> Iterator[None]:
     real_sleep = time.sleep
 
     def sleep(seconds: float) -> None:
-        # Other threads, such as the live view's, keep the wall's time.
+        # Other threads, such as the live view's, sleep in wall time.
         if threading.current_thread() is threading.main_thread():
             world.sleep(seconds)
         else:

@@ -43,11 +43,11 @@ class Logger:
         return _levels.get(self.name, LoggingSeverity.INFO)
 
     def debug(self, message: object, **options: Any) -> bool:
-        """Say something for those who look for a fault."""
+        """Log a line of level DEBUG."""
         return self._say(LoggingSeverity.DEBUG, message, **options)
 
     def info(self, message: object, **options: Any) -> bool:
-        """Say how things go."""
+        """Log a line of level INFO."""
         return self._say(LoggingSeverity.INFO, message, **options)
 
     def warning(self, message: object, **options: Any) -> bool:
@@ -97,5 +97,5 @@ def get_logger(name: str) -> Logger:
 
 
 def set_logger_level(name: str, level: LoggingSeverity) -> None:
-    """Leave out what a logger says below a level."""
+    """Suppress the lines of a logger below a level."""
     Logger(name).set_level(level)

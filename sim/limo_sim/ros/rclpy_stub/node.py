@@ -58,7 +58,7 @@ class Publisher:
         current().world.publish(self.topic, msg)
 
     def get_subscription_count(self) -> int:
-        """Return how many listen; the robot listens to /cmd_vel."""
+        """Return the number of subscriptions; the robot is one to /cmd_vel."""
         world = current().world
         return sum(reader.topic == self.topic for reader in world.readers) + (self.topic == names.COMMAND)
 
@@ -76,7 +76,7 @@ class Subscription:
         self.qos_profile = qos
         keep_all = qos.history == HistoryPolicy.KEEP_ALL
         self._queue: deque[Message] = deque(maxlen=None if keep_all else max(qos.depth, 1))
-        # As in ROS, who asks for old messages gets none from those who do not keep them.
+        # As in ROS, a transient-local subscription gets no message from a volatile publisher.
         self._deaf = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL and topic in names.TYPES
 
     def offer(self, message: Message) -> None:
@@ -93,7 +93,7 @@ class Subscription:
         return self._queue.popleft()
 
     def destroy(self) -> None:
-        """Listen no more."""
+        """End the subscription."""
         world = current().world
         if self in world.readers:
             world.readers.remove(self)
@@ -133,7 +133,7 @@ class Node:
         self._timers: list[Timer] = []
 
     def __getattr__(self, name: str) -> Any:
-        # Only what a real node has is limo-hog's to refuse; the rest is the script's own mistake.
+        # Names that a real node has raise an error that says so; any other name is the script's own mistake.
         if name in _NOT_OFFERED:
             raise StubError(f"limo-hog run does not offer Node.{name}")
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
@@ -185,7 +185,7 @@ class Node:
     def create_publisher(
         self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int, **_: Any
     ) -> Publisher:
-        """Begin to publish on a topic."""
+        """Return a new publisher of a topic."""
         _check_type(msg_type)
         publisher = Publisher(msg_type, self.resolve_topic_name(topic), to_profile(qos_profile))
         _check_topic(publisher.topic, msg_type)
@@ -200,7 +200,7 @@ class Node:
         qos_profile: QoSProfile | int,
         **_: Any,
     ) -> Subscription:
-        """Begin to listen to a topic."""
+        """Return a new subscription to a topic."""
         _check_type(msg_type)
         subscription = Subscription(msg_type, self.resolve_topic_name(topic), callback, to_profile(qos_profile))
         _check_topic(subscription.topic, msg_type)
@@ -318,11 +318,11 @@ def _check_type(msg_type: Any) -> None:
 def _check_topic(topic: str, msg_type: type[Message]) -> None:
     wanted = names.TYPES.get(topic)
     if wanted is not None and wanted != msg_type._type_name:
-        raise StubError(f"{topic} carries {wanted}, the script says {msg_type._type_name}")
+        raise StubError(f"{topic} carries {wanted}, the script uses {msg_type._type_name}")
 
 
-def _take_out(things: list[Any], thing: Any) -> bool:
-    if thing not in things:
+def _take_out(items: list[Any], item: Any) -> bool:
+    if item not in items:
         return False
-    things.remove(thing)
+    items.remove(item)
     return True

@@ -151,7 +151,7 @@ class Parameters:
 
 @dataclass
 class ParameterDescriptor:
-    """What is said about a parameter; of this, `dynamic_typing` alone changes anything."""
+    """The description of a parameter; only `dynamic_typing` has an effect."""
 
     name: str = ""
     type: int = 0

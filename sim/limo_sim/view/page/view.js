@@ -1,4 +1,4 @@
-// The page of a running episode: shows what the run sends, and sends back what its reader wishes.
+// The page of a running episode: shows what the run sends, and sends back control messages.
 "use strict";
 
 const $ = (id) => document.getElementById(id);
@@ -125,17 +125,17 @@ const percent = (share) => (share === undefined ? "–" : `${(100 * share).toFix
 const ZONES = ["intimate", "personal", "social", "public"];
 const zone = (distance) => ZONES[scene.zones.filter((end) => distance > end).length];
 
-// Wishes
+// Controls
 
-const wish = (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
-const pause = () => wish({ do: now && now.paused ? "resume" : "pause" });
+const send = (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+const pause = () => send({ do: now && now.paused ? "resume" : "pause" });
 $("pause").onclick = pause;
-$("step").onclick = () => wish({ do: "step" });
-$("speed").onchange = (event) => wish({ do: "speed", value: Number(event.target.value) });
+$("step").onclick = () => send({ do: "step" });
+$("speed").onchange = (event) => send({ do: "speed", value: Number(event.target.value) });
 document.onkeydown = (event) => {
   if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName)) return;
   if (event.key === " ") pause();
-  else if (event.key === ".") wish({ do: "step" });
+  else if (event.key === ".") send({ do: "step" });
   else return;
   event.preventDefault();
 };
@@ -149,13 +149,14 @@ function parameters(all) {
     const [own, part = ""] = name.split(".").reverse();
     if (part !== group) $("fields").append(element("h3", { textContent: part }));
     group = part;
+    const words = (unit && own.endsWith(`_${unit}`) ? own.slice(0, -unit.length - 1) : own).replaceAll("_", " ");
     const input = element("input", { type: "number", step: whole ? 1 : "any", min: low, max: high, name, value });
     const label = element("label", { title: `${tooltip} From ${low} to ${high}${unit && ` ${unit}`}.` });
-    label.append(element("span", { textContent: own.replaceAll("_", " ") }), input, element("small", { textContent: unit }));
+    label.append(element("span", { textContent: words }), input, element("small", { textContent: unit }));
     input.onfocus = () => ($("about").textContent = label.title);
     input.onchange = () => {
       $("complaint").textContent = "";
-      wish({ set: name, value: input.valueAsNumber });
+      send({ set: name, value: input.valueAsNumber });
     };
     $("fields").append(label);
   }

@@ -188,7 +188,7 @@ pub(super) trait Lane: Copy {
     fn at_least(self, total: Self::Sum, least: i32) -> u32;
 
     /// One row of a level in `C` channels: neighbouring pixels of two rows (each byte flipped by 0x80) mixed as
-    /// `columns` tells, then (upper·(256 − weight) + lower·weight) / 2¹⁶, rounded half up.
+    /// `columns` says, then (upper·(256 − weight) + lower·weight) / 2¹⁶, rounded half up.
     /// # Safety
     /// The taps of `columns` and [`SLACK`](super::layout::SLACK) bytes after them are readable in all rows; `to` has
     /// room for all groups.

@@ -17,7 +17,7 @@ import aiohttp
 import pytest
 
 from limo_hog.follow.control.naming import controller_named
-from limo_sim.view.door import Door
+from limo_sim.view.access import Access
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable
@@ -64,7 +64,7 @@ SAME = {"none", "same", "https"}
 def quiet(capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture) -> Iterator[None]:
     """Nothing is printed or logged."""
     yield
-    gc.collect()  # where a task's exception would be told that nobody asked for
+    gc.collect()  # an exception of a task that was not awaited is told here
     assert capfd.readouterr().err == ""
     assert caplog.get_records("call") == []
 
@@ -111,15 +111,15 @@ def test_a_request_comes_in_by_this_machines_own_names_and_from_its_own_page(bin
 
 def test_a_page_asked_for_by_a_name_answers_to_it() -> None:
     for loopback in (True, False):
-        door = Door("Robot.Lab", loopback).at("Robot.Lab", ["127.0.1.1" if loopback else "192.0.2.7"])
-        assert door.admits("robot.lab:8488", "http://robot.lab:8488")
-        assert not door.admits("evil.lab:8488", "http://evil.lab:8488")
-        assert door.admits("192.0.2.7:8488", None) is not loopback
+        access = Access("Robot.Lab", loopback).at("Robot.Lab", ["127.0.1.1" if loopback else "192.0.2.7"])
+        assert access.admits("robot.lab:8488", "http://robot.lab:8488")
+        assert not access.admits("evil.lab:8488", "http://evil.lab:8488")
+        assert access.admits("192.0.2.7:8488", None) is not loopback
 
 
 def test_a_mapped_loopback_address_is_loopback() -> None:
-    assert Door.at("::ffff:127.0.0.1", ["::ffff:127.0.0.1"]).loopback
-    assert not Door.at("localhost", ["127.0.0.1", "192.0.2.7"]).loopback
+    assert Access.at("::ffff:127.0.0.1", ["::ffff:127.0.0.1"]).loopback
+    assert not Access.at("localhost", ["127.0.0.1", "192.0.2.7"]).loopback
 
 
 @pytest.mark.parametrize("path", ["/", "/view.js", "/view.css", "/live", "/nothing", "/../server.py"])
@@ -134,13 +134,13 @@ def test_every_answer_has_the_headers_that_keep_other_code_out(path: str) -> Non
     assert headers["x-frame-options"] == "DENY"
 
 
-def _answer(view: View, wish: str | bytes) -> dict[str, Any] | None:
-    """What the page is told after a wish: a complaint, or None where the connection is closed."""
+def _answer(view: View, text: str | bytes) -> dict[str, Any] | None:
+    """What the page is told after a control message: a complaint, or None where the connection is closed."""
 
     async def ask() -> dict[str, Any] | None:
         async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live", max_msg_size=0) as page:
             assert (await page.receive_json(timeout=10))["scenario"] == "workshop"
-            await (page.send_bytes(wish) if isinstance(wish, bytes) else page.send_str(wish))
+            await (page.send_bytes(text) if isinstance(text, bytes) else page.send_str(text))
             message = await page.receive(timeout=10)
             return json.loads(message.data) if message.type is aiohttp.WSMsgType.TEXT else None
 
@@ -148,7 +148,7 @@ def _answer(view: View, wish: str | bytes) -> dict[str, Any] | None:
 
 
 @pytest.mark.parametrize(
-    "wish",
+    "text",
     [
         "",
         "[]",
@@ -175,23 +175,23 @@ def _answer(view: View, wish: str | bytes) -> dict[str, Any] | None:
         b"\xff\xfe",
         b'{"do": "pause"}',
     ],
-    ids=lambda wish: repr(wish)[:40],
+    ids=lambda text: repr(text)[:40],
 )
-def test_a_wish_that_makes_no_sense_is_answered_and_changes_nothing(wish: str | bytes, quiet: None) -> None:
+def test_a_control_message_that_makes_no_sense_is_answered_and_changes_nothing(text: str | bytes, quiet: None) -> None:
     controller: Tunable[Any] = Tunable(controller_named("tracking", None))
     before = controller.parameters
     with View(WORKSHOP, controller, pace=Pace(2)) as view:
-        answer = _answer(view, wish)
+        answer = _answer(view, text)
         assert answer is not None
         assert len(answer["complaint"]) < 1000
         assert (view.pace.speed, view.pace.paused) == (2, False)
     assert controller.parameters == before
 
 
-@pytest.mark.parametrize("wish", ["[" * 100_000, " " * 1025, b"x" * 2000], ids=["deep", "long", "bytes"])
-def test_a_message_longer_than_any_wish_closes_the_connection(wish: str | bytes, quiet: None) -> None:
+@pytest.mark.parametrize("text", ["[" * 100_000, " " * 1025, b"x" * 2000], ids=["deep", "long", "bytes"])
+def test_a_message_longer_than_any_control_message_closes_the_connection(text: str | bytes, quiet: None) -> None:
     with View(WORKSHOP) as view:
-        assert _answer(view, wish) is None
+        assert _answer(view, text) is None
 
 
 @pytest.mark.parametrize(
@@ -234,7 +234,7 @@ def test_a_fault_of_the_page_itself_is_told(monkeypatch: pytest.MonkeyPatch, cap
     def fail(*_: object) -> bool:
         raise ZeroDivisionError("ours")
 
-    monkeypatch.setattr(Door, "admits", fail)
+    monkeypatch.setattr(Access, "admits", fail)
     with View(WORKSHOP) as view:
         assert _status(view, "/", {"Host": "localhost"})[0] == 500
     assert "ZeroDivisionError: ours" in caplog.text

@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from aiohttp.http_exceptions import HttpProcessingError
 
-#: Sent with every answer: nothing from elsewhere, no inline script or style, in nobody's frame.
+#: Sent with every answer: nothing from elsewhere, no inline script or style, in no frame of another page.
 HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
@@ -31,8 +31,8 @@ HEADERS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Door:
-    """Decides by `Host` and `Origin` whether a request may come in.
+class Access:
+    """Decides by `Host` and `Origin` whether a request is admitted.
 
     Attributes
     ----------
@@ -46,12 +46,12 @@ class Door:
     loopback: bool
 
     @classmethod
-    def at(cls, name: str, addresses: Iterable[str]) -> Door:
-        """Return the door of a page asked for at `name` that listens at some IP addresses."""
+    def at(cls, name: str, addresses: Iterable[str]) -> Access:
+        """Return the rule for a page asked for at `name` that listens at some IP addresses."""
         return cls(name.casefold(), all(_is_loopback(address) for address in addresses))
 
     def admits(self, host: str | None, origin: str | None) -> bool:
-        """Whether a request with these headers may come in.
+        """Whether a request with these headers is admitted.
 
         `Host` must name this machine: by loopback or as it was asked for; where the page is open to the network also
         by any IP address or by this machine's own name. `Origin`, where there is one, must be the same host and port.

@@ -1,0 +1,39 @@
+"""`limo-hog completion` prints a script with which a shell completes commands, options and values."""
+
+from __future__ import annotations
+
+import subprocess
+
+import pytest
+
+from limo_hog.cli.completion import SHELLS
+from limo_hog.cli.main import ARENA, BUILT_IN, main
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("limo-hog ''", {*ARENA, *BUILT_IN}),
+        ("limo-hog det", {"detect"}),
+        ("limo-hog detect --min", {"--min-height"}),
+        ("limo-hog detect --nms ''", {"overlap", "iou", "soft", "group"}),
+        ("limo-hog follow --controller tr", {"tracking"}),
+        ("limo-hog workshop ''", {"new", "check", "solution"}),
+    ],
+)
+def test_bash_completes(typed: str, offered: set[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    complete = (
+        f'COMP_WORDS=({typed}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _shtab_limo_hog; echo "${{COMPREPLY[@]}}"'
+    )
+    done = subprocess.run(["bash", "-c", f"{script}\n{complete}"], capture_output=True, text=True, check=True)
+    found = {word for word in done.stdout.split() if word.startswith("--") or not word.startswith("-")}
+    assert found == offered
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_each_shell_gets_a_script_that_knows_every_command(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(command in script for command in ARENA | BUILT_IN)

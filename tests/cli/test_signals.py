@@ -1,0 +1,84 @@
+"""A signal stops a command once, between two writes, and is not lost."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+
+from limo_hog.cli.support import signals
+from limo_hog.cli.support.signals import Stopped, held, stopping
+
+
+def _send(number: int) -> None:
+    os.kill(os.getpid(), number)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_a_command_and_handlers_are_put_back(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with pytest.raises(Stopped) as stopped, stopping():
+        _send(number)
+    assert stopped.value.signal == number
+    assert signal.getsignal(number) is before
+
+
+def test_a_write_is_finished_before_a_signal_stops_the_command() -> None:
+    done = []
+    with pytest.raises(Stopped), stopping():
+        with held(), held():
+            _send(signal.SIGTERM)
+            done.append("written")
+        done.append("not reached")
+    assert done == ["written"]
+
+
+def test_a_signal_that_a_library_swallows_stops_the_command_at_the_next_write() -> None:
+    done = []
+    with pytest.raises(Stopped), stopping():
+        try:
+            _send(signal.SIGTERM)
+        except KeyboardInterrupt:
+            done.append("swallowed")
+        with held():
+            done.append("written")
+        done.append("not reached")
+    assert done == ["swallowed", "written"]
+
+
+def test_the_signals_of_one_closing_terminal_do_not_interrupt_the_closing(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = []
+    with pytest.raises(Stopped), stopping():
+        try:
+            _send(signal.SIGHUP)
+        finally:
+            _send(signal.SIGTERM)
+            closed.append("whole")
+            monkeypatch.setattr(signals, "IMPATIENT_S", 0.0)
+            _send(signal.SIGTERM)
+            closed.append("not reached")
+    assert closed == ["whole"]
+
+
+def test_an_ignored_signal_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stopping():
+            _send(signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_thread_may_run_a_command() -> None:
+    done = []
+
+    def run() -> None:
+        with stopping(), held():
+            done.append("run")
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert done == ["run"]

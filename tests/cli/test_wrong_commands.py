@@ -1,0 +1,184 @@
+"""Fifty wrong command lines: each is answered at once, by one line that says what is wrong and what is wanted."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from limo_hog.cli.main import main
+
+#: Wrong arguments, which end with 2: what is typed, and a part of the last line of the answer.
+WRONG_ARGUMENTS = [
+    ("", "usage: limo-hog"),
+    ("detct a.jpg", "did you mean detect?"),
+    ("--verison", "did you mean --version?"),
+    ("detect", "the following arguments are required: INPUT"),
+    ("detect a.jpg --threshold high", "'high' is no score; wanted is a number from -100 to 100"),
+    ("detect a.jpg --threshold nan", "'nan' is no score"),
+    ("detect a.jpg --min-height 0", "'0' is no height in pixels; wanted is a number from 8 to 10000"),
+    ("detect a.jpg --min-height 200 --max-height 100", "max_height is 100; at least 200 is wanted"),
+    ("detect a.jpg --nms best", "invalid choice: 'best' (choose from"),
+    ("detect a.jpg --nms group --overlap 0.5", "overlap has no meaning for nms"),
+    ("detect a.jpg --overlap 2", "'2' is no overlap; wanted is a number from 0 to 1"),
+    ("detect a.jpg --threads -1", "'-1' is no number of threads"),
+    ("detect a.jpg --every 0", "'0' is no count; wanted is a whole number from 1 on"),
+    ("detect a.jpg --format gif", "invalid choice: 'gif' (choose from"),
+    ("detect a.jpg --resume", "give one of them"),
+    ("detect a.jpg --resume --overwrite --json x", "not allowed with argument --resume"),
+    ("detect a.jpg --csv -", "standard output is for --json -"),
+    ("detect a.jpg --json folder", "'folder' is a folder"),
+    ("detect a.jpg --json there.txt", "there.txt would be overwritten: --overwrite replaces it"),
+    ("detect a.jpg --outt found", "did you mean --out?"),
+    ("detect a.jpg --model nobody.yml", "the path of a model file is wanted"),
+    ("bench --size 640", "'640' is no size; wanted is WIDTHxHEIGHT such as 640x480"),
+    ("bench --size 0x480", "'0x480' is no size"),
+    ("bench --channels rgb", "invalid choice: 'rgb' (choose from"),
+    ("bench --threads many", "'many' is no number of threads"),
+    ("follow --controller fast", "invalid choice: 'fast' (choose from"),
+    ("follow --target 100", "'100' is no distance in metres; wanted is a number from 0.1 to 8"),
+    ("follow --seconds -5", "'-5' is no duration in seconds"),
+    ("follow --seed 1.5", "'1.5' is no seed; wanted is a whole number from 0 on"),
+    ("follow --view 99999", "'99999' is no [HOST:]PORT such as 8488"),
+    ("follow --video film.avi", "'film.avi': wanted is a name that ends in .mp4"),
+    ("follow --record run.bag", "'run.bag': wanted is a name that ends in .mcap"),
+    ("follow --plot run.gif", "'run.gif': wanted is a name that ends in .png or .svg or .pdf"),
+    ("follow --json folder", "'folder' is a folder"),
+    ("score --plot compared.txt", "'compared.txt': wanted is a name that ends in .png or .svg or .pdf"),
+    ("score --seeds 0", "'0' is no count"),
+    ("score --controller zigzag", "invalid choice: 'zigzag' (choose from"),
+    ("arena", "give --ros2, --view, --video or --record"),
+    ("run", "the following arguments are required: NODE.py"),
+    ("run node.py --real --json card.json", "a script on the network is not scored"),
+    ("workshop", "the following arguments are required: new|check|solution"),
+    ("workshop new there.txt", "there.txt is there already; give another name"),
+    ("replay", "the following arguments are required: FILE"),
+    ("topic", "the following arguments are required"),
+    ("completion fish", "invalid choice: 'fish' (choose from"),
+]
+#: What cannot be done, which ends with 1: what is typed, and a part of the only line of the answer.
+IMPOSSIBLE = [
+    ("detect a.jpg --model there.txt", "there.txt"),
+    ("bench --image there.txt", "there.txt: not an image that OpenCV can read (4 bytes)"),
+    ("follow --scenario nowhere", "unknown scenario nowhere: want one of crossing,"),
+    ("follow --scenario nowhere.toml", "nowhere.toml: cannot be read: No such file or directory"),
+    ("follow --controller approach --target 1", "the approach controller holds no distance: use proxemic or tracking"),
+    ("follow --detector yolo", "no detector 'yolo': want one of hog,"),
+    ("follow --detector onnx:none.onnx", "none.onnx: no such file; --detector onnx:FILE wants an ONNX network"),
+    ("score --detector yolo", "no detector 'yolo': want one of hog,"),
+    ("score --controller approach --target 2", "the approach controller holds no distance"),
+    ("run none.py", "none.py: no such file"),
+    ("workshop check none.py", "none.py: no such file"),
+    ("replay none.mcap", "none.mcap"),
+    ("replay there.txt", "there.txt"),
+]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A working directory with a picture, a node, a text and a folder."""
+    monkeypatch.chdir(tmp_path)
+    cv2.imwrite("a.jpg", np.zeros((200, 200, 3), np.uint8))
+    Path("there.txt").write_text("text")
+    Path("node.py").write_text("")
+    Path("folder").mkdir()
+
+
+@pytest.mark.parametrize(("typed", "told"), WRONG_ARGUMENTS)
+def test_wrong_arguments_are_answered_by_one_line_and_2(
+    typed: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(typed.split()) == 2
+    shown = capsys.readouterr()
+    assert not shown.out
+    told_lines = [line for line in shown.err.splitlines() if told in line]
+    assert len(told_lines) == 1 and len(told_lines[0]) < 300
+    # Before it, argparse's usage; after it nothing, but for the bare command, which is answered by its help.
+    assert told_lines[0] == shown.err.splitlines()[-1] or not typed
+
+
+@pytest.mark.parametrize(("typed", "told"), IMPOSSIBLE)
+def test_what_cannot_be_done_is_told_by_one_line_and_1(
+    typed: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(typed.split()) == 1
+    shown = capsys.readouterr()
+    assert not shown.out
+    (line,) = shown.err.splitlines()
+    assert line.startswith("limo-hog: ") and told in line and len(line) < 400
+
+
+#: Libraries that are not installed, what is typed then, and the end of the only line of the answer.
+MISSING = [
+    ("cv2", "detect a.jpg", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    ("cv2", "bench --image a.jpg", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    ("cv2", "follow", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    ("cv2", "arena --view", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    ("cv2", "run node.py", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    ("cv2", "workshop check node.py", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    ("cv2", "score --seeds 1", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    ("cv2", "replay a.mcap --detector cv2", "needs OpenCV: pip install 'limo-hog[cv]'"),
+    ("av", "follow --video a.mp4", "writing H.264 video needs PyAV: pip install 'limo-hog[video]'"),
+    ("matplotlib", "follow --plot a.png", "--plot needs matplotlib: pip install 'limo-hog[plot]'"),
+    ("rerun", "follow --rerun a.rrd", "--rerun needs the Rerun SDK: pip install 'limo-hog[viz]'"),
+    ("rosbags", "follow --record a.mcap", "pip install 'limo-hog[record]'"),
+    ("rosbags", "run node.py", "limo-hog run needs rosbags: pip install 'limo-hog[record]'"),
+    ("rosbags", "workshop check node.py", "limo-hog workshop needs rosbags: pip install 'limo-hog[record]'"),
+    ("rosbags", "replay a.mcap", "pip install 'limo-hog[record]'"),
+    ("cyclonedds", "follow --ros2", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
+    ("cyclonedds", "arena --ros2", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
+    ("cyclonedds", "topic list", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
+    ("shtab", "completion bash", "limo-hog completion needs shtab: pip install 'limo-hog[completion]'"),
+    ("aiohttp", "follow --view", "needs the module aiohttp, which is not installed: install limo-hog anew"),
+]
+
+
+def limo_hog_without(library: str, typed: str) -> subprocess.CompletedProcess[str]:
+    code = f"import sys; sys.modules[{library!r}] = None; from limo_hog.cli.main import main; sys.exit(main())"
+    command = [sys.executable, "-c", code, *typed.split()]
+    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=240)
+
+
+@pytest.mark.parametrize(("library", "typed", "told"), MISSING)
+def test_a_missing_library_is_told_by_the_line_that_installs_it(library: str, typed: str, told: str) -> None:
+    done = limo_hog_without(library, typed)
+    assert (done.returncode, done.stdout) == (1, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("limo-hog: ") and line.endswith(told)
+
+
+@pytest.mark.parametrize("library", ["cyclonedds", "rosbags"])
+def test_an_arena_that_is_only_filmed_needs_no_ros(library: str) -> None:
+    done = limo_hog_without(library, "arena --video a.mp4 --seconds 0.5")
+    assert done.returncode == 0, done.stderr
+    assert Path("a.mp4").stat().st_size > 1000
+
+
+def test_opencvs_detector_is_refused_at_once_where_opencv_has_none(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delattr(cv2, "HOGDescriptor")
+    for typed in ("follow --detector cv2", "score --detector cv2"):
+        assert main(typed.split()) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.endswith("has no HOGDescriptor: use the detector hog, or OpenCV 4")
+
+
+def test_a_library_that_does_not_load_is_told_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = tmp_path / "site" / "cv2.py"
+    broken.parent.mkdir()
+    broken.write_text("raise ImportError('libGL.so.1: cannot open shared object file', name='cv2')")
+    code = (
+        f"import sys; sys.path.insert(0, {str(broken.parent)!r}); from limo_hog.cli.main import main; sys.exit(main())"
+    )
+    for typed in (["detect", "a.jpg"], ["follow"]):
+        done = subprocess.run([sys.executable, "-c", code, *typed], check=False, capture_output=True, text=True)
+        assert done.returncode == 1
+        (line,) = done.stderr.splitlines()
+        assert line.endswith(
+            "needs OpenCV, which is installed but does not load: libGL.so.1: cannot open shared object file"
+        )

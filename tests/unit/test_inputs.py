@@ -1,0 +1,105 @@
+"""The detector takes names of files and PIL images, and finds in them what OpenCV's reading of them holds."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from limo_hog import Detections, MissingExtraError, PeopleDetector
+from limo_hog.cli.support.scene import street
+from limo_hog.exceptions import ImageError, ImageTypeError
+from limo_hog.imaging.inputs import as_array
+
+
+@pytest.fixture(scope="module")
+def scene() -> NDArray[np.uint8]:
+    return street(640, 480, 3)
+
+
+@pytest.fixture
+def file(tmp_path: Path, scene: NDArray[np.uint8]) -> Path:
+    path = tmp_path / "street.png"
+    cv2.imwrite(str(path), scene)
+    return path
+
+
+def assert_same(found: Detections, expected: Detections) -> None:
+    assert len(expected) > 0
+    np.testing.assert_array_equal(found.boxes, expected.boxes)
+    np.testing.assert_array_equal(found.scores, expected.scores)
+
+
+def test_a_file_and_a_pil_image_hold_the_same_people_as_the_array(file: Path, scene: NDArray[np.uint8]) -> None:
+    detector = PeopleDetector(min_height=None)
+    expected = detector.detect(scene)
+    for image in (file, str(file), Image.open(file)):
+        assert_same(detector.detect(image), expected)
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "P", "L", "1", "CMYK"])
+def test_pil_images_of_8_bits_become_bgr_or_gray(file: Path, mode: str) -> None:
+    image = Image.open(file).convert(mode)
+    gray = mode in ("L", "1")
+    expected = np.asarray(image.convert("L" if gray else "RGB"))
+    np.testing.assert_array_equal(as_array(image), expected if gray else expected[..., ::-1])
+
+
+@pytest.mark.parametrize("mode", ["I", "F", "I;16"])
+def test_pil_images_of_more_bits_are_refused(mode: str) -> None:
+    with pytest.raises(ImageTypeError, match=f"mode {mode}; 8 bits a channel are wanted"):
+        PeopleDetector().detect(Image.new(mode, (200, 200)))
+
+
+def test_a_file_that_is_no_picture_is_named(tmp_path: Path) -> None:
+    for content, told in ((b"text", "not an image"), (b"", "the file is empty")):
+        path = tmp_path / "a.jpg"
+        path.write_bytes(content)
+        with pytest.raises(ImageError, match=f"a.jpg: {told}"):
+            PeopleDetector().detect(path)
+    with pytest.raises(FileNotFoundError, match=r"none\.jpg"):
+        PeopleDetector().detect(tmp_path / "none.jpg")
+    with pytest.raises(IsADirectoryError):
+        PeopleDetector().detect(tmp_path)
+
+
+def test_what_is_neither_is_refused_as_before() -> None:
+    for image in ([[1, 2]], 7, None):
+        with pytest.raises(ImageTypeError, match="an image is a uint8 numpy array"):
+            PeopleDetector().detect(image)  # type: ignore[arg-type]
+
+
+def without(modules: str, code: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    hide = f"import sys; sys.modules.update(dict.fromkeys({modules.split()!r})); import limo_hog;"
+    command = [sys.executable, "-c", hide + code, *map(str, arguments)]
+    return subprocess.run(command, check=False, capture_output=True, text=True)
+
+
+def test_without_opencv_pillow_reads_the_file(file: Path, tmp_path: Path, scene: NDArray[np.uint8]) -> None:
+    code = "print(limo_hog.PeopleDetector(min_height=None).detect(sys.argv[1]).boxes.tolist())"
+    done = without("cv2", code, file)
+    assert done.stdout.strip() == str(PeopleDetector(min_height=None).detect(scene).boxes.tolist()), done.stderr
+
+    # Turned by its EXIF data, as OpenCV turns it.
+    turned = tmp_path / "turned.jpg"
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    Image.fromarray(scene).save(turned, exif=exif)
+    code = "from limo_hog.imaging.inputs import as_array; print(as_array(sys.argv[1]).shape)"
+    assert without("cv2", code, turned).stdout.strip() == "(640, 480, 3)" == str(as_array(turned).shape)
+
+    (tmp_path / "text.jpg").write_bytes(b"text")
+    code = "limo_hog.PeopleDetector().detect(sys.argv[1])"
+    assert without("cv2", code, tmp_path / "text.jpg").stderr.strip().endswith("not an image that Pillow can read")
+
+
+def test_without_either_the_error_names_what_to_install(file: Path) -> None:
+    done = without("cv2 PIL", "limo_hog.PeopleDetector().detect(sys.argv[1])", file)
+    assert done.stderr.strip().endswith("reading pictures needs OpenCV or Pillow: pip install 'limo-hog[cv]'")
+    assert MissingExtraError.__name__ in done.stderr

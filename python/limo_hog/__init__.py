@@ -18,7 +18,8 @@ from limo_hog.cv2_api.functions import (
 )
 from limo_hog.cv2_api.hog import HOGDescriptor
 from limo_hog.cv2_api.install import install_into_cv2
-from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.detections import Detections
+from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import (
     BackendError,
     DetectorSizeError,

@@ -5,19 +5,19 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog import _core
 from limo_hog.cv2_api.arguments import integer, pair, pixels, real, shown
-from limo_hog.exceptions import HogError, ImageError, LimoHogError, ParameterError, ParameterTypeError
-from limo_hog.models import PERSON_BOX, Calibration, Model, PersonBox, load_model
+from limo_hog.detections import Detections, remembered
+from limo_hog.exceptions import ImageError, ParameterError, ParameterTypeError
+from limo_hog.models import Model, load_model
 from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
 
 if TYPE_CHECKING:
@@ -35,131 +35,6 @@ _GROUP_THRESHOLD = 2
 _LEVELS = 2048
 #: Bounds of arguments, so that no image grows, and no pyramid is cut, beyond what memory and `_LEVELS` hold.
 _FINEST_SCALE, _LEAST_HEIGHT_PX, _MOST_PIXELS = 1.005, 8.0, 2**28
-
-
-@dataclass(frozen=True, slots=True)
-class Detections:
-    """People found in one image, best first.
-
-    `len(d)` counts them, iterating and `d[i]` give (box, score), a slice, mask or array of indices gives `Detections`.
-    Jupyter shows a table, and the picture as long as the program holds it, or its file is there.
-
-    Attributes
-    ----------
-    boxes
-        int32 (N, 4): x, y, w, h [px] of the detection windows, top left corner first.
-    scores
-        float64 (N,): SVM margin of each box, descending; larger is surer, 0 is the model's own threshold.
-    person_box
-        Where the person stands in a window, as shares of it.
-    calibration
-        How the model's margins become probabilities; None where that was never measured.
-    """
-
-    boxes: NDArray[np.int32]
-    scores: NDArray[np.float64]
-    person_box: PersonBox = PERSON_BOX
-    calibration: Calibration | None = None
-    #: What was searched, for `_repr_html_`: a file's name, or a reference that keeps no image alive.
-    _searched: Any = field(default=None, repr=False, compare=False)
-
-    @classmethod
-    def none(cls) -> Detections:
-        """Return no detections: arrays of length 0."""
-        return cls(np.empty((0, 4), np.int32), np.empty(0))
-
-    def __len__(self) -> int:
-        return len(self.scores)
-
-    def __iter__(self) -> Iterator[tuple[NDArray[np.int32], float]]:
-        for box, score in zip(self.boxes, self.scores, strict=True):
-            yield box, float(score)
-
-    @overload
-    def __getitem__(self, index: int) -> tuple[NDArray[np.int32], float]: ...
-
-    @overload
-    def __getitem__(self, index: slice | NDArray[Any]) -> Detections: ...
-
-    def __getitem__(self, index: int | slice | NDArray[Any]) -> tuple[NDArray[np.int32], float] | Detections:
-        boxes, scores = self.boxes[index], self.scores[index]
-        if scores.ndim == 0:
-            return boxes, float(scores)
-        return dataclasses.replace(self, boxes=boxes, scores=scores)
-
-    @property
-    def person_boxes(self) -> NDArray[np.int32]:
-        """int32 (N, 4): the boxes without the window's margin, tight around the person [px]."""
-        return np.rint(self.person_box.inside(self.boxes)).astype(np.int32)
-
-    @property
-    def probabilities(self) -> NDArray[np.float64]:
-        """float64 (N,): probability that each box holds a person, by the model's calibration.
-
-        Raises
-        ------
-        HogError
-            The model has no calibration.
-        """
-        if self.calibration is None:
-            raise HogError("the model has no calibration, so its margins stand for no probabilities: use scores")
-        slope, offset = self.calibration
-        probabilities: NDArray[np.float64] = 0.5 + 0.5 * np.tanh(0.5 * (slope * self.scores + offset))
-        return probabilities
-
-    def draw(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Draw the people's boxes and scores into a copy of the image.
-
-        Parameters
-        ----------
-        image
-            uint8 (H, W), (H, W, 1) or (H, W, 3) BGR.
-
-        Returns
-        -------
-        uint8 (H, W, 3) BGR.
-
-        Raises
-        ------
-        MissingExtraError
-            OpenCV, which draws, is not installed.
-        """
-        from limo_hog.imaging.drawing import annotate
-
-        return annotate(pixels(image), self.person_boxes, [f"{score:.1f}" for score in self.scores])
-
-    def _repr_html_(self) -> str:
-        # Imported here: only notebooks need it.
-        from limo_hog.imaging.notebook import shown
-
-        name = self._searched if isinstance(self._searched, str) else ""
-        caption = f"{len(self)} {'person' if len(self) == 1 else 'people'}{name and f' in {name}'}"
-        rows = [
-            [str(i), *map(str, box), f"{score:.2f}"]
-            for i, (box, score) in enumerate(zip(self.person_boxes.tolist(), self.scores, strict=True))
-        ]
-        return shown(caption, ("", "x", "y", "width", "height", "margin"), rows, self._jpeg())
-
-    def _jpeg(self) -> bytes | None:
-        """Return the small picture with the boxes; None where it is gone, or OpenCV is not installed."""
-        from limo_hog.imaging.inputs import as_array
-        from limo_hog.imaging.notebook import reduced
-
-        searched = self._searched() if isinstance(self._searched, weakref.ref) else self._searched
-        if searched is None:
-            return None
-        try:
-            from limo_hog.imaging.writing import jpeg
-
-            image, divisor = reduced(pixels(as_array(searched)))
-            small = dataclasses.replace(self, boxes=np.asarray(self.boxes // divisor, np.int32))
-            return jpeg(small.draw(image))
-        except (LimoHogError, OSError):
-            return None
-
-    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        # A copy in another process does not know the image.
-        return Detections, (self.boxes, self.scores, self.person_box, self.calibration)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,7 +181,7 @@ class PeopleDetector:
         OSError
             The file cannot be read.
         """
-        searched = _remembered(image)
+        searched = remembered(image)
         if not isinstance(image, np.ndarray):
             # Imported here, as programs that read pictures themselves do not need it.
             from limo_hog.imaging.inputs import as_array
@@ -369,16 +244,6 @@ class PeopleDetector:
         # Copies and pickles are made anew of the arguments: the compiled detector cannot be pickled.
         arguments = {name.name: getattr(self, name.name) for name in dataclasses.fields(self) if name.init}
         return partial(type(self), **arguments), ()
-
-
-def _remembered(image: Any) -> Any:
-    """Return what finds an image again without keeping it alive: its file's name, or a weak reference."""
-    if isinstance(image, (str, os.PathLike)):
-        return os.fspath(image)
-    try:
-        return weakref.ref(image)
-    except TypeError:
-        return None
 
 
 def _number(name: str, value: Any, low: float, high: float) -> float:

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -16,42 +12,20 @@ import av
 import cv2
 import numpy as np
 import pytest
+from tests.cli.material import OPENCVS, PICTURE, film_of, lines_of
 
 import limo_hog
 from limo_hog.cli.main import main
-from limo_hog.cli.support.scene import street
 from limo_hog.detector import PeopleDetector
-from limo_hog.imaging.writing import video_writer, write_image
+from limo_hog.imaging.writing import write_image
 
 LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
-PICTURE = street(192, 256, 3)
-#: With these `detect` gives OpenCV's rectangles.
-OPENCVS = ("--min-height", "none", "--nms", "group")
-
-
-@pytest.fixture
-def pictures(tmp_path: Path) -> Path:
-    folder = tmp_path / "in"
-    write_image(folder / "a.png", PICTURE)
-    write_image(folder / "deep" / "b.png", np.ascontiguousarray(PICTURE[:, ::-1]))
-    write_image(folder / "c.png", np.zeros((20, 20, 3), np.uint8))
-    return folder
-
-
-def _film(path: Path, frames: int = 12) -> None:
-    with video_writer(path, fps=10) as write:
-        for i in range(frames):
-            write(np.ascontiguousarray(np.roll(PICTURE, 4 * i, axis=1)))
-
-
-def _lines(text: str) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in text.splitlines()]
 
 
 def test_results_are_lines_in_the_order_of_the_inputs(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["detect", str(pictures), "--json", "-"]) == 0
-    results = _lines(capsys.readouterr().out)
+    results = lines_of(capsys.readouterr().out)
     assert [Path(r["source"]).name for r in results] == ["a.png", "c.png", "b.png"]
     expected = PeopleDetector().detect(PICTURE)
     assert len(expected) > 0
@@ -82,7 +56,7 @@ def test_what_cannot_be_read_is_named_and_the_rest_is_done(
     inputs = [str(pictures), str(tmp_path / "nothing"), "missing.png"]
     assert main(["detect", *inputs, "--json", "-"]) == 1
     shown = capsys.readouterr()
-    assert len(_lines(shown.out)) == 3
+    assert len(lines_of(shown.out)) == 3
     complaints = [line for line in shown.err.splitlines() if line.startswith("limo-hog: ")]
     assert len(complaints) == 4
     for words in ("nothing: no image", "missing.png: no such", "broken.jpg: not an", "empty.mp4: the file is empty"):
@@ -91,9 +65,9 @@ def test_what_cannot_be_read_is_named_and_the_rest_is_done(
 
 def test_a_video_gives_a_line_a_frame_and_an_annotated_copy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     film, out = tmp_path / "film.mp4", tmp_path / "out"
-    _film(film)
+    film_of(film)
     assert main(["detect", str(film), "--every", "3", "--json", "-", "--out", str(out)]) == 0
-    assert [r["frame"] for r in _lines(capsys.readouterr().out)] == [0, 3, 6, 9]
+    assert [r["frame"] for r in lines_of(capsys.readouterr().out)] == [0, 3, 6, 9]
     with av.open(out / "film.mp4") as container:
         stream = container.streams.video[0]
         assert (stream.codec_context.name, stream.width, stream.height) == ("h264", 192, 256)
@@ -130,7 +104,7 @@ def test_ctrl_c_is_the_end_of_a_camera(
     monkeypatch.setattr(cv2, "VideoCapture", Camera)
     out = tmp_path / "out"
     assert main(["detect", "0", "--json", "-", "--out", str(out)]) == 0
-    results = _lines(capsys.readouterr().out)
+    results = lines_of(capsys.readouterr().out)
     with av.open(out / "0.mp4") as container:
         assert len(list(container.decode(video=0))) == len(results) > 0
 
@@ -141,7 +115,7 @@ def test_a_small_person_is_found_by_enlarging(tmp_path: Path, capsys: pytest.Cap
     assert main(["detect", str(path), "--json", "-", "--min-height", "none"]) == 0
     assert main(["detect", str(path), "--json", "-", "--min-height", "36"]) == 0
     assert main(["detect", str(path), "--json", "-", "--min-height", "36", "--max-height", "37"]) == 0
-    plain, enlarged, low = _lines(capsys.readouterr().out)
+    plain, enlarged, low = lines_of(capsys.readouterr().out)
     assert plain["boxes"] == []
     assert len(enlarged["boxes"]) > 0
     x, y, w, h = enlarged["boxes"][0]
@@ -155,7 +129,7 @@ def test_person_boxes_lie_within_the_windows(pictures: Path, capsys: pytest.Capt
     path = str(pictures / "a.png")
     assert main(["detect", path, "--json", "-"]) == 0
     assert main(["detect", path, "--json", "-", "--person-box"]) == 0
-    window, person = (r["boxes"][0] for r in _lines(capsys.readouterr().out))
+    window, person = (r["boxes"][0] for r in lines_of(capsys.readouterr().out))
     x, y, w, h = window
     assert person == [round(x + 0.2 * w), round(y + 0.1 * h), round(0.6 * w), round(0.78 * h)]
 
@@ -164,7 +138,7 @@ def test_overlapping_hits_leave_only_the_best(pictures: Path, capsys: pytest.Cap
     path = str(pictures / "a.png")
     for overlap in ("0", "1"):
         assert main(["detect", path, "--json", "-", "--nms", "iou", "--overlap", overlap]) == 0
-    few, all_ = _lines(capsys.readouterr().out)
+    few, all_ = lines_of(capsys.readouterr().out)
     raw = PeopleDetector(nms="group", group_threshold=0).detect(PICTURE)
     assert len(all_["boxes"]) == len(raw)
     assert 0 < len(few["boxes"]) < len(raw)
@@ -196,70 +170,8 @@ def test_a_model_from_a_file_is_used(pictures: Path, tmp_path: Path, capsys: pyt
     path = str(pictures / "a.png")
     assert main(["detect", path, "--json", "-"]) == 0
     assert main(["detect", path, "--json", "-", "--model", str(tmp_path / "people.yml")]) == 0
-    named, read = _lines(capsys.readouterr().out)
+    named, read = lines_of(capsys.readouterr().out)
     assert named["boxes"] == read["boxes"] != []
-
-
-def test_resuming_does_only_what_is_left(pictures: Path, tmp_path: Path) -> None:
-    file, film = tmp_path / "out.json", tmp_path / "film.mp4"
-    _film(film)
-    arguments = ["detect", str(pictures), str(film), "--json", str(file), "--resume"]
-    assert main(arguments[:-1]) == 0
-    whole = file.read_text().splitlines()
-    assert len(whole) == 3 + 12
-    # As a killed run leaves it: beside, with half a line.
-    file.unlink()
-    (tmp_path / ".out.part.json").write_text("\n".join([whole[0], *whole[3:8], whole[8][:20]]))
-    assert main(arguments) == 0
-    key = [(r["source"], r["frame"]) for r in _lines("\n".join(whole))]
-    again = _lines(file.read_text())
-    assert sorted((r["source"], r["frame"]) for r in again) == sorted(key)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["film.mp4", "in", "out.json"]
-
-
-def test_copies_that_are_there_are_not_made_again(pictures: Path, tmp_path: Path) -> None:
-    film, out = tmp_path / "film.mp4", tmp_path / "out"
-    _film(film)
-    arguments = ["detect", str(pictures), str(film), "--out", str(out), "--resume"]
-    assert main(arguments) == 0
-    made = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
-    assert len(made) == 4
-    gone = next(path for path in made if path.name == "b.png")
-    gone.unlink()
-    assert main(arguments) == 0
-    again = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
-    assert again.keys() == made.keys()
-    assert [path for path in made if made[path] != again[path]] == [gone]
-
-
-def test_the_files_of_an_earlier_run_are_replaced_only_when_asked(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out, table = tmp_path / "out", tmp_path / "found.csv"
-    file = tmp_path / "found.json"
-    for kept, told in (
-        (["--json", str(file)], "found.json"),
-        (["--out", str(out)], "a.png"),
-        (["--csv", str(table)], "csv"),
-    ):
-        arguments = ["detect", str(pictures), *kept]
-        assert main(arguments) == 0
-        before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
-        capsys.readouterr()
-        assert main(arguments) == 2
-        said = capsys.readouterr().err
-        assert told in said and "--overwrite" in said
-        assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
-        assert main([*arguments, "--overwrite"]) == 0
-    assert len(_lines(file.read_text())) == 3
-
-
-def test_what_a_killed_run_left_is_not_lost_unasked(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / ".found.part.json").write_text("{}\n")
-    assert main(["detect", str(pictures), "--json", str(tmp_path / "found.json")]) == 2
-    assert "--resume goes on from it" in capsys.readouterr().err
 
 
 def test_a_copy_never_overwrites_its_picture(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -269,27 +181,12 @@ def test_a_copy_never_overwrites_its_picture(pictures: Path, capsys: pytest.Capt
     np.testing.assert_array_equal(np.asarray(cv2.imread(str(pictures / "a.png"))), PICTURE)
 
 
-def test_resuming_with_other_parameters_is_refused(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "found.json"
-    arguments = ["detect", str(pictures), "--json", str(file)]
-    assert main([*arguments, "--threshold", "0.5"]) == 0
-    before = file.read_bytes()
-    assert main([*arguments, "--resume"]) == 1
-    assert "found.json was made with other parameters: threshold 0.5, now None" in capsys.readouterr().err
-    assert file.read_bytes() == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["found.json", "in"]
-    assert main([*arguments, "--resume", "--threshold", "0.5"]) == 0
-    assert file.read_bytes() == before
-
-
 def test_a_dangling_link_is_named(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (pictures / "gone.png").symlink_to("nowhere.png")
     assert main(["detect", str(pictures), "--json", "-"]) == 1
     shown = capsys.readouterr()
     assert "gone.png: No such file or directory" in shown.err
-    assert len(_lines(shown.out)) == 3
+    assert len(lines_of(shown.out)) == 3
 
 
 def test_copies_are_of_their_pictures_format_or_the_one_asked_for(tmp_path: Path) -> None:
@@ -305,11 +202,11 @@ def test_copies_are_of_their_pictures_format_or_the_one_asked_for(tmp_path: Path
 
 def test_results_are_a_table_and_coco_too(pictures: Path, tmp_path: Path) -> None:
     film = tmp_path / "film.mp4"
-    _film(film, frames=2)
+    film_of(film, frames=2)
     files = {name: tmp_path / f"found.{name}" for name in ("json", "csv", "coco")}
     asked = [word for name, path in files.items() for word in (f"--{name}", str(path))]
     assert main(["detect", str(pictures), str(film), *asked]) == 0
-    results = _lines(files["json"].read_text())
+    results = lines_of(files["json"].read_text())
     people = [
         (r["source"], r["frame"], box, score)
         for r in results
@@ -338,70 +235,11 @@ def test_tables_to_standard_output_and_of_half_a_run_are_refused(capsys: pytest.
     assert "--json FILE" in capsys.readouterr().err
 
 
-def test_resuming_what_was_not_kept_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["detect", "a.png", "--resume"]) == 2
-    assert "--json FILE or --out DIR" in capsys.readouterr().err
-
-
-def test_resuming_from_another_file_leaves_it_alone(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "notes.json"
-    file.write_text("my notes\n")
-    assert main(["detect", str(pictures), "--json", str(file), "--resume"]) == 1
-    assert "not the JSON lines of an earlier run" in capsys.readouterr().err
-    assert file.read_text() == "my notes\n"
-
-
-def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
-    film, file, out = tmp_path / "film.mp4", tmp_path / "out.json", tmp_path / "out"
-    _film(film, frames=2000)
-    command = [str(LIMO_HOG), "detect", str(film), "--json", str(file), "--out", str(out)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    part = tmp_path / ".out.part.json"
-    deadline = time.monotonic() + 30
-    while not (part.exists() and part.stat().st_size) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert said.splitlines()[-1] == "limo-hog: stopped"
-    assert "Traceback" not in said
-    frames = [r["frame"] for r in _lines(file.read_text())]
-    assert frames == list(range(len(frames)))
-    assert 0 < len(frames) < 2000
-    assert list(out.iterdir()) == []
-    assert not part.exists()
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a tiny disk needs root")
-def test_a_full_disk_is_one_line_and_leaves_nothing_half_written(pictures: Path, tmp_path: Path) -> None:
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)], check=False, capture_output=True
-    )
-    if mounted.returncode:
-        pytest.skip("no tmpfs can be mounted here")
-    try:
-        command = [str(LIMO_HOG), "detect", str(pictures), "--out", str(disk), "--json", str(disk / "o.json")]
-        done = subprocess.run(command, check=False, capture_output=True, text=True)
-        assert done.returncode == 1
-        assert "No space left on device" in done.stderr
-        assert "Traceback" not in done.stderr
-        for path in disk.rglob("*.png"):
-            assert cv2.imread(str(path)) is not None
-        assert _lines((disk / "o.json").read_text()) is not None
-        assert not list(disk.rglob(".*"))
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
-
-
 @pytest.mark.skipif(not REAL.exists(), reason="needs ../shared/data/real")
 def test_photographs_give_opencvs_rectangles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     golden = json.loads((REAL / "golden_cv2_4.14.json").read_text())["images"]
     assert main(["detect", str(REAL / "pedestrians"), "--out", str(tmp_path), "--json", "-", *OPENCVS]) == 0
-    results = _lines(capsys.readouterr().out)
+    results = lines_of(capsys.readouterr().out)
     assert len(results) == 12
     for result in results:
         wanted = golden[str(Path(result["source"]).relative_to(REAL))]["ws8_pad4_s1.05_group2"]

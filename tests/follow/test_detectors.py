@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from tests.follow.onnx_file import dark_cells
 
-from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.detections import Detections
+from limo_hog.detector import PeopleDetector
 from limo_hog.follow.sense.detectors import (
     Cv2Detector,
     DetectorError,

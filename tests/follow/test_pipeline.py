@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tests.follow.views import boxes, flat, scan, scan_of
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Follower, Mode, Observation, Odometry, Region, Sensors, Twist
 
 IMAGE = np.full((480, 640, 3), 90, np.uint8)

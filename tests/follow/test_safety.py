@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.follow.views import boxes, flat, look, scan, scan_of
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Twist
 from limo_hog.follow.sense.clearance import speed_within
 

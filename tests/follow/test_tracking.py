@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.follow.views import GREEN, NOBODY, RED, World, flat, scan_of
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingController
 from limo_hog.follow.control.tracking import TrackingState
 from limo_hog.follow.sense.appearance import clothes_in

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow.sense.observation import Observation, Odometry, Scan
 from limo_hog.follow.twist import Twist
 

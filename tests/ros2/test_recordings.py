@@ -18,7 +18,8 @@ from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
 from limo_hog.cli.main import main
-from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.detections import Detections
+from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.observation import Odometry, Scan

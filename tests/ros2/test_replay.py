@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from limo_hog.cli import replay as command
 from limo_hog.cli.main import main
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Mode, Observation, Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.bag import Record, bag_writer

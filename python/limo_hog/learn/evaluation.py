@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.learn.curve import (
     Curve,
     Figures,

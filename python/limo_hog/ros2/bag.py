@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from limo_hog.atomic import about, whole_file
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.ros2.mcap_reading import check_type, mcap_messages

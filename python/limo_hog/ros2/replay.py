@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, Sighting

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, Sensors
 from limo_hog.follow.sense.detectors import Detector

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow.twist import Twist
 from limo_sim.ros.lockstep.world import Found, World
 from limo_sim.ros.script import Outcome, run_script

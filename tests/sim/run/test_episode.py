@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections, PeopleDetector
+from limo_hog.detections import Detections
+from limo_hog.detector import PeopleDetector
 from limo_hog.follow import (
     ApproachController,
     Decision,

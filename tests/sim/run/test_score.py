@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_sim.run.episode import Episode, FrameRecord, Step

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.follow.sense.region import Region

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.follow.sense.appearance import Clothes, clothes_in
 from limo_hog.follow.sense.region import Region
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.cv2_api.install import install_into_cv2
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.extras import needed
 from limo_sim.ros.lockstep.world import Found, World
 

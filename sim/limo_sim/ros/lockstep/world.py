@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detector import Detections
+from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.pipeline import CONTROL_PERIOD

@@ -1,0 +1,26 @@
+"""Pictures and films for `detect`, and its JSON lines read back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from limo_hog.cli.support.scene import street
+from limo_hog.imaging.writing import video_writer
+
+PICTURE = street(192, 256, 3)
+#: With these `detect` gives OpenCV's rectangles.
+OPENCVS = ("--min-height", "none", "--nms", "group")
+
+
+def film_of(path: Path, frames: int = 12) -> None:
+    with video_writer(path, fps=10) as write:
+        for i in range(frames):
+            write(np.ascontiguousarray(np.roll(PICTURE, 4 * i, axis=1)))
+
+
+def lines_of(text: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines()]

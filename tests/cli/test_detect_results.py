@@ -1,0 +1,154 @@
+"""What `detect` writes is whole, replaced only when asked, and gone on from."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import pytest
+from tests.cli.material import film_of, lines_of
+
+from limo_hog.cli.main import main
+
+LIMO_HOG = Path(sys.executable).with_name("limo-hog")
+
+
+def test_resuming_does_only_what_is_left(pictures: Path, tmp_path: Path) -> None:
+    file, film = tmp_path / "out.json", tmp_path / "film.mp4"
+    film_of(film)
+    arguments = ["detect", str(pictures), str(film), "--json", str(file), "--resume"]
+    assert main(arguments[:-1]) == 0
+    whole = file.read_text().splitlines()
+    assert len(whole) == 3 + 12
+    # As a killed run leaves it: beside, with half a line.
+    file.unlink()
+    (tmp_path / ".out.part.json").write_text("\n".join([whole[0], *whole[3:8], whole[8][:20]]))
+    assert main(arguments) == 0
+    key = [(r["source"], r["frame"]) for r in lines_of("\n".join(whole))]
+    again = lines_of(file.read_text())
+    assert sorted((r["source"], r["frame"]) for r in again) == sorted(key)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["film.mp4", "in", "out.json"]
+
+
+def test_copies_that_are_there_are_not_made_again(pictures: Path, tmp_path: Path) -> None:
+    film, out = tmp_path / "film.mp4", tmp_path / "out"
+    film_of(film)
+    arguments = ["detect", str(pictures), str(film), "--out", str(out), "--resume"]
+    assert main(arguments) == 0
+    made = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
+    assert len(made) == 4
+    gone = next(path for path in made if path.name == "b.png")
+    gone.unlink()
+    assert main(arguments) == 0
+    again = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
+    assert again.keys() == made.keys()
+    assert [path for path in made if made[path] != again[path]] == [gone]
+
+
+def test_the_files_of_an_earlier_run_are_replaced_only_when_asked(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, table = tmp_path / "out", tmp_path / "found.csv"
+    file = tmp_path / "found.json"
+    for kept, told in (
+        (["--json", str(file)], "found.json"),
+        (["--out", str(out)], "a.png"),
+        (["--csv", str(table)], "csv"),
+    ):
+        arguments = ["detect", str(pictures), *kept]
+        assert main(arguments) == 0
+        before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
+        capsys.readouterr()
+        assert main(arguments) == 2
+        said = capsys.readouterr().err
+        assert told in said and "--overwrite" in said
+        assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
+        assert main([*arguments, "--overwrite"]) == 0
+    assert len(lines_of(file.read_text())) == 3
+
+
+def test_what_a_killed_run_left_is_not_lost_unasked(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / ".found.part.json").write_text("{}\n")
+    assert main(["detect", str(pictures), "--json", str(tmp_path / "found.json")]) == 2
+    assert "--resume goes on from it" in capsys.readouterr().err
+
+
+def test_resuming_with_other_parameters_is_refused(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "found.json"
+    arguments = ["detect", str(pictures), "--json", str(file)]
+    assert main([*arguments, "--threshold", "0.5"]) == 0
+    before = file.read_bytes()
+    assert main([*arguments, "--resume"]) == 1
+    assert "found.json was made with other parameters: threshold 0.5, now None" in capsys.readouterr().err
+    assert file.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["found.json", "in"]
+    assert main([*arguments, "--resume", "--threshold", "0.5"]) == 0
+    assert file.read_bytes() == before
+
+
+def test_resuming_what_was_not_kept_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["detect", "a.png", "--resume"]) == 2
+    assert "--json FILE or --out DIR" in capsys.readouterr().err
+
+
+def test_resuming_from_another_file_leaves_it_alone(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "notes.json"
+    file.write_text("my notes\n")
+    assert main(["detect", str(pictures), "--json", str(file), "--resume"]) == 1
+    assert "not the JSON lines of an earlier run" in capsys.readouterr().err
+    assert file.read_text() == "my notes\n"
+
+
+def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
+    film, file, out = tmp_path / "film.mp4", tmp_path / "out.json", tmp_path / "out"
+    film_of(film, frames=2000)
+    command = [str(LIMO_HOG), "detect", str(film), "--json", str(file), "--out", str(out)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    part = tmp_path / ".out.part.json"
+    deadline = time.monotonic() + 30
+    while not (part.exists() and part.stat().st_size) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert said.splitlines()[-1] == "limo-hog: stopped"
+    assert "Traceback" not in said
+    frames = [r["frame"] for r in lines_of(file.read_text())]
+    assert frames == list(range(len(frames)))
+    assert 0 < len(frames) < 2000
+    assert list(out.iterdir()) == []
+    assert not part.exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a tiny disk needs root")
+def test_a_full_disk_is_one_line_and_leaves_nothing_half_written(pictures: Path, tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)], check=False, capture_output=True
+    )
+    if mounted.returncode:
+        pytest.skip("no tmpfs can be mounted here")
+    try:
+        command = [str(LIMO_HOG), "detect", str(pictures), "--out", str(disk), "--json", str(disk / "o.json")]
+        done = subprocess.run(command, check=False, capture_output=True, text=True)
+        assert done.returncode == 1
+        assert "No space left on device" in done.stderr
+        assert "Traceback" not in done.stderr
+        for path in disk.rglob("*.png"):
+            assert cv2.imread(str(path)) is not None
+        assert lines_of((disk / "o.json").read_text()) is not None
+        assert not list(disk.rglob(".*"))
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)

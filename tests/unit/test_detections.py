@@ -1,0 +1,100 @@
+"""Detections are indexed, drawn, and told as probabilities."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import limo_hog
+from limo_hog import Detections, PeopleDetector
+from limo_hog.cli.support.scene import street
+from limo_hog.models import Calibration, PersonBox
+
+PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
+Image = NDArray[np.uint8]
+
+
+@cache
+def picture() -> Image:
+    return street(640, 480, 3)
+
+
+def some() -> Detections:
+    boxes = np.array([[0, 0, 64, 128], [100, 50, 128, 256], [10, 10, 100, 200]], np.int32)
+    return Detections(boxes, np.array([2.0, 0.5, -1.0]))
+
+
+def test_the_person_is_two_tenths_in_from_the_side_and_one_from_the_top() -> None:
+    assert some().person_boxes.tolist() == [[13, 13, 38, 100], [126, 76, 77, 200], [30, 30, 60, 156]]
+    assert some().person_boxes.dtype == np.int32
+
+
+def test_detections_are_indexed_as_they_are_iterated() -> None:
+    found = some()
+    for index, (box, score) in enumerate(found):
+        np.testing.assert_array_equal(found[index][0], box)
+        assert found[index][1] == score
+    assert found[-1][1] == -1.0
+    with pytest.raises(IndexError):
+        found[3]
+
+
+def test_a_slice_or_mask_of_detections_is_detections() -> None:
+    found = replace(some(), person_box=PersonBox(0, 0, 1, 1), calibration=Calibration(1, 0))
+    for part in (found[:2], found[found.scores > 0], found[np.array([0, 1])]):
+        assert isinstance(part, Detections)
+        assert part.boxes.tolist() == found.boxes[:2].tolist() and part.scores.tolist() == [2.0, 0.5]
+        assert (part.person_box, part.calibration) == (found.person_box, found.calibration)
+    assert len(found[5:]) == 0
+
+
+def test_no_detections_are_empty_arrays() -> None:
+    none = Detections.none()
+    assert none.boxes.shape == (0, 4) and none.boxes.dtype == np.int32 and none.scores.shape == (0,)
+    assert len(none) == 0 and list(none) == [] and none.person_boxes.shape == (0, 4)
+
+
+def test_opencvs_models_have_a_calibration_in_which_surer_is_likelier() -> None:
+    for model, even in (("opencv", 0.26), ("daimler", 1.52)):
+        found = replace(PeopleDetector(model=model).detect(picture()), scores=np.array([3.0, even, -1.0]))
+        assert found.probabilities == pytest.approx([1.0, 0.5, 0.0], abs=0.05)
+
+
+def test_probabilities_need_a_calibration() -> None:
+    with pytest.raises(limo_hog.HogError, match="no calibration"):
+        _ = some().probabilities
+    found = replace(some(), calibration=Calibration(500.0, 0.0))
+    assert found.probabilities.tolist() == [1.0, 1.0, 0.0]
+
+
+def test_the_people_are_drawn_into_a_copy() -> None:
+    for shape in ((480, 640, 3), (480, 640), (480, 640, 1)):
+        image = np.full(shape, 128, np.uint8)
+        drawn = some().draw(image)
+        assert drawn.shape == (480, 640, 3)
+        assert (image == 128).all()
+        assert (drawn[76 + 100, 126] != 128).any()
+        assert (drawn[300:, 300:] == 128).all()
+
+
+def test_drawing_without_opencv_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "cv2", None)
+    monkeypatch.delitem(__import__("sys").modules, "limo_hog.imaging.drawing", raising=False)
+    with pytest.raises(limo_hog.MissingExtraError, match=r"pip install 'limo-hog\[cv\]'"):
+        some().draw(picture())
+
+
+def test_detecting_and_enlarging_need_no_opencv() -> None:
+    import subprocess
+    import sys
+
+    code = (
+        "import sys; sys.modules['cv2'] = None; import numpy as np, limo_hog;"
+        "limo_hog.PeopleDetector().detect(np.zeros((200, 200, 3), np.uint8))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -132,7 +132,9 @@ def _show(verdicts: list[Verdict], hints: int) -> None:
         won = f"{verdict.points:3d}/{verdict.worth:<3d}" if verdict.worth else " " * 7
         console.print(Text.assemble(marks[verdict.holds], f" task {verdict.task} {won} {verdict.checkpoint}"))
         style = "" if verdict.holds is False else "dim"
-        console.print(Padding(Text(evidence(verdict), style=style, overflow="fold"), (0, 0, 0, 4), expand=False), width=width)
+        console.print(
+            Padding(Text(evidence(verdict), style=style, overflow="fold"), (0, 0, 0, 4), expand=False), width=width
+        )
     points, worth = total(verdicts)
     tasks = ", ".join(f"task {task}: {won} of {of}" for task, (won, of) in by_task(verdicts).items())
     console.print(f"{points} of {worth} points ({tasks})", width=width)

@@ -279,6 +279,7 @@ def test_every_topic_of_the_workshop_arrives_at_its_rate(run: Run) -> None:
         names.DEPTH: 10,
         names.DEPTH_LCAS: 10,
         names.CAMERA_INFO: 10,
+        names.DEPTH_INFO: 10,
         names.SCAN: 8,
         names.ODOMETRY: 50,
         names.IMU: 100,

@@ -8,6 +8,7 @@ DEPTH = "/limo_camera/depth/image_raw"
 #: The name the LCAS/limo_ros2 model gives to the same depth image.
 DEPTH_LCAS = "/limo_camera/depth/camera_image_depth"
 CAMERA_INFO = "/limo_camera/camera_info"
+DEPTH_INFO = "/limo_camera/depth/camera_info"
 ANNOTATED = "/limo_camera/image_annotated"
 SCAN = "/scan"
 ODOMETRY = "/odom"
@@ -21,6 +22,7 @@ TYPES = {
     DEPTH: "sensor_msgs/msg/Image",
     DEPTH_LCAS: "sensor_msgs/msg/Image",
     CAMERA_INFO: "sensor_msgs/msg/CameraInfo",
+    DEPTH_INFO: "sensor_msgs/msg/CameraInfo",
     ANNOTATED: "sensor_msgs/msg/Image",
     SCAN: "sensor_msgs/msg/LaserScan",
     ODOMETRY: "nav_msgs/msg/Odometry",

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _BAR = 24
 _MODE_STYLES = {"search": "blue", "follow": "green", "hold": "cyan", "blocked": "red", "lost": "yellow"}
+_MODE_STYLES |= {"drive": "green", "stand": "blue"}  # of a node whose detector is its own
 _ZONE_STYLES = {"intimate": "red", "personal": "yellow", "social": "green", "public": "blue"}
 
 

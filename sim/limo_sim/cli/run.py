@@ -65,10 +65,10 @@ def run(args: argparse.Namespace) -> int:
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         audience = stack.enter_context(watching(args, scenario))
         bar = stack.enter_context(progress("s"))
-        task = bar.add_task("search", total=args.seconds)
+        task = bar.add_task("runs", total=args.seconds)
 
         def watch(moment: Moment) -> None:
-            bar.update(task, completed=round(moment.step.time, 1), description=moment.step.decision.mode.value)
+            bar.update(task, completed=round(moment.step.time, 1))
             audience.watch(moment)
 
         def log(time: float, level: str, name: str, message: str) -> None:

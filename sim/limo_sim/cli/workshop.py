@@ -7,12 +7,18 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.output import STDOUT, UsageError
+from limo_hog.atomic import whole_file
+from limo_hog.cli.support.output import STDOUT, UsageError, write_json
+from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 
 if TYPE_CHECKING:
     from limo_sim.workshop.check import Verdict
+
+
+#: What `check` prints is no wider [columns].
+WIDTH = 80
 
 
 class CheckpointError(LimoHogError):
@@ -26,7 +32,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Write a ROS 2 node that finds a person and follows them, task by task. The tasks are at "
         "https://github.com/limo-hog/limo-hog/blob/main/docs/workshop/README.md",
     )
-    actions = parser.add_subparsers(dest="action", metavar="new|check|solution", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="new|check|solution|grade", required=True)
     for action, words in (
         ("new", "write the template to begin with"),
         ("check", "run a node and show which checkpoints hold"),
@@ -36,22 +42,49 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         one.add_argument(
             "file", metavar="FILE.py", type=Path, nargs=None if action == "check" else "?", help="the node"
         )
+        if action == "check":
+            one.add_argument(
+                "--hint",
+                nargs="?",
+                type=int,
+                const=1,
+                default=0,
+                metavar="N",
+                help="show N hints for the first checkpoint that does not hold (1)",
+            )
+            one.add_argument("--json", metavar="FILE", help="write points and evidence as JSON; - is standard output")
+            one.add_argument("--gradescope", metavar="FILE", help="write results.json for a Gradescope autograder")
         one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
+    words = "check every node in a folder, each in a process of its own, and write a table of points"
+    one = actions.add_parser("grade", help=words, description=words.capitalize() + ".")
+    one.add_argument("folder", metavar="FOLDER", type=Path, help="its .py files, and those of the folders in it")
+    one.add_argument("--csv", metavar="FILE", default=STDOUT, help="where the table goes (-: standard output)")
+    one.add_argument("--seconds", type=float, default=100.0, metavar="S", help="wall time of a node (100)")
+    one.add_argument("--memory", type=int, default=4000, metavar="MB", help="memory of a node, not on Windows (4000)")
+    one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do one of the three."""
+    """Do one of the four."""
     from limo_sim.workshop import solution, template
 
     node = "proxemic" if args.sequel else "follower"
+    if args.action == "grade":
+        return _grade(args, node)
     if args.action == "check":
         with needed(by="limo-hog workshop", what="rosbags", install="'limo-hog[record]'"):
             from limo_sim.workshop.check import check
+            from limo_sim.workshop.report import to_gradescope, to_json
         verdicts = check(args.file, node)
-        _show(verdicts)
-        failed = [verdict for verdict in verdicts if verdict.holds is False]
-        if failed:
-            raise CheckpointError(f"{args.file}: {len(failed)} of {len(verdicts)} checkpoints do not hold")
+        if args.json:
+            write_json(args.json, to_json(args.file, node, verdicts))
+        if args.gradescope:
+            write_json(args.gradescope, to_gradescope(args.file, verdicts))
+        if STDOUT not in (args.json, args.gradescope):
+            _show(verdicts, args.hint)
+        missed = [verdict for verdict in verdicts if not verdict.holds]
+        if missed:
+            raise CheckpointError(f"{args.file}: {len(missed)} of {len(verdicts)} checkpoints do not hold")
         return 0
     text = template(node) if args.action == "new" else solution(node)
     suffix = "" if args.action == "new" else "_solution"
@@ -66,18 +99,50 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _show(verdicts: list[Verdict]) -> None:
+def _grade(args: argparse.Namespace, node: str) -> int:
+    with needed(by="limo-hog workshop", what="rosbags", install="'limo-hog[record]'"):
+        from limo_sim.workshop.grade import Limits, grade, nodes_in, write_csv
+    files = nodes_in(args.folder)
+    if not files:
+        raise UsageError(f"{args.folder}: no Python file in it, nor in the folders in it")
+    with progress("files") as bar:
+        task = bar.add_task("graded", total=len(files))
+        grades = grade(files, node, Limits(args.seconds, args.memory), lambda _: bar.advance(task))
+    if args.csv == STDOUT:
+        write_csv(grades, args.folder, sys.stdout)
+    else:
+        with whole_file(Path(args.csv)) as part, part.open("w", encoding="utf-8", newline="") as target:
+            write_csv(grades, args.folder, target)
+    failed = sum(graded.result is None for graded in grades)
+    print(f"{len(files)} files graded, {failed} of them without a result", file=sys.stderr)
+    return 0
+
+
+def _show(verdicts: list[Verdict], hints: int) -> None:
+    """Print each checkpoint on one line, its evidence below, and the points; no line is wider than 80 columns."""
     from rich.console import Console
-    from rich.table import Table
+    from rich.padding import Padding
     from rich.text import Text
 
-    marks = {True: Text("✓", style="green"), False: Text("✗", style="bold red"), None: Text("–", style="dim")}
-    table = Table(box=None, show_header=False, padding=(0, 1))
-    table.add_column(no_wrap=True)
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column()
-    table.add_column(style="dim", overflow="fold")
+    from limo_sim.workshop.report import by_task, evidence, total
+
+    marks = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "dim")}
+    console = Console(highlight=False)
+    width = min(console.width, WIDTH)
     for verdict in verdicts:
-        evidence = Text(verdict.evidence, style="" if verdict.holds is False else "dim")
-        table.add_row(marks[verdict.holds], f"task {verdict.task}", verdict.checkpoint, evidence)
-    Console(highlight=False).print(table)
+        won = f"{verdict.points:3d}/{verdict.worth:<3d}" if verdict.worth else " " * 7
+        console.print(Text.assemble(marks[verdict.holds], f" task {verdict.task} {won} {verdict.checkpoint}"))
+        style = "" if verdict.holds is False else "dim"
+        console.print(
+            Padding(Text(evidence(verdict), style=style, overflow="fold"), (0, 0, 0, 4), expand=False), width=width
+        )
+    points, worth = total(verdicts)
+    tasks = ", ".join(f"task {task}: {won} of {of}" for task, (won, of) in by_task(verdicts).items())
+    console.print(f"{points} of {worth} points ({tasks})", width=width)
+    missed = next((verdict for verdict in verdicts if not verdict.holds and verdict.hints), None)
+    if hints and missed is not None:
+        console.print(f"Hints for task {missed.task}, {missed.checkpoint}:", width=width)
+        for hint in missed.hints[:hints]:
+            console.print(Padding(Text(hint), (0, 0, 0, 4), expand=False), width=width)
+        if hints < len(missed.hints):
+            console.print(f"One more: --hint {hints + 1}")

@@ -40,6 +40,7 @@ class Outlet:
             self._camera = stamp = frame.stamp
             out += [
                 (names.CAMERA_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX)),
+                (names.DEPTH_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX)),
                 (names.DEPTH, lambda: messages.image(stamp, frame.depth)),
                 (names.DEPTH_LCAS, lambda: messages.image(stamp, frame.depth)),
                 (names.IMAGE, lambda: messages.image(stamp, frame.image)),

@@ -122,12 +122,18 @@ def run_script(
 
 
 def score_of(outcome: Outcome) -> ScoreCard:
-    """Measure a run; figures of detections are None where the script does not use cv2's HOG detector."""
+    """Measure a run; where the script does not use cv2's HOG detector, figures of detections are None.
+
+    Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
+    """
     card = score(outcome.episode)
     if outcome.world.asked:
         return card
+    twists = [step.decision.twist for step in outcome.episode.steps]
+    driving = sum(bool(twist.linear or twist.angular) for twist in twists) / max(len(twists), 1)
     return replace(
         card,
+        modes={"drive": driving, "stand": 1.0 - driving},
         first_detection_s=None,
         detected=None,
         best_box_wrong=None,

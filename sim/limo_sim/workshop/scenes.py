@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
-from limo_hog.follow.twist import Twist
-from limo_sim.ros.lockstep.world import Found, World
+from limo_sim.ros.lockstep.calls import Calls
+from limo_sim.ros.lockstep.world import LOGGER, Command, Found, Shown, World
 from limo_sim.ros.script import Outcome, run_script
 from limo_sim.run.episode import Moment
 from limo_sim.world.scenario import Person, Scenario
@@ -33,7 +33,8 @@ def _standing(*places: tuple[float, float]) -> Scenario:
 
 LEFT = Scene("left", "a person stands on the left", _standing((2.1, 0.6)))
 RIGHT = Scene("right", "a person stands on the right", _standing((2.1, -0.6)))
-AHEAD = Scene("ahead", "a person stands straight ahead", _standing((2.2, 0.0)))
+#: Longer than 30 frames, since many nodes log every thirtieth.
+AHEAD = Scene("ahead", "a person stands straight ahead", _standing((3.2, 0.0)), 3.3)
 NOBODY = Scene("nobody", "the room is empty", _standing())
 #: Two people, of whom OpenCV's detector lists the less sure one first.
 TWO = Scene("two", "two people stand there", _standing((2.2, 0.7), (3.4, -1.0)), 0.6)
@@ -41,7 +42,7 @@ NEAR = Scene(
     "near", "a person is nearer than the target distance", _standing((2.0, 0.0)), 1.0, ("-p", "target_distance:=2.5")
 )
 FAR = Scene(
-    "far", "a person is farther than the target distance", _standing((3.2, 0.0)), 1.0, ("-p", "target_distance:=1.5")
+    "far", "a person is farther than the target distance", _standing((3.2, 0.0)), 3.3, ("-p", "target_distance:=1.5")
 )
 
 FOLLOWER_SCENES = (LEFT, RIGHT, AHEAD, NOBODY, TWO)
@@ -65,7 +66,7 @@ class Look:
     commands
         What was published on /cmd_vel.
     windows
-        What was shown, by window.
+        The newest picture of each window, shown for this frame or before.
     said
         What was logged.
     """
@@ -74,8 +75,8 @@ class Look:
     image: NDArray[np.uint8]
     found: Detections
     raw: Found | None
-    commands: tuple[Twist, ...]
-    windows: dict[str, NDArray[np.uint8]]
+    commands: tuple[Command, ...]
+    windows: dict[str, Shown]
     said: tuple[str, ...]
 
 
@@ -86,6 +87,11 @@ class Take:
     scene: Scene
     looks: list[Look] = field(default_factory=list)
     outcome: Outcome | None = None
+
+    @property
+    def calls(self) -> Calls:
+        """What the node called."""
+        return self.outcome.world.calls if self.outcome is not None else Calls()
 
 
 def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
@@ -98,7 +104,7 @@ def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
     def watch(moment: Moment) -> None:
         nonlocal commanded
         world = worlds[0]
-        commands = tuple(command.twist for command in world.commands[commanded:])
+        commands = tuple(world.commands[commanded:])
         if moment.frame is None:
             return
         commanded = len(world.commands)
@@ -110,7 +116,7 @@ def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
                 moment.step.detections,
                 raw,
                 commands,
-                dict(moment.windows),
+                dict(world.shown),
                 tuple(said),
             )
         )
@@ -121,7 +127,7 @@ def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
         scene.scenario,
         scene.seconds,
         arguments=("--ros-args", *scene.arguments),
-        log=lambda _time, _level, _name, message: said.append(message),
+        log=lambda _time, _level, name, message: None if name == LOGGER else said.append(message),
         watch=watch,
         patience=patience,
         made=worlds.append,

@@ -55,10 +55,10 @@ def _windows(world: World) -> dict[str, Callable[..., Any]]:
         return -1
 
     def destroy_window(winname: str) -> None:
-        world.windows.pop(winname, None)
+        world.shown.pop(winname, None)
 
     def destroy_all() -> None:
-        world.windows.clear()
+        world.shown.clear()
 
     def nothing(*_: Any, **__: Any) -> None:
         return None
@@ -102,14 +102,25 @@ def _watched(base: Any, world: World) -> Any:
 
         def __init__(self, *args: Any, **kwargs: Any) -> None:
             self._descriptor = base(*args, **kwargs)
+            self._has_svm = False
 
         def __getattr__(self, name: str) -> Any:
             return getattr(self._descriptor, name)
+
+        def setSVMDetector(self, svmdetector: Any) -> Any:  # noqa: N802 — OpenCV's name
+            self._has_svm = True
+            return self._descriptor.setSVMDetector(svmdetector)
+
+        def load(self, filename: str, *args: Any) -> Any:
+            self._has_svm = True
+            return self._descriptor.load(filename, *args)
 
         def detectMultiScale(self, img: Any, *args: Any, **kwargs: Any) -> Any:  # noqa: N802 — OpenCV's name
             looked_at = f"{getattr(img, 'dtype', type(img).__name__)} {np.shape(img)}"
             if looked_at not in world.asked:
                 world.asked.append(looked_at)
+            if not self._has_svm:
+                world.calls.untaught = world.line()
             began = time.perf_counter()
             rects, weights = self._descriptor.detectMultiScale(img, *args, **kwargs)
             ms = 1e3 * (time.perf_counter() - began)

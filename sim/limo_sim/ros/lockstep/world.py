@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import copy
 import math
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,12 +26,18 @@ from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
 from limo_hog.ros2.messages import to_twist
 from limo_sim.ros.interfaces import Message, from_wire
+from limo_sim.ros.lockstep.calls import PUBLISHED, Calls, nearest_topic
 from limo_sim.ros.lockstep.patience import Patience
 from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import Episode, FrameRecord, Moment, Step
 from limo_sim.sensing.camera import Frame
 from limo_sim.world.scenario import Scenario
+
+#: A subscription is warned of when nobody publishes its topic for this time [s]. Chosen: publishers start within it.
+UNHEARD_AFTER = 2.0
+#: The name under which the run itself logs.
+LOGGER = "limo-hog"
 
 #: Takes what a script logs: time [s], level, logger, message.
 Log = Callable[[float, str, str, str], None]
@@ -64,10 +72,19 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command the script sent, and when [s]."""
+    """A command the script sent, when [s], and from which line of the script."""
 
     time: float
     twist: Twist
+    line: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A picture in a window, and when [s]."""
+
+    time: float
+    picture: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +113,10 @@ class World:
         The newest values of the nodes' parameters, by name.
     fault
         The first exception in the script, even if the script caught it.
+    calls
+        What the script called, and where.
+    shown
+        The newest picture of each window with its time; closing a window removes it.
     """
 
     def __init__(
@@ -119,7 +140,9 @@ class World:
         self.published: dict[str, str] = {}
         self.commands: list[Command] = []
         self.found: list[Found] = []
-        self.windows: dict[str, NDArray[np.uint8]] = {}
+        self.shown: dict[str, Shown] = {}
+        self.calls = Calls()
+        self._unheard: dict[str, float] = {}
         self.fault: BaseException | None = None
         self.callbacks: list[Callback] = []
         self.asked: list[str] = []
@@ -132,6 +155,18 @@ class World:
         self._seen_before = False
         self._began = time.perf_counter()
         self._collected = False
+
+    @property
+    def windows(self) -> dict[str, NDArray[np.uint8]]:
+        """The newest picture of each window."""
+        return {name: shown.picture for name, shown in self.shown.items()}
+
+    def line(self) -> int | None:
+        """Return the line of the script that runs now; None where the script is not in the call."""
+        frame: FrameType | None = sys._getframe(1)
+        while frame is not None and frame.f_code.co_filename != str(self.script):
+            frame = frame.f_back
+        return None if frame is None else frame.f_lineno
 
     @property
     def time(self) -> float:
@@ -158,6 +193,7 @@ class World:
             self.arena.step()
         self._collected = True
         self._collect()
+        self._warn()
         self.patience.progress()
 
     def sleep(self, seconds: float) -> None:
@@ -181,11 +217,30 @@ class World:
 
     def show(self, window: str, picture: NDArray[np.uint8]) -> None:
         """Keep the newest picture of a window."""
-        self.windows[window] = picture
+        self.calls.windows.setdefault(window, self.line())
+        self.shown[window] = Shown(self.time, picture)
 
     def note(self, found: Found) -> None:
         """Take what the script's detector found."""
         self.found.append(found)
+
+    def subscribe(self, reader: Reader) -> None:
+        """Add a subscription; it is warned of if nobody publishes its topic."""
+        self.readers.append(reader)
+        self.calls.readers.setdefault(reader.topic, self.line())
+        self._unheard.setdefault(reader.topic, self.time + UNHEARD_AFTER)
+
+    def _warn(self) -> None:
+        """Name each subscription to a topic that nobody publishes, once."""
+        due = [topic for topic, at in self._unheard.items() if self.time >= at - 1e-9]
+        for topic in due:
+            del self._unheard[topic]
+            if topic in PUBLISHED or topic in self.calls.writers:
+                continue
+            line = self.calls.readers[topic]
+            where = "" if line is None else f", subscribed to at line {line}"
+            said = f"nobody publishes {topic!r}{where}; did you mean {nearest_topic(topic)!r}?"
+            self.log(self.time, "WARN", LOGGER, said)
 
     def publish(self, topic: str, message: Message) -> None:
         """Take a message from the script: a command drives the robot, and the script's own subscriptions get it.
@@ -231,7 +286,7 @@ class World:
             if not math.isfinite(value):
                 raise StubError(f"the command's {name} is {value}: a robot can be given finite numbers alone")
         twist = to_twist(message)
-        self.commands.append(Command(self.time, twist))
+        self.commands.append(Command(self.time, twist, self.line()))
         self.arena.command(twist)
 
     def _collect(self) -> None:
@@ -277,7 +332,7 @@ class World:
                         frame if fresh else None,
                         self.arena.scan(),
                         self.arena.odometry(),
-                        windows=dict(self.windows),
+                        windows=self.windows,
                     )
                 )
 

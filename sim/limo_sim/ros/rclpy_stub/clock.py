@@ -8,6 +8,7 @@ from typing import Any
 
 from limo_sim.ros.interfaces import message_class
 from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.offered import Offered
 
 
 class ClockType(IntEnum):
@@ -119,8 +120,10 @@ class Time:
         return f"Time(nanoseconds={self.nanoseconds}, clock_type={self.clock_type.name})"
 
 
-class Clock:
+class Clock(Offered):
     """Tells the arena's time."""
+
+    _not_offered = ("create_jump_callback", "sleep_until", "ros_time_is_active", "set_ros_time_override", "handle")
 
     def __init__(self, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> None:
         self.clock_type = clock_type
@@ -135,8 +138,10 @@ class Clock:
         return True
 
 
-class Timer:
+class Timer(Offered):
     """Calls back again and again; after a blocked while, the calls that were missed are left out, as in ROS."""
+
+    _not_offered = ("time_since_last_call", "time_until_next_call", "clock", "handle", "callback_group")
 
     def __init__(self, period_s: float, callback: Callable[[], Any], autostart: bool = True) -> None:
         self.callback = callback

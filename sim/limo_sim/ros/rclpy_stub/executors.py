@@ -65,6 +65,7 @@ class Executor:
 
     def _wait(self, context: Context, timeout: float) -> None:
         world = context.world
+        world.calls.spun = True
         deadline = world.time + timeout
         waited = False
         while not world.over:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.abc
 import sys
 import threading
@@ -114,8 +115,11 @@ def _modules(run: context.Context) -> dict[str, ModuleType]:
 def _offered(run: context.Context) -> dict[str, dict[str, Any]]:
     """Every module and what it holds: the whole of what a script may import."""
 
-    def init(*, args: list[str] | None = None, context: Any = None, **_: Any) -> None:  # noqa: ARG001
+    def init(*, args: list[str] | None = None, context: Any = None, **_: Any) -> Any:  # noqa: ARG001
         run.init(args)
+        ended = contextlib.ExitStack()
+        ended.callback(run.shutdown)
+        return ended
 
     def shutdown(*, context: Any = None, uninstall_handlers: bool | None = None) -> None:  # noqa: ARG001
         run.shutdown()
@@ -191,6 +195,7 @@ def _offered(run: context.Context) -> dict[str, dict[str, Any]]:
             "SetParametersResult": parameters.SetParametersResult,
             "ParameterDescriptor": parameters.ParameterDescriptor,
             "ParameterType": parameters.ParameterType,
+            "ParameterValue": parameters.ParameterValue,
         },
         "message_filters": {
             "SimpleFilter": filters.SimpleFilter,

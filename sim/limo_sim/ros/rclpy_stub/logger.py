@@ -7,6 +7,7 @@ from enum import IntEnum
 from typing import Any
 
 from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.offered import Offered
 
 
 class LoggingSeverity(IntEnum):
@@ -23,8 +24,10 @@ class LoggingSeverity(IntEnum):
 _levels: dict[str, LoggingSeverity] = {}
 
 
-class Logger:
+class Logger(Offered):
     """Speaks under a name."""
+
+    _not_offered = ("log", "is_enabled_for", "get_logger_name")
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -12,6 +12,7 @@ from limo_sim.ros.lockstep.world import StubError
 from limo_sim.ros.rclpy_stub.clock import Clock, ClockType, Timer
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.logger import Logger
+from limo_sim.ros.rclpy_stub.offered import Offered
 from limo_sim.ros.rclpy_stub.parameters import Parameter, Parameters, SetParametersResult
 from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, to_profile
 
@@ -32,8 +33,10 @@ class ReentrantCallbackGroup(CallbackGroup):
     """Callbacks that may run at once; here they do not."""
 
 
-class Publisher:
+class Publisher(Offered):
     """Sends messages of one type to one topic."""
+
+    _not_offered = ("assert_liveliness", "wait_for_all_acked", "handle", "event_handlers", "logger_name")
 
     def __init__(self, msg_type: type[Message], topic: str, qos: QoSProfile) -> None:
         self.msg_type = msg_type
@@ -66,8 +69,10 @@ class Publisher:
         """Nothing is kept open."""
 
 
-class Subscription:
+class Subscription(Offered):
     """Calls back with each message of a topic; the newest `depth` wait for a slow callback."""
+
+    _not_offered = ("get_publisher_count", "handle", "event_handlers", "callback_group", "raw", "logger_name")
 
     def __init__(self, msg_type: type[Message], topic: str, callback: Callable[[Any], Any], qos: QoSProfile) -> None:
         self.msg_type = msg_type
@@ -90,6 +95,8 @@ class Subscription:
 
     def take(self) -> Message:
         """Return the oldest message that waits."""
+        if self.topic in (names.IMAGE, names.IMAGE_COMPRESSED):
+            current().world.calls.images += 1
         return self._queue.popleft()
 
     def destroy(self) -> None:
@@ -99,8 +106,22 @@ class Subscription:
             world.readers.remove(self)
 
 
-class Node:
+#: Options of rclpy's Node that change nothing here.
+_WITHOUT_EFFECT = (
+    *("context", "enable_rosout", "rosout_qos_profile", "start_parameter_services", "enable_logger_service"),
+)
+
+
+class Node(Offered):
     """What a script derives its node from."""
+
+    _not_offered = (
+        *("create_client", "create_service", "create_rate", "create_guard_condition", "executor", "handle", "context"),
+        *("waitables", "services", "clients", "guards", "add_waitable", "destroy_client", "destroy_service"),
+        *("get_node_names", "get_service_names_and_types", "get_publishers_info_by_topic"),
+        *("get_subscriptions_info_by_topic", "describe_parameter", "list_parameters", "undeclare_parameter"),
+        *("set_parameters_atomically", "get_parameters_by_prefix", "wait_for_node"),
+    )
 
     def __init__(
         self,
@@ -110,8 +131,13 @@ class Node:
         parameter_overrides: list[Parameter] | None = None,
         cli_args: list[str] | None = None,
         use_global_arguments: bool = True,
-        **_: Any,
+        allow_undeclared_parameters: bool = False,
+        automatically_declare_parameters_from_overrides: bool = False,
+        **options: Any,
     ) -> None:
+        unknown = ", ".join(repr(name) for name in options if name not in _WITHOUT_EFFECT)
+        if unknown:
+            raise TypeError(f"rclpy's Node has no option {unknown}")
         context = current()
         if not context.is_initialized:
             raise NotInitializedException("rclpy.init() has not been called")
@@ -123,20 +149,21 @@ class Node:
         self._namespace = "/" + self._remaps.get("__ns", namespace or "").strip("/")
         overrides = arguments.parameters_of(self._name, self._namespace) if use_global_arguments else {}
         overrides = {p.name: p.value for p in parameter_overrides or ()} | overrides
-        self._parameters = Parameters(overrides, context.world.parameters)
-        self._parameters.declare("use_sim_time", False)
+        context.world.calls.nodes.setdefault(self._name, context.world.line())
+        self._parameters = Parameters(
+            overrides,
+            context.world.parameters,
+            declares_overrides=automatically_declare_parameters_from_overrides,
+            allows_undeclared=allow_undeclared_parameters,
+        )
+        if not self._parameters.has("use_sim_time"):
+            self._parameters.declare("use_sim_time", False)
         self._logger = Logger(self.get_fully_qualified_name().strip("/").replace("/", "."))
         self._clock = Clock(clock_type=ClockType.ROS_TIME)
         self.default_callback_group = MutuallyExclusiveCallbackGroup()
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
         self._timers: list[Timer] = []
-
-    def __getattr__(self, name: str) -> Any:
-        # Names that a real node has raise an error that says so; any other name is the script's own mistake.
-        if name in _NOT_OFFERED:
-            raise StubError(f"limo-hog run does not offer Node.{name}")
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     def get_name(self) -> str:
         """Return the node's name."""
@@ -190,6 +217,8 @@ class Node:
         publisher = Publisher(msg_type, self.resolve_topic_name(topic), to_profile(qos_profile))
         _check_topic(publisher.topic, msg_type)
         self._publishers.append(publisher)
+        world = current().world
+        world.calls.writers.setdefault(publisher.topic, world.line())
         return publisher
 
     def create_subscription(
@@ -205,7 +234,7 @@ class Node:
         subscription = Subscription(msg_type, self.resolve_topic_name(topic), callback, to_profile(qos_profile))
         _check_topic(subscription.topic, msg_type)
         self._subscriptions.append(subscription)
-        current().world.readers.append(subscription)
+        current().world.subscribe(subscription)
         return subscription
 
     def create_timer(
@@ -298,16 +327,6 @@ class Node:
     def add_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
         """Ask before a parameter changes."""
         self._parameters.callbacks.insert(0, callback)
-
-
-#: Parts of rclpy's Node that lock step has no use for.
-_NOT_OFFERED = (
-    *("create_client", "create_service", "create_rate", "create_guard_condition", "executor", "handle", "context"),
-    *("waitables", "services", "clients", "guards", "add_waitable", "destroy_client", "destroy_service"),
-    *("get_node_names", "get_service_names_and_types", "get_publishers_info_by_topic"),
-    *("get_subscriptions_info_by_topic", "describe_parameter", "list_parameters", "undeclare_parameter"),
-    *("set_parameters_atomically", "get_parameters_by_prefix", "wait_for_node"),
-)
 
 
 def _check_type(msg_type: Any) -> None:

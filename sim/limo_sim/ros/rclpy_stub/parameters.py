@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
+
+from limo_sim.ros.rclpy_stub.offered import Offered
 
 
 class ParameterException(Exception):  # noqa: N818 — rclpy's names
@@ -62,8 +64,26 @@ class ParameterType(IntEnum):
         raise TypeError(f"a parameter cannot hold {type(value).__name__} {value!r}")
 
 
-class Parameter:
+@dataclass
+class ParameterValue:
+    """A value with its type: the field of that type holds it, the others their defaults."""
+
+    type: int = 0
+    bool_value: bool = False
+    integer_value: int = 0
+    double_value: float = 0.0
+    string_value: str = ""
+    byte_array_value: list[bytes] = field(default_factory=list)
+    bool_array_value: list[bool] = field(default_factory=list)
+    integer_array_value: list[int] = field(default_factory=list)
+    double_array_value: list[float] = field(default_factory=list)
+    string_array_value: list[str] = field(default_factory=list)
+
+
+class Parameter(Offered):
     """A name with a value."""
+
+    _not_offered = ("to_parameter_msg", "from_parameter_msg")
 
     Type = ParameterType
 
@@ -71,6 +91,14 @@ class Parameter:
         self.name = name
         self.type_ = ParameterType.from_parameter_value(value) if type_ is None else type_
         self.value = value
+
+    def get_parameter_value(self) -> ParameterValue:
+        """Return the value as ROS sends it: `string_value`, `double_value` and so on."""
+        message = ParameterValue(type=int(self.type_))
+        if self.type_ != ParameterType.NOT_SET:
+            kept = list(self.value) if isinstance(self.value, tuple) else self.value
+            setattr(message, f"{self.type_.name.lower()}_value", kept)
+        return message
 
     def __repr__(self) -> str:
         return f"Parameter(name={self.name!r}, type_={self.type_.name}, value={self.value!r})"
@@ -85,13 +113,28 @@ class SetParametersResult:
 
 
 class Parameters:
-    """The parameters of one node; their values are noted in `noted` as well."""
+    """The parameters of one node; their values are noted in `noted` as well.
 
-    def __init__(self, overrides: dict[str, Any], noted: dict[str, Any]) -> None:
+    With `declares_overrides`, those of the command line are declared at once; with `allows_undeclared`, any other is
+    read as one that is not set.
+    """
+
+    def __init__(
+        self,
+        overrides: dict[str, Any],
+        noted: dict[str, Any],
+        *,
+        declares_overrides: bool = False,
+        allows_undeclared: bool = False,
+    ) -> None:
+        self._allows_undeclared = allows_undeclared
         self._overrides = overrides
         self._noted = noted
         self._values: dict[str, Parameter] = {}
         self.callbacks: list[Callable[[list[Parameter]], Any]] = []
+        if declares_overrides:
+            for name, value in overrides.items():
+                self.declare(name, value)
 
     def declare(self, name: str, default: Any, descriptor: Any = None, ignore_override: bool = False) -> Parameter:
         """Add a parameter; the command line's value wins.
@@ -124,6 +167,8 @@ class Parameters:
     def get(self, name: str) -> Parameter:
         """Return a declared parameter."""
         if name not in self._values:
+            if self._allows_undeclared:
+                return Parameter(name)
             raise ParameterNotDeclaredException(name)
         return self._values[name]
 

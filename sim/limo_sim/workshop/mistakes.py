@@ -1,0 +1,109 @@
+"""The likely mistake of a node that gets no picture, finds nobody or moves nothing, with the line it is in."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from limo_hog.ros2 import names
+from limo_sim.ros.lockstep.calls import Calls, nearest_topic
+from limo_sim.workshop.scenes import Take
+
+#: Topics that carry the camera's colour image.
+_IMAGES = (names.IMAGE, names.IMAGE_COMPRESSED)
+
+
+class Finding(NamedTuple):
+    """Whether a checkpoint holds, None where it could not be tried; why; and the line of the student's file."""
+
+    holds: bool | None
+    evidence: str
+    line: int | None = None
+
+
+def camera_read(calls: Calls) -> bool:
+    """Whether a subscription asks for the camera's colour image."""
+    return any(topic in calls.readers for topic in _IMAGES)
+
+
+def no_picture(script: Path, takes: Sequence[Take]) -> Finding | None:
+    """Return why no camera image reaches a callback; None where one does."""
+    calls = takes[0].calls
+    if calls.images:
+        return None
+    if not calls.nodes:
+        main = _uncalled(script, "main")
+        if main is not None:
+            return Finding(False, "main() is never called; end the file with: if __name__ == '__main__': main()", main)
+        return Finding(False, "the script makes no node: call rclpy.init(), make the node, and rclpy.spin(node)")
+    if not camera_read(calls):
+        return Finding(False, *_no_subscription(calls))
+    if not calls.spun:
+        name, line = next(iter(calls.nodes.items()))
+        return Finding(
+            False, f"the node {name!r} is made and never spun: without rclpy.spin(node) no callback runs", line
+        )
+    line = next(calls.readers[topic] for topic in _IMAGES if topic in calls.readers)
+    return Finding(False, "the callback never ran; is rclpy.spin given the node that has the subscription?", line)
+
+
+def no_detection(script: Path, takes: Sequence[Take]) -> Finding | None:
+    """Return why the detector cannot find anybody; None where it looks at pictures with an SVM."""
+    if not any(look.raw is not None for take in takes for look in take.looks):
+        line = _first_call(script, "detectMultiScale")
+        if line is None:
+            return Finding(False, "self.hog.detectMultiScale was never called")
+        return Finding(False, "detectMultiScale was never called: this line never runs", line)
+    untaught = takes[0].calls.untaught
+    if untaught != 0:
+        said = "detectMultiScale ran before setSVMDetector, so it finds nothing; in __init__, call\n"
+        said += "hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())"
+        return Finding(False, said, untaught)
+    return None
+
+
+def no_command(takes: Sequence[Take]) -> Finding | None:
+    """Return why no command reaches the robot; None where one does."""
+    if any(take.outcome and take.outcome.world.commands for take in takes):
+        return None
+    calls = takes[0].calls
+    other = {topic: line for topic, line in calls.writers.items() if topic not in names.TYPES}
+    if names.COMMAND in calls.writers:
+        return Finding(False, "the publisher is made, but publish is never called", calls.writers[names.COMMAND])
+    if other:
+        topic, line = next(iter(other.items()))
+        return Finding(False, f"publishes on {topic!r}; the robot listens to {names.COMMAND!r}", line)
+    return Finding(False, f"nothing is published on {names.COMMAND!r}")
+
+
+def _no_subscription(calls: Calls) -> tuple[str, int | None]:
+    unknown = {topic: line for topic, line in calls.readers.items() if topic not in (*names.TYPES, *calls.writers)}
+    if unknown:
+        topic, line = next(iter(unknown.items()))
+        nearest = nearest_topic(topic)
+        return f"the topic {topic!r} is not published; did you mean {nearest!r}?", line
+    if calls.readers:
+        topic, line = next(iter(calls.readers.items()))
+        return f"subscribes to {topic!r}; the camera's image is {names.IMAGE!r}", line
+    return f"the node has no subscription: call create_subscription(Image, {names.IMAGE!r}, …)", None
+
+
+def _uncalled(script: Path, function: str) -> int | None:
+    """Return the line of a function of the module that nothing calls; None where it is called or absent."""
+    defined = [node for node in _tree(script).body if isinstance(node, ast.FunctionDef) and node.name == function]
+    return defined[0].lineno if defined and _first_call(script, function) is None else None
+
+
+def _first_call(script: Path, function: str) -> int | None:
+    lines = [
+        node.lineno
+        for node in ast.walk(_tree(script))
+        if isinstance(node, ast.Call) and function in (getattr(node.func, "attr", ""), getattr(node.func, "id", ""))
+    ]
+    return min(lines, default=None)
+
+
+def _tree(script: Path) -> ast.Module:
+    return ast.parse(script.read_bytes())

@@ -1,0 +1,54 @@
+"""`limo-hog workshop grade`: a folder of nodes, some of them hostile."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from limo_hog.cli.main import main
+from limo_sim.workshop import solution, template
+from limo_sim.workshop.grade import Limits, grade, nodes_in
+
+LOOP = "while True:\n    try:\n        while True: pass\n    except BaseException: pass\n"
+HOSTILE = {
+    "loop": LOOP,
+    "exit": "import os\nos._exit(0)\n",
+    "memory": "keep = bytearray(10 * 10**9)\n",
+    "child": "import subprocess\nsubprocess.Popen(['sleep', '600'])\n" + LOOP,
+}
+REASONS = {"loop": "more than 12 s", "exit": "exit code 0", "child": "more than 12 s"}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_node_ends_within_its_limits_and_gets_no_points(tmp_path: Path, name: str) -> None:
+    (tmp_path / "node.py").write_text(HOSTILE[name])
+    (graded,) = grade(nodes_in(tmp_path), limits=Limits(seconds=60.0 if name == "memory" else 12.0))
+    if name == "memory":
+        assert graded.result is not None
+        assert graded.result["points"] == 0
+        assert "MemoryError" in graded.result["checkpoints"][0]["evidence"]
+    else:
+        assert graded.result is None
+        assert REASONS[name] in graded.reason
+
+
+def test_a_folder_becomes_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "amy").mkdir()
+    (tmp_path / "amy" / "node.py").write_text(solution("follower"))
+    (tmp_path / "bob.py").write_text(template("follower"))
+    (tmp_path / "eve.py").write_text(HOSTILE["exit"])
+    table = tmp_path / "points.csv"
+    assert main(["workshop", "grade", str(tmp_path), "--csv", str(table)]) == 0
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    assert [(row["file"], row["points"]) for row in rows] == [("amy/node.py", "100"), ("bob.py", "0"), ("eve.py", "0")]
+    assert [rows[0][f"task_{task}"] for task in (1, 2, 3, 4)] == ["10", "25", "25", "40"]
+    assert rows[1]["first_mistake"].startswith("the camera image is shown: ")
+    assert "os._exit" in rows[2]["first_mistake"]
+    assert "3 files" in capsys.readouterr().err
+
+
+def test_a_folder_without_nodes_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["workshop", "grade", str(tmp_path)]) == 2
+    assert "no Python file" in capsys.readouterr().err

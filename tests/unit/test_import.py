@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from importlib.metadata import version
+from importlib.metadata import metadata, requires, version
 from pathlib import Path
 
 import pytest
@@ -62,3 +62,15 @@ def test_the_version_is_that_of_the_crate_for_both_distributions() -> None:
 def test_what_the_package_has_not_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match=r"'limo_hog' has no attribute 'nothing'"):
         getattr(limo_hog, "nothing")  # noqa: B009
+
+
+def test_no_distribution_requires_an_opencv_and_no_extra_but_cv_brings_one() -> None:
+    lines = [line for name in ("limo-hog", "limo-sim") for line in requires(name) or []]
+    assert [line for line in lines if "opencv" in line or "[cv" in line or ",cv" in line] == [
+        line
+        for line in lines
+        if line.startswith("opencv-python-headless") and re.search(r"extra == ['\"]cv['\"]", line)
+    ]
+    (everything,) = [line for line in lines if line.startswith("limo-hog[")]
+    extras = set(metadata("limo-hog").get_all("Provides-Extra") or []) - {"all", "cv"}
+    assert set(re.findall(r"\w+", everything.partition("]")[0].partition("[")[2])) == extras

@@ -149,6 +149,38 @@ class Imu:
 
 
 @dataclass(frozen=True, slots=True)
+class DetectorFaults:
+    """What a less kind detector would do: each person's misses come in bursts, and there are boxes on nothing.
+
+    Attributes
+    ----------
+    recall
+        Share of the camera's frames in which a person is not missed, in the long run, of those in which the detector
+        itself finds the person [0 … 1].
+    burst_s
+        Mean length of an unbroken row of missed frames [s].
+    false_rate
+        Mean number of false boxes in a frame that is searched as a whole.
+    """
+
+    recall: float = within(1.0, 0.0, 1.0)
+    burst_s: float = within(0.3, 0.02, 60.0)
+    false_rate: float = within(0.0, 0.0, 20.0)
+
+    def check(self, rate_hz: float, where: str) -> None:
+        """Raise `ScenarioError` unless a camera of `rate_hz` can show bursts of this length."""
+        if not 0.0 < self.recall < 1.0:
+            return
+        # At best every gap between two bursts is one frame long.
+        least = max(1.0, (1.0 - self.recall) / self.recall) / rate_hz
+        if self.burst_s < least * (1.0 - 1e-9):
+            raise ScenarioError(
+                f"{where}burst_s: got {self.burst_s:g}, want at least {least:.3g} s: a burst is one frame or longer, "
+                f"and recall {self.recall:g} at {rate_hz:g} Hz leaves one frame or more between two bursts"
+            )
+
+
+@dataclass(frozen=True, slots=True)
 class Light:
     """The sun's direction and strengths, and the brightness of sky, floor and walls, 0 … 1."""
 
@@ -174,6 +206,7 @@ class Scenario:
     lidar: Lidar = dataclasses.field(default_factory=Lidar)
     odometry: Wheels = dataclasses.field(default_factory=Wheels)
     imu: Imu = dataclasses.field(default_factory=Imu)
+    detector: DetectorFaults = dataclasses.field(default_factory=DetectorFaults)
     light: Light = dataclasses.field(default_factory=Light)
 
     @staticmethod
@@ -213,6 +246,7 @@ class Scenario:
         check_fields(self, where)
         if math.hypot(*self.light.sun) < 0.1:
             raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
+        self.detector.check(self.camera.rate_hz, f"{where}detector.")
         for index, piece in enumerate(self.furniture):
             gap = distance_to(piece.footprint, self.robot.x, self.robot.y)
             self._check_robot_free(gap, f"{where}furniture[{index}]")

@@ -76,6 +76,13 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
         ("[[furniture]]\nkind = 'chair'\nx = 0.1\ny = 0", "mine.toml: furniture[0]: is 0.00 m from the robot's centre"),
         ("[light]\nsun = [0, 0, 0]", "mine.toml: light.sun: got (0.0, 0.0, 0.0), want a direction"),
         ("[robot]\nx = 4.9", "mine.toml: robot.x: got 4.9, want a number in -4.6 … 4.6"),
+        ("[detector]\nrecall = 1.2", "mine.toml: detector.recall: got 1.2, want a number in 0 … 1"),
+        ("[detector]\nfalse_rate = -1", "mine.toml: detector.false_rate: got -1.0, want a number in 0 … 20"),
+        (
+            "[detector]\nrecall = 0.5\nburst_s = 0.05",
+            "mine.toml: detector.burst_s: got 0.05, want at least 0.1 s",
+        ),
+        ("[detector]\nrecall = 0.1", "mine.toml: detector.burst_s: got 0.3, want at least 0.9 s"),
         ("[camera", "mine.toml: not TOML"),
     ],
 )
@@ -107,8 +114,10 @@ def test_a_replaced_scenario_is_checked_when_the_arena_is_built() -> None:
 
 def test_the_page_about_the_arena_tells_the_truth(tmp_path: Path) -> None:
     page = (Path(__file__).parents[3] / "docs" / "simulator.md").read_text(encoding="utf-8")
-    [example] = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    scenario = Scenario.load(written(tmp_path, example))
+    scenario, *others = (
+        Scenario.load(written(tmp_path, text)) for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    )
+    assert others
     assert scenario.camera.drop_probability == 0.3
     for name in Scenario.names():
         assert f"| `{name}` |" in page

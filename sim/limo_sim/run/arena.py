@@ -274,9 +274,12 @@ class Arena:
     def _place_people(self, time: float) -> None:
         """Give each person the velocity that leads to their place at `time` [s]."""
         for index, pose in enumerate(self._poses(time)):
-            if pose is None:
-                continue
             person = self._people[index]
+            if pose is None:
+                if person is not None:
+                    self._space.remove(person, *person.shapes)
+                    self._people[index] = None
+                continue
             if person is None:
                 person = self._people[index] = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
                 person.position = pose.x, pose.y

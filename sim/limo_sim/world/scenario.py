@@ -25,9 +25,9 @@ WALL_HEIGHT = 1.0
 """Of the walls [m], as in `hri_world.world`."""
 ROBOT_RADIUS = 0.19
 """The circle about the base centre that holds the robot's 0.29 × 0.22 m body [m]."""
-# Corners of routes lie within ± this [m]. Chosen: the widest person's cylinder, 0.22 m, and 0.38 m to the wall, the
-# robot's diameter, so that a person does not press the robot against a wall.
-_ROUTE_HALF = 4.3
+# Corners of routes keep this distance from the walls [m]: the first, or a person's radius and the second, if that is
+# more. Chosen: the robot's diagonal is 0.364 m, so that a person does not press the robot against a wall.
+_WALL_DISTANCE, _WALL_GAP = 0.6, 0.37
 # Routes keep this distance from furniture [m]. Chosen: arms swing beyond the cylinder that stands for the body.
 _CLEARANCE = 0.2
 # Distances from routes to furniture are taken at points this far apart [m]: right to within half of it.
@@ -46,23 +46,29 @@ class Person:
         each on arrival [m, m, s]. One corner: the person stands there.
     speed
         Walking speed [m/s].
+    speeds
+        Walking speed from each corner to the next, one for each corner [m/s]; without them, `speed` everywhere.
     height
         Stature [m]; the whole body scales with it.
     girth
         Breadth of limbs and trunk, relative to that of `person.body`.
     arrives_s
         The person is not in the arena before this time [s].
+    leaves_s
+        Nor from this time on [s].
     facing
         Direction in which a person whose route has a single corner faces [rad].
     shirt, trousers, skin, hair
         Colours, red, green, blue, 0 … 255.
     """
 
-    route: tuple[tuple[float, float, float], ...] = required(-_ROUTE_HALF, 3600.0)
+    route: tuple[tuple[float, float, float], ...] = required(-ROOM_HALF, 3600.0)
     speed: float = within(0.75, 0.05, 2.0)
-    height: float = within(0.9, 0.6, 1.3)
+    speeds: tuple[float, ...] = within((), 0.05, 2.0)
+    height: float = within(0.9, 0.6, 2.0)
     girth: float = within(1.0, 0.7, 1.4)
     arrives_s: float = within(0.0, 0.0, 3600.0)
+    leaves_s: float = within(math.inf, 0.0, math.inf)
     facing: float = within(math.pi, -2 * math.pi, 2 * math.pi)
     shirt: tuple[float, float, float] = within((34, 52, 128), 0, 255)
     trousers: tuple[float, float, float] = within((38, 42, 56), 0, 255)
@@ -262,14 +268,24 @@ class Scenario:
     def _check_person(self, person: Person, where: str) -> None:
         if not person.route:
             raise ScenarioError(f"{where}.route: is empty, want at least one corner [x, y, pause]")
+        # In whole centimetres, as the message shows it.
+        half = math.floor(100 * (ROOM_HALF - max(_WALL_DISTANCE, person.radius + _WALL_GAP))) / 100
         for index, (x, y, pause) in enumerate(person.route):
-            if max(abs(x), abs(y)) > _ROUTE_HALF:
+            if max(abs(x), abs(y)) > half:
                 raise ScenarioError(
                     f"{where}.route[{index}]: ({x:g}, {y:g}) is in a wall or too near one, "
-                    f"want x and y in {-_ROUTE_HALF:g} … {_ROUTE_HALF:g}"
+                    f"want x and y in {-half:g} … {half:g}"
                 )
             if pause < 0:
                 raise ScenarioError(f"{where}.route[{index}]: pause {pause:g} s, want 0 … 3600")
+        if person.speeds and len(person.speeds) != len(person.route):
+            raise ScenarioError(
+                f"{where}.speeds: got {len(person.speeds)} values, want one for each of {len(person.route)} corners"
+            )
+        if person.leaves_s <= person.arrives_s:
+            raise ScenarioError(
+                f"{where}.leaves_s: got {person.leaves_s:g}, want more than arrives_s, {person.arrives_s:g}"
+            )
         x, y, _ = person.route[0]
         if person.arrives_s == 0:
             robot = math.hypot(x - self.robot.x, y - self.robot.y)

@@ -257,3 +257,17 @@ def test_the_contacts_of_a_frame_are_those_at_its_stamp() -> None:
     assert frame.stamp < arena.time - 0.3
     assert frame.truth.contacts == Contacts(0, 0)
     assert arena.truth().contacts == Contacts(1, 0)
+
+
+def test_somebody_who_left_is_neither_seen_nor_in_the_way() -> None:
+    gone = Person(route=((0.8, 0.0, 0.0),), height=1.85, leaves_s=1.0)
+    arena = Arena(Scenario(people=(gone,)), 0)
+    before = arena.frame()
+    assert before.truth.people[0] is not None
+    assert arena.scan().ranges[136:156].min() < 0.8
+    while arena.time < 5.0:
+        arena.command(Twist(0.5 if arena.time > 1.2 else 0.0, 0.0))
+        arena.step()
+    assert arena.frame().truth.people == (None,)
+    assert arena.truth().robot[0] > 1.2
+    assert arena.contacts.person == 0

@@ -65,9 +65,10 @@ def test_a_walking_person_shows_two_shins_of_a_shins_width() -> None:
         assert math.hypot(shin.x - 2, shin.y) < 0.3
 
 
+@pytest.mark.parametrize("height", [0.6, 1.2, 1.85, 2.0])
 @pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4, 5.6])
-def test_the_legs_are_all_that_the_plane_cuts_of_a_body(phase: float) -> None:
-    person, pose = Person(route=((2, 0, 0),), height=0.6, girth=1.3), Pose(2, -1, 0.8, phase, 1.0)
+def test_the_legs_are_all_that_the_plane_cuts_of_a_body(phase: float, height: float) -> None:
+    person, pose = Person(route=((2, 0, 0),), height=height, girth=1.3), Pose(2, -1, 0.8, phase, 1.0)
     cut = legs_at(person, pose, lidar.MOUNT_HEIGHT)
     whole = body(person, pose)
     x, y = np.mgrid[1.6:2.4:0.005, -1.4:-0.6:0.005]

@@ -26,9 +26,13 @@ Picture = tuple[NDArray[np.uint8], NDArray[np.float32], list[Seen]]
 
 
 def picture(
-    *poses: Pose | None, furniture: tuple[Furniture, ...] = (), camera: CameraPose = HERE, scenario: Scenario = EXACT
+    *poses: Pose | None,
+    furniture: tuple[Furniture, ...] = (),
+    camera: CameraPose = HERE,
+    scenario: Scenario = EXACT,
+    person: Person = SOMEBODY,
 ) -> Picture:
-    scenario = dataclasses.replace(scenario, people=(SOMEBODY,) * len(poses), furniture=furniture)
+    scenario = dataclasses.replace(scenario, people=(person,) * len(poses), furniture=furniture)
     return Renderer(scenario, np.random.default_rng(0)).render(camera, poses, np.random.default_rng(1))
 
 
@@ -192,6 +196,40 @@ def test_visible_share_is_that_of_the_silhouette_in_a_wider_image(distance: floa
     within = (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
     [(visible, _)] = picture(pose)[2]
     assert visible == pytest.approx((covered & within).sum() / covered.sum(), abs=0.03)
+
+
+@pytest.mark.parametrize("height", [1.5, 1.75, 2.0])
+@pytest.mark.parametrize("distance", [3.9, 4.6])
+def test_an_adult_is_as_high_in_the_image_as_a_pinhole_camera_makes_them(height: float, distance: float) -> None:
+    adult = Person(route=((3, 0, 0),), height=height)
+    _, depth, [(visible, box)] = picture(Pose(distance, 0.0, math.pi), person=adult)
+    figure = body(adult, Pose(distance, 0.0, math.pi))
+    crown = max(float((figure.centre[:, 2] + np.linalg.norm(figure.axes[:, 2], axis=1)).max()), 0.0)
+    assert crown == pytest.approx(height, rel=0.025)
+    assert box is not None
+    head, feet = CENTRE_Y - FOCAL_PX * (crown - 0.175) / distance, CENTRE_Y + FOCAL_PX * 0.175 / distance
+    assert visible == pytest.approx(1.0, abs=0.01)
+    assert box[1] == pytest.approx(max(head, 0.0), abs=2.5)
+    # the toes stand before the axis, lower in the image
+    assert 0.0 <= box[1] + box[3] - feet < 0.2 * FOCAL_PX * height / distance * 0.175 / (distance - 0.2) + 3.0
+    trunk = depth[round(CENTRE_Y - FOCAL_PX * (0.65 * height - 0.175) / distance), 320]
+    assert trunk == pytest.approx(distance - 0.06 * height, abs=0.03 * height)
+
+
+@pytest.mark.parametrize("distance", [1.2, 1.6, 2.5])
+def test_of_an_adult_nearby_the_image_shows_what_single_rays_show(distance: float) -> None:
+    adult, pose = Person(route=((3, 0, 0),), height=1.85), Pose(distance, 0.2, 2.0, 2.0, 1.0)
+    rows, columns = (grid.reshape(-1) for grid in np.mgrid[-900:1000:6, -300:900:6])
+    expected = first_hit(body(adult, pose), rays(columns, rows))
+    covered = np.isfinite(expected)
+    within = (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
+    _, depth, [(visible, box)] = picture(pose, person=adult)
+    assert visible == pytest.approx((covered & within).sum() / covered.sum(), abs=0.03)
+    assert box is not None
+    assert box[1] == 0
+    shown = covered & within
+    gaps = np.abs(depth[rows[shown], columns[shown]] - expected[shown])
+    assert np.median(gaps) < 0.01
 
 
 def test_somebody_behind_the_camera_is_not_seen() -> None:

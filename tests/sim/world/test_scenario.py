@@ -76,6 +76,26 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
         ("[[furniture]]\nkind = 'chair'\nx = 0.1\ny = 0", "mine.toml: furniture[0]: is 0.00 m from the robot's centre"),
         ("[light]\nsun = [0, 0, 0]", "mine.toml: light.sun: got (0.0, 0.0, 0.0), want a direction"),
         ("[robot]\nx = 4.9", "mine.toml: robot.x: got 4.9, want a number in -4.6 … 4.6"),
+        (
+            "[[people]]\nroute = [[2, 0, 0], [4.3, 0, 0]]\nheight = 1.85",
+            "mine.toml: people[0].route[1]: (4.3, 0) is in a wall or too near one, want x and y in -4.21 … 4.21",
+        ),
+        (
+            "[[people]]\nroute = [[2, 0, 0]]\nheight = 2.1",
+            "mine.toml: people[0].height: got 2.1, want a number in 0.6 … 2",
+        ),
+        (
+            "[[people]]\nroute = [[2, 0, 0]]\nleaves_s = nan",
+            "mine.toml: people[0].leaves_s: got nan, want a number in 0",
+        ),
+        (
+            "[[people]]\nroute = [[2, 0, 0]]\narrives_s = 5\nleaves_s = 4",
+            "mine.toml: people[0].leaves_s: got 4, want more than arrives_s, 5",
+        ),
+        (
+            "[[people]]\nroute = [[2, 0, 0], [3, 0, 0]]\nspeeds = [0.5]",
+            "mine.toml: people[0].speeds: got 1 values, want one for each of 2 corners",
+        ),
         ("[detector]\nrecall = 1.2", "mine.toml: detector.recall: got 1.2, want a number in 0 … 1"),
         ("[detector]\nfalse_rate = -1", "mine.toml: detector.false_rate: got -1.0, want a number in 0 … 20"),
         (

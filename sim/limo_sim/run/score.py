@@ -23,6 +23,7 @@ from limo_hog.follow.robot import LIMO
 from limo_hog.follow.zones import Zone, zone_of
 from limo_sim.run.episode import Episode, Step
 from limo_sim.run.matching import CRITERIA, NO_PERSON, Criteria, person_of
+from limo_sim.run.provenance import code_version, scenario_hash
 from limo_sim.sensing.camera import WIDTH
 from limo_sim.world.robot import max_turn_rate
 from limo_sim.world.truth import PersonTruth, Truth
@@ -37,6 +38,8 @@ class ScoreCard:
 
     Attributes
     ----------
+    scenario_hash, code_version
+        What was run, as `limo_sim.run.provenance` tells it: cards with both equal are of the same arena and code.
     target_m
         Distance that the controller holds [m]; None for one that holds none, such as `approach`.
     success
@@ -92,6 +95,8 @@ class ScoreCard:
     detector: str
     seed: int
     seconds: float
+    scenario_hash: str
+    code_version: str
     target_m: float | None
     success: bool | None
     frames: int
@@ -165,6 +170,8 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         detector=episode.detector,
         seed=episode.seed,
         seconds=round(episode.seconds, 6),
+        scenario_hash=scenario_hash(episode.scenario),
+        code_version=code_version(),
         target_m=target,
         success=_success(episode, [step.time for step in frames[first:]], visible[after], criteria),
         frames=len(frames),

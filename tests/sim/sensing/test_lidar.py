@@ -12,7 +12,7 @@ from limo_sim.run.arena import Arena
 from limo_sim.sensing import lidar
 from limo_sim.world.furniture import Disc, Rectangle
 from limo_sim.world.person import Pose, body, legs_at
-from limo_sim.world.scenario import Person, Scenario
+from limo_sim.world.scenario import Lidar, Person, Room, Scenario, Wall
 
 
 def by_physics(x: float, y: float, yaw: float, shapes: list[Disc | Rectangle]) -> list[float]:
@@ -103,3 +103,13 @@ def test_a_scan_has_the_robots_beams_and_sees_the_walls() -> None:
     assert (scan.angle_min, scan.angle_max, scan.range_min, scan.range_max) == (-2.0, 2.0, 0.12, 8.0)
     ahead = scan.ranges[140:152]
     assert ahead == pytest.approx(4.9 - 0.103, abs=0.05)
+
+
+def test_a_scan_sees_inner_walls_and_the_walls_of_another_room() -> None:
+    wall = Wall((1.0, 1.0), (3.0, 1.0), 0.2)
+    arena = Arena(Scenario(lidar=Lidar(noise_m=0.0), room=Room(3.0), walls=(wall,)), 0)
+    ranges, angles = arena.scan().ranges, np.linspace(-2, 2, 292)
+    ahead, left = 0.103 + ranges * np.cos(angles), ranges * np.sin(angles)
+    for angle, x, y in ((0.0, 3.0, None), (math.pi / 6, None, 0.9), (-1.2, None, -3.0), (1.9, None, 3.0)):
+        beam = int(np.abs(angles - angle).argmin())
+        assert (ahead[beam], left[beam]) == pytest.approx((x or ahead[beam], y or left[beam]), abs=1e-3)

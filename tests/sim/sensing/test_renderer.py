@@ -15,7 +15,7 @@ from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, CameraPose
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Box
 from limo_sim.world.person import BodyMesh, Pose, body
-from limo_sim.world.scenario import Camera, Depth, Furniture, Person, Scenario
+from limo_sim.world.scenario import Camera, Depth, Furniture, Person, Room, Scenario, Wall
 
 HERE = CameraPose(0.0, 0.0, 0.0)
 EYE = np.array([0.0, 0.0, 0.175])
@@ -146,6 +146,49 @@ def test_the_room_has_the_depth_of_its_planes(camera: CameraPose) -> None:
         elif -down * expected > 1.0 - 0.175:
             expected = math.inf
         assert depth[row, column] == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("camera", [HERE, CameraPose(1.0, -2.0, 0.7), CameraPose(-3.0, 3.0, -0.6)])
+@pytest.mark.parametrize("half", [4.0, 12.0])
+def test_inner_walls_have_the_depth_that_marching_along_the_rays_finds(camera: CameraPose, half: float) -> None:
+    walls = (Wall((1.5, -1.0), (3.5, 0.5), 0.2), Wall((2.0, 1.0), (2.0, 3.5)), Wall((-3.0, 0.0), (1.0, 3.0), 0.05))
+    flat = dataclasses.replace(EXACT, room=Room(half), walls=walls)
+    _, depth, _ = picture(camera=camera, scenario=flat)
+    steps = np.arange(0.0, 2 * half, 0.002)
+    look = math.cos(camera.yaw), math.sin(camera.yaw)
+    kinds = set()
+    for row in (120, 200, 230, 250, 300):
+        for column in range(7, 640, 48):
+            right, down = (column - CENTRE_X) / FOCAL_PX, (row - CENTRE_Y) / FOCAL_PX
+            x = camera.x + steps * (look[0] + right * look[1])
+            y = camera.y + steps * (look[1] - right * look[0])
+            z = 0.175 - steps * down
+            solid = (np.maximum(np.abs(x), np.abs(y)) > half) & (z < 1.0)
+            for number, wall in enumerate(walls):
+                (x0, y0), (x1, y1) = wall.start, wall.end
+                length = math.hypot(x1 - x0, y1 - y0)
+                along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length
+                across = ((x - x0) * (y1 - y0) - (y - y0) * (x1 - x0)) / length
+                inside = (along > 0) & (along < length) & (np.abs(across) < wall.thickness / 2) & (z < 1.0)
+                if inside.any() and not solid[: inside.argmax()].any():
+                    kinds.add(number)
+                solid |= inside
+            solid |= z < 0.0
+            expected = steps[solid.argmax()] if solid.any() and (z[solid.argmax()] < 1.0) else math.inf
+            limit = flat.depth.far_m
+            if min(expected, limit) == limit:
+                assert depth[row, column] > limit - 0.01
+            else:
+                assert depth[row, column] == pytest.approx(expected, abs=0.004)
+    assert kinds
+
+
+def test_somebody_behind_an_inner_wall_is_hidden_and_in_its_door_is_not() -> None:
+    walls = (Wall((2.0, -3.0), (2.0, -0.5)), Wall((2.0, 0.5), (2.0, 3.0)))
+    flat = dataclasses.replace(EXACT, walls=walls)
+    shares = [picture(Pose(3.0, y, 0.0), scenario=flat)[2][0][0] for y in (0.0, 1.4)]
+    assert shares == [1.0, 0.0]
+    assert picture(Pose(1.5, 0.6, 0.0), scenario=flat)[2][0][0] == 1.0
 
 
 def test_colour_changes_where_depth_does() -> None:

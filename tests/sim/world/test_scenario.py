@@ -10,7 +10,7 @@ import pytest
 
 from limo_hog.exceptions import LimoHogError
 from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import Camera, Furniture, Person, Scenario
+from limo_sim.world.scenario import Camera, Furniture, Person, Scenario, Wall
 from limo_sim.world.schema import ScenarioError
 
 NAMES = ("crossing", "empty", "followable", "furniture", "late", "occlusion", "two_people", "workshop", "zigzag")
@@ -96,6 +96,34 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
             "[[people]]\nroute = [[2, 0, 0], [3, 0, 0]]\nspeeds = [0.5]",
             "mine.toml: people[0].speeds: got 1 values, want one for each of 2 corners",
         ),
+        ("[room]\nhalf = 16", "mine.toml: room.half: got 16.0, want a number in 1.5 … 15"),
+        ("[room]\nhalf = 2\n[robot]\ny = -1.8", "mine.toml: robot.y: got -1.8, want a number in -1.7 … 1.7"),
+        (
+            "[[furniture]]\nkind = 'cone'\nx = 2\ny = 4.8",
+            "mine.toml: furniture[0].y: got 4.8, want a number in -4.7 … 4.7",
+        ),
+        (
+            "[[walls]]\nstart = [2, 0]\nend = [2, 6]",
+            "mine.toml: walls[0].end[1]: got 6.0, want a number in -4.9 … 4.9",
+        ),
+        ("[[walls]]\nstart = [2, 0]", "mine.toml: walls[0].end: missing"),
+        ("[[walls]]\nstart = [2, 0]\nend = [2, 0.01]", "mine.toml: walls[0]: is 0.01 m long, want at least 0.05 m"),
+        (
+            "[[walls]]\nstart = [2, 0]\nend = [2, 1]\nthickness = 2",
+            "mine.toml: walls[0].thickness: got 2.0, want a number in 0.02 … 1",
+        ),
+        (
+            "[[walls]]\nstart = [-1, 0.1]\nend = [1, 0.1]",
+            "mine.toml: walls[0]: is 0.05 m from the robot's centre, want at least 0.19 m",
+        ),
+        (
+            "[[people]]\nroute = [[2, -2, 0], [2, 2, 0]]\n[[walls]]\nstart = [1, 0]\nend = [4, 0]",
+            "mine.toml: people[0].route[0]: the way to the next corner passes 0.00 m from walls[0], want at least",
+        ),
+        (
+            "[room]\nhalf = 3\n[[people]]\nroute = [[2.5, 0, 0]]",
+            "mine.toml: people[0].route[0]: (2.5, 0) is in a wall or too near one, want x and y in -2.4 … 2.4",
+        ),
         ("[detector]\nrecall = 1.2", "mine.toml: detector.recall: got 1.2, want a number in 0 … 1"),
         ("[detector]\nfalse_rate = -1", "mine.toml: detector.false_rate: got -1.0, want a number in 0 … 20"),
         (
@@ -141,7 +169,7 @@ def test_the_page_about_the_arena_tells_the_truth(tmp_path: Path) -> None:
     assert scenario.camera.drop_probability == 0.3
     for name in Scenario.names():
         assert f"| `{name}` |" in page
-    known = {"people[]": Person, "furniture[]": Furniture} | {
+    known = {"people[]": Person, "furniture[]": Furniture, "walls[]": Wall} | {
         field.name: type(getattr(scenario, field.name)) for field in dataclasses.fields(scenario)
     }
     told = set()

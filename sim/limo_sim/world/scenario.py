@@ -103,6 +103,26 @@ class Furniture:
 
 
 @dataclass(frozen=True, slots=True)
+class Vary:
+    """How much the people of a run differ from the scenario's, drawn from the run's seed.
+
+    Attributes
+    ----------
+    clothes
+        Whether colours and girth are drawn.
+    height, speed
+        By up to this share of the scenario's [1].
+    place
+        By how much each corner of a route is moved along x and y, at most [m].
+    """
+
+    clothes: bool = False
+    height: float = within(0.0, 0.0, 0.5)
+    speed: float = within(0.0, 0.0, 0.9)
+    place: float = within(0.0, 0.0, 2.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Room:
     """A square room around the origin; its outer walls' inner faces stand at ± `half` [m]."""
 
@@ -250,6 +270,7 @@ class Scenario:
     light: Light = dataclasses.field(default_factory=Light)
     room: Room = dataclasses.field(default_factory=Room)
     walls: tuple[Wall, ...] = ()
+    vary: Vary = dataclasses.field(default_factory=Vary)
 
     @staticmethod
     def names() -> tuple[str, ...]:

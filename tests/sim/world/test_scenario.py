@@ -96,6 +96,8 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
             "[[people]]\nroute = [[2, 0, 0], [3, 0, 0]]\nspeeds = [0.5]",
             "mine.toml: people[0].speeds: got 1 values, want one for each of 2 corners",
         ),
+        ("[vary]\nspeed = 1", "mine.toml: vary.speed: got 1.0, want a number in 0 … 0.9"),
+        ("[vary]\nclothes = 1", "mine.toml: vary.clothes: got 1, want bool"),
         ("[room]\nhalf = 16", "mine.toml: room.half: got 16.0, want a number in 1.5 … 15"),
         ("[room]\nhalf = 2\n[robot]\ny = -1.8", "mine.toml: robot.y: got -1.8, want a number in -1.7 … 1.7"),
         (

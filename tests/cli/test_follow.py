@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -96,3 +97,24 @@ def test_score_compares_controllers(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert result["summary"][2]["measures"]["in_view"]["mean"] == 1.0
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert "followable" in capsys.readouterr().out
+
+
+def test_score_writes_a_line_for_each_run_from_the_first_seed_on(tmp_path: Path) -> None:
+    table, out = tmp_path / "score.csv", tmp_path / "score.json"
+    command = ["score", "--scenario", "empty", "--controller", "approach", "--seconds", "0.2", "--workers", "1"]
+    assert main([*command, "--seeds", "2", "--seed-start", "7", "--csv", str(table), "--json", str(out)]) == 0
+    with table.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    cards = json.loads(out.read_text())["runs"]
+    assert [row["seed"] for row in rows] == ["7", "8"]
+    for row, card in zip(rows, cards, strict=True):
+        for name, text in row.items():
+            assert text == ("" if card[name] is None else str(card[name]))
+        assert len(row["scenario_hash"]) == 16
+        assert row["code_version"].startswith("limo-hog ")
+    assert set(cards[0]) - set(rows[0]) == {"modes", "reasons"}
+
+
+@pytest.mark.parametrize("arguments", [["--csv", "score.txt"], ["--seed-start", "-1"], ["--seeds", "0"]])
+def test_wrong_arguments_of_score_are_refused(arguments: list[str]) -> None:
+    assert main(["score", *arguments]) == 2

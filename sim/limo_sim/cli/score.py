@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import csv
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
@@ -11,7 +12,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from limo_hog.cli.support.arguments import count, file_ending, metres, output_file, seconds
+from limo_hog.atomic import about, whole_file
+from limo_hog.cli.support.arguments import count, file_ending, metres, output_file, seconds, seed
 from limo_hog.cli.support.environment import cores
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
@@ -19,6 +21,7 @@ from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.sense.detectors import NAMES, detector_named
 
 if TYPE_CHECKING:
+    from limo_sim.run.score import ScoreCard
     from limo_sim.run.sweep import Estimate, Summary
 
 #: Columns of the table: a figure of the score card, its heading, its unit, how it is written.
@@ -44,7 +47,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--scenario", nargs="+", metavar="NAME|FILE.toml", help="only these (all that come along)")
     parser.add_argument("--controller", nargs="+", choices=CONTROLLERS, default=CONTROLLERS, help="only these (all)")
-    parser.add_argument("--seeds", type=count, default=20, metavar="N", help="seeds 0 … N-1 of each (%(default)s)")
+    parser.add_argument("--seeds", type=count, default=20, metavar="N", help="how many of each (%(default)s)")
+    parser.add_argument("--seed-start", type=seed, default=0, metavar="N", help="the first of the seeds (%(default)s)")
     parser.add_argument("--seconds", type=seconds, default=60.0, metavar="S", help="simulated time of a run (60)")
     parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
     parser.add_argument(
@@ -53,6 +57,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--workers", type=count, metavar="N", help="processes (one for each core)")
     parser.add_argument(
         "--json", type=output_file, metavar="FILE", help="write every score card and the summary; - is standard output"
+    )
+    parser.add_argument(
+        "--csv",
+        type=file_ending(".csv"),
+        metavar="FILE.csv",
+        help="write the score cards' figures, a line for each run",
     )
     parser.add_argument(
         "--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help="draw the comparison"
@@ -76,10 +86,10 @@ def run(args: argparse.Namespace) -> int:
     for name in args.controller:
         controller_named(name, args.target)
     runs = [
-        Run(scenario, controller, args.detector, seed, args.seconds, args.target)
+        Run(scenario, controller, args.detector, number, args.seconds, args.target)
         for scenario in scenarios
         for controller in args.controller
-        for seed in range(args.seeds)
+        for number in range(args.seed_start, args.seed_start + args.seeds)
     ]
     card_of = {}
     with progress("runs") as bar:
@@ -92,11 +102,24 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         result = {"runs": [card.to_json() for card in cards], "summary": [asdict(one) for one in summaries]}
         write_json(args.json, result)
+    if args.csv:
+        _write_csv(args.csv, cards)
     if args.plot:
         plot(summaries, args.plot)
     if args.json != STDOUT:
         Console(highlight=False).print(_table(summaries, args.seconds))
     return 0
+
+
+def _write_csv(path: Path, cards: Sequence[ScoreCard]) -> None:
+    """Write one line for each card; shares of modes and reasons, which have no fixed names, are left out."""
+    rows = [
+        {name: value for name, value in card.to_json().items() if name not in ("modes", "reasons")} for card in cards
+    ]
+    with whole_file(path) as part, about(path), part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def _table(summaries: Sequence[Summary], duration: float) -> Table:

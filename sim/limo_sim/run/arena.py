@@ -22,7 +22,7 @@ from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
 from limo_sim.world.person import Pose, Walk, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
-from limo_sim.world.scenario import ROOM_HALF, Scenario
+from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
 STEPS_PER_SECOND = 50
@@ -101,6 +101,7 @@ class Arena:
             for piece in scenario.furniture
             for shape in KINDS[piece.kind].scanned
         ]
+        self._static_scanned += [wall.footprint for wall in scenario.walls]
         self._renderer: Renderer | None = None
         self._frame: Frame | None = None
         self._scan: tuple[int, Scan] | None = None
@@ -179,7 +180,7 @@ class Arena:
             x = state.x + lidar.MOUNT_AHEAD * math.cos(state.yaw)
             y = state.y + lidar.MOUNT_AHEAD * math.sin(state.yaw)
             ranges = lidar.measure(
-                lidar.cast(x, y, state.yaw, shapes),
+                lidar.cast(x, y, state.yaw, shapes, self.scenario.room.half),
                 self.scenario.lidar.noise_m,
                 self._stream(_LIDAR_STREAM, exposure),
             )
@@ -255,11 +256,13 @@ class Arena:
 
     def _add_obstacles(self) -> None:
         ground = self._space.static_body
-        middle, half = ROOM_HALF + _WALL_HALF, ROOM_HALF + 2 * _WALL_HALF
+        room = self.scenario.room.half
+        middle, half = room + _WALL_HALF, room + 2 * _WALL_HALF
         footprints: list[Disc | Rectangle] = []
         for side in (middle, -middle):
             footprints += [Rectangle(side, 0, _WALL_HALF, half), Rectangle(0, side, half, _WALL_HALF)]
         footprints += [piece.footprint for piece in self.scenario.furniture]
+        footprints += [wall.footprint for wall in self.scenario.walls]
         for footprint in footprints:
             shape: pymunk.Shape
             if isinstance(footprint, Disc):
@@ -274,9 +277,12 @@ class Arena:
     def _place_people(self, time: float) -> None:
         """Give each person the velocity that leads to their place at `time` [s]."""
         for index, pose in enumerate(self._poses(time)):
-            if pose is None:
-                continue
             person = self._people[index]
+            if pose is None:
+                if person is not None:
+                    self._space.remove(person, *person.shapes)
+                    self._people[index] = None
+                continue
             if person is None:
                 person = self._people[index] = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
                 person.position = pose.x, pose.y

@@ -17,8 +17,9 @@ from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.sense.region import Region
 from limo_sim.run.arena import Arena
+from limo_sim.run.detector_faults import FaultyDetector
 from limo_sim.sensing.camera import FOCAL_PX, Frame
-from limo_sim.world.scenario import Scenario
+from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.truth import Contacts, Truth
 
 
@@ -142,7 +143,8 @@ def run_episode(
     controller
         Steers by what the detector finds.
     detector
-        Finds people in uint8 (H, W, 3) BGR images. If it raises, the robot stops and says so.
+        Finds people in uint8 (H, W, 3) BGR images; the scenario's faults come on top. If it raises, the robot stops and
+        says so.
     seconds
         Simulated time [s].
     names
@@ -152,7 +154,12 @@ def run_episode(
     """
     began = time.perf_counter()
     arena = Arena(scenario, seed)
+    faulty = None
+    if scenario.detector != DetectorFaults():
+        rate, people = scenario.camera.rate_hz, len(scenario.people)
+        detector = faulty = FaultyDetector(detector, scenario.detector, rate, people, seed)
     follower = Follower(controller, detector)
+    region: Region | None = None
     steps = []
     last_frame, last_command = -np.inf, -np.inf
     while arena.time < seconds:
@@ -166,8 +173,11 @@ def run_episode(
             record = None
             if fresh:
                 last_frame = frame.stamp
+                if faulty is not None:
+                    faulty.face(frame.truth, region)
                 sighting = follower.see(frame.stamp, frame.image, Sensors(FOCAL_PX, frame.depth, scan, odometry))
                 decision = sighting.decision
+                region = decision.region
                 record = FrameRecord(frame.truth, sighting.detections, sighting.region, sighting.detect_ms, render_ms)
             else:
                 decision = follower.recheck(arena.time, scan, odometry)

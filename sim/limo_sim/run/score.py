@@ -22,48 +22,11 @@ from limo_hog.follow.decision import Mode
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.zones import Zone, zone_of
 from limo_sim.run.episode import Episode, Step
+from limo_sim.run.matching import CRITERIA, NO_PERSON, Criteria, person_of
+from limo_sim.run.provenance import code_version, scenario_hash
 from limo_sim.sensing.camera import WIDTH
 from limo_sim.world.robot import max_turn_rate
 from limo_sim.world.truth import PersonTruth, Truth
-
-NO_PERSON = -1
-
-
-@dataclass(frozen=True, slots=True)
-class Criteria:
-    """Thresholds of the score card; only cards of equal criteria can be compared.
-
-    Attributes
-    ----------
-    in_view
-        Share of the silhouette from which a person is in view. Chosen: half.
-    lost_after_s
-        A subject who was not the target for longer than this was lost [s]. Chosen: five camera frames, more than a
-        detector's single misses.
-    found_within_s
-        A lost subject counts as found again within this time [s]. Chosen: a person who walks at 0.75 m/s crosses the
-        camera's field, 71° at 1.5 m, in 3 s.
-    unseen_s
-        A run in which the subject is out of view for longer than this fails [s]. Follow-Bench (arXiv 2509.10796): 100
-        frames of a camera of 10 Hz.
-    box_margin
-        How far beside a silhouette the middle of a box on it may lie [widths of the silhouette]. Chosen: the middle of
-        a box strays by up to 16 px (arena measurements, 1.75 … 4 m), a silhouette 4 m away is 35 … 50 px wide.
-    box_height_min, box_height_max
-        How high a box on a person may be [heights of the silhouette]. HOG's window is 1.33 times as high; chosen: half
-        of that, for silhouettes cut off by the image's edge, to twice.
-    """
-
-    in_view: float = 0.5
-    lost_after_s: float = 0.5
-    found_within_s: float = 3.0
-    unseen_s: float = 10.0
-    box_margin: float = 0.25
-    box_height_min: float = 0.6
-    box_height_max: float = 2.5
-
-
-CRITERIA = Criteria()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +38,8 @@ class ScoreCard:
 
     Attributes
     ----------
+    scenario_hash, code_version
+        What was run, as `limo_sim.run.provenance` tells it: cards with both equal are of the same arena and code.
     target_m
         Distance that the controller holds [m]; None for one that holds none, such as `approach`.
     success
@@ -130,6 +95,8 @@ class ScoreCard:
     detector: str
     seed: int
     seconds: float
+    scenario_hash: str
+    code_version: str
     target_m: float | None
     success: bool | None
     frames: int
@@ -203,6 +170,8 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         detector=episode.detector,
         seed=episode.seed,
         seconds=round(episode.seconds, 6),
+        scenario_hash=scenario_hash(episode.scenario),
+        code_version=code_version(),
         target_m=target,
         success=_success(episode, [step.time for step in frames[first:]], visible[after], criteria),
         frames=len(frames),
@@ -241,31 +210,9 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
     )
 
 
-def on_person(box: NDArray[np.int32], truth: PersonTruth, criteria: Criteria = CRITERIA) -> bool:
-    """Whether a detection window (x, y, w, h) [px] is on a person: its middle on the silhouette, of about its size."""
-    if truth.box is None:
-        return False
-    x, y, w, h = truth.box
-    column, row = box[0] + box[2] / 2, box[1] + box[3] / 2
-    margin = criteria.box_margin * w
-    inside = x - margin <= column <= x + w + margin and y <= row <= y + h
-    return bool(inside and criteria.box_height_min <= box[3] / h <= criteria.box_height_max)
-
-
 def _hits(step: Step, criteria: Criteria) -> list[int]:
     """Return the person that each box is on, in the boxes' order."""
-    return [_hit(box, _people(step.seen), criteria) for box in step.detections.boxes]
-
-
-def _hit(box: NDArray[np.int32], people: Sequence[PersonTruth | None], criteria: Criteria) -> int:
-    """Return the person a box is on: of several, those in view first, then the one whose middle is nearest."""
-    middle = box[0] + box[2] / 2
-    ranks = [
-        (person.visible < criteria.in_view, abs(person.box[0] + person.box[2] / 2 - middle), index)
-        for index, person in enumerate(people)
-        if person and person.box and on_person(box, person, criteria)
-    ]
-    return min(ranks)[2] if ranks else NO_PERSON
+    return [person_of(box, _people(step.seen), criteria) for box in step.detections.boxes]
 
 
 def _target(step: Step, hits: Sequence[int]) -> int | None:

@@ -22,7 +22,9 @@ MOUNT_AHEAD, MOUNT_HEIGHT = LIMO.lidar_x, LIMO.lidar_z
 _ANGLES = np.linspace(-ANGLE_MAX, ANGLE_MAX, BEAMS)
 
 
-def cast(x: float, y: float, yaw: float, shapes: Iterable[Disc | Rectangle]) -> NDArray[np.float64]:
+def cast(
+    x: float, y: float, yaw: float, shapes: Iterable[Disc | Rectangle], half: float = ROOM_HALF
+) -> NDArray[np.float64]:
     """Distance [m] along every beam to the nearest wall or shape.
 
     Parameters
@@ -31,6 +33,8 @@ def cast(x: float, y: float, yaw: float, shapes: Iterable[Disc | Rectangle]) -> 
         The lidar's pose in the arena's frame, inside the walls.
     shapes
         Obstacles at the height of its plane.
+    half
+        The outer walls stand at ± this [m].
 
     Returns
     -------
@@ -39,8 +43,8 @@ def cast(x: float, y: float, yaw: float, shapes: Iterable[Disc | Rectangle]) -> 
     angles = _ANGLES + yaw
     cos, sin = np.cos(angles), np.sin(angles)
     with np.errstate(divide="ignore"):
-        walls_x = (np.copysign(ROOM_HALF, cos) - x) / cos
-        walls_y = (np.copysign(ROOM_HALF, sin) - y) / sin
+        walls_x = (np.copysign(half, cos) - x) / cos
+        walls_y = (np.copysign(half, sin) - y) / sin
     ranges = np.minimum(walls_x, walls_y)
     discs = [(shape.x - x, shape.y - y, shape.radius) for shape in shapes if isinstance(shape, Disc)]
     if discs:

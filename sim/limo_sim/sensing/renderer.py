@@ -30,11 +30,12 @@ from limo_sim.sensing.solids import (
     cast_frustum,
     covers,
     outline,
+    slab,
     upright_bounds,
 )
-from limo_sim.world.furniture import KINDS, Box, Frustum
+from limo_sim.world.furniture import KINDS, Box, Frustum, Rectangle
 from limo_sim.world.person import Pose, body
-from limo_sim.world.scenario import ROOM_HALF, WALL_HEIGHT, Furniture, Scenario
+from limo_sim.world.scenario import WALL_HEIGHT, Furniture, Scenario
 
 with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
     import cv2
@@ -65,6 +66,7 @@ class Renderer:
         self._scenario = scenario
         self._sun = Sun.above(scenario.light)
         self._backdrop = self._make_backdrop()
+        self._walls = [wall.footprint for wall in scenario.walls]
         self._wall_greys = self._make_wall_greys()
         self._palettes = [_palette(body(person, Pose(0, 0, 0)).colours.tolist()) for person in scenario.people]
         self._models = {piece: _model(piece) for piece in scenario.furniture}
@@ -150,12 +152,19 @@ class Renderer:
         """Sky, floor and walls; `room` is grey and has its sky and floor already."""
         look = math.cos(camera.yaw), math.sin(camera.yaw)
         ahead_x, ahead_y = look[0] + look[1] * _COLUMNS, look[1] - look[0] * _COLUMNS
+        half = np.float32(self._scenario.room.half)
         with np.errstate(divide="ignore"):
-            to_x = (np.copysign(np.float32(ROOM_HALF), ahead_x) - camera.x) / ahead_x
-            to_y = (np.copysign(np.float32(ROOM_HALF), ahead_y) - camera.y) / ahead_y
+            to_x = (np.copysign(half, ahead_x) - camera.x) / ahead_x
+            to_y = (np.copysign(half, ahead_y) - camera.y) / ahead_y
         wall = np.minimum(to_x, to_y).astype(np.float32)
+        faces = np.where(to_x < to_y, 2 * (ahead_x < 0), 1 + 2 * (ahead_y < 0))
+        # All walls are equally high and higher than the camera: of a column's walls, the nearest hides the others.
+        for number, shape in enumerate(self._walls, start=1):
+            enters, face = _nearest_face(shape, camera, ahead_x, ahead_y)
+            nearer = enters < wall
+            wall, faces = np.where(nearer, enters, wall), np.where(nearer, 4 * number + face, faces)
         if room is not None:
-            self._paint_walls(room, wall, np.where(to_x < to_y, 2 * (ahead_x < 0), 1 + 2 * (ahead_y < 0)))
+            self._paint_walls(room, wall, faces)
         depth: F32 = np.minimum(_FLOOR_DEPTH, wall)
         top = CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) / wall
         sky, end = (max(0, math.ceil(float(edge))) for edge in (top.min(), top.max()))
@@ -234,10 +243,30 @@ class Renderer:
         return np.repeat(rows[:, None], WIDTH, axis=1)
 
     def _make_wall_greys(self) -> list[float]:
-        """Brightness of the walls at +x, +y, -x, -y by how they face the sun."""
+        """Brightness of the outer walls at +x, +y, -x, -y, then of each inner wall's sides, as they face the sun."""
         x, y, _ = self._sun.towards
+        facings = [-x, -y, x, y]
+        for shape in self._walls:
+            cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
+            facings += [cos * x + sin * y, cos * y - sin * x, -cos * x - sin * y, sin * x - cos * y]
         wall = 255 * self._scenario.light.wall
-        return [min(wall * (0.895 + 0.095 * facing), 255.0) for facing in (-x, -y, x, y)]
+        return [min(wall * (0.895 + 0.095 * facing), 255.0) for facing in facings]
+
+
+def _nearest_face(shape: Rectangle, camera: CameraPose, ahead_x: F32, ahead_y: F32) -> tuple[F32, NDArray[np.int64]]:
+    """Where each column's ray meets an upright block: depth float32 (W,) [m], inf where it does not, and on which side.
+
+    The sides are numbered 0 … 3: +x, +y, -x, -y of the block's own frame.
+    """
+    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
+    from_x, from_y = camera.x - shape.x, camera.y - shape.y
+    along_x, along_y = cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
+    in_x, out_x = slab(cos * from_x + sin * from_y, along_x, shape.half_x)
+    in_y, out_y = slab(cos * from_y - sin * from_x, along_y, shape.half_y)
+    enters = np.maximum(in_x, in_y)
+    hit = (enters < np.minimum(out_x, out_y)) & (enters > 0)
+    face = np.where(in_x > in_y, 2 * (along_x > 0), 1 + 2 * (along_y > 0))
+    return np.where(hit, enters, np.inf).astype(np.float32), face
 
 
 def _shade_floor(room: U8, depth: F32, camera: CameraPose, at: tuple[float, float], radius: float) -> None:

@@ -301,9 +301,9 @@ def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int
     facing_z = math.copysign(1.0, MOUNT_HEIGHT - middle) * z
     for at in canvas.bands(*bounds):
         right, down = (canvas.xs[at[1]] - CENTRE_X) / FOCAL_PX, (canvas.ys[at[0]] - CENTRE_Y) / FOCAL_PX
-        in_x, out_x = _slab(cos * from_x + sin * from_y, look_cos + look_sin * right, solid.half_x)
-        in_y, out_y = _slab(cos * from_y - sin * from_x, look_sin - look_cos * right, solid.half_y)
-        in_z, out_z = _slab(MOUNT_HEIGHT - middle, -down, half)
+        in_x, out_x = slab(cos * from_x + sin * from_y, look_cos + look_sin * right, solid.half_x)
+        in_y, out_y = slab(cos * from_y - sin * from_x, look_sin - look_cos * right, solid.half_y)
+        in_z, out_z = slab(MOUNT_HEIGHT - middle, -down, half)
         in_side = np.maximum(in_x, in_y)
         depth = np.maximum(in_side, in_z)
         hit = (depth < np.minimum(np.minimum(out_x, out_y), out_z)) & (depth > NEAR)
@@ -313,7 +313,7 @@ def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int
         canvas.put(at, depth, hit.astype(np.float32), tone.astype(np.float32))
 
 
-def _slab(origin: float, direction: F32, half: float) -> tuple[F32, F32]:
+def slab(origin: float, direction: F32, half: float) -> tuple[F32, F32]:
     """Where rays enter and leave the layer -half … half."""
     inverse = 1.0 / np.where(np.abs(direction) < 1e-9, np.float32(1e-9), direction)
     one, other = (-half - origin) * inverse, (half - origin) * inverse

@@ -20,14 +20,20 @@ else:
     import tomli as tomllib  # type: ignore[import-not-found]
 
 ROOM_HALF = 4.9
-"""The walls' inner faces stand at ± this [m]: 0.2 m thick, centred on ± 5 m, as in the workshop's `hri_world.world`."""
+"""Without `room.half` the walls' inner faces stand at ± this [m]: 0.2 m thick, on ± 5 m, as in `hri_world.world`."""
 WALL_HEIGHT = 1.0
 """Of the walls [m], as in `hri_world.world`."""
 ROBOT_RADIUS = 0.19
 """The circle about the base centre that holds the robot's 0.29 × 0.22 m body [m]."""
-# Corners of routes lie within ± this [m]. Chosen: the widest person's cylinder, 0.22 m, and 0.38 m to the wall, the
-# robot's diameter, so that a person does not press the robot against a wall.
-_ROUTE_HALF = 4.3
+# Corners of routes keep this distance from the walls [m]: the first, or a person's radius and the second, if that is
+# more. Chosen: the robot's diagonal is 0.364 m, so that a person does not press the robot against a wall.
+_WALL_DISTANCE, _WALL_GAP = 0.6, 0.37
+# The middle of a piece of furniture, and of the robot at the start, keep these distances from the outer walls [m].
+_FURNITURE_DISTANCE, _ROBOT_DISTANCE = 0.2, 0.3
+# Half of the widest room [m]. Chosen: 30 m, nearly twice as far as the depth camera sees in any direction.
+_WIDEST = 15.0
+# Inner walls are at least this long [m]: shorter than thick they would have no direction to speak of.
+_SHORTEST_WALL = 0.05
 # Routes keep this distance from furniture [m]. Chosen: arms swing beyond the cylinder that stands for the body.
 _CLEARANCE = 0.2
 # Distances from routes to furniture are taken at points this far apart [m]: right to within half of it.
@@ -46,23 +52,29 @@ class Person:
         each on arrival [m, m, s]. One corner: the person stands there.
     speed
         Walking speed [m/s].
+    speeds
+        Walking speed from each corner to the next, one for each corner [m/s]; without them, `speed` everywhere.
     height
         Stature [m]; the whole body scales with it.
     girth
         Breadth of limbs and trunk, relative to that of `person.body`.
     arrives_s
         The person is not in the arena before this time [s].
+    leaves_s
+        Nor from this time on [s].
     facing
         Direction in which a person whose route has a single corner faces [rad].
     shirt, trousers, skin, hair
         Colours, red, green, blue, 0 … 255.
     """
 
-    route: tuple[tuple[float, float, float], ...] = required(-_ROUTE_HALF, 3600.0)
+    route: tuple[tuple[float, float, float], ...] = required(-_WIDEST, 3600.0)
     speed: float = within(0.75, 0.05, 2.0)
-    height: float = within(0.9, 0.6, 1.3)
+    speeds: tuple[float, ...] = within((), 0.05, 2.0)
+    height: float = within(0.9, 0.6, 2.0)
     girth: float = within(1.0, 0.7, 1.4)
     arrives_s: float = within(0.0, 0.0, 3600.0)
+    leaves_s: float = within(math.inf, 0.0, math.inf)
     facing: float = within(math.pi, -2 * math.pi, 2 * math.pi)
     shirt: tuple[float, float, float] = within((34, 52, 128), 0, 255)
     trousers: tuple[float, float, float] = within((38, 42, 56), 0, 255)
@@ -80,8 +92,8 @@ class Furniture:
     """A piece of one of the known kinds, standing at (x, y)."""
 
     kind: str = one_of(tuple(KINDS))
-    x: float = required(-4.7, 4.7)
-    y: float = required(-4.7, 4.7)
+    x: float = required(-_WIDEST, _WIDEST)
+    y: float = required(-_WIDEST, _WIDEST)
     yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
 
     @property
@@ -91,11 +103,59 @@ class Furniture:
 
 
 @dataclass(frozen=True, slots=True)
+class Vary:
+    """How much the people of a run differ from the scenario's, drawn from the run's seed.
+
+    Attributes
+    ----------
+    clothes
+        Whether colours and girth are drawn.
+    height, speed
+        By up to this share of the scenario's [1].
+    place
+        By how much each corner of a route is moved along x and y, at most [m].
+    """
+
+    clothes: bool = False
+    height: float = within(0.0, 0.0, 0.5)
+    speed: float = within(0.0, 0.0, 0.9)
+    place: float = within(0.0, 0.0, 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """A square room around the origin; its outer walls' inner faces stand at ± `half` [m]."""
+
+    half: float = within(ROOM_HALF, 1.5, _WIDEST)
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """A straight inner wall, as high as the outer ones, from the middle of one end (x, y) to that of the other [m]."""
+
+    start: tuple[float, float] = required(-_WIDEST, _WIDEST)
+    end: tuple[float, float] = required(-_WIDEST, _WIDEST)
+    thickness: float = within(0.1, 0.02, 1.0)
+
+    @property
+    def length(self) -> float:
+        """Between its ends [m]."""
+        return math.dist(self.start, self.end)
+
+    @property
+    def footprint(self) -> Rectangle:
+        """What stands on the floor, in the arena's frame."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        yaw = math.atan2(y1 - y0, x1 - x0)
+        return Rectangle((x0 + x1) / 2, (y0 + y1) / 2, self.length / 2, self.thickness / 2, yaw)
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
     """The Limo's start [m, m, rad], its wheels' limits [m/s, m/s²], and the watchdog's time [s]."""
 
-    x: float = within(0.0, -4.6, 4.6)
-    y: float = within(0.0, -4.6, 4.6)
+    x: float = within(0.0, -_WIDEST, _WIDEST)
+    y: float = within(0.0, -_WIDEST, _WIDEST)
     yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
     wheel_speed: float = within(1.0, 0.05, 3.0)
     wheel_acceleration: float = within(1.0, 0.1, 10.0)
@@ -149,6 +209,38 @@ class Imu:
 
 
 @dataclass(frozen=True, slots=True)
+class DetectorFaults:
+    """What a less kind detector would do: each person's misses come in bursts, and there are boxes on nothing.
+
+    Attributes
+    ----------
+    recall
+        Share of the camera's frames in which a person is not missed, in the long run, of those in which the detector
+        itself finds the person [0 … 1].
+    burst_s
+        Mean length of an unbroken row of missed frames [s].
+    false_rate
+        Mean number of false boxes in a frame that is searched as a whole.
+    """
+
+    recall: float = within(1.0, 0.0, 1.0)
+    burst_s: float = within(0.3, 0.02, 60.0)
+    false_rate: float = within(0.0, 0.0, 20.0)
+
+    def check(self, rate_hz: float, where: str) -> None:
+        """Raise `ScenarioError` unless a camera of `rate_hz` can show bursts of this length."""
+        if not 0.0 < self.recall < 1.0:
+            return
+        # At best every gap between two bursts is one frame long.
+        least = max(1.0, (1.0 - self.recall) / self.recall) / rate_hz
+        if self.burst_s < least * (1.0 - 1e-9):
+            raise ScenarioError(
+                f"{where}burst_s: got {self.burst_s:g}, want at least {least:.3g} s: a burst is one frame or longer, "
+                f"and recall {self.recall:g} at {rate_hz:g} Hz leaves one frame or more between two bursts"
+            )
+
+
+@dataclass(frozen=True, slots=True)
 class Light:
     """The sun's direction and strengths, and the brightness of sky, floor and walls, 0 … 1."""
 
@@ -174,7 +266,11 @@ class Scenario:
     lidar: Lidar = dataclasses.field(default_factory=Lidar)
     odometry: Wheels = dataclasses.field(default_factory=Wheels)
     imu: Imu = dataclasses.field(default_factory=Imu)
+    detector: DetectorFaults = dataclasses.field(default_factory=DetectorFaults)
     light: Light = dataclasses.field(default_factory=Light)
+    room: Room = dataclasses.field(default_factory=Room)
+    walls: tuple[Wall, ...] = ()
+    vary: Vary = dataclasses.field(default_factory=Vary)
 
     @staticmethod
     def names() -> tuple[str, ...]:
@@ -213,11 +309,37 @@ class Scenario:
         check_fields(self, where)
         if math.hypot(*self.light.sun) < 0.1:
             raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
+        self.detector.check(self.camera.rate_hz, f"{where}detector.")
+        self._check_inside((self.robot.x, self.robot.y), _ROBOT_DISTANCE, (f"{where}robot.x", f"{where}robot.y"))
         for index, piece in enumerate(self.furniture):
-            gap = distance_to(piece.footprint, self.robot.x, self.robot.y)
-            self._check_robot_free(gap, f"{where}furniture[{index}]")
+            names = f"{where}furniture[{index}].x", f"{where}furniture[{index}].y"
+            self._check_inside((piece.x, piece.y), _FURNITURE_DISTANCE, names)
+        for index, wall in enumerate(self.walls):
+            for name, place in (("start", wall.start), ("end", wall.end)):
+                key = f"{where}walls[{index}].{name}"
+                self._check_inside(place, 0.0, (f"{key}[0]", f"{key}[1]"))
+            if wall.length < _SHORTEST_WALL:
+                raise ScenarioError(
+                    f"{where}walls[{index}]: is {wall.length:g} m long, want at least {_SHORTEST_WALL} m"
+                )
+        for name, footprint in self._obstacles():
+            self._check_robot_free(distance_to(footprint, self.robot.x, self.robot.y), f"{where}{name.split(' ')[0]}")
         for index, person in enumerate(self.people):
             self._check_person(person, f"{where}people[{index}]")
+
+    def _obstacles(self) -> list[tuple[str, Disc | Rectangle]]:
+        """Return what stands in the room, by the name that a message gives it."""
+        furniture = [
+            (f"furniture[{index}] ({piece.kind})", piece.footprint) for index, piece in enumerate(self.furniture)
+        ]
+        return [*furniture, *((f"walls[{index}]", wall.footprint) for index, wall in enumerate(self.walls))]
+
+    def _check_inside(self, place: tuple[float, float], distance: float, names: tuple[str, str]) -> None:
+        """Refuse a place nearer to the outer walls than a distance [m]."""
+        half = self.room.half - distance
+        for name, value in zip(names, place, strict=True):
+            if abs(value) > half + 1e-9:
+                raise ScenarioError(f"{name}: got {value}, want a number in {-half:g} … {half:g}")
 
     def _check_robot_free(self, distance: float, where: str) -> None:
         if distance < ROBOT_RADIUS:
@@ -228,26 +350,36 @@ class Scenario:
     def _check_person(self, person: Person, where: str) -> None:
         if not person.route:
             raise ScenarioError(f"{where}.route: is empty, want at least one corner [x, y, pause]")
+        # In whole centimetres, as the message shows it.
+        half = math.floor(100 * (self.room.half - max(_WALL_DISTANCE, person.radius + _WALL_GAP))) / 100
         for index, (x, y, pause) in enumerate(person.route):
-            if max(abs(x), abs(y)) > _ROUTE_HALF:
+            if max(abs(x), abs(y)) > half:
                 raise ScenarioError(
                     f"{where}.route[{index}]: ({x:g}, {y:g}) is in a wall or too near one, "
-                    f"want x and y in {-_ROUTE_HALF:g} … {_ROUTE_HALF:g}"
+                    f"want x and y in {-half:g} … {half:g}"
                 )
             if pause < 0:
                 raise ScenarioError(f"{where}.route[{index}]: pause {pause:g} s, want 0 … 3600")
+        if person.speeds and len(person.speeds) != len(person.route):
+            raise ScenarioError(
+                f"{where}.speeds: got {len(person.speeds)} values, want one for each of {len(person.route)} corners"
+            )
+        if person.leaves_s <= person.arrives_s:
+            raise ScenarioError(
+                f"{where}.leaves_s: got {person.leaves_s:g}, want more than arrives_s, {person.arrives_s:g}"
+            )
         x, y, _ = person.route[0]
         if person.arrives_s == 0:
             robot = math.hypot(x - self.robot.x, y - self.robot.y)
             self._check_robot_free(robot - person.radius, f"{where}.route[0]")
         for index, corner in enumerate(person.route):
             after = person.route[(index + 1) % len(person.route)]
-            for number, piece in enumerate(self.furniture):
-                gap = _gap(corner, after, piece.footprint) - person.radius
+            for name, footprint in self._obstacles():
+                gap = _gap(corner, after, footprint) - person.radius
                 if gap < _CLEARANCE:
                     raise ScenarioError(
                         f"{where}.route[{index}]: the way to the next corner passes {max(gap, 0.0):.2f} m "
-                        f"from furniture[{number}] ({piece.kind}), want at least {_CLEARANCE} m"
+                        f"from {name}, want at least {_CLEARANCE} m"
                     )
 
 

@@ -33,7 +33,7 @@ class Limits:
         elif isinstance(value, str):
             if self.words and value not in self.words:
                 raise ScenarioError(f"{where}: got {value!r}, want one of {', '.join(self.words)}")
-        elif not (math.isfinite(value) and self.low <= value <= self.high):
+        elif not self.low <= value <= self.high:
             raise ScenarioError(f"{where}: got {value}, want a number in {self.low:g} … {self.high:g}")
 
 

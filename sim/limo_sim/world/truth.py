@@ -55,7 +55,7 @@ class Truth:
     robot
         x, y, yaw of the base centre in the arena's frame [m, m, rad].
     people
-        In the scenario's order; None for a person who has not arrived.
+        In the scenario's order; None for a person who is not in the arena, yet or any more.
     contacts
         Of the robot since the start.
     """

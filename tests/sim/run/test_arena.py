@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 from limo_hog.follow import detector_named
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.run.catalogue import load
 from limo_sim.sensing.camera import CENTRE_X, FOCAL_PX
-from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Person, Scenario, Wheels
+from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Person, Robot, Room, Scenario, Wall, Wheels
 from limo_sim.world.truth import Contacts
 from limo_sim.world.variants import made_up
 
@@ -257,3 +258,33 @@ def test_the_contacts_of_a_frame_are_those_at_its_stamp() -> None:
     assert frame.stamp < arena.time - 0.3
     assert frame.truth.contacts == Contacts(0, 0)
     assert arena.truth().contacts == Contacts(1, 0)
+
+
+def test_somebody_who_left_is_neither_seen_nor_in_the_way() -> None:
+    gone = Person(route=((0.8, 0.0, 0.0),), height=1.85, leaves_s=1.0)
+    arena = Arena(Scenario(people=(gone,)), 0)
+    before = arena.frame()
+    assert before.truth.people[0] is not None
+    assert arena.scan().ranges[136:156].min() < 0.8
+    while arena.time < 5.0:
+        arena.command(Twist(0.5 if arena.time > 1.2 else 0.0, 0.0))
+        arena.step()
+    assert arena.frame().truth.people == (None,)
+    assert arena.truth().robot[0] > 1.2
+    assert arena.contacts.person == 0
+
+
+def test_the_robot_is_stopped_by_an_inner_wall_and_drives_on_in_a_larger_room() -> None:
+    free = Scenario(room=Room(8.0), robot=Robot(x=4.0))
+    barred = dataclasses.replace(free, walls=(Wall((5.5, -1.0), (5.5, 1.0), 0.2),))
+    ends = []
+    for scenario in (free, barred):
+        arena = Arena(scenario, 0)
+        while arena.time < 4.0:
+            arena.command(Twist(0.6, 0.0))
+            arena.step()
+        ends.append((arena.truth().robot[0], arena.contacts.wall))
+    assert ends[0][0] > 6.0
+    assert ends[0][1] == 0
+    assert ends[1][0] == pytest.approx(5.4 - LIMO.half_length, abs=0.01)
+    assert ends[1][1] == 1

@@ -14,7 +14,8 @@ from limo_hog.detections import Detections
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_sim.run.episode import Episode, FrameRecord, Step
-from limo_sim.run.score import ScoreCard, on_person, score
+from limo_sim.run.matching import on_person
+from limo_sim.run.score import ScoreCard, score
 from limo_sim.run.sweep import estimate, summarise
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth

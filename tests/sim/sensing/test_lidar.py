@@ -12,7 +12,7 @@ from limo_sim.run.arena import Arena
 from limo_sim.sensing import lidar
 from limo_sim.world.furniture import Disc, Rectangle
 from limo_sim.world.person import Pose, body, legs_at
-from limo_sim.world.scenario import Person, Scenario
+from limo_sim.world.scenario import Lidar, Person, Room, Scenario, Wall
 
 
 def by_physics(x: float, y: float, yaw: float, shapes: list[Disc | Rectangle]) -> list[float]:
@@ -65,9 +65,10 @@ def test_a_walking_person_shows_two_shins_of_a_shins_width() -> None:
         assert math.hypot(shin.x - 2, shin.y) < 0.3
 
 
+@pytest.mark.parametrize("height", [0.6, 1.2, 1.85, 2.0])
 @pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4, 5.6])
-def test_the_legs_are_all_that_the_plane_cuts_of_a_body(phase: float) -> None:
-    person, pose = Person(route=((2, 0, 0),), height=0.6, girth=1.3), Pose(2, -1, 0.8, phase, 1.0)
+def test_the_legs_are_all_that_the_plane_cuts_of_a_body(phase: float, height: float) -> None:
+    person, pose = Person(route=((2, 0, 0),), height=height, girth=1.3), Pose(2, -1, 0.8, phase, 1.0)
     cut = legs_at(person, pose, lidar.MOUNT_HEIGHT)
     whole = body(person, pose)
     x, y = np.mgrid[1.6:2.4:0.005, -1.4:-0.6:0.005]
@@ -102,3 +103,13 @@ def test_a_scan_has_the_robots_beams_and_sees_the_walls() -> None:
     assert (scan.angle_min, scan.angle_max, scan.range_min, scan.range_max) == (-2.0, 2.0, 0.12, 8.0)
     ahead = scan.ranges[140:152]
     assert ahead == pytest.approx(4.9 - 0.103, abs=0.05)
+
+
+def test_a_scan_sees_inner_walls_and_the_walls_of_another_room() -> None:
+    wall = Wall((1.0, 1.0), (3.0, 1.0), 0.2)
+    arena = Arena(Scenario(lidar=Lidar(noise_m=0.0), room=Room(3.0), walls=(wall,)), 0)
+    ranges, angles = arena.scan().ranges, np.linspace(-2, 2, 292)
+    ahead, left = 0.103 + ranges * np.cos(angles), ranges * np.sin(angles)
+    for angle, x, y in ((0.0, 3.0, None), (math.pi / 6, None, 0.9), (-1.2, None, -3.0), (1.9, None, 3.0)):
+        beam = int(np.abs(angles - angle).argmin())
+        assert (ahead[beam], left[beam]) == pytest.approx((x or ahead[beam], y or left[beam]), abs=1e-3)

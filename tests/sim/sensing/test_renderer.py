@@ -15,7 +15,7 @@ from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, CameraPose
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Box
 from limo_sim.world.person import BodyMesh, Pose, body
-from limo_sim.world.scenario import Camera, Depth, Furniture, Person, Scenario
+from limo_sim.world.scenario import Camera, Depth, Furniture, Person, Room, Scenario, Wall
 
 HERE = CameraPose(0.0, 0.0, 0.0)
 EYE = np.array([0.0, 0.0, 0.175])
@@ -26,9 +26,13 @@ Picture = tuple[NDArray[np.uint8], NDArray[np.float32], list[Seen]]
 
 
 def picture(
-    *poses: Pose | None, furniture: tuple[Furniture, ...] = (), camera: CameraPose = HERE, scenario: Scenario = EXACT
+    *poses: Pose | None,
+    furniture: tuple[Furniture, ...] = (),
+    camera: CameraPose = HERE,
+    scenario: Scenario = EXACT,
+    person: Person = SOMEBODY,
 ) -> Picture:
-    scenario = dataclasses.replace(scenario, people=(SOMEBODY,) * len(poses), furniture=furniture)
+    scenario = dataclasses.replace(scenario, people=(person,) * len(poses), furniture=furniture)
     return Renderer(scenario, np.random.default_rng(0)).render(camera, poses, np.random.default_rng(1))
 
 
@@ -144,6 +148,49 @@ def test_the_room_has_the_depth_of_its_planes(camera: CameraPose) -> None:
         assert depth[row, column] == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.parametrize("camera", [HERE, CameraPose(1.0, -2.0, 0.7), CameraPose(-3.0, 3.0, -0.6)])
+@pytest.mark.parametrize("half", [4.0, 12.0])
+def test_inner_walls_have_the_depth_that_marching_along_the_rays_finds(camera: CameraPose, half: float) -> None:
+    walls = (Wall((1.5, -1.0), (3.5, 0.5), 0.2), Wall((2.0, 1.0), (2.0, 3.5)), Wall((-3.0, 0.0), (1.0, 3.0), 0.05))
+    flat = dataclasses.replace(EXACT, room=Room(half), walls=walls)
+    _, depth, _ = picture(camera=camera, scenario=flat)
+    steps = np.arange(0.0, 2 * half, 0.002)
+    look = math.cos(camera.yaw), math.sin(camera.yaw)
+    kinds = set()
+    for row in (120, 200, 230, 250, 300):
+        for column in range(7, 640, 48):
+            right, down = (column - CENTRE_X) / FOCAL_PX, (row - CENTRE_Y) / FOCAL_PX
+            x = camera.x + steps * (look[0] + right * look[1])
+            y = camera.y + steps * (look[1] - right * look[0])
+            z = 0.175 - steps * down
+            solid = (np.maximum(np.abs(x), np.abs(y)) > half) & (z < 1.0)
+            for number, wall in enumerate(walls):
+                (x0, y0), (x1, y1) = wall.start, wall.end
+                length = math.hypot(x1 - x0, y1 - y0)
+                along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length
+                across = ((x - x0) * (y1 - y0) - (y - y0) * (x1 - x0)) / length
+                inside = (along > 0) & (along < length) & (np.abs(across) < wall.thickness / 2) & (z < 1.0)
+                if inside.any() and not solid[: inside.argmax()].any():
+                    kinds.add(number)
+                solid |= inside
+            solid |= z < 0.0
+            expected = steps[solid.argmax()] if solid.any() and (z[solid.argmax()] < 1.0) else math.inf
+            limit = flat.depth.far_m
+            if min(expected, limit) == limit:
+                assert depth[row, column] > limit - 0.01
+            else:
+                assert depth[row, column] == pytest.approx(expected, abs=0.004)
+    assert kinds
+
+
+def test_somebody_behind_an_inner_wall_is_hidden_and_in_its_door_is_not() -> None:
+    walls = (Wall((2.0, -3.0), (2.0, -0.5)), Wall((2.0, 0.5), (2.0, 3.0)))
+    flat = dataclasses.replace(EXACT, walls=walls)
+    shares = [picture(Pose(3.0, y, 0.0), scenario=flat)[2][0][0] for y in (0.0, 1.4)]
+    assert shares == [1.0, 0.0]
+    assert picture(Pose(1.5, 0.6, 0.0), scenario=flat)[2][0][0] == 1.0
+
+
 def test_colour_changes_where_depth_does() -> None:
     """The wall's upper edge lies at the same row in both images, in every column."""
     image, depth, _ = picture(camera=CameraPose(1.0, -2.0, 0.7))
@@ -192,6 +239,40 @@ def test_visible_share_is_that_of_the_silhouette_in_a_wider_image(distance: floa
     within = (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
     [(visible, _)] = picture(pose)[2]
     assert visible == pytest.approx((covered & within).sum() / covered.sum(), abs=0.03)
+
+
+@pytest.mark.parametrize("height", [1.5, 1.75, 2.0])
+@pytest.mark.parametrize("distance", [3.9, 4.6])
+def test_an_adult_is_as_high_in_the_image_as_a_pinhole_camera_makes_them(height: float, distance: float) -> None:
+    adult = Person(route=((3, 0, 0),), height=height)
+    _, depth, [(visible, box)] = picture(Pose(distance, 0.0, math.pi), person=adult)
+    figure = body(adult, Pose(distance, 0.0, math.pi))
+    crown = max(float((figure.centre[:, 2] + np.linalg.norm(figure.axes[:, 2], axis=1)).max()), 0.0)
+    assert crown == pytest.approx(height, rel=0.025)
+    assert box is not None
+    head, feet = CENTRE_Y - FOCAL_PX * (crown - 0.175) / distance, CENTRE_Y + FOCAL_PX * 0.175 / distance
+    assert visible == pytest.approx(1.0, abs=0.01)
+    assert box[1] == pytest.approx(max(head, 0.0), abs=2.5)
+    # the toes stand before the axis, lower in the image
+    assert 0.0 <= box[1] + box[3] - feet < 0.2 * FOCAL_PX * height / distance * 0.175 / (distance - 0.2) + 3.0
+    trunk = depth[round(CENTRE_Y - FOCAL_PX * (0.65 * height - 0.175) / distance), 320]
+    assert trunk == pytest.approx(distance - 0.06 * height, abs=0.03 * height)
+
+
+@pytest.mark.parametrize("distance", [1.2, 1.6, 2.5])
+def test_of_an_adult_nearby_the_image_shows_what_single_rays_show(distance: float) -> None:
+    adult, pose = Person(route=((3, 0, 0),), height=1.85), Pose(distance, 0.2, 2.0, 2.0, 1.0)
+    rows, columns = (grid.reshape(-1) for grid in np.mgrid[-900:1000:6, -300:900:6])
+    expected = first_hit(body(adult, pose), rays(columns, rows))
+    covered = np.isfinite(expected)
+    within = (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
+    _, depth, [(visible, box)] = picture(pose, person=adult)
+    assert visible == pytest.approx((covered & within).sum() / covered.sum(), abs=0.03)
+    assert box is not None
+    assert box[1] == 0
+    shown = covered & within
+    gaps = np.abs(depth[rows[shown], columns[shown]] - expected[shown])
+    assert np.median(gaps) < 0.01
 
 
 def test_somebody_behind_the_camera_is_not_seen() -> None:

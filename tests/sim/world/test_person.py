@@ -98,12 +98,27 @@ def test_somebody_late_is_not_there_before() -> None:
     assert walk.pose(20.0) is not None
 
 
+def test_somebody_who_left_is_not_there_any_more() -> None:
+    walk = Walk(Person(route=((2, 1, 0), (2, -1, 0)), arrives_s=1.0, leaves_s=4.0))
+    assert [walk.pose(time) is not None for time in (0.9, 1.0, 3.99, 4.0, 100.0)] == [False, True, True, False, False]
+
+
+def test_every_leg_has_its_own_speed() -> None:
+    walk = Walk(Person(route=((0, 0, 1.0), (2, 0, 0), (2, 2, 0)), speeds=(0.5, 1.0, 0.25)))
+    lap = 2 / 0.5 + 2 / 1.0 + math.hypot(2, 2) / 0.25 + 1.0
+    for start in (0.0, lap):
+        for time, x, y in ((2.0, 1.0, 0.0), (4.0, 2.0, 0.0), (5.0, 2.0, 1.0), (6.0, 2.0, 2.0), (10.0, 1.2929, 1.2929)):
+            pose = walk.pose(start + time)
+            assert pose is not None
+            assert (pose.x, pose.y) == pytest.approx((x, y), abs=1e-4)
+
+
 def test_one_corner_means_standing() -> None:
     walk = Walk(Person(route=((2, 1, 0),), facing=1.0))
     assert walk.pose(0.0) == walk.pose(100.0) == Pose(2, 1, 1.0)
 
 
-@pytest.mark.parametrize("height", [0.8, 0.9, 1.1])
+@pytest.mark.parametrize("height", [0.8, 0.9, 1.1, 2.0])
 def test_the_lowest_foot_touches_the_floor_and_the_head_is_at_full_height(height: float) -> None:
     person = Person(route=((2, 0, 0),), height=height)
     for phase in np.linspace(0, math.tau, 12, endpoint=False):

@@ -10,7 +10,7 @@ import pytest
 
 from limo_hog.exceptions import LimoHogError
 from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import Camera, Furniture, Person, Scenario
+from limo_sim.world.scenario import Camera, Furniture, Person, Scenario, Wall
 from limo_sim.world.schema import ScenarioError
 
 NAMES = ("crossing", "empty", "followable", "furniture", "late", "occlusion", "two_people", "workshop", "zigzag")
@@ -76,6 +76,63 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
         ("[[furniture]]\nkind = 'chair'\nx = 0.1\ny = 0", "mine.toml: furniture[0]: is 0.00 m from the robot's centre"),
         ("[light]\nsun = [0, 0, 0]", "mine.toml: light.sun: got (0.0, 0.0, 0.0), want a direction"),
         ("[robot]\nx = 4.9", "mine.toml: robot.x: got 4.9, want a number in -4.6 … 4.6"),
+        (
+            "[[people]]\nroute = [[2, 0, 0], [4.3, 0, 0]]\nheight = 1.85",
+            "mine.toml: people[0].route[1]: (4.3, 0) is in a wall or too near one, want x and y in -4.21 … 4.21",
+        ),
+        (
+            "[[people]]\nroute = [[2, 0, 0]]\nheight = 2.1",
+            "mine.toml: people[0].height: got 2.1, want a number in 0.6 … 2",
+        ),
+        (
+            "[[people]]\nroute = [[2, 0, 0]]\nleaves_s = nan",
+            "mine.toml: people[0].leaves_s: got nan, want a number in 0",
+        ),
+        (
+            "[[people]]\nroute = [[2, 0, 0]]\narrives_s = 5\nleaves_s = 4",
+            "mine.toml: people[0].leaves_s: got 4, want more than arrives_s, 5",
+        ),
+        (
+            "[[people]]\nroute = [[2, 0, 0], [3, 0, 0]]\nspeeds = [0.5]",
+            "mine.toml: people[0].speeds: got 1 values, want one for each of 2 corners",
+        ),
+        ("[vary]\nspeed = 1", "mine.toml: vary.speed: got 1.0, want a number in 0 … 0.9"),
+        ("[vary]\nclothes = 1", "mine.toml: vary.clothes: got 1, want bool"),
+        ("[room]\nhalf = 16", "mine.toml: room.half: got 16.0, want a number in 1.5 … 15"),
+        ("[room]\nhalf = 2\n[robot]\ny = -1.8", "mine.toml: robot.y: got -1.8, want a number in -1.7 … 1.7"),
+        (
+            "[[furniture]]\nkind = 'cone'\nx = 2\ny = 4.8",
+            "mine.toml: furniture[0].y: got 4.8, want a number in -4.7 … 4.7",
+        ),
+        (
+            "[[walls]]\nstart = [2, 0]\nend = [2, 6]",
+            "mine.toml: walls[0].end[1]: got 6.0, want a number in -4.9 … 4.9",
+        ),
+        ("[[walls]]\nstart = [2, 0]", "mine.toml: walls[0].end: missing"),
+        ("[[walls]]\nstart = [2, 0]\nend = [2, 0.01]", "mine.toml: walls[0]: is 0.01 m long, want at least 0.05 m"),
+        (
+            "[[walls]]\nstart = [2, 0]\nend = [2, 1]\nthickness = 2",
+            "mine.toml: walls[0].thickness: got 2.0, want a number in 0.02 … 1",
+        ),
+        (
+            "[[walls]]\nstart = [-1, 0.1]\nend = [1, 0.1]",
+            "mine.toml: walls[0]: is 0.05 m from the robot's centre, want at least 0.19 m",
+        ),
+        (
+            "[[people]]\nroute = [[2, -2, 0], [2, 2, 0]]\n[[walls]]\nstart = [1, 0]\nend = [4, 0]",
+            "mine.toml: people[0].route[0]: the way to the next corner passes 0.00 m from walls[0], want at least",
+        ),
+        (
+            "[room]\nhalf = 3\n[[people]]\nroute = [[2.5, 0, 0]]",
+            "mine.toml: people[0].route[0]: (2.5, 0) is in a wall or too near one, want x and y in -2.4 … 2.4",
+        ),
+        ("[detector]\nrecall = 1.2", "mine.toml: detector.recall: got 1.2, want a number in 0 … 1"),
+        ("[detector]\nfalse_rate = -1", "mine.toml: detector.false_rate: got -1.0, want a number in 0 … 20"),
+        (
+            "[detector]\nrecall = 0.5\nburst_s = 0.05",
+            "mine.toml: detector.burst_s: got 0.05, want at least 0.1 s",
+        ),
+        ("[detector]\nrecall = 0.1", "mine.toml: detector.burst_s: got 0.3, want at least 0.9 s"),
         ("[camera", "mine.toml: not TOML"),
     ],
 )
@@ -107,12 +164,14 @@ def test_a_replaced_scenario_is_checked_when_the_arena_is_built() -> None:
 
 def test_the_page_about_the_arena_tells_the_truth(tmp_path: Path) -> None:
     page = (Path(__file__).parents[3] / "docs" / "simulator.md").read_text(encoding="utf-8")
-    [example] = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    scenario = Scenario.load(written(tmp_path, example))
+    scenario, *others = (
+        Scenario.load(written(tmp_path, text)) for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    )
+    assert others
     assert scenario.camera.drop_probability == 0.3
     for name in Scenario.names():
         assert f"| `{name}` |" in page
-    known = {"people[]": Person, "furniture[]": Furniture} | {
+    known = {"people[]": Person, "furniture[]": Furniture, "walls[]": Wall} | {
         field.name: type(getattr(scenario, field.name)) for field in dataclasses.fields(scenario)
     }
     told = set()

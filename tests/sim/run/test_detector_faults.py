@@ -1,0 +1,159 @@
+"""A scenario's detector faults: as often, as long and as many as asked for, and the same for the same seed."""
+
+from __future__ import annotations
+
+import math
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_hog.detections import Detections
+from limo_hog.follow import TrackingController
+from limo_hog.follow.sense.detectors import HalfSize, detect_in, detector_named
+from limo_hog.follow.sense.region import Region
+from limo_sim.run.catalogue import load
+from limo_sim.run.detector_faults import FaultyDetector
+from limo_sim.run.episode import run_episode
+from limo_sim.run.score import score
+from limo_sim.run.sweep import Run, play_all
+from limo_sim.world.scenario import DetectorFaults
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
+
+IMAGE = np.zeros((480, 640, 3), np.uint8)
+SILHOUETTES = ((100, 150, 60, 180), (420, 150, 60, 180))
+WINDOWS = np.array([[85, 120, 90, 240], [405, 120, 90, 240]], np.int32)
+WALL_CLOCK = {"detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor"}
+
+
+class SeesBoth:
+    """Finds both people in every camera image."""
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        del image
+        return Detections(WINDOWS, np.array([1.0, 0.8]))
+
+
+def truth(frame: int, rate: float = 10.0) -> Truth:
+    people = tuple(PersonTruth(2.0, 0.0, 0.0, 2.0, 0.0, 1.8, 1.0, box) for box in SILHOUETTES)
+    return Truth(frame / rate, (0.0, 0.0, 0.0), people, Contacts())
+
+
+def seen(faults: DetectorFaults, frames: int, seed: int = 0, rate: float = 10.0) -> list[Detections]:
+    detector = FaultyDetector(SeesBoth(), faults, rate, 2, seed)
+    found = []
+    for frame in range(frames):
+        detector.face(truth(frame, rate), None)
+        found.append(detector.detect(IMAGE))
+    return found
+
+
+def found_of(frames: list[Detections], person: int) -> NDArray[np.bool_]:
+    return np.array([(found.boxes == WINDOWS[person]).all(axis=1).any() for found in frames])
+
+
+@pytest.mark.parametrize(("recall", "burst_s"), [(0.5, 0.3), (0.7, 0.3), (0.9, 0.5), (0.2, 0.6)])
+def test_recall_and_bursts_are_those_asked_for_in_ten_thousand_frames(recall: float, burst_s: float) -> None:
+    frames = seen(DetectorFaults(recall=recall, burst_s=burst_s), 10_000)
+    for person in (0, 1):
+        found = found_of(frames, person)
+        assert abs(found.mean() - recall) < 0.02
+        bursts = [len(list(run)) for there, run in groupby(found) if not there]
+        # Four standard errors of a geometric distribution's mean.
+        mean = 10 * burst_s
+        assert abs(np.mean(bursts) - mean) < 4 * math.sqrt(mean * (mean - 1) / len(bursts))
+
+
+def test_people_are_missed_independently_of_each_other() -> None:
+    frames = seen(DetectorFaults(recall=0.5), 10_000)
+    one, other = found_of(frames, 0), found_of(frames, 1)
+    assert abs((one & other).mean() - 0.25) < 0.03
+
+
+@pytest.mark.parametrize(("recall", "share"), [(1.0, 1.0), (0.0, 0.0)])
+def test_recall_of_one_loses_nobody_and_recall_of_none_everybody(recall: float, share: float) -> None:
+    assert found_of(seen(DetectorFaults(recall=recall), 500), 0).mean() == share
+
+
+def test_false_boxes_come_at_their_rate_within_the_image_and_best_first() -> None:
+    frames = seen(DetectorFaults(false_rate=0.4), 10_000)
+    counts = [len(found) - 2 for found in frames]
+    # Four standard errors of a Poisson distribution's mean.
+    assert abs(np.mean(counts) - 0.4) < 4 * math.sqrt(0.4 / 10_000)
+    assert abs(np.var(counts) - 0.4) < 0.05
+    boxes = np.concatenate([found.boxes for found in frames])
+    assert (boxes[:, :2] >= 0).all()
+    assert (boxes[:, 0] + boxes[:, 2] <= 640).all()
+    assert (boxes[:, 1] + boxes[:, 3] <= 480).all()
+    assert boxes[:, 3].min() >= 128
+    assert all((np.diff(found.scores) <= 0).all() for found in frames)
+
+
+def test_a_seed_fixes_every_miss_and_false_box_whichever_frames_are_read() -> None:
+    faults = DetectorFaults(recall=0.5, false_rate=0.5)
+    every = seen(faults, 300, seed=4)
+    sparse = FaultyDetector(SeesBoth(), faults, 10.0, 2, 4)
+    for frame in range(0, 300, 7):
+        sparse.face(truth(frame), None)
+        found = sparse.detect(IMAGE)
+        np.testing.assert_array_equal(found.boxes, every[frame].boxes)
+        np.testing.assert_array_equal(found.scores, every[frame].scores)
+    assert (found_of(every, 0) != found_of(seen(faults, 300, seed=5), 0)).any()
+
+
+@pytest.mark.parametrize("window_height", [200.0, 400.0])
+def test_a_search_in_part_of_the_image_or_at_half_size_loses_the_same_people(window_height: float) -> None:
+    class SeesOne:
+        """Finds the first person in a part of the image that begins at (48, 96), at whatever size."""
+
+        def detect(self, image: NDArray[np.uint8]) -> Detections:
+            return Detections((WINDOWS[:1] - np.array([48, 96, 0, 0])) * image.shape[0] // 288, np.array([1.0]))
+
+    region = Region(48, 96, 192, 288, window_height)
+    faults = DetectorFaults(recall=0.5, false_rate=2.0)
+    whole = seen(faults, 200)
+    detector = FaultyDetector(SeesOne(), faults, 10.0, 2, 0)
+    extra = 0
+    for frame in range(200):
+        detector.face(truth(frame), region)
+        found = detect_in(detector, IMAGE, region)
+        near = np.abs(found.boxes - WINDOWS[0]).max(axis=1, initial=0) <= 1
+        assert near.any() == found_of(whole[frame : frame + 1], 0)[0]
+        assert (found.boxes[:, :2] >= (48, 96)).all()
+        assert (found.boxes[:, :2] + found.boxes[:, 2:] <= (240, 384)).all()
+        extra += np.count_nonzero(~near)
+    assert 0 < extra < 400
+
+
+def test_the_half_size_detector_keeps_its_own_boxes() -> None:
+    detector = FaultyDetector(HalfSize(SeesBoth()), DetectorFaults(false_rate=0.001), 10.0, 2, 0)
+    detector.face(truth(0), None)
+    np.testing.assert_array_equal(detector.detect(IMAGE).boxes[:2], WINDOWS * 2)
+
+
+@pytest.fixture
+def unkind(tmp_path: Path) -> str:
+    file = tmp_path / "unkind.toml"
+    file.write_text(
+        "[[people]]\nroute = [[3.0, 0.0, 0.0]]\n[detector]\nrecall = 0.5\nburst_s = 0.2\nfalse_rate = 0.2\n",
+        encoding="utf-8",
+    )
+    return str(file)
+
+
+def test_in_the_closed_loop_the_card_shows_the_recall(unkind: str) -> None:
+    episode = run_episode(load(unkind), TrackingController(), detector_named("hog"), 20.0, 0)
+    card = score(episode)
+    assert card.detected is not None
+    # 200 frames of a chain with a correlation of 0: four standard errors.
+    assert abs(card.detected - 0.5) < 4 * 0.5 / math.sqrt(200)
+
+
+def test_one_and_two_workers_play_the_same_runs(unkind: str) -> None:
+    runs = [Run(unkind, "tracking", "hog", seed, 2.0) for seed in (0, 1)]
+    one, two = dict(play_all(runs, 1)), dict(play_all(runs, 2))
+    for run in runs:
+        cards = [{k: v for k, v in cards[run].to_json().items() if k not in WALL_CLOCK} for cards in (one, two)]
+        assert cards[0] == cards[1]

@@ -1,0 +1,29 @@
+"""A card tells what it came from."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import pytest
+
+from limo_sim.run.catalogue import load
+from limo_sim.run.provenance import code_version, scenario_hash
+from limo_sim.world.scenario import Camera, Scenario
+
+
+def test_scenarios_have_hashes_of_their_own_whatever_they_are_called() -> None:
+    names = (*Scenario.names(), "workshop:1", "workshop:2", "random:1")
+    assert len({scenario_hash(load(name)) for name in names}) == len(names)
+    workshop = load("workshop")
+    assert scenario_hash(dataclasses.replace(workshop, name="mine", summary="")) == scenario_hash(workshop)
+
+
+@pytest.mark.parametrize("camera", [Camera(noise=1.001), Camera(rate_hz=11.0)])
+def test_any_value_changes_the_hash(camera: Camera) -> None:
+    workshop = load("workshop")
+    assert scenario_hash(dataclasses.replace(workshop, camera=camera)) != scenario_hash(workshop)
+
+
+def test_the_code_is_told_by_versions_and_a_hash() -> None:
+    assert re.fullmatch(r"limo-hog \d+\.\d+\S*, limo-sim \d+\.\d+\S*, [0-9a-f]{16}", code_version())

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
-from limo_hog.learn.curve import bootstrap, collect, curve, figures, match, threshold_at
+from limo_hog.learn.evaluation.curve import bootstrap, collect, curve, figures, match, threshold_at
 
 Found = list[tuple[NDArray[np.float64], NDArray[np.float64]]]
 Labelled = list[tuple[NDArray[np.float64], NDArray[np.bool_]]]

@@ -14,7 +14,7 @@ from limo_hog.cli.main import main
 from limo_hog.cli.support.scene import street
 from limo_hog.detector import PeopleDetector
 from limo_hog.imaging.writing import write_image
-from limo_hog.learn.evaluation import Rival, compare, evaluate
+from limo_hog.learn.evaluation.run import Rival, compare, evaluate
 from limo_hog.learn.formats import read_labels
 
 USC = Path(__file__).parents[3] / "shared" / "data" / "eval" / "usc-c"

@@ -10,7 +10,7 @@ from limo_hog.cli.support.arguments import number
 from limo_hog.cli.support.output import STDOUT, write_json
 
 if TYPE_CHECKING:
-    from limo_hog.learn.evaluation import Evaluation, EvaluationParameters, Rival
+    from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, Rival
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -60,13 +60,13 @@ def run(args: argparse.Namespace) -> int:
     """Measure, print a table and, if asked, write JSON and a page."""
     from limo_hog.cli.support.progress import progress
     from limo_hog.cli.support.warned import warnings_in_one_line
-    from limo_hog.learn.evaluation import EvaluationParameters, as_json, evaluate
+    from limo_hog.learn.evaluation.run import EvaluationParameters, as_json, evaluate
     from limo_hog.learn.formats import read_labels
     from limo_hog.learn.labels import choose
 
     if args.report:
         # What it lacks is said before the work, not after.
-        from limo_hog.learn.report import write_report
+        from limo_hog.learn.evaluation.report import write_report
     how = EvaluationParameters()
     rivals = _rivals(args)
     with warnings_in_one_line():
@@ -91,7 +91,7 @@ def _rivals(args: argparse.Namespace) -> list[Rival]:
     from dataclasses import replace
 
     from limo_hog.detector import PeopleDetector
-    from limo_hog.learn.evaluation import Rival
+    from limo_hog.learn.evaluation.run import Rival
 
     rivals = []
     for model in dict.fromkeys([args.model, *args.against]):
@@ -110,7 +110,7 @@ def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters)
     from rich.console import Console
     from rich.table import Table
 
-    from limo_hog.learn.evaluation import compare
+    from limo_hog.learn.evaluation.run import compare
 
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for column in ("model", "LAMR", f"{how.confidence:.0%}", "R at .1", "R at 1", "AP", "T at .1", "ms"):

@@ -17,7 +17,7 @@ from limo_hog.atomic import about, whole_file
 from limo_hog.cv2_api import model_files
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
-from limo_hog.learn.evaluation import Evaluation, EvaluationParameters, Rival, evaluate
+from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, Rival, evaluate
 from limo_hog.learn.mining import in_order, readable
 from limo_hog.learn.sources import TrainingData
 from limo_hog.learn.training import Round, TrainingParameters

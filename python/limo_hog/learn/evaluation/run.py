@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
-from limo_hog.learn.curve import (
+from limo_hog.learn.evaluation.curve import (
     Curve,
     Figures,
     Match,

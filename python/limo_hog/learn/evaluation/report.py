@@ -13,9 +13,9 @@ import numpy as np
 from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
 from limo_hog.imaging.writing import write_image
-from limo_hog.learn.evaluation import Evaluation, EvaluationParameters, as_json, compare
+from limo_hog.learn.evaluation.mistakes import draw_sheet, worst_mistakes
+from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, as_json, compare
 from limo_hog.learn.labels import Picture
-from limo_hog.learn.mistakes import draw_sheet, worst_mistakes
 
 with needed(by="--report", what="matplotlib", install="'limo-hog[plot]'"):
     from matplotlib.figure import Figure

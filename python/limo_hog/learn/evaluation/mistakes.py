@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from limo_hog.imaging.drawing import annotate
 from limo_hog.imaging.resize import resize
-from limo_hog.learn.evaluation import Evaluation
+from limo_hog.learn.evaluation.run import Evaluation
 from limo_hog.learn.labels import Picture
 
 #: Mistakes on a sheet, a row of it, and a tile's size [px].

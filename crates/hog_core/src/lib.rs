@@ -21,6 +21,8 @@ pub mod pyramid;
 
 mod detect;
 mod fast;
+mod interrupt;
+mod memory;
 mod rescore;
 mod threads;
 mod workspace;
@@ -34,5 +36,6 @@ pub use fast::Backend;
 pub use geometry::{Rect, Size};
 pub use group::Candidate;
 pub use image::ImageView;
+pub use interrupt::Interrupt;
 pub use params::{HogParams, HogSpec};
 pub use rescore::Hit;

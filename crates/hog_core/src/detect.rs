@@ -7,12 +7,11 @@ use crate::geometry::{Padding, Rect, Size};
 use crate::group::{Candidate, clip, group_candidates, mean_shift};
 use crate::image::ImageView;
 use crate::interrupt::Interrupt;
-use crate::memory;
+use crate::memory::{self, Pool};
 use crate::params::{HogParams, HogSpec};
 use crate::pyramid::{Level, Steps, levels, to_image};
 use crate::rescore::{Fast, Hit, SCRATCH, Scorer};
 use crate::threads::in_order;
-use crate::workspace::Pool;
 
 /// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
 #[derive(Debug, Clone)]

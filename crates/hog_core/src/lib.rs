@@ -25,7 +25,6 @@ mod interrupt;
 mod memory;
 mod rescore;
 mod threads;
-mod workspace;
 
 #[cfg(feature = "python")]
 mod python;

@@ -6,10 +6,9 @@ use crate::fast::{self, Backend, Plan, Planes};
 use crate::geometry::Size;
 use crate::image::ImageView;
 use crate::interrupt::Interrupt;
-use crate::memory;
+use crate::memory::{self, Pool};
 use crate::params::HogSpec;
 use crate::pyramid::{Grid, resize};
-use crate::workspace::Pool;
 
 /// Scratch memory of the fast path, one per thread at work.
 pub(crate) static SCRATCH: Pool<fast::Scratch> = Pool::new();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// The top modules from the lowest to the highest; a module may use those of lower layers alone.
 const LAYERS: [&[&str]; 11] = [
-    &["geometry", "model", "workspace"],
+    &["geometry", "model"],
     &["error"],
     &["interrupt", "memory"],
     &["image", "threads"],

@@ -3,9 +3,8 @@
 use crate::error::Result;
 use crate::geometry::Size;
 use crate::interrupt::Interrupt;
-use crate::memory;
+use crate::memory::{self, Workspace};
 use crate::pyramid::Grid;
-use crate::workspace::Workspace;
 
 use super::lane::Lane;
 use super::layout::{BAND, BLOCK, CARRY, CELL, WORDS};

@@ -3,9 +3,8 @@
 use crate::error::Result;
 use crate::geometry::Size;
 use crate::image::{ImageView, reflect_101};
-use crate::memory;
+use crate::memory::{self, Workspace};
 use crate::pyramid::{Tap, taps};
-use crate::workspace::Workspace;
 
 use super::lane::{Columns, Lane, RowPointers};
 use super::layout::{OVERREAD, SLACK, STEP};

@@ -1,6 +1,11 @@
 //! Memory whose size follows from arguments: where it cannot be had, the call fails, not the process.
 //!
 //! `Vec`'s own methods abort the process when an allocation fails. These give [`HogError::Memory`] instead.
+//! `workspace` keeps memory from call to call.
+
+mod workspace;
+
+pub(crate) use workspace::{Pool, Workspace};
 
 use crate::error::{HogError, Result};
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 
-import limo_hog
 import pytest
 from tests.reliability.child import run
+
+import limo_hog
 
 
 @pytest.mark.skipif(os.name != "posix", reason="resource limits are POSIX")

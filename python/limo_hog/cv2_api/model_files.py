@@ -60,9 +60,9 @@ def load(filename: str | os.PathLike[str], name: str = "") -> tuple[Geometry, li
         objects = _parse(_text(path).lstrip("\ufeff \t\r\n"))
         geometry, svm = _from_entries(_chosen(objects, name))
         _assert_in_proportion(geometry, svm)
-        return geometry, svm
     except (ValueError, RecursionError, EOFError, gzip.BadGzipFile, zlib.error, ElementTree.ParseError) as error:
         raise ModelFormatError(f"{path} holds no HOG detector: {error}") from error
+    return geometry, svm
 
 
 def _assert_in_proportion(geometry: Geometry, svm: list[float]) -> None:
@@ -71,8 +71,8 @@ def _assert_in_proportion(geometry: Geometry, svm: list[float]) -> None:
     most = _BLOCK_PIXELS + _PIXELS_PER_COEFFICIENT * len(svm)
     if width * height > most:
         raise ValueError(
-            f"its block of {width} x {height} pixels is too large for a file of {len(svm)} coefficients (at most {most} "
-            "pixels); make the HOGDescriptor with this geometry in the program, and give it the coefficients"
+            f"its block of {width} x {height} pixels is too large for a file of {len(svm)} coefficients (at most "
+            f"{most} pixels); make the HOGDescriptor with this geometry in the program, and give it the coefficients"
         )
 
 

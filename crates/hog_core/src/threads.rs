@@ -115,15 +115,14 @@ mod tests {
         let items: Vec<usize> = (0..1000).collect();
         for threads in [1, 2, 8] {
             let begun = AtomicUsize::new(0);
-            let found = in_order(&items, threads, &Interrupt::NEVER, |&i, interrupt| {
+            let found = in_order(&items, threads, &Interrupt::NEVER, |&i, interrupt| -> Result<()> {
                 begun.fetch_add(1, Ordering::Relaxed);
                 if i == 0 {
                     return Err(HogError::Memory { bytes: 5 });
                 }
-                while threads > 1 {
-                    interrupt.check()?;
+                loop {
+                    interrupt.check()?; // until the first item has failed
                 }
-                Ok(i)
             });
             assert_eq!(found.unwrap_err(), HogError::Memory { bytes: 5 });
             assert!(begun.into_inner() <= threads);

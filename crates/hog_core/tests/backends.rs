@@ -106,7 +106,7 @@ fn a_detector_that_is_a_windows_own_descriptor_is_scored_alike() {
     for (seed, scale) in [(1, 0.1), (2, 1.0)] {
         let picture = Picture::new(150, 200, 3, seed);
         let params = HogParams::default();
-        let hog = Hog::new(&params, None, &Interrupt::NEVER).unwrap();
+        let hog = Hog::new(&params, None).unwrap();
         let mut own = vec![0.0; 3780];
         hog.compute(picture.view(), &STEPS, Some(&[(16, 24)]), &Interrupt::NEVER, &mut own).unwrap();
         let coefficients = own.iter().map(|x| scale * x).collect();

@@ -5,6 +5,9 @@ roundings and the order of sums of OpenCV 4.14, so that its trained models mean 
 
 Sizes, strides, paddings and places are (x, y) [px]. Images are uint8, (H, W), (H, W, 1) or (H, W, 3), in any memory
 layout and order of colours; pixels outside the array are mirrored ones (reflect-101). Calls release the GIL.
+
+Every call raises MemoryError, with the bytes, where the memory that its arguments ask for cannot be had. Ctrl-C ends a
+search or a grouping within a second.
 """
 
 from collections.abc import Sequence
@@ -227,7 +230,17 @@ def daimler_people_detector() -> NDArray[np.float32]:
     """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
 
 def set_num_threads(count: int) -> None:
-    """Let pyramids be searched by this many threads; 0 for one per core."""
+    """Let pyramids be searched by this many threads; 0 for one per core.
+
+    More than 256 are never used, and threads that the system does not give are done without.
+
+    Raises
+    ------
+    ParameterError
+        The number is negative, or larger than a machine word.
+    ParameterTypeError
+        It is no integer.
+    """
 
 def get_num_threads() -> int:
     """How many threads search a pyramid."""

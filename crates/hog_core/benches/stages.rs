@@ -8,7 +8,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use hog_core::{Backend, Grouping, Hog, HogParams, ImageView, Search, Size, model, pyramid};
+use hog_core::{Backend, Grouping, Hog, HogParams, ImageView, Interrupt, Search, Size, model, pyramid};
 
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
@@ -37,9 +37,12 @@ fn exact_path(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements((WIDTH * HEIGHT) as u64));
         let smaller = Size::new(WIDTH * 20 / 21, HEIGHT * 20 / 21);
         group.bench_function("resize", |b| b.iter(|| pyramid::resize(black_box(image), smaller)));
-        group.bench_function("gradient", |b| b.iter(|| hog.gradient(black_box(image), [0; 4])));
-        group
-            .bench_function("compute", |b| b.iter(|| hog.compute(black_box(image), &SEARCH, None, &mut out)));
+        group.bench_function("gradient", |b| {
+            b.iter(|| hog.gradient(black_box(image), [0; 4], &Interrupt::NEVER))
+        });
+        group.bench_function("compute", |b| {
+            b.iter(|| hog.compute(black_box(image), &SEARCH, None, &Interrupt::NEVER, &mut out))
+        });
     }
 }
 
@@ -51,10 +54,14 @@ fn fast_path(criterion: &mut Criterion) {
             let image = ImageView::new(&data, WIDTH, HEIGHT, channels, channels * WIDTH).unwrap();
             let mut group = criterion.benchmark_group(format!("{}/{kind}", backend.name()));
             group.throughput(Throughput::Elements((WIDTH * HEIGHT) as u64));
-            group.bench_function("level", |b| b.iter(|| hog.detect(black_box(image), &SEARCH, None)));
+            group.bench_function("level", |b| {
+                b.iter(|| hog.detect(black_box(image), &SEARCH, None, &Interrupt::NEVER))
+            });
             let grouping = Grouping::Similar(2);
             group.bench_function("pyramid", |b| {
-                b.iter(|| hog.detect_multi_scale(black_box(image), &SEARCH, 1.05, grouping, 1));
+                b.iter(|| {
+                    hog.detect_multi_scale(black_box(image), &SEARCH, 1.05, grouping, 1, &Interrupt::NEVER)
+                });
             });
         }
     }

@@ -6,11 +6,12 @@ use crate::fast::{self, Backend, Plan, Planes};
 use crate::geometry::{Padding, Rect, Size};
 use crate::group::{Candidate, clip, group_candidates, mean_shift};
 use crate::image::ImageView;
+use crate::interrupt::Interrupt;
+use crate::memory::{self, Pool};
 use crate::params::{HogParams, HogSpec};
 use crate::pyramid::{Level, Steps, levels, to_image};
-use crate::rescore::{Fast, Hit, Scorer};
+use crate::rescore::{Fast, Hit, SCRATCH, Scorer};
 use crate::threads::in_order;
-use crate::workspace::Pool;
 
 /// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
 #[derive(Debug, Clone)]
@@ -63,7 +64,7 @@ impl Hog {
         let spec = HogSpec::new(params)?;
         let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
         let plan = svm.as_ref().and_then(|svm| fast::plan(backend, &spec, svm));
-        Ok(Self { tables: Tables::new(&spec), spec, svm, plan, backend })
+        Ok(Self { tables: Tables::new(&spec)?, spec, svm, plan, backend })
     }
 
     /// The checked geometry.
@@ -76,6 +77,7 @@ impl Hog {
         &self,
         image: ImageView,
         [left, top, right, bottom]: [i64; 4],
+        interrupt: &Interrupt,
     ) -> Result<(Gradient, Size)> {
         let side = |axis: &'static str, length: usize, before: i64, after: i64| {
             let padded = (length as i64).saturating_add(before).saturating_add(after);
@@ -91,7 +93,8 @@ impl Hog {
         if size.width.saturating_mul(size.height) > i32::MAX as usize {
             return Err(ParameterError::PaddedArea { width: size.width, height: size.height }.into());
         }
-        Ok((exact::gradient(image, Padding { left, top, size }, &self.spec, &self.tables), size))
+        let padding = Padding { left, top, size };
+        Ok((exact::gradient(image, padding, &self.spec, &self.tables, interrupt)?, size))
     }
 
     /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).
@@ -121,17 +124,18 @@ impl Hog {
         image: ImageView,
         search: &Search,
         locations: Option<&[(i64, i64)]>,
+        interrupt: &Interrupt,
         out: &mut [f32],
     ) -> Result<()> {
         let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
         let Some(locations) = locations else {
-            exact::descriptors(image, &grid, &self.spec, &self.tables, out);
-            return Ok(());
+            return exact::descriptors(image, &grid, &self.spec, &self.tables, interrupt, out);
         };
-        let places: Vec<_> = locations.iter().map(|&at| grid.to_padded(at, &self.spec)).collect();
-        let inside: Vec<_> = places.iter().flatten().copied().collect();
-        let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables);
+        let places = memory::collect(locations.iter().map(|&at| grid.to_padded(at, &self.spec)))?;
+        let inside = memory::collect(places.iter().flatten().copied())?;
+        let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables, interrupt)?;
         for (place, out) in places.into_iter().zip(out.chunks_exact_mut(self.spec.descriptor_len().max(1))) {
+            interrupt.check()?;
             match place {
                 Some(at) => out.copy_from_slice(windows.descriptor(at)),
                 None => out.fill(0.0),
@@ -148,16 +152,25 @@ impl Hog {
         image: ImageView,
         search: &Search,
         locations: Option<&[(i64, i64)]>,
+        interrupt: &Interrupt,
     ) -> Result<Vec<Hit>> {
         let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
-            return self.with_scorer(image, svm, search, false, |scorer| scorer.hits(image.size(), &grid));
+            let find = |scorer: &Scorer| scorer.hits(image.size(), &grid, interrupt);
+            return self.with_scorer(image, svm, search, false, find);
         };
-        let inside: Vec<_> = locations.iter().filter_map(|&at| grid.to_padded(at, &self.spec)).collect();
-        let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables);
-        let scored = inside.iter().map(|&at| Hit::new(&grid, at, windows.score(at, svm)));
-        Ok(scored.filter(|hit| hit.weight >= search.hit_threshold).collect())
+        let inside = memory::collect(locations.iter().filter_map(|&at| grid.to_padded(at, &self.spec)))?;
+        let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables, interrupt)?;
+        let mut hits = Vec::new();
+        for at in inside {
+            interrupt.check()?;
+            let hit = Hit::new(&grid, at, windows.score(at, svm));
+            if hit.weight >= search.hit_threshold {
+                memory::push(&mut hits, hit)?;
+            }
+        }
+        Ok(hits)
     }
 
     /// Rectangles of all hits of the pyramid whose levels shrink by `scale`, grouped and clipped to the image.
@@ -171,26 +184,30 @@ impl Hog {
         scale: f64,
         grouping: Grouping,
         threads: usize,
+        interrupt: &Interrupt,
     ) -> Result<Vec<(Rect, f64)>> {
         let steps = self.steps(search, self.spec.stride)?;
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
-        let levels = levels(image.size(), scale, &self.spec);
+        let levels = levels(image.size(), scale, &self.spec, interrupt)?;
         // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
         let exact_weights = matches!(grouping, Grouping::MeanShift(_));
         let search_levels = |scorer: &Scorer| -> Result<Vec<Candidate>> {
-            let of_level = |level: &Level| self.level_candidates(scorer, level, &steps);
+            let of_level = |level: &Level, interrupt: &Interrupt| {
+                self.level_candidates(scorer, level, &steps, interrupt)
+            };
             let mut candidates = Vec::new();
-            for found in in_order(&levels, threads, of_level) {
-                candidates.append(&mut found?);
+            for found in in_order(&levels, threads, interrupt, of_level)? {
+                memory::reserve_some(&mut candidates, found.len())?;
+                candidates.extend(found);
             }
             Ok(candidates)
         };
         let candidates = self.with_scorer(image, svm, search, exact_weights, search_levels)?;
         let win = self.spec.win;
         let found = match grouping {
-            Grouping::Similar(threshold) => group_candidates(&candidates, threshold),
+            Grouping::Similar(threshold) => group_candidates(&candidates, threshold, interrupt)?,
             Grouping::MeanShift(threshold) => {
-                mean_shift(&candidates, threshold, (win.width as i32, win.height as i32))
+                mean_shift(&candidates, threshold, (win.width as i32, win.height as i32), interrupt)?
             }
         };
         Ok(clip(found, image.width() as i32, image.height() as i32))
@@ -207,27 +224,37 @@ impl Hog {
         svm: &Svm,
         search: &Search,
         exact_weights: bool,
-        work: impl FnOnce(&Scorer) -> R,
-    ) -> R {
+        work: impl FnOnce(&Scorer) -> Result<R>,
+    ) -> Result<R> {
         let Self { spec, tables, plan, backend, .. } = self;
         let hit_threshold = search.hit_threshold;
         let exact = Scorer { image, spec, tables, svm, hit_threshold, fast: None };
         let Some(plan) = plan else { return work(&exact) };
         let error = plan.score_error_bound();
         let rescore_margin = if exact_weights || error > SCORE_ERROR_MAX { f64::INFINITY } else { error };
-        PLANES.with(|planes| {
-            fast::fill_planes(*backend, planes, image);
+        let found = PLANES.with(|planes| {
+            fast::fill_planes(*backend, planes, image)?;
             work(&Scorer { fast: Some(Fast { backend: *backend, plan, planes, rescore_margin }), ..exact })
-        })
+        });
+        // Not after each level: the levels of a large image use large workspaces again.
+        PLANES.trim();
+        SCRATCH.trim();
+        found
     }
 
-    fn level_candidates(&self, scorer: &Scorer, level: &Level, steps: &Steps) -> Result<Vec<Candidate>> {
-        let hits = scorer.hits(level.size, &steps.grid(level.size, &self.spec))?;
+    fn level_candidates(
+        &self,
+        scorer: &Scorer,
+        level: &Level,
+        steps: &Steps,
+        interrupt: &Interrupt,
+    ) -> Result<Vec<Candidate>> {
+        let hits = scorer.hits(level.size, &steps.grid(level.size, &self.spec), interrupt)?;
         let candidate = |hit: &Hit| Candidate {
             rect: to_image(hit.x, hit.y, level.scale, &self.spec),
             weight: hit.weight,
             scale: level.scale,
         };
-        Ok(hits.iter().map(candidate).collect())
+        memory::collect(hits.iter().map(candidate))
     }
 }

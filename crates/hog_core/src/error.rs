@@ -1,10 +1,10 @@
-//! What the detector refuses: closed enums with the numbers that came, one enum per exception of Python.
+//! How calls fail: closed enums with the numbers that came, one enum per exception of Python.
 
 use thiserror::Error;
 
 use crate::geometry::Size;
 
-/// Every way in which input can be refused; nothing else can fail.
+/// Every way in which a call can fail: its input is refused, its memory cannot be had, or its caller ends it.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum HogError {
     /// Window, block, stride and cell sizes do not fit together.
@@ -27,6 +27,17 @@ pub enum HogError {
     /// The forced instruction set is unknown, or this CPU does not have it.
     #[error(transparent)]
     Backend(#[from] BackendError),
+    /// The memory that the arguments ask for cannot be had.
+    #[error(
+        "{bytes} bytes of memory are wanted, and cannot be had; use a smaller image, padding or geometry"
+    )]
+    Memory {
+        /// Bytes of the list that did not fit.
+        bytes: usize,
+    },
+    /// The caller ended the call.
+    #[error("the call was interrupted")]
+    Interrupted,
 }
 
 /// A geometry that [`HogSpec`](crate::HogSpec) refuses.
@@ -183,6 +194,12 @@ pub enum ParameterError {
         windows: usize,
         /// Elements of the descriptor of each.
         elements: usize,
+    },
+    /// The number of threads does not fit its type.
+    #[error("the number of threads is negative or far too large; 0 (one per core) to {most} are wanted")]
+    Threads {
+        /// The most that are ever used.
+        most: usize,
     },
 }
 

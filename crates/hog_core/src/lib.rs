@@ -21,9 +21,10 @@ pub mod pyramid;
 
 mod detect;
 mod fast;
+mod interrupt;
+mod memory;
 mod rescore;
 mod threads;
-mod workspace;
 
 #[cfg(feature = "python")]
 mod python;
@@ -34,5 +35,6 @@ pub use fast::Backend;
 pub use geometry::{Rect, Size};
 pub use group::Candidate;
 pub use image::ImageView;
+pub use interrupt::Interrupt;
 pub use params::{HogParams, HogSpec};
 pub use rescore::Hit;

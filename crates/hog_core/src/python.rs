@@ -1,15 +1,18 @@
 //! The Python module `limo_hog._core`: reads arguments, releases the GIL, calls, wraps, maps errors. Nothing else.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOverflowError};
 use pyo3::prelude::*;
 
-use crate::error::ImageError;
-use crate::{Backend, Grouping, HogError, HogParams, ImageView, Rect, Search};
+use crate::error::{ImageError, ParameterError};
+use crate::{Backend, Grouping, HogError, HogParams, ImageView, Interrupt, Rect, Search, memory};
 
 type Pair = (i64, i64);
 type Array1<'py, T> = Bound<'py, PyArray1<T>>;
@@ -19,11 +22,15 @@ type Array3<'py, T> = Bound<'py, PyArray3<T>>;
 /// Threads of a pyramid search; 0 stands for all cores.
 static THREADS: AtomicUsize = AtomicUsize::new(0);
 
+/// More threads are never used: levels are shared among them, and a pyramid has 64 levels unless asked for more.
+const THREADS_MAX: usize = 256;
+
 fn threads() -> usize {
-    match THREADS.load(Ordering::Relaxed) {
+    let threads = match THREADS.load(Ordering::Relaxed) {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
         chosen => chosen,
-    }
+    };
+    threads.min(THREADS_MAX)
 }
 
 /// Raises the class of `limo_hog.exceptions` that stands for `error`.
@@ -34,12 +41,57 @@ fn raised(py: Python<'_>, error: &HogError) -> PyErr {
         HogError::Image(_) => "ImageError",
         HogError::Parameter(_) => "ParameterError",
         HogError::Backend(_) => "BackendError",
+        HogError::Memory { .. } => return PyMemoryError::new_err(error.to_string()),
+        HogError::Interrupted => return PyKeyboardInterrupt::new_err(error.to_string()),
     };
+    raised_as(py, class, error.to_string())
+}
+
+/// Raises a class of `limo_hog.exceptions`.
+fn raised_as(py: Python<'_>, class: &str, message: String) -> PyErr {
     let raise = || {
         let class = py.import("limo_hog.exceptions")?.getattr(class)?;
-        Ok(PyErr::from_value(class.call1((error.to_string(),))?))
+        Ok(PyErr::from_value(class.call1((message,))?))
     };
     raise().unwrap_or_else(|missing: PyErr| missing)
+}
+
+/// How often a long call looks for signals: a tenth of the second within which Ctrl-C is to end it, and so rarely that
+/// taking the GIL from a busy thread costs little.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// Runs `work` without the GIL; what a signal's handler raises (Ctrl-C: `KeyboardInterrupt`) ends it.
+fn detached<R: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&Interrupt) -> crate::Result<R> + Send,
+) -> PyResult<R> {
+    // Python handles signals in its main thread alone: any other would take the GIL for nothing.
+    let threading = py.import("threading")?;
+    let main = threading.call_method0("main_thread")?.getattr("ident")?;
+    let is_main = threading.call_method0("get_ident")?.eq(main)?;
+    let (found, signal) = py.detach(|| {
+        let (looked, signal) = (Cell::new(Instant::now()), Cell::new(None));
+        let ask = || {
+            if looked.get().elapsed() < LOOK_EVERY {
+                return false;
+            }
+            let seen = Python::attach(|py| py.check_signals());
+            looked.set(Instant::now());
+            seen.map_err(|error| signal.set(Some(error))).is_err()
+        };
+        let found = work(&if is_main { Interrupt::when(&ask) } else { Interrupt::NEVER });
+        (found, signal.take())
+    });
+    match signal {
+        Some(error) => Err(error),
+        None => found.map_err(|error| raised(py, &error)),
+    }
+}
+
+/// Numbers as an array of numpy's.
+fn array1<T: numpy::Element>(py: Python<'_>, values: impl IntoIterator<Item = T>) -> PyResult<Array1<'_, T>> {
+    let values = memory::collect(values).map_err(|error| raised(py, &error))?;
+    Ok(PyArray1::from_vec(py, values))
 }
 
 /// The pixels of a numpy image: borrowed where it is contiguous, else copied.
@@ -62,7 +114,10 @@ impl<'a> Pixels<'a> {
         // `as_slice` also succeeds on Fortran order, with the pixels in that order.
         let data = match array.as_slice() {
             Ok(slice) if array.is_c_contiguous() => Cow::Borrowed(slice),
-            _ => Cow::Owned(array.as_array().iter().copied().collect()),
+            _ => {
+                let copy = memory::collect(array.as_array().iter().copied());
+                Cow::Owned(copy.map_err(|error| raised(py, &error))?)
+            }
         };
         Ok(Self { data, width, height, channels })
     }
@@ -83,11 +138,11 @@ impl Hog {
     fn on<R: Send>(
         &self,
         image: &PyReadonlyArrayDyn<'_, u8>,
-        work: impl FnOnce(&crate::Hog, ImageView) -> crate::Result<R> + Send,
+        work: impl FnOnce(&crate::Hog, ImageView, &Interrupt) -> crate::Result<R> + Send,
     ) -> PyResult<R> {
         let py = image.py();
         let pixels = Pixels::new(py, image)?;
-        py.detach(|| work(&self.inner, pixels.view()?)).map_err(|error| raised(py, &error))
+        detached(py, |interrupt| work(&self.inner, pixels.view()?, interrupt))
     }
 }
 
@@ -121,9 +176,9 @@ impl Hog {
             nlevels,
             signed_gradient,
         };
-        let detector = detector.map(|array| array.as_array().to_vec());
-        let inner = crate::Hog::new(&params, detector.as_deref()).map_err(|error| raised(py, &error))?;
-        Ok(Self { inner })
+        let detector = detector.map(|array| memory::collect(array.as_array().iter().copied())).transpose();
+        let inner = detector.and_then(|detector| crate::Hog::new(&params, detector.as_deref()));
+        Ok(Self { inner: inner.map_err(|error| raised(py, &error))? })
     }
 
     #[getter]
@@ -137,7 +192,7 @@ impl Hog {
         padding: [i64; 4],
     ) -> PyResult<(Array3<'py, f32>, Array3<'py, u8>)> {
         let py = image.py();
-        let (found, size) = self.on(&image, |hog, view| hog.gradient(view, padding))?;
+        let (found, size) = self.on(&image, |hog, view, interrupt| hog.gradient(view, padding, interrupt))?;
         let shape = [size.height, size.width, 2];
         let shares = PyArray1::from_vec(py, found.shares.into_flattened()).reshape(shape)?;
         Ok((shares, PyArray1::from_vec(py, found.bins.into_flattened()).reshape(shape)?))
@@ -157,10 +212,16 @@ impl Hog {
         let (view, locations) = (pixels.view().map_err(raise)?, locations.as_deref());
         let len = self.inner.compute_len(view, &search, locations).map_err(raise)?;
         // In memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
-        let descriptors = PyArray1::zeros(py, len, false);
+        // (`PyArray1::zeros` would panic where there is none.)
+        let zeros = py.import("numpy")?.call_method1("zeros", (len, "float32"));
+        let memory = || raise(HogError::Memory { bytes: len.saturating_mul(size_of::<f32>()) });
+        let descriptors = match zeros {
+            Err(error) if error.is_instance_of::<PyMemoryError>(py) => return Err(memory()),
+            zeros => zeros?.cast_into::<PyArray1<f32>>()?,
+        };
         let mut out = descriptors.readwrite();
         let out = out.as_slice_mut()?;
-        py.detach(|| self.inner.compute(view, &search, locations, out)).map_err(raise)?;
+        detached(py, |interrupt| self.inner.compute(view, &search, locations, interrupt, out))?;
         Ok(descriptors)
     }
 
@@ -173,11 +234,12 @@ impl Hog {
         locations: Option<Vec<Pair>>,
     ) -> PyResult<(Array2<'py, i32>, Array1<'py, f64>)> {
         let search = Search { hit_threshold, win_stride, padding };
-        let hits = self.on(&image, |hog, view| hog.detect(view, &search, locations.as_deref()))?;
-        let places = hits.iter().flat_map(|hit| [hit.x as i32, hit.y as i32]).collect();
-        let weights = hits.iter().map(|hit| hit.weight).collect();
-        let py = image.py();
-        Ok((PyArray1::from_vec(py, places).reshape([hits.len(), 2])?, PyArray1::from_vec(py, weights)))
+        let find = |hog: &crate::Hog, view: ImageView, interrupt: &Interrupt| {
+            hog.detect(view, &search, locations.as_deref(), interrupt)
+        };
+        let (py, hits) = (image.py(), self.on(&image, find)?);
+        let places = array1(py, hits.iter().flat_map(|hit| [hit.x as i32, hit.y as i32]))?;
+        Ok((places.reshape([hits.len(), 2])?, array1(py, hits.iter().map(|hit| hit.weight))?))
     }
 
     #[allow(clippy::too_many_arguments, reason = "they are OpenCV's detectMultiScale arguments")]
@@ -197,16 +259,17 @@ impl Hog {
         } else {
             Grouping::Similar(group_threshold as i32)
         };
-        let found =
-            self.on(&image, |hog, view| hog.detect_multi_scale(view, &search, scale, grouping, threads()))?;
-        let (rects, weights): (Vec<Rect>, Vec<f64>) = found.into_iter().unzip();
-        Ok((rect_array(image.py(), &rects)?, PyArray1::from_vec(image.py(), weights)))
+        let find = |hog: &crate::Hog, view: ImageView, interrupt: &Interrupt| {
+            hog.detect_multi_scale(view, &search, scale, grouping, threads(), interrupt)
+        };
+        let (py, found) = (image.py(), self.on(&image, find)?);
+        Ok((rect_array(py, &found)?, array1(py, found.iter().map(|&(_, weight)| weight))?))
     }
 }
 
-fn rect_array<'py>(py: Python<'py>, rects: &[Rect]) -> PyResult<Array2<'py, i32>> {
-    let values = rects.iter().flat_map(|r| [r.x, r.y, r.width, r.height]).collect();
-    PyArray1::from_vec(py, values).reshape([rects.len(), 4])
+fn rect_array<'py, T>(py: Python<'py>, found: &[(Rect, T)]) -> PyResult<Array2<'py, i32>> {
+    let values = found.iter().flat_map(|(r, _)| [r.x, r.y, r.width, r.height]);
+    array1(py, values)?.reshape([found.len(), 4])
 }
 
 #[pymodule(gil_used = false)]
@@ -224,10 +287,11 @@ mod _core {
         eps: f64,
     ) -> PyResult<(Array2<'py, i32>, Array1<'py, i32>)> {
         let rect = |[x, y, width, height]: [i32; 4]| Rect { x, y, width, height };
-        let rects: Vec<Rect> = rects.into_iter().map(rect).collect();
-        let found = py.detach(|| crate::group::group_rectangles(&rects, threshold, eps));
-        let (rects, counts): (Vec<Rect>, Vec<i32>) = found.into_iter().unzip();
-        Ok((rect_array(py, &rects)?, PyArray1::from_vec(py, counts)))
+        let found = detached(py, |interrupt| {
+            let rects = memory::collect(rects.into_iter().map(rect))?;
+            crate::group::group_rectangles(&rects, threshold, eps, interrupt)
+        })?;
+        Ok((rect_array(py, &found)?, array1(py, found.iter().map(|&(_, count)| count))?))
     }
 
     #[pyfunction]
@@ -241,8 +305,16 @@ mod _core {
     }
 
     #[pyfunction]
-    fn set_num_threads(count: usize) {
-        THREADS.store(count, Ordering::Relaxed);
+    fn set_num_threads(count: &Bound<'_, PyAny>) -> PyResult<()> {
+        let py = count.py();
+        let refused = |error: PyErr| {
+            if error.is_instance_of::<PyOverflowError>(py) {
+                return raised(py, &ParameterError::Threads { most: THREADS_MAX }.into());
+            }
+            raised_as(py, "ParameterTypeError", format!("the number of threads must be an integer: {error}"))
+        };
+        THREADS.store(count.extract().map_err(refused)?, Ordering::Relaxed);
+        Ok(())
     }
 
     #[pyfunction]

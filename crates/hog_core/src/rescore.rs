@@ -5,12 +5,13 @@ use crate::exact::{self, Svm, Tables};
 use crate::fast::{self, Backend, Plan, Planes};
 use crate::geometry::Size;
 use crate::image::ImageView;
+use crate::interrupt::Interrupt;
+use crate::memory::{self, Pool};
 use crate::params::HogSpec;
 use crate::pyramid::{Grid, resize};
-use crate::workspace::Pool;
 
 /// Scratch memory of the fast path, one per thread at work.
-static SCRATCH: Pool<fast::Scratch> = Pool::new();
+pub(crate) static SCRATCH: Pool<fast::Scratch> = Pool::new();
 
 /// A window that scored at least the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,37 +58,47 @@ pub(crate) struct Scorer<'a> {
 
 impl Scorer<'_> {
     /// The hits among all windows of the image shrunk to `size`, row by row.
-    pub(crate) fn hits(&self, size: Size, grid: &Grid) -> Result<Vec<Hit>> {
+    pub(crate) fn hits(&self, size: Size, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Hit>> {
         match &self.fast {
-            Some(fast) if fast::serves(grid) => self.fast_hits(fast, size, grid),
-            _ => self.exact_hits(size, grid),
+            Some(fast) if fast::serves(grid) => self.fast_hits(fast, size, grid, interrupt),
+            _ => self.exact_hits(size, grid, interrupt),
         }
     }
 
     /// The hits by the exact path alone.
-    fn exact_hits(&self, size: Size, grid: &Grid) -> Result<Vec<Hit>> {
+    fn exact_hits(&self, size: Size, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Hit>> {
         let level = LevelImage::new(self.image, size)?;
-        let scores = exact::scores(level.view()?, grid, self.spec, self.tables, self.svm);
+        let scores = exact::scores(level.view()?, grid, self.spec, self.tables, self.svm, interrupt)?;
         let place = |index: usize| {
             let (column, row) = (index % grid.windows.width, index / grid.windows.width);
             (column * grid.stride.width, row * grid.stride.height)
         };
         let hits = scores.into_iter().enumerate().filter(|&(_, score)| score >= self.hit_threshold);
-        Ok(hits.map(|(index, score)| Hit::new(grid, place(index), score)).collect())
+        memory::collect(hits.map(|(index, score)| Hit::new(grid, place(index), score)))
     }
 
     /// The hits by the fast path, each close call decided by the exact path.
-    fn fast_hits(&self, fast: &Fast, size: Size, grid: &Grid) -> Result<Vec<Hit>> {
+    fn fast_hits(&self, fast: &Fast, size: Size, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Hit>> {
         SCRATCH.with(|scratch| {
-            fast::detect(fast.backend, fast.plan, fast.planes, size, grid, self.hit_threshold, scratch);
-            self.rescore_close_calls(fast.rescore_margin, size, grid, &mut scratch.found)?;
+            let Fast { backend, plan, planes, rescore_margin } = *fast;
+            let threshold = self.hit_threshold;
+            let task = fast::Task { plan, source: planes, size, grid, threshold, interrupt };
+            fast::detect(backend, task, scratch)?;
+            self.rescore_close_calls(rescore_margin, size, grid, interrupt, &mut scratch.found)?;
             let hits = scratch.found.iter().filter(|&&(_, _, score)| score >= self.hit_threshold);
-            Ok(hits.map(|&(x, y, score)| Hit::new(grid, (x, y), score)).collect())
+            memory::collect(hits.map(|&(x, y, score)| Hit::new(grid, (x, y), score)))
         })
     }
 
     /// Gives the exact score to every window of `found` whose score is within `margin` of the threshold.
-    fn rescore_close_calls(&self, margin: f64, size: Size, grid: &Grid, found: &mut [Found]) -> Result<()> {
+    fn rescore_close_calls(
+        &self,
+        margin: f64,
+        size: Size,
+        grid: &Grid,
+        interrupt: &Interrupt,
+        found: &mut [Found],
+    ) -> Result<()> {
         // A score that is not a number is never sure.
         let is_sure = |score: f64| (score - self.hit_threshold).abs() > margin;
         let close = found.iter().filter(|&&(_, _, score)| !is_sure(score)).count();
@@ -99,11 +110,14 @@ impl Scorer<'_> {
         let Self { spec, tables, svm, .. } = self;
         // Neighbouring windows share pixels and blocks: scoring all at once is cheaper than scoring many one by one.
         let at_once = close * spec.win.area() > grid.padded.area();
-        let all = if at_once { exact::scores(level, grid, spec, tables, svm) } else { Vec::new() };
+        let all =
+            if at_once { exact::scores(level, grid, spec, tables, svm, interrupt)? } else { Vec::new() };
         for (x, y, score) in found.iter_mut().filter(|(_, _, score)| !is_sure(*score)) {
             let index = *y / grid.stride.height * grid.windows.width + *x / grid.stride.width;
-            let alone = || exact::window_score(level, grid, (*x, *y), spec, tables, svm);
-            *score = all.get(index).copied().unwrap_or_else(alone);
+            *score = match all.get(index) {
+                Some(&score) => score,
+                None => exact::window_score(level, grid, (*x, *y), spec, tables, svm, interrupt)?,
+            };
         }
         Ok(())
     }

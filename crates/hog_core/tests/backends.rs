@@ -6,7 +6,7 @@ mod common;
 use common::{Detector, Picture, assert_same, available, reached_by};
 use hog_core::group::{Candidate, clip, group_candidates, mean_shift};
 use hog_core::pyramid::{levels, resize, to_image};
-use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Rect, Search, Size, model};
+use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size, model};
 use proptest::prelude::*;
 
 const ALL_WINDOWS: f64 = -1e9;
@@ -24,14 +24,17 @@ fn compare(detector: &Detector, size: (usize, usize), channels: usize, search: S
     for backend in available() {
         let what = format!("{} {size:?}x{channels} {search:?}", backend.name());
         let hog = hog(detector, backend);
-        let found = hog.detect(image, &Search { hit_threshold: ALL_WINDOWS, ..search }, None).unwrap();
+        let found = hog
+            .detect(image, &Search { hit_threshold: ALL_WINDOWS, ..search }, None, &Interrupt::NEVER)
+            .unwrap();
         assert_same(&found, &wanted, detector.rounding(), &what);
         if wanted.is_empty() {
             continue;
         }
         for share in [0.0, 0.02, 0.5] {
             let hit_threshold = reached_by(&wanted, share);
-            let found = hog.detect(image, &Search { hit_threshold, ..search }, None).unwrap();
+            let found =
+                hog.detect(image, &Search { hit_threshold, ..search }, None, &Interrupt::NEVER).unwrap();
             let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
             assert_same(&found, &hits, detector.rounding(), &format!("{what} at {hit_threshold}"));
         }
@@ -105,7 +108,7 @@ fn a_detector_that_is_a_windows_own_descriptor_is_scored_alike() {
         let params = HogParams::default();
         let hog = Hog::new(&params, None).unwrap();
         let mut own = vec![0.0; 3780];
-        hog.compute(picture.view(), &STEPS, Some(&[(16, 24)]), &mut own).unwrap();
+        hog.compute(picture.view(), &STEPS, Some(&[(16, 24)]), &Interrupt::NEVER, &mut own).unwrap();
         let coefficients = own.iter().map(|x| scale * x).collect();
         compare(&Detector { params, coefficients }, (150, 200), 3, STEPS, seed);
     }
@@ -115,7 +118,7 @@ fn a_detector_that_is_a_windows_own_descriptor_is_scored_alike() {
 fn candidates(detector: &Detector, image: ImageView, search: &Search, scale: f64) -> Vec<Candidate> {
     let (spec, mut found) = (detector.spec(), Vec::new());
     let steps = Search { win_stride: (8, 8), ..*search };
-    for level in levels(Size::new(image.width(), image.height()), scale, &spec) {
+    for level in levels(Size::new(image.width(), image.height()), scale, &spec, &Interrupt::NEVER).unwrap() {
         let shrunk = resize(image, level.size).unwrap();
         let (width, channels) = (level.size.width, image.channels());
         let shrunk = ImageView::new(&shrunk, width, level.size.height, channels, width * channels).unwrap();
@@ -143,16 +146,17 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
         let search = STEPS;
         let candidates = candidates(&detector, image, &search, 1.1);
         let inside = |found| clip(found, size.0 as i32, size.1 as i32);
-        let every = inside(group_candidates(&candidates, 0));
-        let grouped = inside(group_candidates(&candidates, 2));
-        let modes = inside(mean_shift(&candidates, 0.1, (64, 128)));
+        let every = inside(group_candidates(&candidates, 0, &Interrupt::NEVER).unwrap());
+        let grouped = inside(group_candidates(&candidates, 2, &Interrupt::NEVER).unwrap());
+        let modes = inside(mean_shift(&candidates, 0.1, (64, 128), &Interrupt::NEVER).unwrap());
         let counts = [every.len(), grouped.len(), modes.len()];
         assert!(counts.iter().zip([50, 3, 3]).all(|(count, least)| *count >= least), "too few: {counts:?}");
         for backend in available() {
             let hog = hog(&detector, backend);
             for threads in [1, 2, 5] {
-                let detect =
-                    |grouping| hog.detect_multi_scale(image, &search, 1.1, grouping, threads).unwrap();
+                let detect = |grouping| {
+                    hog.detect_multi_scale(image, &search, 1.1, grouping, threads, &Interrupt::NEVER).unwrap()
+                };
                 let found = detect(Grouping::Similar(0));
                 assert_eq!(rects(&found), rects(&every), "{}", backend.name());
                 let off = found.iter().zip(&every).map(|(found, wanted)| (found.1 - wanted.1).abs());
@@ -160,7 +164,9 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
                 assert_eq!(rects(&detect(Grouping::Similar(2))), rects(&grouped), "{}", backend.name());
             }
             // Mean-shift is given exact weights: not a bit differs.
-            let found = hog.detect_multi_scale(image, &search, 1.1, Grouping::MeanShift(0.1), 2).unwrap();
+            let found = hog
+                .detect_multi_scale(image, &search, 1.1, Grouping::MeanShift(0.1), 2, &Interrupt::NEVER)
+                .unwrap();
             assert_eq!(found, modes, "{}", backend.name());
         }
     }
@@ -177,8 +183,12 @@ fn many_hits_of_a_loud_detector_weigh_what_each_weighs_exactly() {
     for backend in available() {
         for share in [0.1, 1.0] {
             let hit_threshold = reached_by(&wanted, share);
-            let found =
-                hog(&detector, backend).detect(picture.view(), &Search { hit_threshold, ..search }, None);
+            let found = hog(&detector, backend).detect(
+                picture.view(),
+                &Search { hit_threshold, ..search },
+                None,
+                &Interrupt::NEVER,
+            );
             let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
             assert_same(&found.unwrap(), &hits, 0.0, backend.name());
         }
@@ -213,12 +223,18 @@ fn geometries_without_kernels_and_odd_strides_find_what_the_exact_path_finds() {
         let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
         for backend in available() {
             let hog = hog(&detector, backend);
-            let found = hog.detect(image, &Search { hit_threshold, ..search }, None).unwrap();
+            let found =
+                hog.detect(image, &Search { hit_threshold, ..search }, None, &Interrupt::NEVER).unwrap();
             assert_same(&found, &hits, 0.0, backend.name());
             // The same windows, each asked for by its place.
             let places: Vec<_> = wanted.iter().map(|hit| (hit.x, hit.y)).collect();
             let all = Search { hit_threshold: ALL_WINDOWS, ..search };
-            assert_same(&hog.detect(image, &all, Some(&places)).unwrap(), &wanted, 0.0, backend.name());
+            assert_same(
+                &hog.detect(image, &all, Some(&places), &Interrupt::NEVER).unwrap(),
+                &wanted,
+                0.0,
+                backend.name(),
+            );
         }
     }
 }
@@ -231,7 +247,12 @@ fn a_detector_with_a_weight_that_is_no_number_has_no_hits() {
     let search = Search { hit_threshold: ALL_WINDOWS, win_stride: (8, 8), padding: (0, 0) };
     assert!(detector.every_window(picture.view(), &search)[0].weight.is_nan());
     for backend in available() {
-        assert!(hog(&detector, backend).detect(picture.view(), &search, None).unwrap().is_empty());
+        assert!(
+            hog(&detector, backend)
+                .detect(picture.view(), &search, None, &Interrupt::NEVER)
+                .unwrap()
+                .is_empty()
+        );
     }
 }
 
@@ -242,7 +263,7 @@ fn a_threshold_that_is_no_number_has_no_hits_and_minus_infinity_has_all() {
         let hog = hog(&Detector::people(), backend);
         for (hit_threshold, count) in [(f64::NAN, 0), (f64::NEG_INFINITY, 6), (f64::INFINITY, 0)] {
             let search = Search { hit_threshold, win_stride: (8, 8), padding: (0, 0) };
-            assert_eq!(hog.detect(picture.view(), &search, None).unwrap().len(), count);
+            assert_eq!(hog.detect(picture.view(), &search, None, &Interrupt::NEVER).unwrap().len(), count);
         }
     }
 }

@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The top modules from the lowest to the highest; a module may use those of lower layers alone.
-const LAYERS: [&[&str]; 10] = [
-    &["geometry", "model", "threads", "workspace"],
+const LAYERS: [&[&str]; 11] = [
+    &["geometry", "model"],
     &["error"],
-    &["image"],
+    &["interrupt", "memory"],
+    &["image", "threads"],
     &["params", "group"],
     &["pyramid"],
     &["exact"],

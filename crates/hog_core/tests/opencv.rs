@@ -6,7 +6,7 @@ mod common;
 use common::{Detector, Picture, available};
 use hog_core::exact::Svm;
 use hog_core::group::{Candidate, group_rectangles, mean_shift};
-use hog_core::{Grouping, Hog, HogParams, HogSpec, ImageView, Rect, Search};
+use hog_core::{Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, Search};
 
 fn rect([x, y, width, height]: [i32; 4]) -> Rect {
     Rect { x, y, width, height }
@@ -30,7 +30,9 @@ fn a_search_finds_what_opencv_finds_grouped_by_similarity_and_by_mean_shift() {
     detector.coefficients[3780] += 1.5;
     for backend in available() {
         let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
-        let search = |grouping| hog.detect_multi_scale(picture.view(), &STEPS, 1.1, grouping, 1).unwrap();
+        let search = |grouping| {
+            hog.detect_multi_scale(picture.view(), &STEPS, 1.1, grouping, 1, &Interrupt::NEVER).unwrap()
+        };
         assert_eq!(search(Grouping::Similar(0)).len(), 51);
         assert_found(
             &search(Grouping::Similar(1)),
@@ -91,7 +93,11 @@ fn rectangles_are_grouped_as_opencv_groups_them() {
     let expected: [(_, _, &[_]); 4] = [(1, 0.2, &four), (2, 0.2, &four), (3, 0.05, &strict), (2, 0.1, &five)];
     for (threshold, eps, wanted) in expected {
         let wanted: Vec<_> = wanted.iter().map(|&(sides, count)| (rect(sides), count)).collect();
-        assert_eq!(group_rectangles(&rects, threshold, eps), wanted, "{threshold} {eps}");
+        assert_eq!(
+            group_rectangles(&rects, threshold, eps, &Interrupt::NEVER).unwrap(),
+            wanted,
+            "{threshold} {eps}"
+        );
     }
 }
 
@@ -106,10 +112,10 @@ fn a_weak_group_inside_a_strong_one_is_dropped_as_opencv_drops_it() {
     let rects: Vec<Rect> = groups.iter().flat_map(|&(count, rect)| vec![rect; count]).collect();
     let (outer, apart) = ((groups[0].1, 5), (groups[3].1, 3));
     for threshold in [1, 2] {
-        assert_eq!(group_rectangles(&rects, threshold, 0.2), [outer, apart]);
+        assert_eq!(group_rectangles(&rects, threshold, 0.2, &Interrupt::NEVER).unwrap(), [outer, apart]);
     }
     for threshold in [3, 4] {
-        assert_eq!(group_rectangles(&rects, threshold, 0.2), [outer]);
+        assert_eq!(group_rectangles(&rects, threshold, 0.2, &Interrupt::NEVER).unwrap(), [outer]);
     }
 }
 
@@ -119,13 +125,13 @@ fn a_hit_alone_is_a_mode_of_the_weight_that_its_bandwidths_give_it() {
         let candidate = Candidate { rect: rect([40, 30, 64, 128]), weight: 2.0, scale };
         // Bandwidths of 8 · scale and 16 · scale pixels and of ln 1.3 along the logarithm of the scale.
         let weight = 2.0 / (8.0 * scale + 16.0 * scale + 1.3_f64.ln()).sqrt();
-        let found = mean_shift(&[candidate], weight - 1e-9, (64, 128));
+        let found = mean_shift(&[candidate], weight - 1e-9, (64, 128), &Interrupt::NEVER).unwrap();
         let (width, height) = ((64.0 * scale) as i32, (128.0 * scale) as i32);
         let wanted = Rect { x: 72 - width / 2, y: 94 - height / 2, width, height };
         assert_eq!(found[0].0, wanted);
         assert!((found[0].1 - weight).abs() < 1e-12);
         assert!(
-            mean_shift(&[candidate], found[0].1, (64, 128)).is_empty(),
+            mean_shift(&[candidate], found[0].1, (64, 128), &Interrupt::NEVER).unwrap().is_empty(),
             "more than the threshold is wanted"
         );
     }
@@ -137,7 +143,7 @@ fn mean_shift_climbs_to_the_highest_place_of_the_density() {
     let candidate =
         |&(x, y, weight): &(i32, i32, f64)| Candidate { rect: rect([x, y, 64, 128]), weight, scale: 1.0 };
     let candidates: Vec<Candidate> = hits.iter().map(candidate).collect();
-    let found = mean_shift(&candidates, 0.0, (64, 128));
+    let found = mean_shift(&candidates, 0.0, (64, 128), &Interrupt::NEVER).unwrap();
     let density = |x: f64, y: f64| {
         let of = |&(hx, hy, weight): &(i32, i32, f64)| {
             let squared = ((x - f64::from(hx)) / 8.0).powi(2) + ((y - f64::from(hy)) / 16.0).powi(2);
@@ -163,7 +169,7 @@ fn modes_less_than_a_bandwidth_apart_are_one() {
     // Two hits far enough apart to be modes of their own at scale 1; at scale 3 they are one.
     let at = |x, scale| Candidate { rect: rect([x, 0, 64, 128]), weight: 1.0, scale };
     for (scale, apart, modes) in [(1.0, 20, 2), (1.0, 12, 1), (3.0, 20, 1), (3.0, 60, 2)] {
-        let found = mean_shift(&[at(0, scale), at(apart, scale)], 0.0, (64, 128));
+        let found = mean_shift(&[at(0, scale), at(apart, scale)], 0.0, (64, 128), &Interrupt::NEVER).unwrap();
         assert_eq!(found.len(), modes, "{apart} pixels at scale {scale}");
     }
 }
@@ -175,7 +181,7 @@ fn equal_channels_tie_for_the_lowest_but_in_the_last_columns_for_the_highest() {
     let data: Vec<u8> = (0..7 * 6).flat_map(pixel).collect();
     let image = ImageView::new(&data, 7, 6, 3, 21).unwrap();
     let params = HogParams { gamma_correction: false, ..HogParams::default() };
-    let (found, _) = Hog::new(&params, None).unwrap().gradient(image, [0; 4]).unwrap();
+    let (found, _) = Hog::new(&params, None).unwrap().gradient(image, [0; 4], &Interrupt::NEVER).unwrap();
     assert_eq!(found.bins[14..21], [[4, 5], [8, 0], [8, 0], [8, 0], [4, 5], [4, 5], [4, 5]]);
     assert_eq!(found.shares[14], [10.0, 0.0]);
     assert_eq!(found.shares[15..18], [[5.0, 5.0]; 3]);

@@ -33,6 +33,9 @@ _TYPE = "opencv-object-detector-hog"
 _GZIP_MAGIC = b"\x1f\x8b"
 #: Text of a file, unpacked: room for three million coefficients, 800 times the people detector's.
 _MOST_BYTES = 64 << 20
+#: Pixels that a file's block may have [px]: 256 x 256 in any file, and as many more for each coefficient as cells of
+#: 48 x 48 pixels and 9 bins take, 36 times the area of OpenCV's own.
+_BLOCK_PIXELS, _PIXELS_PER_COEFFICIENT = 1 << 16, 48 * 48 // 9
 #: XML tags inside each other; OpenCV's own files have three.
 _MOST_DEPTH = 16
 #: A line is broken before it would grow beyond this.
@@ -49,14 +52,28 @@ def load(filename: str | os.PathLike[str], name: str = "") -> tuple[Geometry, li
     OSError
         The file cannot be read.
     ModelFormatError
-        It is not one of OpenCV's files, or has no such object, or that is no HOG detector.
+        It is not one of OpenCV's files, or has no such object, or that is no HOG detector, or its block is far larger
+        than its coefficients justify.
     """
     path = Path(filename)
     try:
         objects = _parse(_text(path).lstrip("\ufeff \t\r\n"))
-        return _from_entries(_chosen(objects, name))
+        geometry, svm = _from_entries(_chosen(objects, name))
+        _assert_in_proportion(geometry, svm)
     except (ValueError, RecursionError, EOFError, gzip.BadGzipFile, zlib.error, ElementTree.ParseError) as error:
         raise ModelFormatError(f"{path} holds no HOG detector: {error}") from error
+    return geometry, svm
+
+
+def _assert_in_proportion(geometry: Geometry, svm: list[float]) -> None:
+    """Raise ValueError where a small file asks for much memory: a block's tables have up to 160 bytes a pixel."""
+    width, height = geometry.blockSize
+    most = _BLOCK_PIXELS + _PIXELS_PER_COEFFICIENT * len(svm)
+    if width * height > most:
+        raise ValueError(
+            f"its block of {width} x {height} pixels is too large for a file of {len(svm)} coefficients (at most "
+            f"{most} pixels); make the HOGDescriptor with this geometry in the program, and give it the coefficients"
+        )
 
 
 def _text(path: Path) -> str:

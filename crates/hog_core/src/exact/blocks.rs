@@ -72,6 +72,8 @@ struct CellsAbreast<'a, const LANES: usize> {
 }
 
 impl<const LANES: usize> Work for CellsAbreast<'_, LANES> {
+    type Output = ();
+
     #[inline(always)]
     fn run<M: MulAdd>(self) {
         let Self { votes, firsts, spec, pixels, out } = self;
@@ -163,7 +165,7 @@ mod tests {
             let vote = |&(a, b, bin): &(f32, f32, u8)| Vote { shares: [a, b], bins: bins(bin) };
             let votes = Votes { width: 40, pixels: votes.iter().map(vote).collect() };
             let mut together = vec![f32::NAN; firsts.len() * spec.block_len];
-            let tables = Tables::new(&spec);
+            let tables = Tables::new(&spec).unwrap();
             block_histograms(&votes, &firsts, &spec, &tables, &mut together);
             for (&first, found) in firsts.iter().zip(together.chunks_exact(spec.block_len)) {
                 let mut alone = vec![f32::NAN; spec.block_len];

@@ -4,8 +4,11 @@
 
 use std::ops::Range;
 
+use crate::error::Result;
 use crate::geometry::{Padding, Region, Size};
 use crate::image::{ImageView, reflect_101};
+use crate::interrupt::Interrupt;
+use crate::memory;
 use crate::params::HogSpec;
 
 use super::isa::{MulAdd, Work, run};
@@ -46,16 +49,22 @@ const POLAR_RUN: usize = 1024;
 const POLAR_VECTOR_MIN: usize = 16;
 
 /// The gradient of the whole padded image.
-pub fn gradient(image: ImageView, padding: Padding, spec: &HogSpec, tables: &Tables) -> Gradient {
+pub fn gradient(
+    image: ImageView,
+    padding: Padding,
+    spec: &HogSpec,
+    tables: &Tables,
+    interrupt: &Interrupt,
+) -> Result<Gradient> {
     let Size { width, height } = padding.size;
-    let mut out =
-        Gradient { shares: Vec::with_capacity(width * height), bins: Vec::with_capacity(width * height) };
+    let pixels = width.saturating_mul(height);
+    let mut out = Gradient { shares: memory::with_room(pixels)?, bins: memory::with_room(pixels)? };
     let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
         out.shares.extend(a.iter().zip(b).map(|(&a, &b)| [a, b]));
         out.bins.extend(first.iter().zip(second).map(|(&first, &second)| [first, second]));
     };
-    run(Rows { image, padding, region: Region { x: 0, y: 0, width, height }, spec, tables, put });
-    out
+    rows(image, padding, Region { x: 0, y: 0, width, height }, spec, tables, interrupt, put)?;
+    Ok(out)
 }
 
 /// The votes of `region` of the padded image, as if the whole padded image had been computed.
@@ -65,8 +74,9 @@ pub(super) fn votes(
     region: Region,
     spec: &HogSpec,
     tables: &Tables,
-) -> Votes {
-    let mut pixels = Vec::with_capacity(region.width * region.height);
+    interrupt: &Interrupt,
+) -> Result<Votes> {
+    let mut pixels = memory::with_room(region.width.saturating_mul(region.height))?;
     let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
         let bins = first.iter().zip(second);
         let votes = a.iter().zip(b).zip(bins);
@@ -74,8 +84,8 @@ pub(super) fn votes(
             votes.map(|((&a, &b), (&first, &second))| Vote { shares: [a, b], bins: [first, second] }),
         );
     };
-    run(Rows { image, padding, region, spec, tables, put });
-    Votes { width: region.width, pixels }
+    rows(image, padding, region, spec, tables, interrupt, put)?;
+    Ok(Votes { width: region.width, pixels })
 }
 
 /// The votes of a row of pixels.
@@ -87,31 +97,63 @@ struct Row {
 }
 
 /// Hands the votes of a region to `put`, row by row.
+fn rows(
+    image: ImageView,
+    padding: Padding,
+    region: Region,
+    spec: &HogSpec,
+    tables: &Tables,
+    interrupt: &Interrupt,
+    put: impl FnMut(&Row),
+) -> Result<()> {
+    if region.width == 0 {
+        return Ok(());
+    }
+    let row = || memory::filled(region.width, 0.0f32);
+    let bins = || memory::filled(region.width, 0u8);
+    let padded_row = || memory::filled((region.width + 2) * image.channels(), 0.0f32);
+    run(Rows {
+        image,
+        padding,
+        region,
+        spec,
+        interrupt,
+        put,
+        source: Source::new(image, padding, region, tables)?,
+        lines: [row()?, row()?, row()?, row()?],
+        votes: Row { shares: [row()?, row()?], bins: [bins()?, bins()?] },
+        padded: [padded_row()?, padded_row()?, padded_row()?],
+    })
+}
+
+/// The work of [`rows`], and its memory.
 struct Rows<'a, P> {
     image: ImageView<'a>,
     padding: Padding,
     region: Region,
     spec: &'a HogSpec,
-    tables: &'a Tables,
+    interrupt: &'a Interrupt<'a>,
     put: P,
+    source: Source<'a>,
+    /// Of one row: derivatives along x and y, magnitude, angle.
+    lines: [Vec<f32>; 4],
+    votes: Row,
+    /// Three neighbouring rows of the padded image.
+    padded: [Vec<f32>; 3],
 }
 
 impl<P: FnMut(&Row)> Work for Rows<'_, P> {
+    type Output = Result<()>;
+
     #[inline(always)]
-    fn run<M: MulAdd>(self) {
-        let Self { image, padding, region, spec, tables, mut put } = self;
-        if region.width == 0 {
-            return;
-        }
-        let source = Source::new(image, padding, region, tables);
-        let row = || vec![0.0f32; region.width];
-        let [mut dx, mut dy, mut magnitude, mut angle] = [(); 4].map(|()| row());
-        let bins = || vec![0u8; region.width];
-        let mut votes = Row { shares: [row(), row()], bins: [bins(), bins()] };
-        let mut rows = [(); 3].map(|()| vec![0.0; (region.width + 2) * image.channels()]);
+    fn run<M: MulAdd>(self) -> Result<()> {
+        let Self { image, padding, region, spec, interrupt, mut put, source, lines, mut votes, padded } =
+            self;
+        let ([mut dx, mut dy, mut magnitude, mut angle], mut rows) = (lines, padded);
         source.fill(0, &mut rows[0]);
         source.fill(1, &mut rows[1]);
         for y in 0..region.height {
+            interrupt.check()?;
             source.fill(y + 2, &mut rows[(y + 2) % 3]);
             let neighbours = [y, y + 1, y + 2].map(|row| rows[row % 3].as_slice());
             if image.channels() == 1 {
@@ -125,6 +167,7 @@ impl<P: FnMut(&Row)> Work for Rows<'_, P> {
             vote(spec, &magnitude, &angle, &mut votes);
             put(&votes);
         }
+        Ok(())
     }
 }
 
@@ -142,21 +185,21 @@ struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    fn new(image: ImageView<'a>, padding: Padding, region: Region, tables: &'a Tables) -> Self {
+    fn new(image: ImageView<'a>, padding: Padding, region: Region, tables: &'a Tables) -> Result<Self> {
         let left = region.x as i64 - 1 - padding.left;
         let width = region.width + 2;
         let within = |x: i64| x.clamp(0, width as i64) as usize;
         let inside = within(-left)..within(image.width() as i64 - left);
         let outside = (0..inside.start).chain(inside.end..width);
-        Self {
+        Ok(Self {
             image,
             gamma: &tables.gamma,
             width,
             left,
             top: region.y as i64 - 1 - padding.top,
-            mirrored: outside.map(|i| (i, reflect_101(left + i as i64, image.width()))).collect(),
+            mirrored: memory::collect(outside.map(|i| (i, reflect_101(left + i as i64, image.width()))))?,
             inside,
-        }
+        })
     }
 
     /// Writes the channels of row `y`, one after the other.
@@ -290,14 +333,16 @@ mod tests {
     #[test]
     fn a_region_votes_as_it_does_in_the_whole_image_also_beyond_a_narrow_one() {
         let spec = HogSpec::new(&HogParams::default()).unwrap();
-        let tables = Tables::new(&spec);
+        let tables = Tables::new(&spec).unwrap();
         let data: Vec<u8> = (0..300).map(|i| (i * i % 251) as u8).collect();
         for channels in [1, 3] {
             for (width, height) in [(1, 1), (1, 9), (5, 3), (20, 5)] {
                 let image = ImageView::new(&data, width, height, channels, width * channels).unwrap();
                 let padding = Padding { left: 12, top: 3, size: Size::new(width + 30, height + 6) };
                 let Size { width, height } = padding.size;
-                let whole = votes(image, padding, Region { x: 0, y: 0, width, height }, &spec, &tables);
+                let all = Region { x: 0, y: 0, width, height };
+                let never = &Interrupt::NEVER;
+                let whole = votes(image, padding, all, &spec, &tables, never).unwrap();
                 for x in 0..width {
                     let part = votes(
                         image,
@@ -305,7 +350,9 @@ mod tests {
                         Region { x, y: 2, width: width - x, height: 2 },
                         &spec,
                         &tables,
-                    );
+                        never,
+                    )
+                    .unwrap();
                     for (i, vote) in part.pixels.iter().enumerate() {
                         let there = whole.pixels[(2 + i / part.width) * width + x + i % part.width];
                         assert_eq!((vote.shares, vote.bins), (there.shares, there.bins));

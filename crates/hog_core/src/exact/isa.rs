@@ -33,28 +33,26 @@ impl MulAdd for Separate {
 
 /// A loop to be compiled for several instruction sets; `run` must be `#[inline(always)]`.
 pub(super) trait Work {
-    fn run<M: MulAdd>(self);
+    type Output;
+    fn run<M: MulAdd>(self) -> Self::Output;
 }
 
 /// Runs `work` as compiled for this CPU.
-pub(super) fn run(work: impl Work) {
+pub(super) fn run<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-            // SAFETY: both instruction sets were found on this CPU.
-            unsafe { run_avx2(work) }
-        } else {
-            work.run::<Separate>();
-        }
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: both instruction sets were found on this CPU.
+        return unsafe { run_avx2(work) };
     }
     #[cfg(target_arch = "aarch64")]
-    work.run::<Fused>();
-    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-    work.run::<Separate>();
+    type Plain = Fused;
+    #[cfg(not(target_arch = "aarch64"))]
+    type Plain = Separate;
+    work.run::<Plain>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn run_avx2(work: impl Work) {
-    work.run::<Fused>();
+fn run_avx2<W: Work>(work: W) -> W::Output {
+    work.run::<Fused>()
 }

@@ -1,6 +1,7 @@
 //! Stage 3: the linear SVM's score of a window, summed in OpenCV's own order.
 
 use crate::error::{HogError, Result};
+use crate::memory;
 use crate::params::HogSpec;
 
 /// A linear SVM over window descriptors.
@@ -19,7 +20,7 @@ impl Svm {
             got if got == wanted + 1 => coefficients[wanted],
             got => return Err(HogError::DetectorSize { got, wanted }),
         };
-        Ok(Self { weights: coefficients[..wanted].to_vec(), bias })
+        Ok(Self { weights: memory::collect(coefficients[..wanted].iter().copied())?, bias })
     }
 
     /// One weight per descriptor element.

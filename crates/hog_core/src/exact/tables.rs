@@ -1,6 +1,8 @@
 //! Tables of a geometry: the value of each pixel after gamma correction, and its weight in each cell of a block.
 
+use crate::error::Result;
 use crate::geometry::Size;
+use crate::memory;
 use crate::params::HogSpec;
 
 /// The tables of one geometry.
@@ -14,11 +16,11 @@ pub struct Tables {
 
 impl Tables {
     /// The tables of the geometry `spec`.
-    pub fn new(spec: &HogSpec) -> Self {
-        Self {
+    pub fn new(spec: &HogSpec) -> Result<Self> {
+        Ok(Self {
             gamma: gamma_table(spec.gamma_correction),
-            weights: BlockWeights::new(spec.block, spec.cell, spec.sigma),
-        }
+            weights: BlockWeights::new(spec.block, spec.cell, spec.sigma)?,
+        })
     }
 }
 
@@ -65,6 +67,14 @@ impl<const CELLS: usize> Pixel<CELLS> {
     }
 }
 
+/// How many of the pixels along one axis reach one cell, and how many two.
+fn reach_along(cell: usize, cells: usize) -> [usize; 2] {
+    let reaching = |wanted: usize| {
+        (0..cell * cells).filter(|&pixel| cells_along(pixel, cell, cells).len() == wanted).count()
+    };
+    [reaching(1), reaching(2)]
+}
+
 /// Up to two cells (index and share) that a pixel reaches along one axis.
 fn cells_along(pixel: usize, cell: usize, cells: usize) -> Vec<(usize, f32)> {
     let position = (pixel as f32 + 0.5) / cell as f32 - 0.5;
@@ -83,12 +93,16 @@ fn cells_along(pixel: usize, cell: usize, cells: usize) -> Vec<(usize, f32)> {
 
 impl BlockWeights {
     /// The weights of a block of `block` pixels in cells of `cell` pixels under a Gaussian of `sigma` pixels.
-    pub(super) fn new(block: Size, cell: Size, sigma: f32) -> Self {
+    pub(super) fn new(block: Size, cell: Size, sigma: f32) -> Result<Self> {
         let cells = Size::new(block.width / cell.width, block.height / cell.height);
         let scale = 1.0 / ((sigma * sigma) * 2.0);
         // Centred on (width / 2, height / 2), not on the middle pixel: the models were trained that way.
         let squared = |index: usize, side: usize| (index as f32 - side as f32 * 0.5).powi(2);
-        let mut weights = Self::default();
+        let (across, down) = (reach_along(cell.width, cells.width), reach_along(cell.height, cells.height));
+        let mut weights = Self::with_room(
+            [across[0] * down[0], across[0] * down[1] + across[1] * down[0], across[1] * down[1]],
+            cells.area(),
+        )?;
         for column in 0..block.width {
             let across = cells_along(column, cell.width, cells.width);
             for row in 0..block.height {
@@ -107,17 +121,34 @@ impl BlockWeights {
                 }
             }
         }
-        match cells.width * cells.height {
-            0..=4 => weights.abreast_4 = weights.abreast(),
-            5..=16 => weights.abreast_16 = weights.abreast(),
+        let mut abreast_4 = std::mem::take(&mut weights.abreast_4);
+        let mut abreast_16 = std::mem::take(&mut weights.abreast_16);
+        match cells.area() {
+            0..=4 => abreast_4.extend(weights.abreast()),
+            5..=16 => abreast_16.extend(weights.abreast()),
             _ => {}
         }
-        weights
+        Ok(Self { abreast_4, abreast_16, ..weights })
     }
 
-    fn abreast<const LANES: usize>(&self) -> Vec<Abreast<LANES>> {
+    /// No weights yet, but room for those of so many pixels that reach one, two and four cells: a block may be so large
+    /// that its weights do not fit the memory, and then this is known before they are computed.
+    fn with_room([one, two, four]: [usize; 3], cells: usize) -> Result<Self> {
+        let abreast = |least: usize, most: usize| {
+            if (least..=most).contains(&cells) { one + two + four } else { 0 }
+        };
+        Ok(Self {
+            one: memory::with_room(one)?,
+            two: memory::with_room(two)?,
+            four: memory::with_room(four)?,
+            abreast_4: memory::with_room(abreast(0, 4))?,
+            abreast_16: memory::with_room(abreast(5, 16))?,
+        })
+    }
+
+    fn abreast<const LANES: usize>(&self) -> impl Iterator<Item = Abreast<LANES>> {
         let one = self.one.iter().map(Pixel::abreast);
-        one.chain(self.two.iter().map(Pixel::abreast)).chain(self.four.iter().map(Pixel::abreast)).collect()
+        one.chain(self.two.iter().map(Pixel::abreast)).chain(self.four.iter().map(Pixel::abreast))
     }
 }
 
@@ -130,7 +161,24 @@ mod tests {
         // 1 2 1     corners reach one cell, edges two, the middle four
         // 2 4 2
         // 1 2 1     (zones of 4, 8 and 4 pixels)
-        let weights = BlockWeights::new(Size::new(16, 16), Size::new(8, 8), 4.0);
+        let weights = BlockWeights::new(Size::new(16, 16), Size::new(8, 8), 4.0).unwrap();
         assert_eq!((weights.one.len(), weights.two.len(), weights.four.len()), (4 * 16, 4 * 32, 64));
+    }
+
+    #[test]
+    fn room_is_made_for_as_many_weights_as_come() {
+        for (cells, cell) in
+            [((1, 1), (8, 8)), ((2, 2), (5, 5)), ((3, 2), (7, 4)), ((5, 4), (1, 3)), ((2, 3), (2, 1))]
+        {
+            let block = Size::new(cells.0 * cell.0, cells.1 * cell.1);
+            let weights = BlockWeights::new(block, Size::new(cell.0, cell.1), 4.0).unwrap();
+            assert_eq!(weights.one.capacity(), weights.one.len());
+            assert_eq!(weights.two.capacity(), weights.two.len());
+            assert_eq!(weights.four.capacity(), weights.four.len());
+            assert_eq!(
+                weights.abreast_4.capacity() + weights.abreast_16.capacity(),
+                weights.abreast_4.len() + weights.abreast_16.len()
+            );
+        }
     }
 }

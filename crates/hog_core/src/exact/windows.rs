@@ -4,8 +4,11 @@
 
 use std::collections::BTreeMap;
 
+use crate::error::Result;
 use crate::geometry::{Region, Size};
 use crate::image::ImageView;
+use crate::interrupt::Interrupt;
+use crate::memory;
 use crate::params::HogSpec;
 use crate::pyramid::Grid;
 
@@ -28,38 +31,49 @@ struct BlockRows<'a> {
 }
 
 impl<'a> BlockRows<'a> {
-    fn new(image: ImageView, grid: &Grid, spec: &'a HogSpec, tables: &'a Tables) -> Self {
+    fn new(
+        image: ImageView,
+        grid: &Grid,
+        spec: &'a HogSpec,
+        tables: &'a Tables,
+        interrupt: &Interrupt,
+    ) -> Result<Self> {
         let of_window =
             |i: usize| (0..spec.blocks.width).map(move |b| i * grid.stride.width + b * spec.stride.width);
-        let mut columns: Vec<usize> = (0..grid.windows.width).flat_map(of_window).collect();
-        let wanted = columns.clone();
+        let wanted = grid.windows.width.saturating_mul(spec.blocks.width);
+        let mut columns: Vec<usize> = memory::with_room(wanted)?;
+        columns.extend((0..grid.windows.width).flat_map(of_window));
+        let mut places = memory::collect(columns.iter().copied())?;
         columns.sort_unstable();
         columns.dedup();
-        let places = wanted.iter().map(|x| columns.partition_point(|column| column < x)).collect();
-        let votes = votes(image, grid.padding(), grid.whole(), spec, tables);
-        Self { spec, tables, votes, columns, places, rows: BTreeMap::new() }
+        for place in &mut places {
+            *place = columns.partition_point(|column| column < place);
+        }
+        let votes = votes(image, grid.padding(), grid.whole(), spec, tables, interrupt)?;
+        Ok(Self { spec, tables, votes, columns, places, rows: BTreeMap::new() })
     }
 
     /// Makes the rows of blocks that windows at padded row `y` need.
-    fn advance(&mut self, y: usize) {
+    fn advance(&mut self, y: usize) -> Result<()> {
         let Self { spec, tables, votes, columns, rows, .. } = self;
         *rows = rows.split_off(&y);
         let below = (0..spec.blocks.height).map(|block| y + block * spec.stride.height);
         let votes: &Votes = votes;
-        let missing: Vec<usize> = below.filter(|y| !rows.contains_key(y)).collect();
-        let firsts: Vec<usize> =
-            missing.iter().flat_map(|y| columns.iter().map(move |x| y * votes.width + x)).collect();
-        let mut blocks = vec![0.0; firsts.len() * spec.block_len];
+        let missing = memory::collect(below.filter(|y| !rows.contains_key(y)))?;
+        let mut firsts = memory::with_room(missing.len().saturating_mul(columns.len()))?;
+        firsts.extend(missing.iter().flat_map(|y| columns.iter().map(move |x| y * votes.width + x)));
+        let mut blocks = memory::filled(firsts.len().saturating_mul(spec.block_len), 0.0)?;
         block_histograms(votes, &firsts, spec, tables, &mut blocks);
         for (y, row) in missing.into_iter().zip(blocks.chunks_exact(columns.len() * spec.block_len)) {
-            rows.insert(y, row.to_vec());
+            rows.insert(y, memory::collect(row.iter().copied())?);
         }
+        Ok(())
     }
 
     /// The rows of blocks of the windows at padded row `y`.
-    fn rows(&self, y: usize) -> Vec<&[f32]> {
+    fn rows(&self, y: usize) -> Result<Vec<&[f32]>> {
         let row = |by| self.rows.get(&(y + by * self.spec.stride.height)).map_or(&[][..], Vec::as_slice);
-        (0..self.spec.blocks.height).map(row).collect()
+        memory::collect((0..self.spec.blocks.height).map(row))
     }
 
     /// The blocks of window `i` of `rows`, in descriptor order: column by column.
@@ -71,37 +85,54 @@ impl<'a> BlockRows<'a> {
 }
 
 /// The descriptors of all windows, one after the other.
-pub fn descriptors(image: ImageView, grid: &Grid, spec: &HogSpec, tables: &Tables, out: &mut [f32]) {
+pub fn descriptors(
+    image: ImageView,
+    grid: &Grid,
+    spec: &HogSpec,
+    tables: &Tables,
+    interrupt: &Interrupt,
+    out: &mut [f32],
+) -> Result<()> {
     if spec.descriptor_len() == 0 || grid.is_empty() {
-        return;
+        return Ok(());
     }
-    let mut blocks = BlockRows::new(image, grid, spec, tables);
+    let mut blocks = BlockRows::new(image, grid, spec, tables, interrupt)?;
     let row_len = grid.windows.width * spec.descriptor_len();
     for (j, out) in out.chunks_exact_mut(row_len).enumerate() {
         let y = j * grid.stride.height;
-        blocks.advance(y);
-        let rows = blocks.rows(y);
+        interrupt.check()?;
+        blocks.advance(y)?;
+        let rows = blocks.rows(y)?;
         let found = (0..grid.windows.width).flat_map(|i| blocks.window(&rows, i));
         for (out, block) in out.chunks_exact_mut(spec.block_len).zip(found) {
             out.copy_from_slice(block);
         }
     }
+    Ok(())
 }
 
 /// The scores of all windows, row by row.
-pub fn scores(image: ImageView, grid: &Grid, spec: &HogSpec, tables: &Tables, svm: &Svm) -> Vec<f64> {
+pub fn scores(
+    image: ImageView,
+    grid: &Grid,
+    spec: &HogSpec,
+    tables: &Tables,
+    svm: &Svm,
+    interrupt: &Interrupt,
+) -> Result<Vec<f64>> {
     if grid.is_empty() || spec.descriptor_len() == 0 {
-        return vec![f64::from(svm.bias()); grid.len()];
+        return memory::filled(grid.len(), f64::from(svm.bias()));
     }
-    let mut blocks = BlockRows::new(image, grid, spec, tables);
-    let mut scores = Vec::with_capacity(grid.len());
+    let mut scores = memory::with_room(grid.len())?;
+    let mut blocks = BlockRows::new(image, grid, spec, tables, interrupt)?;
     for j in 0..grid.windows.height {
         let y = j * grid.stride.height;
-        blocks.advance(y);
-        let rows = blocks.rows(y);
+        interrupt.check()?;
+        blocks.advance(y)?;
+        let rows = blocks.rows(y)?;
         scores.extend((0..grid.windows.width).map(|i| svm.score(blocks.window(&rows, i))));
     }
-    scores
+    Ok(scores)
 }
 
 /// Some windows of an image, for which the gradient is computed no further than they reach.
@@ -123,7 +154,8 @@ impl<'a> Windows<'a> {
         places: &[(usize, usize)],
         spec: &'a HogSpec,
         tables: &'a Tables,
-    ) -> Self {
+        interrupt: &Interrupt,
+    ) -> Result<Self> {
         let along = |of: fn(&(usize, usize)) -> usize, win: usize| {
             let first = places.iter().map(of).min().unwrap_or(0);
             (first, places.iter().map(of).max().map_or(0, |last| last + win - first))
@@ -131,9 +163,10 @@ impl<'a> Windows<'a> {
         let (x, width) = along(|place| place.0, spec.win.width);
         let (y, height) = along(|place| place.1, spec.win.height);
         let region = Region { x, y, width, height };
-        let votes = votes(image, grid.padding(), region, spec, tables);
-        let descriptor = vec![0.0; spec.descriptor_len()];
-        Self { spec, tables, region, votes, firsts: Vec::new(), descriptor }
+        let votes = votes(image, grid.padding(), region, spec, tables, interrupt)?;
+        let firsts = memory::with_room(spec.blocks.area())?;
+        let descriptor = memory::filled(spec.descriptor_len(), 0.0)?;
+        Ok(Self { spec, tables, region, votes, firsts, descriptor })
     }
 
     /// The descriptor of the window at padded (`x`, `y`), one of those prepared.
@@ -164,6 +197,7 @@ pub fn window_score(
     spec: &HogSpec,
     tables: &Tables,
     svm: &Svm,
-) -> f64 {
-    Windows::new(image, grid, &[at], spec, tables).score(at, svm)
+    interrupt: &Interrupt,
+) -> Result<f64> {
+    Ok(Windows::new(image, grid, &[at], spec, tables, interrupt)?.score(at, svm))
 }

@@ -1,7 +1,7 @@
 //! Which kernels serve a call: every entry to the fast path, and the functions that enable an instruction set.
 
+use crate::error::Result;
 use crate::exact::Svm;
-use crate::geometry::Size;
 use crate::image::ImageView;
 use crate::params::HogSpec;
 use crate::pyramid::Grid;
@@ -64,38 +64,30 @@ pub(crate) fn serves(grid: &Grid) -> bool {
     grid.stride.width.is_multiple_of(4) && grid.stride.height.is_multiple_of(4)
 }
 
-/// Puts into `scratch.found` every window of `grid` whose exact score may be at least `threshold`, row by row: x, y in
+/// Puts into `scratch.found` every window whose exact score may be at least the task's threshold, row by row: x, y in
 /// padded pixels.
-pub(crate) fn detect(
-    backend: Backend,
-    plan: &Plan,
-    source: &Planes,
-    size: Size,
-    grid: &Grid,
-    threshold: f64,
-    scratch: &mut Scratch,
-) {
+pub(crate) fn detect(backend: Backend, task: Task, scratch: &mut Scratch) -> Result<()> {
     scratch.found.clear();
-    if grid.is_empty() {
-        return;
+    if task.grid.is_empty() {
+        return Ok(());
     }
-    let task = Task { plan, source, size, grid, threshold };
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => unsafe { avx512(task, scratch) },
+        Backend::Avx512 => unsafe { avx512(task, scratch) }?,
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => unsafe { avx2(task, scratch) },
+        Backend::Avx2 => unsafe { avx2(task, scratch) }?,
         #[cfg(target_arch = "aarch64")]
-        Backend::Neon => neon(task, scratch),
-        _ => level(Portable, Portable, task, scratch),
+        Backend::Neon => neon(task, scratch)?,
+        _ => level(Portable, Portable, task, scratch)?,
     }
     scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
+    Ok(())
 }
 
 /// Fills `planes` with the pixels of `image`.
-pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageView) {
+pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageView) -> Result<()> {
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2.
@@ -109,29 +101,29 @@ pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageVie
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2_fill_planes(planes: &mut Planes, image: ImageView) {
+fn avx2_fill_planes(planes: &mut Planes, image: ImageView) -> Result<()> {
     // SAFETY: this function's features are the token's.
-    planes.fill(unsafe { Avx2::new() }, image);
+    planes.fill(unsafe { Avx2::new() }, image)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
-fn avx512(task: Task, scratch: &mut Scratch) {
+fn avx512(task: Task, scratch: &mut Scratch) -> Result<()> {
     // SAFETY: this function's features are the tokens'.
     unsafe { level(Avx512::new(), Avx2::new(), task, scratch) }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2(task: Task, scratch: &mut Scratch) {
+fn avx2(task: Task, scratch: &mut Scratch) -> Result<()> {
     // SAFETY: this function's features are the token's.
     let l = unsafe { Avx2::new() };
-    level(l, l, task, scratch);
+    level(l, l, task, scratch)
 }
 
 #[cfg(target_arch = "aarch64")]
-fn neon(task: Task, scratch: &mut Scratch) {
+fn neon(task: Task, scratch: &mut Scratch) -> Result<()> {
     // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
     let l = unsafe { Neon::new() };
-    level(l, l, task, scratch);
+    level(l, l, task, scratch)
 }

@@ -1,6 +1,9 @@
 //! One level, from planes to hits: lattices of blocks, bands of rows, strips, scores.
 
+use crate::error::Result;
 use crate::geometry::Size;
+use crate::interrupt::Interrupt;
+use crate::memory::{self, Workspace};
 use crate::pyramid::Grid;
 
 use super::lane::Lane;
@@ -33,65 +36,90 @@ struct Line(#[allow(dead_code, reason = "read through a pointer")] [u32; 16]);
 
 impl Lines {
     /// Room for `len` words; old ones stay.
-    fn reserve(&mut self, len: usize) -> *mut u32 {
+    fn reserve(&mut self, len: usize) -> Result<*mut u32> {
         let lines = len.div_ceil(16);
         if self.0.len() < lines {
-            self.0.resize(lines, Line([0; 16]));
+            memory::resize(&mut self.0, lines, Line([0; 16]))?;
         }
-        self.0.as_mut_ptr().cast()
+        Ok(self.0.as_mut_ptr().cast())
+    }
+
+    fn bytes(&self) -> usize {
+        self.0.capacity() * size_of::<Line>()
+    }
+}
+
+impl Workspace for Scratch {
+    fn bytes(&self) -> usize {
+        self.band.bytes()
+            + self.carry.bytes()
+            + self.blocks.bytes()
+            + self.bytes.bytes()
+            + self.edge.capacity() * size_of::<[f32; BLOCK]>()
+            + self.masks.capacity() * size_of::<u32>()
+            + self.found.capacity() * size_of::<(usize, usize, f64)>()
     }
 }
 
 /// The search of one level.
 #[derive(Clone, Copy)]
-pub(super) struct Task<'a> {
+pub(crate) struct Task<'a> {
     pub plan: &'a Plan,
     pub source: &'a Planes,
     pub size: Size,
     pub grid: &'a Grid,
     pub threshold: f64,
+    pub interrupt: &'a Interrupt<'a>,
 }
 
 /// `tail` is the narrower vector: for single windows, and for a level's last strip where its lanes are enough.
 #[inline(always)]
-pub(super) fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) {
-    scratch.band.begin(task.source, task.size, task.grid.pad.width, L::GROUP, L::REACH);
+pub(super) fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) -> Result<()> {
+    scratch.band.begin(task.source, task.size, task.grid.pad.width, L::GROUP, L::REACH)?;
     let Task { grid, .. } = task;
     // Windows whose distance is no multiple of 8 lie on several lattices of blocks.
     let lattices = |stride: usize| if stride.is_multiple_of(8) { 0..1 } else { 0..2 };
     for y in lattices(grid.stride.height) {
         for x in lattices(grid.stride.width) {
-            lattice(l, tail, task, (4 * x, 4 * y), scratch);
+            lattice(l, tail, task, (4 * x, 4 * y), scratch)?;
         }
     }
+    Ok(())
 }
 
 #[inline(always)]
-fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usize), scratch: &mut Scratch) {
-    let Task { plan, source, grid, threshold, .. } = task;
+fn lattice<L: Lane, T: Lane>(
+    l: L,
+    tail: T,
+    task: Task,
+    (left, top): (usize, usize),
+    scratch: &mut Scratch,
+) -> Result<()> {
+    let Task { plan, source, grid, threshold, interrupt, .. } = task;
     let along = |padded: usize, blocks: usize, origin: usize| {
         (padded - origin).checked_sub(8 * (blocks + 1)).map_or(0, |room| room / 8 + 1)
     };
     let width = along(grid.padded.width, plan.blocks.width, left);
     let height = along(grid.padded.height, plan.blocks.height, top);
     if width == 0 || height == 0 {
-        return;
+        return Ok(());
     }
     let (cells_x, cells_y) = (width + plan.blocks.width, height + plan.blocks.height);
     let lanes = cells_x.next_multiple_of(32) + 32 + plan.blocks.width.next_multiple_of(16);
     let Scratch { band, carry, blocks, bytes, edge, masks, found } = scratch;
-    let blocks: *mut f32 = blocks.reserve((cells_y - 1) * BLOCK * lanes + 64).cast();
-    let bytes = bytes.reserve((cells_y - 1) * WORDS * lanes + 64);
-    let carry: *mut f32 = carry.reserve(cells_x.div_ceil(L::LANES) * CARRY * L::LANES).cast();
+    let blocks: *mut f32 = blocks.reserve((cells_y - 1) * BLOCK * lanes + 64)?.cast();
+    let bytes = bytes.reserve((cells_y - 1) * WORDS * lanes + 64)?;
+    let carry: *mut f32 = carry.reserve(cells_x.div_ceil(L::LANES) * CARRY * L::LANES)?.cast();
     edge.clear();
-    edge.resize(cells_y, [0.0; BLOCK]);
+    memory::resize(edge, cells_y, [0.0; BLOCK])?;
     let at_once = (BAND / (CELL * band.stride)).max(1);
     for begin in (0..cells_y).step_by(at_once) {
+        interrupt.check()?;
         let cells = begin..(begin + at_once).min(cells_y);
         let above = (top + CELL * begin) as i64 - 1 - grid.pad.height as i64;
         match source.channels() {
-            1 => band.fill::<L, 1>(l, source, above, CELL * cells.len() + 2),
-            _ => band.fill::<L, 3>(l, source, above, CELL * cells.len() + 2),
+            1 => band.fill::<L, 1>(l, source, above, CELL * cells.len() + 2)?,
+            _ => band.fill::<L, 3>(l, source, above, CELL * cells.len() + 2)?,
         }
         let mut origin = [band.pixels().as_ptr(); 3];
         for (channel, origin) in origin.iter_mut().enumerate().take(source.channels()) {
@@ -115,7 +143,7 @@ fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usi
     let before = found.len();
     let windows = WindowGrid { plan, blocks, bytes, lanes, width, height };
     // SAFETY: the strips have filled the blocks of all windows; `lanes` is as wide as wanted.
-    unsafe { score(l, tail, &windows, threshold, masks, found) };
+    unsafe { score(l, tail, &windows, threshold, interrupt, masks, found) }?;
     let mut kept = before;
     for index in before..found.len() {
         let (x, y, score) = found[index];
@@ -126,6 +154,7 @@ fn lattice<L: Lane, T: Lane>(l: L, tail: T, task: Task, (left, top): (usize, usi
         }
     }
     found.truncate(kept);
+    Ok(())
 }
 
 #[inline(always)]

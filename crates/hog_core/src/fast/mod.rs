@@ -17,6 +17,6 @@ mod strip;
 
 pub use backend::Backend;
 pub(crate) use dispatch::{detect, fill_planes, plan, serves};
-pub(crate) use level::Scratch;
+pub(crate) use level::{Scratch, Task};
 pub(crate) use plan::Plan;
 pub(crate) use rows::Planes;

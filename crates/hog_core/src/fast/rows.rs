@@ -1,7 +1,9 @@
 //! Pixels for the kernels: the image as planes, shrunk to a level, each row mirrored outwards.
 
+use crate::error::Result;
 use crate::geometry::Size;
 use crate::image::{ImageView, reflect_101};
+use crate::memory::{self, Workspace};
 use crate::pyramid::{Tap, taps};
 
 use super::lane::{Columns, Lane, RowPointers};
@@ -18,12 +20,12 @@ pub(crate) struct Planes {
 impl Planes {
     /// Copies the pixels of `image`.
     #[inline(always)]
-    pub(super) fn fill<L: Lane>(&mut self, l: L, image: ImageView) {
+    pub(super) fn fill<L: Lane>(&mut self, l: L, image: ImageView) -> Result<()> {
         let (width, height, channels) = (image.width(), image.height(), image.channels());
         let plane = width * height;
+        memory::resize(&mut self.data, plane * channels + SLACK, 0)?;
         self.size = Size::new(width, height);
         self.channels = channels;
-        self.data.resize(plane * channels + SLACK, 0);
         for y in 0..height {
             let row = image.row(y);
             if channels == 1 {
@@ -38,6 +40,7 @@ impl Planes {
                 unsafe { l.deinterleave(row.as_ptr(), to, width) };
             }
         }
+        Ok(())
     }
 
     pub(super) fn channels(&self) -> usize {
@@ -46,6 +49,12 @@ impl Planes {
 
     fn row(&self, channel: usize, y: usize) -> &[u8] {
         &self.data[(channel * self.size.height + y) * self.size.width..]
+    }
+}
+
+impl Workspace for Planes {
+    fn bytes(&self) -> usize {
+        self.data.capacity()
     }
 }
 
@@ -73,7 +82,14 @@ impl Band {
     }
 
     /// Prepares for rows of the level of `size` pixels, with room for `pad` pixels of border.
-    pub(super) fn begin(&mut self, source: &Planes, size: Size, pad: usize, group: usize, reach: usize) {
+    pub(super) fn begin(
+        &mut self,
+        source: &Planes,
+        size: Size,
+        pad: usize,
+        group: usize,
+        reach: usize,
+    ) -> Result<()> {
         self.size = size;
         self.pad = pad;
         self.left = (pad + 17).next_multiple_of(64);
@@ -81,16 +97,28 @@ impl Band {
         self.stride = self.plane * source.channels;
         self.down.clear();
         if size != source.size {
-            self.columns.fill(source.size.width, size.width, group, reach);
-            self.down.extend(taps(source.size.height, size.height));
+            self.columns.fill(source.size.width, size.width, group, reach)?;
+            memory::extend(&mut self.down, taps(source.size.height, size.height))?;
         }
+        Ok(())
+    }
+
+    /// How much this holds [bytes].
+    pub(super) fn bytes(&self) -> usize {
+        self.data.capacity() + self.columns.bytes() + self.down.capacity() * size_of::<Tap>()
     }
 
     /// Makes the rows `from..from + count` of the level, mirrored where there are none.
     #[inline(always)]
-    pub(super) fn fill<L: Lane, const C: usize>(&mut self, l: L, source: &Planes, from: i64, count: usize) {
+    pub(super) fn fill<L: Lane, const C: usize>(
+        &mut self,
+        l: L,
+        source: &Planes,
+        from: i64,
+        count: usize,
+    ) -> Result<()> {
         if self.data.len() < count * self.stride {
-            self.data.resize(count * self.stride, 0);
+            memory::resize(&mut self.data, count * self.stride, 0)?;
         }
         let Size { width, height } = self.size;
         for (i, all) in self.data.chunks_exact_mut(self.stride).take(count).enumerate() {
@@ -115,6 +143,7 @@ impl Band {
                 mirror(row, self.left, width, self.pad + 1);
             }
         }
+        Ok(())
     }
 }
 
@@ -151,11 +180,11 @@ mod tests {
         let image = ImageView::new(&data, from.width, from.height, C, from.width * C).unwrap();
         let wanted = resize(image, to).unwrap();
         let mut planes = Planes::default();
-        planes.fill(l, image);
+        planes.fill(l, image).unwrap();
         let mut band = Band::default();
-        band.begin(&planes, to, pad, L::GROUP, L::REACH);
+        band.begin(&planes, to, pad, L::GROUP, L::REACH).unwrap();
         let count = to.height + 2 * pad;
-        band.fill::<L, C>(l, &planes, -(pad as i64), count);
+        band.fill::<L, C>(l, &planes, -(pad as i64), count).unwrap();
         for y in 0..count {
             let wanted_y = reflect_101(y as i64 - pad as i64, to.height);
             for x in 0..to.width + 2 * pad {

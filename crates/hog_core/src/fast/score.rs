@@ -2,6 +2,10 @@
 
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
+use crate::error::Result;
+use crate::interrupt::Interrupt;
+use crate::memory;
+
 use super::lane::Lane;
 use super::layout::{ACROSS, BLOCK, WORDS};
 use super::plan::Plan;
@@ -35,17 +39,19 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
     narrow: T,
     windows: &WindowGrid,
     threshold: f64,
+    interrupt: &Interrupt,
     masks: &mut Vec<u32>,
     found: &mut Vec<(usize, usize, f64)>,
-) {
+) -> Result<()> {
     let plan = windows.plan;
     let groups = windows.width.div_ceil(L::LANES);
     masks.clear();
-    masks.resize(groups * windows.height, u32::MAX);
+    memory::resize(masks, groups * windows.height, u32::MAX)?;
     let least = (threshold - plan.bias - plan.score_error_bound - plan.prefilter.bound) / plan.prefilter.unit;
     let least = least.floor().clamp(f64::from(i32::MIN), f64::from(i32::MAX)) as i32;
     let mut top = 0;
     while L::PREFILTER_VECTORS > 0 && top < windows.height {
+        interrupt.check()?;
         let rows = (windows.height - top).min(ROWS);
         let mut group = 0;
         while group < groups {
@@ -69,6 +75,8 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
         if mask == 0 {
             continue;
         }
+        interrupt.check()?;
+        memory::reserve_some(found, mask.count_ones() as usize)?;
         while mask != 0 {
             let x = x + mask.trailing_zeros() as usize;
             mask &= mask - 1;
@@ -76,6 +84,7 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
             found.push((x, y, unsafe { score_window(narrow, windows, x, y) }));
         }
     }
+    Ok(())
 }
 
 /// The score of one window in single precision. Lanes are neighbouring blocks of the window.

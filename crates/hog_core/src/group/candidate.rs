@@ -15,6 +15,7 @@ pub struct Candidate {
 
 /// The part of each rectangle inside an image of `width` by `height`; those outside are dropped with their weights.
 pub fn clip(found: Vec<(Rect, f64)>, width: i32, height: i32) -> Vec<(Rect, f64)> {
+    // (Collected in the memory of `found`.)
     let clipped = found.into_iter().filter_map(|(rect, weight)| {
         let (x, y) = (rect.x.max(0), rect.y.max(0));
         let right = rect.x.saturating_add(rect.width).min(width);

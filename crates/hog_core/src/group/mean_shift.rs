@@ -1,6 +1,9 @@
 //! Modes of the hits' density: OpenCV's `groupRectangles_meanshift`.
 
+use crate::error::Result;
 use crate::geometry::Rect;
+use crate::interrupt::Interrupt;
+use crate::memory;
 
 use super::candidate::Candidate;
 
@@ -15,12 +18,18 @@ fn bandwidth(log_scale: f64) -> Place {
 /// The modes of the candidates' density whose weight exceeds `threshold`, as rectangles of the window `win`.
 ///
 /// Non-maximum suppression after Dalal's thesis (2006), chapter 5, with OpenCV's bandwidths and rounding.
-pub fn mean_shift(candidates: &[Candidate], threshold: f64, win: (i32, i32)) -> Vec<(Rect, f64)> {
-    let points: Vec<Point> = candidates.iter().map(Point::new).collect();
+pub fn mean_shift(
+    candidates: &[Candidate],
+    threshold: f64,
+    win: (i32, i32),
+    interrupt: &Interrupt,
+) -> Result<Vec<(Rect, f64)>> {
+    let points = memory::collect(candidates.iter().map(Point::new))?;
     let mut modes: Vec<Place> = Vec::new();
     for point in &points {
         let mut place = shifted(&points, point.place);
         for _ in 0..100 {
+            interrupt.check()?;
             let previous = place;
             place = shifted(&points, previous);
             if distance(place, previous) <= 1e-5 {
@@ -28,17 +37,25 @@ pub fn mean_shift(candidates: &[Candidate], threshold: f64, win: (i32, i32)) -> 
             }
         }
         if !modes.iter().any(|&mode| distance(place, mode) < 1.0) {
-            modes.push(place);
+            memory::push(&mut modes, place)?;
         }
     }
-    let weighted = modes.into_iter().map(|mode| (mode, points.iter().map(|p| p.density(mode)).sum::<f64>()));
-    let kept = weighted.filter(|&(_, weight)| weight > threshold);
-    kept.map(|(mode, weight)| (mode_rect(mode, win), weight)).collect()
+    let mut kept = Vec::new();
+    for mode in modes {
+        interrupt.check()?;
+        let weight = points.iter().map(|p| p.density(mode)).sum::<f64>();
+        if weight > threshold {
+            memory::push(&mut kept, (mode_rect(mode, win), weight))?;
+        }
+    }
+    Ok(kept)
 }
 
 struct Point {
     place: Place,
     bandwidth: Place,
+    /// What its density is divided by.
+    norm: f64,
     weight: f64,
 }
 
@@ -48,16 +65,18 @@ impl Point {
         let middle =
             |start: i32, length: i32| ((2.0 * f64::from(start) + f64::from(length)) / 2.0).round_ties_even();
         let log_scale = candidate.scale.ln();
+        let bandwidth = bandwidth(log_scale);
         Self {
             place: [middle(x, width), middle(y, height), log_scale],
-            bandwidth: bandwidth(log_scale),
+            norm: bandwidth.iter().sum::<f64>().sqrt(),
+            bandwidth,
             weight: candidate.weight,
         }
     }
 
     fn density(&self, at: Place) -> f64 {
         let squared: f64 = (0..3).map(|i| ((self.place[i] - at[i]) / self.bandwidth[i]).powi(2)).sum();
-        self.weight * (-0.5 * squared).exp() / self.bandwidth.iter().sum::<f64>().sqrt()
+        self.weight * (-0.5 * squared).exp() / self.norm
     }
 }
 

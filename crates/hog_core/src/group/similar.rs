@@ -1,6 +1,9 @@
 //! Groups of similar rectangles: OpenCV's `groupRectangles`.
 
+use crate::error::Result;
 use crate::geometry::Rect;
+use crate::interrupt::Interrupt;
+use crate::memory;
 
 use super::candidate::Candidate;
 
@@ -9,30 +12,41 @@ pub const HOG_EPS: f64 = 0.2;
 
 /// Groups detections as `HOGDescriptor::groupRectangles` does: the mean rectangle and the largest weight of each
 /// group of more than `threshold` members. A threshold below 1 changes nothing.
-pub fn group_candidates(candidates: &[Candidate], threshold: i32) -> Vec<(Rect, f64)> {
-    let rects: Vec<Rect> = candidates.iter().map(|c| c.rect).collect();
-    if threshold <= 0 || rects.is_empty() {
-        return candidates.iter().map(|c| (c.rect, c.weight)).collect();
+pub fn group_candidates(
+    candidates: &[Candidate],
+    threshold: i32,
+    interrupt: &Interrupt,
+) -> Result<Vec<(Rect, f64)>> {
+    if threshold <= 0 || candidates.is_empty() {
+        return memory::collect(candidates.iter().map(|c| (c.rect, c.weight)));
     }
-    let (labels, classes) = partition(&rects, HOG_EPS);
-    let mut weights = vec![f64::NEG_INFINITY; classes];
+    let rects = memory::collect(candidates.iter().map(|c| c.rect))?;
+    let (labels, classes) = partition(&rects, HOG_EPS, interrupt)?;
+    let mut weights = memory::filled(classes, f64::NEG_INFINITY)?;
     for (candidate, &label) in candidates.iter().zip(&labels) {
         weights[label] = weights[label].max(candidate.weight);
     }
     let mean = |sum: i64, count: usize| (sum as f64 * (1.0 / count as f64)).round_ties_even() as i32;
-    let groups = class_means(&rects, &labels, classes, mean);
-    surviving(&groups, threshold, HOG_EPS).map(|i| (groups[i].0, weights[i])).collect()
+    let groups = class_means(&rects, &labels, classes, mean)?;
+    let kept = surviving(&groups, threshold, HOG_EPS, interrupt)?;
+    memory::collect(kept.into_iter().map(|i| (groups[i].0, weights[i])))
 }
 
 /// `cv2.groupRectangles`: the mean rectangle of each group of more than `threshold` members, and how many they were.
-pub fn group_rectangles(rects: &[Rect], threshold: i32, eps: f64) -> Vec<(Rect, i32)> {
+pub fn group_rectangles(
+    rects: &[Rect],
+    threshold: i32,
+    eps: f64,
+    interrupt: &Interrupt,
+) -> Result<Vec<(Rect, i32)>> {
     if threshold <= 0 || rects.is_empty() {
-        return rects.iter().map(|&rect| (rect, 1)).collect();
+        return memory::collect(rects.iter().map(|&rect| (rect, 1)));
     }
-    let (labels, classes) = partition(rects, eps);
+    let (labels, classes) = partition(rects, eps, interrupt)?;
     let mean = |sum: i64, count: usize| (sum as f32 * (1.0 / count as f32)).round_ties_even() as i32;
-    let groups = class_means(rects, &labels, classes, mean);
-    surviving(&groups, threshold, eps).map(|i| (groups[i].0, groups[i].1 as i32)).collect()
+    let groups = class_means(rects, &labels, classes, mean)?;
+    let kept = surviving(&groups, threshold, eps, interrupt)?;
+    memory::collect(kept.into_iter().map(|i| (groups[i].0, groups[i].1 as i32)))
 }
 
 fn similar(a: &Rect, b: &Rect, eps: f64) -> bool {
@@ -48,8 +62,8 @@ fn similar(a: &Rect, b: &Rect, eps: f64) -> bool {
 }
 
 /// The connected components of [`similar`]: each rectangle's class, numbered by first member, and how many there are.
-fn partition(rects: &[Rect], eps: f64) -> (Vec<usize>, usize) {
-    let mut parent: Vec<usize> = (0..rects.len()).collect();
+fn partition(rects: &[Rect], eps: f64, interrupt: &Interrupt) -> Result<(Vec<usize>, usize)> {
+    let mut parent = memory::collect(0..rects.len())?;
     fn root(parent: &mut [usize], mut node: usize) -> usize {
         while parent[node] != node {
             parent[node] = parent[parent[node]];
@@ -57,9 +71,10 @@ fn partition(rects: &[Rect], eps: f64) -> (Vec<usize>, usize) {
         }
         node
     }
-    let mut by_x: Vec<usize> = (0..rects.len()).collect();
+    let mut by_x = memory::collect(0..rects.len())?;
     by_x.sort_unstable_by_key(|&i| rects[i].x);
     for (place, &i) in by_x.iter().enumerate() {
+        interrupt.check()?;
         let size = i64::from(rects[i].width) + i64::from(rects[i].height);
         // No rectangle further to the right than this can be similar.
         let reach = if eps >= 0.0 { eps * size as f64 * 0.5 } else { f64::INFINITY };
@@ -74,7 +89,7 @@ fn partition(rects: &[Rect], eps: f64) -> (Vec<usize>, usize) {
         }
     }
     // The root of a class is its first member, so classes are met in the order of their first members.
-    let mut labels = vec![0; rects.len()];
+    let mut labels = memory::filled(rects.len(), 0)?;
     let mut classes = 0;
     for i in 0..rects.len() {
         let first = root(&mut parent, i);
@@ -85,7 +100,7 @@ fn partition(rects: &[Rect], eps: f64) -> (Vec<usize>, usize) {
             labels[first]
         };
     }
-    (labels, classes)
+    Ok((labels, classes))
 }
 
 /// Mean rectangle and size of each class.
@@ -94,8 +109,8 @@ fn class_means(
     labels: &[usize],
     classes: usize,
     mean: impl Fn(i64, usize) -> i32,
-) -> Vec<(Rect, usize)> {
-    let mut sums = vec![([0i64; 4], 0usize); classes];
+) -> Result<Vec<(Rect, usize)>> {
+    let mut sums = memory::filled(classes, ([0i64; 4], 0usize))?;
     for (rect, &label) in rects.iter().zip(labels) {
         let (sum, count) = &mut sums[label];
         for (total, value) in sum.iter_mut().zip([rect.x, rect.y, rect.width, rect.height]) {
@@ -107,13 +122,18 @@ fn class_means(
         let of = |sum| mean(sum, count);
         (Rect { x: of(x), y: of(y), width: of(width), height: of(height) }, count)
     };
-    sums.iter().map(rect_of).collect()
+    memory::collect(sums.iter().map(rect_of))
 }
 
 /// The classes with more than `threshold` members that do not lie within a much stronger one.
-fn surviving(groups: &[(Rect, usize)], threshold: i32, eps: f64) -> impl Iterator<Item = usize> {
+fn surviving(
+    groups: &[(Rect, usize)],
+    threshold: i32,
+    eps: f64,
+    interrupt: &Interrupt,
+) -> Result<Vec<usize>> {
     let threshold = usize::try_from(threshold).unwrap_or(0);
-    let swallowed = move |i: usize| {
+    let swallowed = |i: usize| {
         let (inner, count) = groups[i];
         groups.iter().enumerate().any(|(j, &(outer, outer_count))| {
             let dx = (f64::from(outer.width) * eps).round_ties_even() as i64;
@@ -128,7 +148,14 @@ fn surviving(groups: &[(Rect, usize)], threshold: i32, eps: f64) -> impl Iterato
                 && (outer_count > count.max(3) || count < 3)
         })
     };
-    (0..groups.len()).filter(move |&i| groups[i].1 > threshold && !swallowed(i))
+    let mut kept = Vec::new();
+    for (i, &(_, count)) in groups.iter().enumerate() {
+        interrupt.check()?;
+        if count > threshold && !swallowed(i) {
+            memory::push(&mut kept, i)?;
+        }
+    }
+    Ok(kept)
 }
 
 #[cfg(test)]
@@ -143,14 +170,15 @@ mod tests {
     #[test]
     fn three_alike_become_one_and_a_loner_is_dropped() {
         let rects = [rect(0, 0, 10, 20), rect(1, 0, 10, 20), rect(2, 0, 10, 20), rect(50, 50, 10, 20)];
-        assert_eq!(group_rectangles(&rects, 2, 0.2), [(rect(1, 0, 10, 20), 3)]);
-        assert_eq!(group_rectangles(&rects, 0, 0.2).len(), 4);
+        let group = |threshold| group_rectangles(&rects, threshold, 0.2, &Interrupt::NEVER).unwrap();
+        assert_eq!(group(2), [(rect(1, 0, 10, 20), 3)]);
+        assert_eq!(group(0).len(), 4);
     }
 
     #[test]
     fn classes_are_connected_through_their_members() {
         let chain: Vec<Rect> = (0..20).map(|i| rect(i * 2, 0, 10, 20)).collect();
-        assert_eq!(partition(&chain, 0.2), (vec![0; 20], 1));
+        assert_eq!(partition(&chain, 0.2, &Interrupt::NEVER).unwrap(), (vec![0; 20], 1));
     }
 
     proptest! {
@@ -176,7 +204,7 @@ mod tests {
                     numbers.len() - 1
                 })
             }).collect();
-            prop_assert_eq!(partition(&rects, eps), (renumbered, numbers.len()));
+            prop_assert_eq!(partition(&rects, eps, &Interrupt::NEVER).unwrap(), (renumbered, numbers.len()));
         }
     }
 
@@ -184,6 +212,6 @@ mod tests {
     fn extreme_coordinates_do_not_overflow() {
         let far =
             [rect(i32::MAX, i32::MIN, i32::MAX, i32::MAX), rect(i32::MIN, i32::MAX, i32::MAX, i32::MIN)];
-        assert!(group_rectangles(&far, 1, 0.2).is_empty());
+        assert!(group_rectangles(&far, 1, 0.2, &Interrupt::NEVER).unwrap().is_empty());
     }
 }

@@ -1,6 +1,9 @@
 //! The levels of a pyramid: their scales and sizes, and windows back in the image.
 
+use crate::error::Result;
 use crate::geometry::{Rect, Size};
+use crate::interrupt::Interrupt;
+use crate::memory;
 use crate::params::HogSpec;
 
 /// One level: the image shrunk by `scale`.
@@ -16,8 +19,9 @@ pub struct Level {
 ///
 /// A step that does not shrink (≤ 1, NaN, infinite) leaves level 0 alone. Level 0 is there even if the image is
 /// smaller than the window.
-pub fn levels(image: Size, step: f64, spec: &HogSpec) -> Vec<Level> {
-    let mut levels = vec![Level { scale: 1.0, size: image }];
+pub fn levels(image: Size, step: f64, spec: &HogSpec, interrupt: &Interrupt) -> Result<Vec<Level>> {
+    let mut levels = memory::with_room(at_most(image, step, spec))?;
+    levels.push(Level { scale: 1.0, size: image });
     let mut scale = 1.0;
     while step > 1.0 && levels.len() < spec.nlevels {
         scale *= step;
@@ -26,9 +30,17 @@ pub fn levels(image: Size, step: f64, spec: &HogSpec) -> Vec<Level> {
         if !(width >= spec.win.width as f64 && height >= spec.win.height as f64) {
             break;
         }
-        levels.push(Level { scale, size: Size::new(width as usize, height as usize) });
+        interrupt.check()?;
+        memory::push(&mut levels, Level { scale, size: Size::new(width as usize, height as usize) })?;
     }
-    levels
+    Ok(levels)
+}
+
+/// How many levels there are, or a few more: known before they are made, as their list may not fit the memory.
+fn at_most(image: Size, step: f64, spec: &HogSpec) -> usize {
+    let along = |image: usize, win: usize| (image as f64 / (win as f64 - 0.5)).ln() / step.ln();
+    let shrunk = along(image.width, spec.win.width).min(along(image.height, spec.win.height));
+    if step > 1.0 { (shrunk.max(0.0) as usize).saturating_add(2).min(spec.nlevels) } else { 1 }
 }
 
 /// The window at (`x`, `y`) of a level, in image pixels.
@@ -50,12 +62,13 @@ mod tests {
     #[test]
     fn levels_shrink_until_the_window_no_longer_fits() {
         let spec = HogSpec::new(&HogParams::default()).unwrap();
-        let of = |w, h, step| levels(Size::new(w, h), step, &spec);
+        let of = |w, h, step| levels(Size::new(w, h), step, &spec, &Interrupt::NEVER).unwrap();
         assert_eq!(of(640, 480, 1.05).len(), 28);
         assert_eq!(of(640, 480, 1.0).len(), 1);
         assert_eq!(of(640, 480, f64::NAN).len(), 1);
         assert_eq!(of(640, 480, f64::INFINITY).len(), 1);
         assert_eq!(of(10, 10, 1.05).len(), 1);
         assert_eq!(of(64, 128, 1.001).len(), 4); // 128 / 1.001³ still rounds to 128, 127.5 no longer
+        assert!(of(640, 480, 1.05).capacity() <= 30);
     }
 }

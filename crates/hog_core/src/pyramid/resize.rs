@@ -3,6 +3,7 @@
 use crate::error::{ImageError, Result};
 use crate::geometry::Size;
 use crate::image::ImageView;
+use crate::memory;
 
 /// Where one output pixel reads along one axis: two neighbours and the weight of the second, in 1/256.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +40,7 @@ pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
     if size.width == 0 || size.height == 0 {
         return Err(ImageError::Resize { width: size.width, height: size.height }.into());
     }
-    let across: Vec<Tap> = taps(image.width(), size.width).collect();
+    let across = memory::collect(taps(image.width(), size.width))?;
     let down = taps(image.height(), size.height);
     let shrink_row = |y: usize, out: &mut Vec<u32>| {
         let row = image.row(y);
@@ -51,8 +52,9 @@ pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
             }
         }
     };
-    let mut out = Vec::with_capacity(size.width * size.height * channels);
-    let (mut upper, mut lower) = (Vec::new(), Vec::new());
+    let mut out = memory::with_room(size.area().saturating_mul(channels))?;
+    let row = || memory::with_room(size.width.saturating_mul(channels));
+    let (mut upper, mut lower) = (row()?, row()?);
     let (mut upper_row, mut lower_row) = (usize::MAX, usize::MAX);
     for tap in down {
         if tap.first != upper_row {

@@ -3,7 +3,7 @@
 
 use hog_core::exact::{self, Svm, Tables};
 use hog_core::pyramid::{Grid, Steps};
-use hog_core::{Backend, Hit, HogParams, HogSpec, ImageView, Search, Size, model};
+use hog_core::{Backend, Hit, HogParams, HogSpec, ImageView, Interrupt, Search, Size, model};
 
 /// The backends of this CPU.
 pub fn available() -> impl Iterator<Item = Backend> {
@@ -71,7 +71,9 @@ impl Detector {
         let spec = self.spec();
         let svm = Svm::new(&self.coefficients, &spec).unwrap();
         let grid = self.grid(image, search);
-        let scores = exact::scores(image, &grid, &spec, &Tables::new(&spec), &svm);
+        let scores =
+            exact::scores(image, &grid, &spec, &Tables::new(&spec).unwrap(), &svm, &Interrupt::NEVER)
+                .unwrap();
         assert_eq!(scores.len(), grid.windows.width * grid.windows.height);
         let hit = |(index, weight): (usize, f64)| {
             let (column, row) = (index % grid.windows.width, index / grid.windows.width);

@@ -1,6 +1,8 @@
 //! The rows that [`resize_row`](super::Lane::resize_row) reads and writes, and which pixels it mixes.
 
+use crate::error::Result;
 use crate::fast::layout::STEP;
+use crate::memory;
 use crate::pyramid::{Tap, taps};
 
 /// How a row is shrunk: for every output pixel two neighbours and their weights, in groups that one shuffle fills.
@@ -24,9 +26,9 @@ pub(in crate::fast) struct Columns {
 
 impl Columns {
     /// Prepares to shrink rows of `from` pixels to `to`, in groups of `group` whose parts span at most `reach`.
-    pub(in crate::fast) fn fill(&mut self, from: usize, to: usize, group: usize, reach: usize) {
+    pub(in crate::fast) fn fill(&mut self, from: usize, to: usize, group: usize, reach: usize) -> Result<()> {
         self.taps.clear();
-        self.taps.extend(taps(from, to));
+        memory::extend(&mut self.taps, taps(from, to))?;
         let spanned = |taps: &[Tap]| match taps {
             [first, .., last] => last.second + 1 - first.first,
             _ => 2,
@@ -42,10 +44,10 @@ impl Columns {
         let all = to.div_ceil(STEP) * (STEP / group) * self.parts;
         for list in [&mut self.index, &mut self.weight] {
             list.clear();
-            list.resize(2 * group * all, 0);
+            memory::resize(list, 2 * group * all, 0)?;
         }
         self.base.clear();
-        self.base.resize(all, 0);
+        memory::resize(&mut self.base, all, 0)?;
         let size = group / self.parts;
         for (part, taps) in self.taps.chunks(size).enumerate() {
             let base = taps.first().map_or(0, |tap| tap.first);
@@ -62,6 +64,15 @@ impl Columns {
                 self.weight[at..at + 2].copy_from_slice(&[(256 - weight) as u8, weight as u8]);
             }
         }
+        Ok(())
+    }
+
+    /// How much this holds [bytes].
+    pub(in crate::fast) fn bytes(&self) -> usize {
+        self.base.capacity() * size_of::<u32>()
+            + self.index.capacity()
+            + self.weight.capacity()
+            + self.taps.capacity() * size_of::<Tap>()
     }
 }
 

@@ -1,0 +1,42 @@
+"""Programs run in a process of their own: what hangs or dies there fails one test, not the run."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import textwrap
+
+#: What every program begins with.
+PRELUDE = """
+import faulthandler, os, signal, sys, threading, time
+import numpy as np
+import limo_hog
+from limo_hog import _core
+
+def people(width, height, channels=3, seed=0):
+    noise = np.random.default_rng(seed).integers(0, 255, (height, width, channels), np.uint8)
+    return np.ascontiguousarray(noise if channels > 1 else noise[:, :, 0])
+
+def armed():
+    hog = limo_hog.HOGDescriptor()
+    hog.setSVMDetector(hog.getDefaultPeopleDetector())
+    return hog
+"""
+
+
+def run(program: str, timeout: float, limits: dict[int, int] | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a program after `PRELUDE`, killed after `timeout` [s], under resource limits (RLIMIT_*: value)."""
+
+    def limit() -> None:
+        for kind, value in (limits or {}).items():
+            resource.setrlimit(kind, (value, value))
+
+    return subprocess.run(
+        [sys.executable, "-c", PRELUDE + textwrap.dedent(program)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        preexec_fn=limit,
+        check=False,
+    )

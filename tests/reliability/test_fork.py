@@ -1,0 +1,65 @@
+"""A child forked while threads detect works: no lock of ours is waited for in it."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from tests.reliability.child import run
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+
+FORKING = """
+threads, forks = {threads}, {forks}
+limo_hog.set_num_threads(threads)
+hog, image = armed(), people(96, 160)
+wanted = hog.detectMultiScale(image, -0.5, scale=1.2)
+stop = threading.Event()
+
+def busy():
+    while not stop.is_set():
+        hog.detectMultiScale(image, -0.5, scale=1.2)
+
+for _ in range(4):
+    threading.Thread(target=busy, daemon=True).start()
+for number in range(forks):
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            found = hog.detectMultiScale(image, -0.5, scale=1.2)
+            code = 0 if all(np.array_equal(a, b) for a, b in zip(found, wanted)) else 2
+        finally:
+            os._exit(code)
+    deadline = time.monotonic() + 60
+    while (done := os.waitpid(child, os.WNOHANG)) == (0, 0):
+        if time.monotonic() > deadline:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            print("child", number, "hangs")
+            os._exit(3)
+        time.sleep(0.0005)
+    if done[1] != 0:
+        print("child", number, "ended with status", done[1])
+        os._exit(4)
+stop.set()
+print("all", forks, "children answered")
+os._exit(0)
+"""
+
+
+def assert_every_child_answers(threads: int, forks: int, timeout: float) -> None:
+    done = run(FORKING.format(threads=threads, forks=forks), timeout)
+    assert done.stdout.splitlines()[-1:] == [f"all {forks} children answered"], done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("threads", [0, 1])
+def test_a_child_forked_while_threads_detect_answers(threads: int) -> None:
+    assert_every_child_answers(threads, forks=200, timeout=280)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("threads", [0, 1])
+def test_five_thousand_children_forked_while_threads_detect_answer(threads: int) -> None:
+    assert_every_child_answers(threads, forks=5000, timeout=3500)

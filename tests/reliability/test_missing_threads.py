@@ -1,0 +1,48 @@
+"""Threads that cannot be had are done without; a count that makes no sense is a named error."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from tests.reliability.child import run
+
+import limo_hog
+
+
+@pytest.mark.skipif(os.name != "posix", reason="resource limits are POSIX")
+def test_a_search_finds_the_same_when_no_more_threads_can_be_had() -> None:
+    # With such a stack no thread can be made.
+    program = """
+    os.environ["RUST_MIN_STACK"] = str(1 << 46)
+    hog, image = armed(), people(320, 240)
+    limo_hog.set_num_threads(1)
+    wanted = hog.detectMultiScale(image, -0.5)
+    limo_hog.set_num_threads(10**6)
+    found = hog.detectMultiScale(image, -0.5)
+    print(len(wanted[0]), all(np.array_equal(a, b) for a, b in zip(found, wanted)))
+    """
+    done = run(program, 120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[1:] == ["True"], done.stdout + done.stderr
+
+
+def test_the_number_of_threads_is_bounded() -> None:
+    before = limo_hog.get_num_threads()
+    try:
+        limo_hog.set_num_threads(10**6)
+        assert 1 <= limo_hog.get_num_threads() <= 1024
+    finally:
+        limo_hog.set_num_threads(before)
+
+
+@pytest.mark.parametrize("count", [10**400, -1, -(10**400)])
+def test_a_number_of_threads_beyond_any_machine_is_a_named_error(count: int) -> None:
+    with pytest.raises(limo_hog.ParameterError, match="threads"):
+        limo_hog.set_num_threads(count)
+
+
+@pytest.mark.parametrize("count", ["2", 2.5, None])
+def test_a_number_of_threads_that_is_no_integer_is_a_named_error(count: object) -> None:
+    with pytest.raises(limo_hog.ParameterError, match="integer"):
+        limo_hog.set_num_threads(count)  # type: ignore[arg-type]

@@ -2,47 +2,37 @@
 
 from __future__ import annotations
 
-import hashlib
+import json
 import math
+from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.run.catalogue import load
 
-FRAMES = {
-    "crossing": "32ca43cde9f6cad1",
-    "dropouts": "d461a3968772c550",
-    "empty": "86d4030109df005e",
-    "followable": "452ebc4f316b6a67",
-    "furniture": "b1486f023f589844",
-    "late": "452d8e9243ea62db",
-    "latency": "cdc63f4842a6933c",
-    "occlusion": "32b9839726e2c760",
-    "standing": "636e8214b4a79d88",
-    "two_people": "071a1d9fcf5146d6",
-    "workshop": "452d8e9243ea62db",
-    "zigzag": "c5009c4c30002948",
-    "workshop:3": "600014e828891499",
-    "random:5": "f9518c1d23c510c5",
-    "random:9": "93e1afb82a003e0a",
-}
+#: Some bytes of five frames of each scenario, recorded before rooms, people and detectors could vary.
+RECORDED: dict[str, str] = json.loads(Path(__file__).with_name("frames.json").read_text())
+#: Every so many bytes of a frame one is kept: a prime, so that all columns, rows and channels are met.
+STRIDE = 20_011
 
 
-def pictures(name: str) -> str:
-    """Hash the colour images and the people's boxes of two seconds."""
-    arena, digest = Arena(load(name), 0), hashlib.sha256()
+def sampled(name: str) -> NDArray[np.uint8]:
+    """Return some bytes of the colour images of two seconds."""
+    arena, bytes_ = Arena(load(name), 0), []
     for step in range(100):
         if step % 20 == 0:
-            frame = arena.frame()
-            digest.update(frame.image.tobytes())
-            digest.update(repr([person and person.box for person in frame.truth.people]).encode())
+            bytes_.append(arena.frame().image.ravel()[::STRIDE])
         arena.command(Twist(0.2, 0.4 * math.sin(step)))
         arena.step()
-    return digest.hexdigest()[:16]
+    return np.concatenate(bytes_)
 
 
-@pytest.mark.parametrize("name", FRAMES)
+@pytest.mark.parametrize("name", RECORDED)
 def test_an_old_scenario_shows_the_frames_it_showed_before_rooms_and_detectors_could_vary(name: str) -> None:
-    assert pictures(name) == FRAMES[name]
+    recorded = np.frombuffer(bytes.fromhex(RECORDED[name]), np.uint8)
+    # Another CPU or numpy may round a pixel differently; another seed of the noise leaves half of them unequal.
+    assert (sampled(name) == recorded).mean() > 0.97

@@ -126,7 +126,7 @@ def watching(
         if args.rerun is not None:
             from limo_sim.view.rerun_log import logged
 
-            all_.keepers.append(stack.enter_context(logged(args.rerun)))
+            all_.keepers.append(stack.enter_context(logged(args.rerun, scenario.room.half)))
         if args.view is not None:
             from limo_sim.view.server import View
 

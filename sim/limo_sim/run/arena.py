@@ -261,9 +261,7 @@ class Arena:
         footprints: list[Disc | Rectangle] = []
         for side in (middle, -middle):
             footprints += [Rectangle(side, 0, _WALL_HALF, half), Rectangle(0, side, half, _WALL_HALF)]
-        footprints += [piece.footprint for piece in self.scenario.furniture]
-        footprints += [wall.footprint for wall in self.scenario.walls]
-        for footprint in footprints:
+        for footprint in (*footprints, *self.scenario.footprints):
             shape: pymunk.Shape
             if isinstance(footprint, Disc):
                 shape = pymunk.Circle(ground, footprint.radius, (footprint.x, footprint.y))

@@ -14,7 +14,7 @@ from limo_hog.follow.zones import ZONE_ENDS, Zone
 from limo_sim.run.episode import Episode, Step
 from limo_sim.view.reading import reading
 from limo_sim.world.furniture import Disc
-from limo_sim.world.scenario import ROOM_HALF, Scenario
+from limo_sim.world.scenario import Scenario
 
 with needed(by="--plot", what="matplotlib", install="'limo-hog[plot]'"):
     from matplotlib.figure import Figure
@@ -68,8 +68,7 @@ _TITLE: dict[str, Any] = {"loc": "left", "fontsize": 10, "color": _INK}
 
 
 def _path(axes: Axes, scenario: Scenario, steps: Sequence[Step]) -> None:
-    for piece in scenario.furniture:
-        shape = piece.footprint
+    for shape in scenario.footprints:
         if isinstance(shape, Disc):
             axes.add_patch(Circle((shape.x, shape.y), shape.radius, color=_FAINT))
         else:
@@ -89,12 +88,16 @@ def _path(axes: Axes, scenario: Scenario, steps: Sequence[Step]) -> None:
         looks[:, 0], looks[:, 1], np.cos(looks[:, 2]), np.sin(looks[:, 2]),
         color=_ROBOT, scale=22, width=0.005, alpha=0.7,
     )  # fmt: skip
-    axes.add_patch(Bar((-ROOM_HALF, -ROOM_HALF), 2 * ROOM_HALF, 2 * ROOM_HALF, fill=False, color=_INK, linewidth=2))
+    half = scenario.room.half
+    axes.add_patch(Bar((-half, -half), 2 * half, 2 * half, fill=False, color=_INK, linewidth=2))
     axes.set_aspect("equal")
-    axes.set_xlim(-ROOM_HALF - 0.1, ROOM_HALF + 0.1)
-    axes.set_ylim(-ROOM_HALF - 0.1, ROOM_HALF + 0.1)
-    axes.set_xticks(range(-4, 5, 2))
-    axes.set_yticks(range(-4, 5, 2))
+    axes.set_xlim(-half - 0.1, half + 0.1)
+    axes.set_ylim(-half - 0.1, half + 0.1)
+    # Every 2 m in the workshop's room, fewer in a large one.
+    far, every_m = int(half), 2 if half < 8 else 4
+    ticks = [*range(-(far // every_m) * every_m, far + 1, every_m)]
+    axes.set_xticks(ticks)
+    axes.set_yticks(ticks)
     axes.set_title("path from above [m]; arrows: where the robot looks", **_TITLE)
     axes.legend(loc="lower left", frameon=False, fontsize=8, ncols=2)
     _tidy(axes)

@@ -13,7 +13,6 @@ from limo_hog.atomic import whole_file
 from limo_hog.extras import needed
 from limo_sim.run.episode import Moment
 from limo_sim.view.reading import reading
-from limo_sim.world.scenario import ROOM_HALF
 
 with needed(by="--rerun", what="the Rerun SDK", install="'limo-hog[viz]'"):
     import rerun as rr
@@ -23,12 +22,12 @@ _GREEN, _RED = (60, 200, 80), (235, 60, 60)
 
 
 @contextmanager
-def logged(path: Path) -> Iterator[Callable[[Moment], None]]:
-    """Give a function that logs a moment: camera with boxes, depth, map and series."""
+def logged(path: Path, room_half: float) -> Iterator[Callable[[Moment], None]]:
+    """Give a function that logs a moment: camera with boxes, depth, map of a room of ± `room_half` [m], and series."""
     with whole_file(path) as part:
         log = rr.RecordingStream("limo-hog")
         log.save(part)
-        corners = ROOM_HALF * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+        corners = room_half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
         log.log("map/walls", rr.LineStrips2D([corners], colors=[_WALL]), static=True)
         trail: deque[tuple[float, float]] = deque(maxlen=300)
 

@@ -38,7 +38,7 @@ from limo_sim.view.pace import Pace
 from limo_sim.view.reading import annotated, depth_colours, depth_picture, followed_person, measured_m, reading
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.furniture import Disc
-from limo_sim.world.scenario import ROOM_HALF, Scenario
+from limo_sim.world.scenario import Scenario
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -267,11 +267,11 @@ class View:
     def _welcome(self) -> dict[str, Any]:
         return {
             "scenario": self._scenario.name,
-            "room": ROOM_HALF,
+            "room": self._scenario.room.half,
             "field": FIELD,
             "furniture": [
                 [f.x, f.y, f.radius] if isinstance(f, Disc) else [f.x, f.y, f.half_x, f.half_y, f.yaw]
-                for f in (piece.footprint for piece in self._scenario.furniture)
+                for f in self._scenario.footprints
             ],
             "zones": list(ZONE_ENDS.values()),
             "depth": {"far": self._scenario.depth.far_m, "colours": depth_colours(self._scenario.depth.far_m)},

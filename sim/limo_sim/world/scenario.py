@@ -272,6 +272,11 @@ class Scenario:
     walls: tuple[Wall, ...] = ()
     vary: Vary = dataclasses.field(default_factory=Vary)
 
+    @property
+    def footprints(self) -> tuple[Disc | Rectangle, ...]:
+        """What furniture and inner walls cover on the floor, in the arena's frame."""
+        return (*(piece.footprint for piece in self.furniture), *(wall.footprint for wall in self.walls))
+
     @staticmethod
     def names() -> tuple[str, ...]:
         """Names of the scenarios that come with limo-sim."""

@@ -18,7 +18,7 @@ from limo_hog.cli.main import ARENA, BUILT_IN, main
         ("limo-hog detect --min", {"--min-height"}),
         ("limo-hog detect --nms ''", {"overlap", "iou", "soft", "group"}),
         ("limo-hog follow --controller tr", {"tracking"}),
-        ("limo-hog workshop ''", {"new", "check", "solution"}),
+        ("limo-hog workshop ''", {"new", "check", "grade", "solution"}),
     ],
 )
 def test_bash_completes(typed: str, offered: set[str], capsys: pytest.CaptureFixture[str]) -> None:

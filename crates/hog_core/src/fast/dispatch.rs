@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::exact::Svm;
+use crate::geometry::Size;
 use crate::image::ImageView;
 use crate::params::HogSpec;
 use crate::pyramid::Grid;
@@ -97,6 +98,52 @@ pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageVie
         Backend::Neon => planes.fill(unsafe { Neon::new() }, image),
         _ => planes.fill(Portable, image),
     }
+}
+
+/// Fills `resized` with the pixels of `source`, resized to `size`.
+pub(crate) fn resize_planes(
+    backend: Backend,
+    source: &Planes,
+    resized: &mut Planes,
+    size: Size,
+    scratch: &mut Scratch,
+) -> Result<()> {
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available.
+        Backend::Avx512 => unsafe { avx512_resize_planes(source, resized, size, scratch) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Avx2 => unsafe { avx2_resize_planes(source, resized, size, scratch) },
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: as in `neon`.
+        Backend::Neon => resized.resize(unsafe { Neon::new() }, source, size, &mut scratch.band),
+        _ => resized.resize(Portable, source, size, &mut scratch.band),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
+fn avx512_resize_planes(
+    source: &Planes,
+    resized: &mut Planes,
+    size: Size,
+    scratch: &mut Scratch,
+) -> Result<()> {
+    // SAFETY: this function's features are the token's.
+    resized.resize(unsafe { Avx512::new() }, source, size, &mut scratch.band)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2_resize_planes(
+    source: &Planes,
+    resized: &mut Planes,
+    size: Size,
+    scratch: &mut Scratch,
+) -> Result<()> {
+    // SAFETY: this function's features are the token's.
+    resized.resize(unsafe { Avx2::new() }, source, size, &mut scratch.band)
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -16,7 +16,7 @@ use super::strip::{Job, strip};
 /// Scratch memory of one level, used again from level to level and call to call.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    band: Band,
+    pub(super) band: Band,
     carry: Lines,
     blocks: Lines,
     bytes: Lines,

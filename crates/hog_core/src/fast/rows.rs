@@ -43,6 +43,29 @@ impl Planes {
         Ok(())
     }
 
+    /// Takes the pixels of `source`, resized to `size`.
+    #[inline(always)]
+    pub(super) fn resize<L: Lane>(&mut self, l: L, source: &Self, size: Size, band: &mut Band) -> Result<()> {
+        self.channels = source.channels;
+        self.size = size;
+        memory::resize(&mut self.data, size.area() * source.channels + SLACK, 0)?;
+        band.begin(source, size, 0, L::GROUP, L::REACH)?;
+        for y in 0..size.height {
+            match source.channels {
+                1 => band.fill::<L, 1>(l, source, y as i64, 1)?,
+                _ => band.fill::<L, 3>(l, source, y as i64, 1)?,
+            }
+            for channel in 0..source.channels {
+                let from = &band.pixels()[channel * band.plane + band.left..][..size.width];
+                let to = &mut self.data[(channel * size.height + y) * size.width..][..size.width];
+                for (to, from) in to.iter_mut().zip(from) {
+                    *to = from ^ 0x80;
+                }
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn channels(&self) -> usize {
         self.channels
     }

@@ -211,6 +211,11 @@ class Arena:
         seen = self._render().look(_camera_at(self._state), self._poses(self.time))
         return self._truth_at(self._state, seen)
 
+    def furniture_in_frame(self) -> list[Seen]:
+        """Return the visible share and the box [px] of each piece of furniture in the newest frame."""
+        state = self._camera.newest.state
+        return self._render().look_at_furniture(_camera_at(state), self._poses(state.time))
+
     def _render(self) -> Renderer:
         if self._renderer is None:
             self._renderer = Renderer(self.scenario, self._stream(_PATTERN_STREAM))

@@ -47,7 +47,7 @@ Seen = tuple[float, tuple[int, int, int, int] | None]
 
 _SHADOW = 0.35  # share of the floor's brightness that is lost right under a person or a piece of furniture; by eye
 _BANK_MARGIN = 64  # by how much the noise patterns are larger than a frame, which takes a window of them [px]
-_NO_PERSON = -1
+_NOTHING = -1
 _LEVELS = 128  # of brightness, from black to the full colour
 _COARSE = 64  # rows of the grid on which the part of a silhouette outside the image is measured
 
@@ -108,13 +108,30 @@ class Renderer:
         """Return each person's visible share and box, without drawing colours."""
         return self._draw(None, camera, people)[1]
 
+    def look_at_furniture(self, camera: CameraPose, people: Sequence[Pose | None]) -> list[Seen]:
+        """Return each piece's visible share and box; what the image's edge cuts off is estimated by its upright box."""
+        self._draw(None, camera, people)
+        seen: list[Seen] = []
+        for number, piece in enumerate(self._scenario.furniture, start=len(people)):
+            canvas = self._cast(camera, piece)
+            area = 0 if canvas is None else np.count_nonzero(canvas.inside)
+            if canvas is None or not area:
+                seen.append((0.0, None))
+                continue
+            left, top, right, bottom = canvas.window
+            rows, columns = np.flatnonzero(canvas.inside.any(axis=1)), np.flatnonzero(canvas.inside.any(axis=0))
+            box = int(left + columns[0]), int(top + rows[0]), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
+            visible = np.count_nonzero(self._owner[top:bottom, left:right] == number)
+            seen.append((min(visible / area, 1.0) * _share_inside(self._bounds(camera, piece)), box))
+        return seen
+
     def _draw(self, image: U32 | None, camera: CameraPose, people: Sequence[Pose | None]) -> tuple[F32, list[Seen]]:
         """Return depth and what is visible of people; colours go into `image`, if there is one."""
         scenario, sun = self._scenario, self._sun.seen_from(camera)
         room = self._backdrop.copy() if image is not None else None
         depth = self._draw_room(room, camera)
         outlines: dict[int, Outline] = {}
-        order: list[tuple[float, int | Furniture]] = []
+        order: list[tuple[float, int]] = []  # people by number, then furniture
         for index, (person, pose) in enumerate(zip(scenario.people, people, strict=True)):
             if pose is None:
                 continue
@@ -123,18 +140,20 @@ class Renderer:
             if shape := outline(body(person, pose), camera):
                 outlines[index] = shape
                 order.append((math.hypot(pose.x - camera.x, pose.y - camera.y), index))
-        for piece in scenario.furniture:
-            order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), piece))
+        for number, piece in enumerate(scenario.furniture, start=len(people)):
+            order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), number))
             if room is not None:
                 _shade_floor(room, depth, camera, (piece.x, piece.y), 0.25)
         if image is not None and room is not None:
             cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=_bytes(image))
-        self._owner.fill(_NO_PERSON)
+        self._owner.fill(_NOTHING)
         seen: list[Seen] = [(0.0, None)] * len(people)
         drawn: list[tuple[int, Window, float]] = []
         for _, thing in sorted(order, key=lambda entry: -entry[0]):
-            if isinstance(thing, Furniture):
-                self._draw_furniture(image, depth, camera, thing)
+            if thing >= len(people):
+                piece = scenario.furniture[thing - len(people)]
+                if standing := self._cast(camera, piece):
+                    self._blend(image, depth, standing, self._models[piece][1], thing)
             elif window := _window(outlines[thing].bounds):
                 area = _area_outside(outlines[thing])
                 canvas = Canvas(window, self._sheet)
@@ -191,12 +210,12 @@ class Renderer:
             grey = self._wall_greys[int(faces[start])]
             cv2.fillConvexPoly(room, quad, grey, cv2.LINE_AA, shift=4)
 
-    def _draw_furniture(self, image: U32 | None, depth: F32, camera: CameraPose, piece: Furniture) -> None:
-        solids, palette, (radius, height) = self._models[piece]
-        [[x, _, z]] = camera.to_camera(np.array([[piece.x, piece.y, 0.0]])).tolist()
-        window = _window(upright_bounds(x, z, radius, 0.0, height))
+    def _cast(self, camera: CameraPose, piece: Furniture) -> Canvas | None:
+        """Draw a piece by itself; None where all of it is outside of the image."""
+        solids = self._models[piece][0]
+        window = _window(self._bounds(camera, piece))
         if window is None:
-            return
+            return None
         seen_sun = self._sun.seen_from(camera)
         canvas = Canvas(window, self._sheet)
         for part, solid in enumerate(solids):
@@ -204,10 +223,15 @@ class Renderer:
                 cast_box(canvas, solid, camera, self._sun, part)
             else:
                 cast_frustum(canvas, solid, camera, seen_sun, part)
-        self._blend(image, depth, canvas, palette, _NO_PERSON)
+        return canvas
+
+    def _bounds(self, camera: CameraPose, piece: Furniture) -> Bounds | None:
+        [[x, _, z]] = camera.to_camera(np.array([[piece.x, piece.y, 0.0]])).tolist()
+        radius, height = self._models[piece][2]
+        return upright_bounds(x, z, radius, 0.0, height)
 
     def _blend(self, image: U32 | None, depth: F32, canvas: Canvas, palette: U32, owner: int) -> None:
-        """Draw an object wherever it is nearer than what has been drawn; `owner` is its number in the map of people."""
+        """Draw an object wherever it is nearer than what has been drawn; `owner` is its number in the map."""
         left, top, right, bottom = canvas.window
         step = max(1, BAND // (right - left))
         for row in range(top, bottom, step):
@@ -331,6 +355,15 @@ def _window(bounds: Bounds | None) -> Window | None:
     left, top, right, bottom = _pixels(bounds)
     left, top, right, bottom = max(0, left), max(0, top), min(WIDTH, right), min(HEIGHT, bottom)
     return (left, top, right, bottom) if left < right and top < bottom else None
+
+
+def _share_inside(bounds: Bounds | None) -> float:
+    """Return how much of a box lies within the image: 0 … 1."""
+    window = _window(bounds)
+    if bounds is None or window is None:
+        return 0.0
+    (left, top, right, bottom), whole = window, _pixels(bounds)
+    return (right - left) * (bottom - top) / ((whole[2] - whole[0]) * (whole[3] - whole[1]))
 
 
 def _area_outside(shape: Outline) -> float:

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is there already, and not empty; wanted is a new folder")
     scenario = of_run(load(args.scenario), args.seed)
-    labels = sorted({"person", *(piece.kind for piece in scenario.furniture)})
+    labels = sorted({"person", *(piece.kind for piece in (*scenario.furniture, *scenario.movers))})
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     with about(folder):

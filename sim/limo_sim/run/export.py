@@ -29,7 +29,7 @@ class Thing:
     label
         "person", or the kind of furniture.
     identity
-        Its number in the scenario, people before furniture: the same in all frames.
+        Its number in the scenario, people before furniture, movers last: the same in all frames.
     box
         x, y, w, h [px] around all that lies within the image, as if nothing stood in front of it.
     visible
@@ -86,7 +86,8 @@ def labelled_frames(
     wandering = wandering or Wandering()
     arena = Arena(scenario, seed)
     random = np.random.default_rng([seed, _STREAM])
-    labels = ["person"] * len(scenario.people) + [piece.kind for piece in scenario.furniture]
+    furniture = (*scenario.furniture, *scenario.movers)
+    labels = ["person"] * len(scenario.people) + [piece.kind for piece in furniture]
     steps = round(CONTROL_PERIOD * STEPS_PER_SECOND)
     turn, turning, leg_ends, next_s = 0.0, False, 0.0, 0.0
     while count > 0:

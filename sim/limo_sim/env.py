@@ -72,6 +72,11 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         A `Scenario`, a name or a file that `catalogue.load` knows, or "random": a new one at every reset.
     render_mode
         "rgb_array": `render` returns the image of the last observation.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such scenario, or it asks for faults of a detector: this environment has none.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": ACTIONS_PER_SECOND}  # noqa: RUF012 (Gymnasium's own way)
@@ -81,6 +86,7 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._scenario: Scenario | None = None
         if scenario != "random":
             self._scenario = scenario if isinstance(scenario, Scenario) else load(scenario)
+            self._scenario.check_detector_is_plain("LimoFollow-v0 gives images, and has no detector")
         known = self._scenario or Scenario()
         speed = known.robot.wheel_speed
         limits = np.array([speed, 2 * speed / LIMO.wheel_separation], np.float32)

@@ -82,6 +82,8 @@ def run_script(
     ------
     StubError
         If there is no such script.
+    ScenarioError
+        If the scenario asks for faults of the detector, which is the node's own here.
     """
     if not script.is_file():
         raise StubError(f"{script}: no such file")

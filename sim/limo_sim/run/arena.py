@@ -24,6 +24,7 @@ from limo_sim.world.person import Pose, Walk, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
+from limo_sim.world.variants import of_run
 
 STEPS_PER_SECOND = 50
 STEP_S = 1 / STEPS_PER_SECOND
@@ -56,7 +57,7 @@ class _State:
 
 
 class Arena:
-    """One run of a scenario.
+    """One run of a scenario, whose `vary` draws people from the seed: `scenario` holds those of this run.
 
     Raises
     ------
@@ -66,7 +67,7 @@ class Arena:
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         scenario.check(f"scenario {scenario.name!r}: ")
-        self.scenario = scenario
+        self.scenario = scenario = of_run(scenario, seed)
         self.seed = seed
         self._walks = [Walk(person) for person in scenario.people]
         robot = scenario.robot

@@ -15,7 +15,6 @@ from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.catalogue import load
 from limo_sim.run.episode import run_episode
 from limo_sim.run.score import ScoreCard, score
-from limo_sim.world.variants import of_run
 
 #: Figures of a score card that are summed up, in the order they are shown.
 MEASURES = (
@@ -80,7 +79,7 @@ def play(run: Run) -> ScoreCard:
     cv2.setNumThreads(1)
     controller = controller_named(run.controller, run.target)
     names = (run.controller, run.detector)
-    scenario, detector = of_run(load(run.scenario), run.seed), detector_named(run.detector)
+    scenario, detector = load(run.scenario), detector_named(run.detector)
     return score(run_episode(scenario, controller, detector, run.seconds, run.seed, names=names))
 
 

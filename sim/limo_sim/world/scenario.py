@@ -332,6 +332,13 @@ class Scenario:
         for index, person in enumerate(self.people):
             self._check_person(person, f"{where}people[{index}]")
 
+    def check_detector_is_plain(self, why: str) -> None:
+        """Raise `ScenarioError` if `[detector]` asks for faults where none can be added, which `why` explains."""
+        if self.detector != DetectorFaults():
+            raise ScenarioError(
+                f"scenario {self.name!r}: detector: {why}; leave the table out, or use `limo-hog follow` or `score`"
+            )
+
     def _obstacles(self) -> list[tuple[str, Disc | Rectangle]]:
         """Return what stands in the room, by the name that a message gives it."""
         furniture = [

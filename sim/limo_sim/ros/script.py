@@ -142,6 +142,7 @@ def score_of(outcome: Outcome) -> ScoreCard:
         longest_gap_s=None,
         lost=0,
         found_again=None,
+        time_to_find_again_s=None,
         follows_first=None,
         identity_switches=None,
         detect_ms_p50=None,

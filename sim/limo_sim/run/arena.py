@@ -56,6 +56,15 @@ class _State:
         return self.step / STEPS_PER_SECOND
 
 
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The arena from above at one instant [s]: the robot's x, y, yaw [m, m, rad], and where each person is."""
+
+    stamp: float
+    robot: tuple[float, float, float]
+    people: tuple[Pose | None, ...]
+
+
 class Arena:
     """One run of a scenario, whose `vary` draws people from the seed: `scenario` holds those of this run.
 
@@ -211,6 +220,11 @@ class Arena:
             return self._frame.truth
         seen = self._render().look(_camera_at(self._state), self._poses(self.time))
         return self._truth_at(self._state, seen)
+
+    def plan(self, *, of_frame: bool = False) -> Plan:
+        """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
+        state = self._camera.newest.state if of_frame else self._state
+        return Plan(state.time, (state.x, state.y, state.yaw), tuple(self._poses(state.time)))
 
     def _render(self) -> Renderer:
         if self._renderer is None:

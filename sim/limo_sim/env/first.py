@@ -1,7 +1,4 @@
-"""`LimoFollow-v0`: the arena as a Gymnasium environment; ten actions a second, one for each camera frame.
-
-`gymnasium.make("limo_sim.env:LimoFollow-v0")` imports this module, which registers it.
-"""
+"""`LimoFollow-v0`: the arena as a Gymnasium environment; ten actions a second, one for each camera frame."""
 
 from __future__ import annotations
 
@@ -183,6 +180,3 @@ def reward_parts(
 def _distance(truth: Truth) -> float | None:
     person = truth.people[0] if truth.people else None
     return person.distance if person else None
-
-
-gymnasium.register("LimoFollow-v0", entry_point="limo_sim.env:LimoFollow", max_episode_steps=600)

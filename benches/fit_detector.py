@@ -41,6 +41,7 @@ PLOT = Path(__file__).parents[1] / "docs" / "images" / "detector-model.png"
 TALLEST = 250.0
 #: Photographs and arena are compared in bins of equal width in octaves, four of them from 80 to 250 px [px].
 EDGES = (*(80.0 * (TALLEST / 80) ** (step / 4) for step in range(-1, 4)), TALLEST, TALLEST * (TALLEST / 80) ** 0.25)
+COMPARED = range(1, 5)
 MIDDLES = tuple(math.sqrt(low * high) for low, high in itertools.pairwise(EDGES))
 #: How many people are looked at in the arena, their heights in the image as in the photographs.
 VIEWS = 160
@@ -110,18 +111,20 @@ def main() -> None:
 
 
 def fitted(sightings: Sequence[Sighting]) -> Curve:
-    """Return the curve whose means over the bins up to 250 px come closest to the shares found there.
+    """Return the curve whose means over the bins from 80 to 250 px come closest to the shares found there.
 
     Every bin counts alike: the sets of photographs differ by more than chance, and each has its own heights.
     """
     octaves = np.log2([one.height for one in sightings])
     at = np.digitize([one.height for one in sightings], EDGES) - 1
-    shares = [share for share, _ in recall(sightings)][: EDGES.index(TALLEST)]
+    shares = dict(enumerate(share for share, _ in recall(sightings)))
 
     def error(parameters: NDArray[np.float64]) -> float:
         top, middle, slope = parameters
         curve = top / (1 + np.exp(-slope * (octaves - middle)))
-        return float(sum((curve[at == index].mean() - share) ** 2 for index, share in enumerate(shares)))
+        return float(
+            sum((curve[at == index].mean() - share) ** 2 for index, share in shares.items() if index in COMPARED)
+        )
 
     best = minimize(error, [0.8, math.log2(100), 5.0], method="L-BFGS-B", bounds=[(0.1, 1), (5, 9), (0.5, 30)])
     top, middle, slope = (float(value) for value in best.x)

@@ -19,15 +19,15 @@ from limo_sim.sensing import imu, lidar
 from limo_sim.sensing.camera import CameraPose, Frame
 from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Renderer, Seen
+from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
-from limo_sim.world.person import Pose, Walk, legs_at, trunk_radius
+from limo_sim.world.person import Pose, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 from limo_sim.world.variants import of_run
 
-STEPS_PER_SECOND = 50
-STEP_S = 1 / STEPS_PER_SECOND
+STEPS_PER_SECOND = round(1 / STEP_S)
 
 _ROBOT, _OBSTACLE, _PERSON = 1, 2, 3
 _WALL_HALF = 0.1  # half of the walls' thickness [m]
@@ -40,7 +40,7 @@ _CAMERA_STREAM, _LIDAR_STREAM, _IMU_STREAM, _DROP_STREAM, _SLIP_STREAM, _PATTERN
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """The robot at the end of a step: pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry, contacts."""
+    """The end of a step: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
 
     step: int
     x: float
@@ -50,6 +50,7 @@ class _State:
     turn_rate: float
     odometry: Odometry
     contacts: Contacts
+    people: tuple[Pose | None, ...]
 
     @property
     def time(self) -> float:
@@ -78,7 +79,7 @@ class Arena:
         scenario.check(f"scenario {scenario.name!r}: ")
         self.scenario = scenario = of_run(scenario, seed)
         self.seed = seed
-        self._walks = [Walk(person) for person in scenario.people]
+        self._crowd = Crowd(scenario, seed)
         robot = scenario.robot
         self._drive = Drive(robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
         self._slip = self._stream(_SLIP_STREAM)
@@ -89,10 +90,12 @@ class Arena:
         self._robot = self._add_robot()
         self._add_obstacles()
         self._people: list[pymunk.Body | None] = [None] * len(scenario.people)
-        self._place_people(0.0)
+        self._place_people()
         for other in (_OBSTACLE, _PERSON):
             self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
-        self._state = self._before = _State(0, robot.x, robot.y, robot.yaw, (0.0, 0.0), 0.0, Odometry(), Contacts())
+        self._state = self._before = _State(
+            0, robot.x, robot.y, robot.yaw, (0.0, 0.0), 0.0, Odometry(), Contacts(), self._crowd.poses
+        )
         camera = scenario.camera
         self._camera = Channel(
             camera.rate_hz,
@@ -145,7 +148,8 @@ class Arena:
         before = self._state
         self._drive.advance(before.time, STEP_S)
         step = before.step + 1
-        self._place_people(step / STEPS_PER_SECOND)
+        self._crowd.advance(step / STEPS_PER_SECOND, (before.x, before.y, before.yaw))
+        self._place_people()
         self._space.step(STEP_S)
         robot = self._robot
         twist, wheels = self._drive.twist, before.odometry
@@ -162,6 +166,7 @@ class Arena:
             turn_rate=robot.angular_velocity,
             odometry=Odometry(step / STEPS_PER_SECOND, x, y, yaw, twist.linear, twist.angular),
             contacts=self.contacts,
+            people=self._crowd.poses,
         )
         for channel in (self._camera, self._lidar, self._wheels):
             channel.advance(step, self._state)
@@ -172,7 +177,7 @@ class Arena:
         if self._frame is None or self._frame.stamp != exposure.state.time:
             image, depth, seen = self._render().render(
                 _camera_at(exposure.state),
-                self._poses(exposure.state.time),
+                exposure.state.people,
                 self._stream(_CAMERA_STREAM, exposure),
             )
             self._frame = Frame(exposure.state.time, image, depth, self._truth_at(exposure.state, seen))
@@ -184,7 +189,7 @@ class Arena:
         if self._scan is None or self._scan[0] != exposure.index:
             state = exposure.state
             shapes: list[Disc | Rectangle] = list(self._static_scanned)
-            for person, pose in zip(self.scenario.people, self._poses(state.time), strict=True):
+            for person, pose in zip(self.scenario.people, state.people, strict=True):
                 if pose is not None:
                     shapes += legs_at(person, pose, lidar.MOUNT_HEIGHT)
             x = state.x + lidar.MOUNT_AHEAD * math.cos(state.yaw)
@@ -218,13 +223,13 @@ class Arena:
         """Return the truth now (`Frame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
-        seen = self._render().look(_camera_at(self._state), self._poses(self.time))
+        seen = self._render().look(_camera_at(self._state), self._state.people)
         return self._truth_at(self._state, seen)
 
     def plan(self, *, of_frame: bool = False) -> Plan:
         """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
         state = self._camera.newest.state if of_frame else self._state
-        return Plan(state.time, (state.x, state.y, state.yaw), tuple(self._poses(state.time)))
+        return Plan(state.time, (state.x, state.y, state.yaw), state.people)
 
     def _render(self) -> Renderer:
         if self._renderer is None:
@@ -234,13 +239,10 @@ class Arena:
     def _stream(self, sensor: int, exposure: Exposure[_State] | None = None) -> np.random.Generator:
         return np.random.default_rng([self.seed, sensor, exposure.index if exposure else 0])
 
-    def _poses(self, time: float) -> list[Pose | None]:
-        return [walk.pose(time) for walk in self._walks]
-
     def _truth_at(self, state: _State, seen: list[Seen]) -> Truth:
         camera = _camera_at(state)
         people: list[PersonTruth | None] = []
-        for person, pose, (visible, box) in zip(self.scenario.people, self._poses(state.time), seen, strict=True):
+        for person, pose, (visible, box) in zip(self.scenario.people, state.people, seen, strict=True):
             if pose is None:
                 people.append(None)
                 continue
@@ -287,9 +289,9 @@ class Arena:
             shape.friction, shape.collision_type = _FRICTION, _OBSTACLE
             self._space.add(shape)
 
-    def _place_people(self, time: float) -> None:
-        """Give each person the velocity that leads to their place at `time` [s]."""
-        for index, pose in enumerate(self._poses(time)):
+    def _place_people(self) -> None:
+        """Give each person the velocity that leads to their place at the end of the step."""
+        for index, pose in enumerate(self._crowd.poses):
             person = self._people[index]
             if pose is None:
                 if person is not None:

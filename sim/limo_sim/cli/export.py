@@ -47,12 +47,11 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.run.catalogue import load
     from limo_sim.run.export import labelled_frames
     from limo_sim.run.provenance import code_version, scenario_hash
-    from limo_sim.world.variants import of_run
 
     folder: Path = args.out
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is there already, and not empty; wanted is a new folder")
-    scenario = of_run(load(args.scenario), args.seed)
+    scenario = load(args.scenario)
     labels = sorted({"person", *(piece.kind for piece in (*scenario.furniture, *scenario.movers))})
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []

@@ -43,9 +43,8 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.run.episode import run_episode
     from limo_sim.run.score import score
     from limo_sim.view.tuning import Tunable
-    from limo_sim.world.variants import of_run
 
-    scenario = of_run(load(args.scenario), args.seed)
+    scenario = load(args.scenario)
     controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
     with watching(args, scenario, controller) as audience:

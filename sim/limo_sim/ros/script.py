@@ -82,6 +82,8 @@ def run_script(
     ------
     StubError
         If there is no such script.
+    ScenarioError
+        If the scenario asks for faults of the detector, which is the node's own here.
     """
     if not script.is_file():
         raise StubError(f"{script}: no such file")
@@ -140,6 +142,7 @@ def score_of(outcome: Outcome) -> ScoreCard:
         longest_gap_s=None,
         lost=0,
         found_again=None,
+        time_to_find_again_s=None,
         follows_first=None,
         identity_switches=None,
         detect_ms_p50=None,

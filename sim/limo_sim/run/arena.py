@@ -27,6 +27,7 @@ from limo_sim.world.person import Pose, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
 from limo_sim.world.scenario import Furniture, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
+from limo_sim.world.variants import of_run
 
 STEPS_PER_SECOND = round(1 / STEP_S)
 
@@ -58,8 +59,17 @@ class _State:
         return self.step / STEPS_PER_SECOND
 
 
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The arena from above at one instant [s]: the robot's x, y, yaw [m, m, rad], and where each person is."""
+
+    stamp: float
+    robot: tuple[float, float, float]
+    people: tuple[Pose | None, ...]
+
+
 class Arena:
-    """One run of a scenario.
+    """One run of a scenario, whose `vary` draws people from the seed: `scenario` holds those of this run.
 
     Raises
     ------
@@ -69,7 +79,7 @@ class Arena:
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         scenario.check(f"scenario {scenario.name!r}: ")
-        self.scenario = scenario
+        self.scenario = scenario = of_run(scenario, seed)
         self.seed = seed
         self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario)
         robot = scenario.robot
@@ -223,6 +233,11 @@ class Arena:
         """Return the visible share and the box [px] of each piece of furniture in the newest frame; movers last."""
         state = self._camera.newest.state
         return self._render().look_at_furniture(_camera_at(state), state.people, self._movers.at(state.time))
+
+    def plan(self, *, of_frame: bool = False) -> Plan:
+        """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
+        state = self._camera.newest.state if of_frame else self._state
+        return Plan(state.time, (state.x, state.y, state.yaw), state.people)
 
     def _render(self) -> Renderer:
         if self._renderer is None:

@@ -207,6 +207,9 @@ class DetectorFaults:
 
     Attributes
     ----------
+    model
+        "opencv" or "limo": misses by the person's height in the image, bursts and false boxes as that model of people
+        has them on photographs (docs/detector-model.md); the other keys are then left out. "none": those count.
     recall
         Share of the camera's frames in which a person is not missed, in the long run, of those in which the detector
         itself finds the person [0 … 1].
@@ -216,12 +219,19 @@ class DetectorFaults:
         Mean number of false boxes in a frame that is searched as a whole.
     """
 
+    model: str = one_of(("none", "opencv", "limo"), "none")
     recall: float = within(1.0, 0.0, 1.0)
     burst_s: float = within(0.3, 0.02, 60.0)
     false_rate: float = within(0.0, 0.0, 20.0)
 
     def check(self, rate_hz: float, where: str) -> None:
-        """Raise `ScenarioError` unless a camera of `rate_hz` can show bursts of this length."""
+        """Raise `ScenarioError` unless these keys go together, and a camera of `rate_hz` can show such bursts."""
+        for name in ("recall", "burst_s", "false_rate") if self.model != "none" else ():
+            if getattr(self, name) != getattr(DetectorFaults(), name):
+                raise ScenarioError(
+                    f"{where}{name}: got {getattr(self, name):g} beside model {self.model!r}, which has its own; "
+                    f"give one of the two"
+                )
         if not 0.0 < self.recall < 1.0:
             return
         # At best every gap between two bursts is one frame long.
@@ -350,6 +360,13 @@ class Scenario:
             for member in group.members():
                 check_person(member, around, f"{where}groups[{index}], one of its people")
         return dataclasses.replace(self, people=(*self.people, *(one for group in groups for one in group.members())))
+
+    def check_detector_is_plain(self, why: str) -> None:
+        """Raise `ScenarioError` if `[detector]` asks for faults where none can be added, which `why` explains."""
+        if self.detector != DetectorFaults():
+            raise ScenarioError(
+                f"scenario {self.name!r}: detector: {why}; leave the table out, or use `limo-hog follow` or `score`"
+            )
 
     def _obstacles(self) -> list[tuple[str, Disc | Rectangle]]:
         """Return what stands in the room, by the name that a message gives it."""

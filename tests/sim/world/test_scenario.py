@@ -132,6 +132,11 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
             "[detector]\nrecall = 0.5\nburst_s = 0.05",
             "mine.toml: detector.burst_s: got 0.05, want at least 0.1 s",
         ),
+        ('[detector]\nmodel = "hog"', "mine.toml: detector.model: got 'hog', want one of none, opencv, limo"),
+        (
+            '[detector]\nmodel = "limo"\nrecall = 0.9',
+            "mine.toml: detector.recall: got 0.9 beside model 'limo', which has its own; give one of the two",
+        ),
         ("[detector]\nrecall = 0.1", "mine.toml: detector.burst_s: got 0.3, want at least 0.9 s"),
         ("[camera", "mine.toml: not TOML"),
     ],

@@ -130,6 +130,7 @@ class World:
         watch: Callable[[Moment], None] | None = None,
         patience: float = 20.0,
     ) -> None:
+        scenario.check_detector_is_plain("a node brings its own detector")
         self.arena = Arena(scenario, seed)
         self.seconds = seconds
         self.log = log

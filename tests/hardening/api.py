@@ -271,7 +271,7 @@ def grouping(a: Arguments) -> None:
 
 
 def construction(a: Arguments) -> None:
-    size = lambda: a.some((8, 8), (16, 16), (16, 8), (32, 16), (64, 128), (33, 8), [24, 24])  # noqa: E731
+    size: Callable[[], Any] = lambda: a.some((8, 8), (16, 16), (16, 8), (32, 16), (64, 128), (33, 8), [24, 24])  # noqa: E731
     arguments = [size(), size(), size(), size(), a.some(9, 1, 18, 64, 256)]
     more = [
         a.some(1, 3),
@@ -287,7 +287,8 @@ def construction(a: Arguments) -> None:
     hog.setSVMDetector(a.svm(hog))
     assert hog.checkDetectorSize() is True
     again: Any = pickle.loads(pickle.dumps(copy.deepcopy(hog)))
-    assert again == hog or np.isnan(hog.svmDetector).any()
+    # (What is no number equals nothing.)
+    assert again == hog or np.isnan(hog.svmDetector).any() or "nan" in repr(hog)
 
 
 def svms(a: Arguments) -> None:

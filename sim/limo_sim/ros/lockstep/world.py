@@ -277,7 +277,7 @@ class World:
                 reader.offer(copy.deepcopy(message))
 
     def take_over(self, past: Past, until: float) -> None:
-        """Bring a new world to the time `until` [s] at which another process left its own; it needs the same commands."""
+        """Bring a new world to the time `until` [s] at which another process left its own, by the same commands."""
         arena = self.arena
         for command in past.commands:
             while arena.time < command.time - 1e-9:

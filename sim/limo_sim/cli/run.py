@@ -28,8 +28,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add `run`."""
     parser = subparsers.add_parser(
         "run",
-        description="Run an rclpy script against the arena, in one process and in lock step: time passes only while "
-        "the node waits, so the same file, scenario and seed give the same run. Ends with the score card of `follow`.",
+        description="Run an rclpy script against the arena, in lock step: time passes only while the node "
+        "waits, so the same file, scenario and seed give the same run. Ends with the score card of `follow`.",
         epilog="What of ROS 2's Python API is offered: https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
     )
     parser.add_argument("node", metavar="NODE.py", type=Path, help="the script")
@@ -57,7 +57,8 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.run.catalogue import load
 
     with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
-        from limo_sim.ros.script import run_script, score_of
+        from limo_sim.ros.apart import run_apart
+        from limo_sim.ros.script import score_of
     scenario = load(args.scenario)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
@@ -75,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
             line = f"[{level}] [{time:.9f}] [{name}]: {message}"
             bar.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
-        outcome = run_script(
+        ended = run_apart(
             args.node,
             scenario,
             args.seconds,
@@ -83,17 +84,20 @@ def run(args: argparse.Namespace) -> int:
             arguments=["--ros-args", *args.ros_args],
             log=log,
             watch=watch,
+            pictures=bool(audience),
         )
-        card = score_of(outcome)
+        card = score_of(ended)
         bar.stop()
-        audience.end(outcome.episode, card)
-    if outcome.failure:
-        sys.stderr.write(outcome.traceback)
-        raise ScriptError(outcome.failure)
+        audience.end(ended.episode, card)
     if args.json:
         write_json(args.json, card.to_json())
     if args.json != STDOUT:
         from limo_sim.cli.card import show
 
         show(card)
+    if ended.failure:
+        # What was printed before comes first, where both go to one terminal or file.
+        sys.stdout.flush()
+        sys.stderr.write(ended.traceback)
+        raise ScriptError(ended.failure)
     return 0

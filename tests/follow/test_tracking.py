@@ -43,7 +43,7 @@ def test_it_faces_somebody_new_at_once_and_drives_only_when_sure() -> None:
     assert first.twist.angular > 0.3
     assert first.twist.linear == 0
     assert "possible person" in first.reason
-    assert run(world, 3.0, first.state).twist.linear > 0.2
+    assert run(world, 1.5, first.state).twist.linear > 0.2
 
 
 def test_it_holds_its_distance_to_somebody_who_stands() -> None:

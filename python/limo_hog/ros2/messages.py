@@ -38,6 +38,7 @@ from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.twist import Twist
+from limo_hog.ros2.definitions import add_to
 
 CAMERA_FRAME = "depth_link"
 LIDAR_FRAME = "laser_link"
@@ -68,7 +69,9 @@ class MessageError(LimoHogError):
 @cache
 def typestore() -> Typestore:
     """Return the message definitions."""
-    return get_typestore(Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    add_to(store)
+    return store
 
 
 def serialize(message: Any) -> bytes:

@@ -45,14 +45,14 @@ def run(args: argparse.Namespace) -> int:
     """Write the pictures, then the labels: of those written, if it is stopped."""
     from limo_hog.atomic import about, whole_file
     from limo_sim.run.catalogue import load
-    from limo_sim.run.export import labelled_frames
+    from limo_sim.run.export import labelled_frames, labels_of
     from limo_sim.run.provenance import code_version, scenario_hash
 
     folder: Path = args.out
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is there already, and not empty; wanted is a new folder")
     scenario = load(args.scenario)
-    labels = sorted({"person", *(piece.kind for piece in (*scenario.furniture, *scenario.movers))})
+    labels = sorted({"person", *labels_of(scenario)})
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     with about(folder):

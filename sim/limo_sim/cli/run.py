@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limo_hog.cli.support.arguments import output_file
-from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
@@ -32,7 +32,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "waits, so the same file, scenario and seed give the same run. Ends with the score card of `follow`.",
         epilog="What of ROS 2's Python API is offered: https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
     )
-    parser.add_argument("node", metavar="NODE.py", type=Path, help="the script")
+    parser.add_argument("node", metavar="NODE.py", type=Path, help="the script, or a launch file FILE.launch.py")
+    parser.add_argument("words", metavar="NAME:=VALUE", nargs="*", help="arguments of a launch file")
     add_scenario(parser, 60.0, "simulated time (60)")
     parser.add_argument(
         "--json", type=output_file, metavar="FILE", help="write the score card as JSON; - is standard output"
@@ -54,6 +55,8 @@ def run(args: argparse.Namespace) -> int:
         from limo_sim.cli.real import run_real
 
         return run_real(args)
+    if args.words and not args.node.name.endswith(".launch.py"):
+        raise UsageError(f"{args.words[0]}: only a launch file has arguments; a node's come after --ros-args")
     from limo_sim.run.catalogue import load
 
     with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
@@ -81,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
             scenario,
             args.seconds,
             args.seed,
-            arguments=["--ros-args", *args.ros_args],
+            arguments=[*args.words, "--ros-args", *args.ros_args],
             log=log,
             watch=watch,
             pictures=bool(audience),

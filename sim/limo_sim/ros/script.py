@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from limo_hog.ros2 import names
+from limo_sim.ros.front import in_front
+from limo_sim.ros.launching.programs import SUFFIX, launch
 from limo_sim.ros.lockstep.patience import DiedError, HungError
+from limo_sim.ros.lockstep.turns import ExternalShutdownException, RunOver
 from limo_sim.ros.lockstep.windows import watched_cv2
-from limo_sim.ros.lockstep.world import Log, RunOver, StubError, World
-from limo_sim.ros.rclpy_stub.executors import ExternalShutdownException
-from limo_sim.ros.rclpy_stub.front import in_front
+from limo_sim.ros.lockstep.world import Log, StubError, World
+from limo_sim.ros.rclpy_stub.context import Context
 from limo_sim.run.episode import Episode, Moment
 from limo_sim.run.score import ScoreCard, score
 from limo_sim.world.scenario import Scenario
@@ -71,11 +73,11 @@ def run_script(
     Parameters
     ----------
     script
-        An ordinary rclpy script.
+        An ordinary rclpy script, or a launch file whose nodes are such scripts.
     scenario, seconds, seed
         The arena, and how much of its time the script gets [s].
     arguments
-        Command line of the script; what follows --ros-args is ROS's.
+        Command line of the script; what follows --ros-args is ROS's. Of a launch file: name:=value.
     log
         Called with every line that the script logs.
     watch
@@ -102,8 +104,11 @@ def run_script(
     sys.path.insert(0, str(script.resolve().parent))
     with in_front(world), watched_cv2(world):
         try:
-            with world.patience.watching():
-                runpy.run_path(str(script), run_name="__main__")
+            with world.patience.watching(), world.turns.main(Context(world)):
+                if script.name.endswith(SUFFIX):
+                    launch(script, world, arguments)
+                else:
+                    runpy.run_path(str(script), run_name="__main__")
         except (RunOver, ExternalShutdownException):
             pass
         except SystemExit as exit_:

@@ -86,8 +86,7 @@ def labelled_frames(
     wandering = wandering or Wandering()
     arena = Arena(scenario, seed)
     random = np.random.default_rng([seed, _STREAM])
-    furniture = (*scenario.furniture, *scenario.movers)
-    labels = ["person"] * len(scenario.people) + [piece.kind for piece in furniture]
+    labels = labels_of(scenario)
     steps = round(CONTROL_PERIOD * STEPS_PER_SECOND)
     turn, turning, leg_ends, next_s = 0.0, False, 0.0, 0.0
     while count > 0:
@@ -105,6 +104,12 @@ def labelled_frames(
             everything = enumerate(zip(labels, [*seen, *arena.furniture_in_frame()], strict=True))
             yield frame, tuple(Thing(label, i, box, visible) for i, (label, (visible, box)) in everything if box)
             next_s, count = next_s + every_s, count - 1
+
+
+def labels_of(scenario: Scenario) -> list[str]:
+    """Return the label of every person and piece: people, then furniture, then movers."""
+    kinds = [piece.kind for piece in scenario.furniture] + [piece.kind for piece in scenario.movers]
+    return ["person"] * len(scenario.people) + kinds
 
 
 def _free_ahead(scan: Scan, half_sector: float) -> float:

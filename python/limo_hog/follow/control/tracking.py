@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.search import Search
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.control.steer import Aim, Steering
-from limo_hog.follow.decision import Decision
+from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import scan_points
@@ -97,7 +98,8 @@ class TrackingController:
         unseen_s = observation.stamp - person.seen
         person, tracks = self.tracker.follow_legs(person, tracks)
         state = replace(state, tracks=tracks)
-        aim = self._aim(person, state, observation)
+        keeps = self._keeps(person, observation)
+        aim = self._aim(person, keeps, state, observation)
         lost_s = min(unseen_s, observation.now - person.felt)
         if lost_s <= self.tracker.scan_period_s:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
@@ -106,7 +108,7 @@ class TrackingController:
             return self._search(state)
         twist, mode, reason = self.steering.command(
             aim,
-            self.target_distance,
+            keeps,
             self.robot,
             confirmed=person.confirmed,
             worth_nearing=self._is_worth_nearing(person, aim),
@@ -115,13 +117,16 @@ class TrackingController:
         )
         if appearance.is_other(choice.clothes, person.clothes):
             reason = "following another person: the lost one was not found"
+        elif keeps > self.target_distance + self.steering.distance_tolerance and mode in (Mode.HOLD, Mode.FOLLOW):
+            reason += ", further off than asked: nearer the camera would not show all of them"
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(
             state,
             since_full=0 if region is None else state.since_full + 1,
             detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
         )
-        return Decision(twist, state, mode, reason, boxes.get(person.number), region)
+        belief = Belief(keeps, self._believed(state, observation))
+        return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief)
 
     def _search(self, state: TrackingState) -> Decision[TrackingState]:
         tracks, choice, appearance = state.tracks, state.choice, self.tracker.association.appearance
@@ -130,7 +135,7 @@ class TrackingController:
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
         return Decision(twist, state, mode, reason)
 
-    def _aim(self, person: Person, state: TrackingState, observation: Observation) -> Aim:
+    def _aim(self, person: Person, keeps: float, state: TrackingState, observation: Observation) -> Aim:
         """Return where the person is at the newest stamp, and which way leads there."""
         now, poses = observation.now, state.tracks.poses
         pose, track = pose_at(poses, now), predict(person.track, now, self.tracker.noise)
@@ -139,15 +144,31 @@ class TrackingController:
         if observation.scan is None or not person.confirmed:
             return aim
         obstacles = self.detour.obstacles(scan_points(observation.scan, self.robot), bearing, distance)
-        if distance - self.robot.camera_x > self.target_distance - self.steering.distance_tolerance:
+        if distance - self.robot.camera_x > keeps - self.steering.distance_tolerance:
             preferred = state.detour or self.detour.lean_s * aim.bearing_rate
             aim = replace(aim, heading=self.detour.heading(obstacles, bearing, distance, preferred, self.robot))
         return replace(aim, hidden=self.detour.hides(obstacles, bearing, distance))
 
+    def _keeps(self, person: Person, observation: Observation) -> float:
+        """Return the distance to hold from the camera [m]: the target, but none from which a person is cut off."""
+        if not person.confirmed:
+            return self.target_distance
+        least = self.tracker.visibility.least_distance(person.window, person.centre, observation.height)
+        return max(self.target_distance, least - self.robot.camera_x)
+
+    def _believed(self, state: TrackingState, observation: Observation) -> tuple[tuple[float, float, float], ...]:
+        """Return everyone tracked in the base frame, with the probability of being a person."""
+        pose = pose_at(state.tracks.poses, observation.now)
+        places = []
+        for one in state.tracks.people:
+            bearing, distance = bearing_range(one.track, pose)
+            places.append((distance * math.cos(bearing), distance * math.sin(bearing), one.existence))
+        return tuple(places)
+
     def _is_worth_nearing(self, person: Person, aim: Aim) -> bool:
-        """Whether a track is too far away for HOG to confirm it, and trusted enough to drive there."""
+        """Whether a track is too far away for HOG to confirm it, and likely enough to be one to drive there."""
         too_small = person.window <= aim.distance * self.tracker.visibility.smallest_window
-        return too_small and person.trust >= self.selection.min_trust
+        return too_small and person.existence >= self.selection.min_existence
 
     def _region(self, person: Person, state: TrackingState, observation: Observation) -> Region | None:
         """Return where the person should be in the next frame; None to search all of it."""

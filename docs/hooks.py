@@ -1,4 +1,4 @@
-"""The site's pages from the repository's Markdown: whole files where a page names one, and links that fit both places."""
+"""The site's pages from the repository's Markdown: whole files where a page names one, links that fit both places."""
 
 from __future__ import annotations
 

@@ -164,14 +164,14 @@ class Renderer:
             if pose is None:
                 continue
             if room is not None:
-                _shade_floor(room, depth, camera, (pose.x, pose.y), 0.25 * person.height)
+                _shade_floor(room, depth, camera.ahead_of(pose.x, pose.y), 0.25 * person.height)
             if shape := outline(body(person, pose), camera):
                 outlines[index] = shape
                 order.append((math.hypot(pose.x - camera.x, pose.y - camera.y), index))
         for piece in (*scenario.furniture, *movers):
             order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), piece))
             if room is not None:
-                _shade_floor(room, depth, camera, (piece.x, piece.y), 0.25)
+                _shade_floor(room, depth, camera.ahead_of(piece.x, piece.y), 0.25)
         if image is not None and room is not None:
             cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=_bytes(image))
             self._room.decorate(_bytes(image), columns, camera)
@@ -180,10 +180,12 @@ class Renderer:
         drawn: list[tuple[int, Window, float]] = []
         for _, thing in sorted(order, key=lambda entry: -entry[0]):
             if isinstance(thing, Furniture):
-                self._draw_furniture(image, depth, camera, thing)
+                self._draw_furniture(image, depth, camera, thing, sun, hides=bool(drawn))
             elif window := _window(outlines[thing].bounds):
                 area = _area_outside(outlines[thing])
-                canvas = Canvas(window, self._sheet)
+                canvas = Canvas(
+                    window, self._sheet, solids=len(outlines[thing].strips) + len(outlines[thing].ellipses) + 1
+                )
                 cast_body(canvas, outlines[thing], sun)
                 self._blend(image, depth, canvas, self._palettes[thing], thing)
                 area += np.count_nonzero(canvas.inside)
@@ -195,23 +197,26 @@ class Renderer:
             seen[index] = share, box if self._lens.is_plain else self._lens.box(box)
         return depth, seen
 
-    def _draw_furniture(self, image: U32 | None, depth: F32, camera: CameraPose, piece: Furniture) -> None:
+    def _draw_furniture(
+        self, image: U32 | None, depth: F32, camera: CameraPose, piece: Furniture, sun: Sun, *, hides: bool
+    ) -> None:
+        """Draw a piece; `hides`: whether there may be people behind it."""
         solids, palette, (radius, height) = self._models.get(piece) or _model(piece)
-        [[x, _, z]] = camera.to_camera(np.array([[piece.x, piece.y, 0.0]])).tolist()
+        x, z = camera.ahead_of(piece.x, piece.y)
         window = _window(upright_bounds(x, z, radius, 0.0, height))
         if window is None:
             return
-        seen_sun = self._sun.seen_from(camera)
-        canvas = Canvas(window, self._sheet)
+        canvas = Canvas(window, self._sheet, solids=len(solids))
         for part, solid in enumerate(solids):
             if isinstance(solid, Box):
                 cast_box(canvas, solid, camera, self._sun, part)
             else:
-                cast_frustum(canvas, solid, camera, seen_sun, part)
-        self._blend(image, depth, canvas, palette, _NO_PERSON)
+                cast_frustum(canvas, solid, camera, sun, part)
+        canvas.finish()
+        self._blend(image, depth, canvas, palette, _NO_PERSON if hides else None)
 
-    def _blend(self, image: U32 | None, depth: F32, canvas: Canvas, palette: U32, owner: int) -> None:
-        """Draw an object wherever it is nearer than what has been drawn; `owner` is its number in the map of people."""
+    def _blend(self, image: U32 | None, depth: F32, canvas: Canvas, palette: U32, owner: int | None) -> None:
+        """Draw an object wherever it is nearer than what has been drawn; `owner`: what the map of people says there."""
         left, top, right, bottom = canvas.window
         step = max(1, BAND // (right - left))
         for row in range(top, bottom, step):
@@ -220,7 +225,11 @@ class Renderer:
             there, new, cover = depth[at], canvas.depth[of], canvas.cover[of]
             nearer = new < there
             if image is not None:
-                colour = palette.take((canvas.tone[of] * _LEVELS).astype(np.int32), mode="clip")
+                tone = canvas.tone[of] if len(canvas.tone) > 1 else canvas.tone
+                with np.errstate(invalid="ignore"):  # where the only solid of a canvas is not hit
+                    colour = palette.take((tone * _LEVELS).astype(np.int32), mode="clip")
+                if len(colour) != len(new):
+                    colour = np.repeat(colour, len(new), axis=0)
                 full = cover >= 1.0
                 full &= nearer
                 edge = cover > 0.0
@@ -235,12 +244,13 @@ class Renderer:
                     patch[where] = cv2.blendLinear(over, under, share, 1.0 - share).view(np.uint32)[:, 0, 0]
             nearer &= cover >= 0.5
             cv2.copyTo(new, nearer.view(np.uint8), there)
-            self._owner[at][nearer] = owner
+            if owner is not None:
+                cv2.copyTo(np.full(nearer.shape, owner, np.int16), nearer.view(np.uint8), self._owner[at])
 
 
-def _shade_floor(room: U8, depth: F32, camera: CameraPose, at: tuple[float, float], radius: float) -> None:
-    """Darken the floor softly around something that stands on it."""
-    [[across, _, ahead]] = camera.to_camera(np.array([[*at, 0.0]])).tolist()
+def _shade_floor(room: U8, depth: F32, at: tuple[float, float], radius: float) -> None:
+    """Darken the floor softly around something that stands on it, to the right of and ahead of the camera [m]."""
+    across, ahead = at
     # the nearest floor that the camera sees lies at the image's lower edge
     bounds = upright_bounds(across, ahead, radius, 0.0, 0.0, near=MOUNT_HEIGHT * FOCAL_PX / (HEIGHT - CENTRE_Y))
     window = _window(bounds)

@@ -53,7 +53,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--seconds", type=seconds, default=60.0, metavar="S", help="simulated time of a run (60)")
     parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
     parser.add_argument(
-        "--detector", default="hog", metavar="|".join((*NAMES, "hog:MODEL", "onnx:FILE")), help="the people detector (%(default)s)"
+        "--detector",
+        default="hog",
+        metavar="|".join((*NAMES, "hog:MODEL", "onnx:FILE")),
+        help="the people detector (%(default)s)",
     )
     parser.add_argument("--workers", type=count, metavar="N", help="processes (one for each core)")
     parser.add_argument(

@@ -7,6 +7,7 @@ stream by the number of the reading, so that reading one sensor changes no other
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +22,10 @@ from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
+from limo_sim.world.movers import Movers
 from limo_sim.world.person import Pose, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
-from limo_sim.world.scenario import Scenario
+from limo_sim.world.scenario import Furniture, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 from limo_sim.world.variants import of_run
 
@@ -79,7 +81,7 @@ class Arena:
         scenario.check(f"scenario {scenario.name!r}: ")
         self.scenario = scenario = of_run(scenario, seed)
         self.seed = seed
-        self._crowd = Crowd(scenario, seed)
+        self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario)
         robot = scenario.robot
         self._drive = Drive(robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
         self._slip = self._stream(_SLIP_STREAM)
@@ -91,6 +93,7 @@ class Arena:
         self._add_obstacles()
         self._people: list[pymunk.Body | None] = [None] * len(scenario.people)
         self._place_people()
+        self._moving = [self._add_mover(piece) for piece in self._movers.at(0.0)]
         for other in (_OBSTACLE, _PERSON):
             self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
         self._state = self._before = _State(
@@ -109,12 +112,7 @@ class Arena:
         self._wheels = Channel(
             scenario.odometry.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.odometry.latency_s
         )
-        self._static_scanned = [
-            placed(shape, piece.x, piece.y, piece.yaw)
-            for piece in scenario.furniture
-            for shape in KINDS[piece.kind].scanned
-        ]
-        self._static_scanned += [wall.footprint for wall in scenario.walls]
+        self._static_scanned = _scanned(scenario.furniture) + [wall.footprint for wall in scenario.walls]
         self._renderer: Renderer | None = None
         self._frame: Frame | None = None
         self._scan: tuple[int, Scan] | None = None
@@ -150,6 +148,9 @@ class Arena:
         step = before.step + 1
         self._crowd.advance(step / STEPS_PER_SECOND, (before.x, before.y, before.yaw))
         self._place_people()
+        for body, piece in zip(self._moving, self._movers.at(step / STEPS_PER_SECOND), strict=True):
+            body.velocity = (piece.x - body.position.x) / STEP_S, (piece.y - body.position.y) / STEP_S
+            body.angular_velocity = math.remainder(piece.yaw - body.angle, math.tau) / STEP_S
         self._space.step(STEP_S)
         robot = self._robot
         twist, wheels = self._drive.twist, before.odometry
@@ -179,6 +180,7 @@ class Arena:
                 _camera_at(exposure.state),
                 exposure.state.people,
                 self._stream(_CAMERA_STREAM, exposure),
+                self._movers.at(exposure.state.time),
             )
             self._frame = Frame(exposure.state.time, image, depth, self._truth_at(exposure.state, seen))
         return self._frame
@@ -189,6 +191,7 @@ class Arena:
         if self._scan is None or self._scan[0] != exposure.index:
             state = exposure.state
             shapes: list[Disc | Rectangle] = list(self._static_scanned)
+            shapes += _scanned(self._movers.at(state.time))
             for person, pose in zip(self.scenario.people, state.people, strict=True):
                 if pose is not None:
                     shapes += legs_at(person, pose, lidar.MOUNT_HEIGHT)
@@ -223,7 +226,7 @@ class Arena:
         """Return the truth now (`Frame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
-        seen = self._render().look(_camera_at(self._state), self._state.people)
+        seen = self._render().look(_camera_at(self._state), self._state.people, self._movers.at(self.time))
         return self._truth_at(self._state, seen)
 
     def plan(self, *, of_frame: bool = False) -> Plan:
@@ -279,15 +282,13 @@ class Arena:
         for side in (middle, -middle):
             footprints += [Rectangle(side, 0, _WALL_HALF, half), Rectangle(0, side, half, _WALL_HALF)]
         for footprint in (*footprints, *self.scenario.footprints):
-            shape: pymunk.Shape
-            if isinstance(footprint, Disc):
-                shape = pymunk.Circle(ground, footprint.radius, (footprint.x, footprint.y))
-            else:
-                turned = pymunk.Transform.translation(footprint.x, footprint.y).rotated(footprint.yaw)
-                x, y = footprint.half_x, footprint.half_y
-                shape = pymunk.Poly(ground, [(-x, -y), (x, -y), (x, y), (-x, y)], turned)
-            shape.friction, shape.collision_type = _FRICTION, _OBSTACLE
-            self._space.add(shape)
+            self._space.add(_obstacle(ground, footprint))
+
+    def _add_mover(self, piece: Furniture) -> pymunk.Body:
+        body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        body.position, body.angle = (piece.x, piece.y), piece.yaw
+        self._space.add(body, _obstacle(body, KINDS[piece.kind].footprint))
+        return body
 
     def _place_people(self) -> None:
         """Give each person the velocity that leads to their place at the end of the step."""
@@ -312,6 +313,24 @@ class Arena:
         if step - self._touched[other] > _SAME_CONTACT:
             self._contacts[other] += 1
         self._touched[other] = step
+
+
+def _obstacle(body: pymunk.Body, footprint: Disc | Rectangle) -> pymunk.Shape:
+    """Return what the robot bumps into, in the body's frame."""
+    shape: pymunk.Shape
+    if isinstance(footprint, Disc):
+        shape = pymunk.Circle(body, footprint.radius, (footprint.x, footprint.y))
+    else:
+        turned = pymunk.Transform.translation(footprint.x, footprint.y).rotated(footprint.yaw)
+        x, y = footprint.half_x, footprint.half_y
+        shape = pymunk.Poly(body, [(-x, -y), (x, -y), (x, y), (-x, y)], turned)
+    shape.friction, shape.collision_type = _FRICTION, _OBSTACLE
+    return shape
+
+
+def _scanned(pieces: Iterable[Furniture]) -> list[Disc | Rectangle]:
+    """Return what the lidar sees of furniture."""
+    return [placed(shape, piece.x, piece.y, piece.yaw) for piece in pieces for shape in KINDS[piece.kind].scanned]
 
 
 def _camera_at(state: _State) -> CameraPose:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, MOUNT_HEIGHT, WIDTH, CameraPose
+from limo_sim.sensing.paint import Paint, sides_of
 from limo_sim.sensing.solids import (
     BAND,
     F32,
@@ -68,6 +69,8 @@ class Renderer:
         self._backdrop = self._make_backdrop()
         self._walls = [wall.footprint for wall in scenario.walls]
         self._wall_greys = self._make_wall_greys()
+        self._paint = Paint(scenario, sides_of(scenario.room.half, self._walls, self._wall_greys))
+        self._wall_greys = [grey * self._paint.mean_shade for grey in self._wall_greys]
         self._palettes = [_palette(body(person, Pose(0, 0, 0)).colours.tolist()) for person in scenario.people]
         self._models = {piece: _model(piece) for piece in scenario.furniture}
         shape = (HEIGHT + _BANK_MARGIN, WIDTH + _BANK_MARGIN)
@@ -81,15 +84,19 @@ class Renderer:
         self._dead = round(scenario.depth.invalid * WIDTH * HEIGHT)
 
     def render(
-        self, camera: CameraPose, people: Sequence[Pose | None], noise: np.random.Generator
+        self,
+        camera: CameraPose,
+        people: Sequence[Pose | None],
+        noise: np.random.Generator,
+        movers: Sequence[Furniture] = (),
     ) -> tuple[U8, F32, list[Seen]]:
-        """Expose one frame.
+        """Expose one frame; `movers` are pieces of furniture beside the scenario's.
 
         Returns
         -------
         uint8 (480, 640, 3) BGR; float32 (480, 640) depth [m]; per person the visible share and the box.
         """
-        depth, seen = self._draw(self._colours, camera, people)
+        depth, seen = self._draw(self._colours, camera, people, movers)
         image = cv2.cvtColor(_bytes(self._colours), cv2.COLOR_BGRA2BGR).astype(np.uint8, copy=False)
         row, column = noise.integers(_BANK_MARGIN, size=2)
         brighter, darker = self._grain[:, row : row + HEIGHT, column : column + WIDTH]
@@ -104,15 +111,17 @@ class Renderer:
         depth.reshape(-1)[noise.integers(WIDTH * HEIGHT, size=self._dead)] = np.nan
         return image, depth, seen
 
-    def look(self, camera: CameraPose, people: Sequence[Pose | None]) -> list[Seen]:
+    def look(self, camera: CameraPose, people: Sequence[Pose | None], movers: Sequence[Furniture] = ()) -> list[Seen]:
         """Return each person's visible share and box, without drawing colours."""
-        return self._draw(None, camera, people)[1]
+        return self._draw(None, camera, people, movers)[1]
 
-    def _draw(self, image: U32 | None, camera: CameraPose, people: Sequence[Pose | None]) -> tuple[F32, list[Seen]]:
+    def _draw(
+        self, image: U32 | None, camera: CameraPose, people: Sequence[Pose | None], movers: Sequence[Furniture]
+    ) -> tuple[F32, list[Seen]]:
         """Return depth and what is visible of people; colours go into `image`, if there is one."""
         scenario, sun = self._scenario, self._sun.seen_from(camera)
         room = self._backdrop.copy() if image is not None else None
-        depth = self._draw_room(room, camera)
+        depth, wall, faces = self._draw_room(room, camera)
         outlines: dict[int, Outline] = {}
         order: list[tuple[float, int | Furniture]] = []
         for index, (person, pose) in enumerate(zip(scenario.people, people, strict=True)):
@@ -123,12 +132,14 @@ class Renderer:
             if shape := outline(body(person, pose), camera):
                 outlines[index] = shape
                 order.append((math.hypot(pose.x - camera.x, pose.y - camera.y), index))
-        for piece in scenario.furniture:
+        for piece in (*scenario.furniture, *movers):
             order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), piece))
             if room is not None:
                 _shade_floor(room, depth, camera, (piece.x, piece.y), 0.25)
         if image is not None and room is not None:
             cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=_bytes(image))
+            if not self._paint.is_bare:
+                self._paint.draw(_bytes(image), faces, wall, camera)
         self._owner.fill(_NO_PERSON)
         seen: list[Seen] = [(0.0, None)] * len(people)
         drawn: list[tuple[int, Window, float]] = []
@@ -148,8 +159,11 @@ class Renderer:
             seen[index] = share, (left, top, right - left, bottom - top)
         return depth, seen
 
-    def _draw_room(self, room: U8 | None, camera: CameraPose) -> F32:
-        """Sky, floor and walls; `room` is grey and has its sky and floor already."""
+    def _draw_room(self, room: U8 | None, camera: CameraPose) -> tuple[F32, F32, NDArray[np.int64]]:
+        """Sky, floor and walls; `room` is grey and has its sky and floor already.
+
+        Returns the depth, and for every column the depth and the number of the wall's side that it shows.
+        """
         look = math.cos(camera.yaw), math.sin(camera.yaw)
         ahead_x, ahead_y = look[0] + look[1] * _COLUMNS, look[1] - look[0] * _COLUMNS
         half = np.float32(self._scenario.room.half)
@@ -170,7 +184,7 @@ class Renderer:
         sky, end = (max(0, math.ceil(float(edge))) for edge in (top.min(), top.max()))
         depth[:sky] = np.inf
         depth[sky:end][np.arange(sky, end, dtype=np.float32)[:, None] < top] = np.inf
-        return depth
+        return depth, wall, faces
 
     def _paint_walls(self, room: U8, wall: F32, faces: NDArray[np.int64]) -> None:
         """Paint walls whose depth and number are known for every column."""
@@ -192,7 +206,7 @@ class Renderer:
             cv2.fillConvexPoly(room, quad, grey, cv2.LINE_AA, shift=4)
 
     def _draw_furniture(self, image: U32 | None, depth: F32, camera: CameraPose, piece: Furniture) -> None:
-        solids, palette, (radius, height) = self._models[piece]
+        solids, palette, (radius, height) = self._models.get(piece) or _model(piece)
         [[x, _, z]] = camera.to_camera(np.array([[piece.x, piece.y, 0.0]])).tolist()
         window = _window(upright_bounds(x, z, radius, 0.0, height))
         if window is None:

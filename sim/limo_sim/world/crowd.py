@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_sim.world.furniture import KINDS, reach
+from limo_sim.world.movers import Movers
 from limo_sim.world.paths import FloorPlan
 from limo_sim.world.people import ROBOT_RADIUS, Person, before_door, doors
 from limo_sim.world.person import STRIDE, Pose, Walk, smooth
@@ -245,9 +247,11 @@ class Crowd:
             for index, person in enumerate(people)
             if person.yields
         }
+        self._movers = Movers(scenario)
         self._plan = around.plan(max((person.way_margin for person in people if person.yields), default=0.0))
         self.poses: tuple[Pose | None, ...] = ()
         self._time = 0.0
+        self._robot: RobotPose | None = None  # where it was a step ago
         for walker in self._walkers.values():
             walker.progress(0.0)
         self._note(0.0)
@@ -267,51 +271,63 @@ class Crowd:
 
     def _step(self, robot: RobotPose) -> None:
         """Let all who yield walk one step."""
-        walkers = [(index, walker) for index, walker in self._walkers.items() if walker.pose is not None]
+        walkers = [walker for walker in self._walkers.values() if walker.pose is not None]
         if not walkers:
             return
-        wishes = [walker.wants(self._time, robot) for _, walker in walkers]
-        position, velocity, height = self._everybody([index for index, _ in walkers])
+        wishes = [walker.wants(self._time, robot) for walker in walkers]
+        moving = [(*walker.position, *walker.velocity, MODEL.body * walker.person.height) for walker in walkers]
+        moving += self._timetables(robot)
+        places = np.array(moving)
         people = People(
-            position,
-            velocity,
-            height,
+            places[:, :2],
+            places[:, 2:4],
+            places[:, 4],
+            height=np.array([walker.person.height for walker in walkers]),
             wanted=np.array([wanted for wanted, _ in wishes]),
-            ahead=np.array([(math.cos(walker.yaw), math.sin(walker.yaw)) for _, walker in walkers]),
+            ahead=np.array([(math.cos(walker.yaw), math.sin(walker.yaw)) for walker in walkers]),
         )
-        yielding = [walker for _, walker in walkers]
-        pushes = acceleration(people, self._away(yielding, robot), self._hidden(position, len(yielding)), MODEL)
-        for walker, push, (wanted, looks) in zip(yielding, pushes, wishes, strict=True):
+        ignore = np.array([walker.person.reaction == "ignore" for walker in walkers])
+        hidden = self._hidden(people.position, len(walkers))
+        hidden[:, -1] |= ignore
+        away = self._away(walkers, people)
+        away[ignore, -1] = np.inf
+        for walker, push, (wanted, looks) in zip(
+            walkers, acceleration(people, away, hidden, MODEL), wishes, strict=True
+        ):
             jolt = MANNERS.wander * math.hypot(*wanted) / math.sqrt(STEP_S)
             walker.move(push + jolt * walker.random.standard_normal(2), wanted, looks)
 
-    def _everybody(self, first: list[int]) -> tuple[F64, F64, F64]:
-        """Return positions, velocities and statures of all who are there, those with the indices `first` in front."""
-        there = [(self._walkers[i].position, self._walkers[i].velocity, self._walkers[i].person.height) for i in first]
+    def _timetables(self, robot: RobotPose) -> list[tuple[float, float, float, float, float]]:
+        """Return place, velocity and radius of what feels no forces: people on timetables, movers, the robot last."""
+        there = []
         for index, walk in self._walks.items():
-            now = self.poses[index]
+            now, soon = self.poses[index], walk.pose(self._time + STEP_S)
             if now is not None:
-                next_ = walk.pose(self._time + STEP_S) or now
-                speed = (next_.x - now.x) / STEP_S, (next_.y - now.y) / STEP_S
-                there.append(((now.x, now.y), speed, walk.person.height))
-        position, velocity, height = zip(*there, strict=True)
-        return np.array(position), np.array(velocity), np.array(height)
+                soon = soon or now
+                speed = (soon.x - now.x) / STEP_S, (soon.y - now.y) / STEP_S
+                there.append((now.x, now.y, *speed, MODEL.body * walk.person.height))
+        for piece, soon_piece in zip(self._movers.at(self._time), self._movers.at(self._time + STEP_S), strict=True):
+            speed = (soon_piece.x - piece.x) / STEP_S, (soon_piece.y - piece.y) / STEP_S
+            there.append((piece.x, piece.y, *speed, reach(KINDS[piece.kind].footprint)))
+        before = self._robot or robot
+        speed = (robot[0] - before[0]) / STEP_S, (robot[1] - before[1]) / STEP_S
+        self._robot = robot
+        return [*there, (*robot[:2], *speed, ROBOT_RADIUS)]
 
-    def _away(self, walkers: list[Walker], robot: RobotPose) -> F64:
-        """Return the ways from outer walls, obstacles and the robot to each of some people, as `acceleration` wants."""
-        position = np.array([walker.position for walker in walkers])
-        half = self._scenario.room.half
-        walls = np.zeros((len(walkers), 4, 2))
+    def _away(self, walkers: list[Walker], people: People) -> F64:
+        """Return the ways to some people from outer walls, obstacles, movers and the robot, as `acceleration` wants."""
+        count, half = len(walkers), self._scenario.room.half
+        position = people.position[:count]
+        walls = np.zeros((count, 4, 2))
+        feels = [walker.feels_walls for walker in walkers]
         for side, (axis, sign) in enumerate(((0, 1), (0, -1), (1, 1), (1, -1))):
-            walls[:, side, axis] = np.where(
-                [walker.feels_walls for walker in walkers], position[:, axis] - sign * half, np.inf
-            )
-        # As a disc: before the flat side of a box left is as good as right, and the person would stand still.
-        apart = position - robot[:2]
-        gap = np.maximum(np.hypot(apart[:, 0], apart[:, 1]), 1e-9)
-        clear = apart * np.maximum(1.0 - ROBOT_RADIUS / gap, 1e-9)[:, None]
-        clear[[walker.person.reaction == "ignore" for walker in walkers]] = np.inf
-        return np.concatenate([walls, self._plan.away(position), clear[:, None]], axis=1)
+            walls[:, side, axis] = np.where(feels, position[:, axis] - sign * half, np.inf)
+        # Movers and the robot count as discs: before the flat side of a box, left as good as right, people would stop.
+        first = -1 - len(self._scenario.movers)
+        apart = position[:, None] - people.position[None, first:]
+        gap = np.maximum(np.hypot(apart[..., 0], apart[..., 1]), 1e-9)
+        moving = apart * np.maximum(1.0 - people.radius[first:] / gap, 1e-9)[..., None]
+        return np.concatenate([walls, self._plan.away(position), moving], axis=1)
 
     def _hidden(self, position: F64, count: int) -> NDArray[np.bool_]:
         """Whether each of the first `count` people cannot see each of all."""

@@ -72,6 +72,8 @@ _WOOD: Colour = (150, 108, 72)
 _STEEL: Colour = (92, 94, 98)
 _ORANGE: Colour = (214, 92, 34)
 _WHITE: Colour = (226, 226, 222)
+_CARDBOARD: Colour = (172, 134, 92)
+_POSTS = ((-0.235, -0.155), (-0.235, 0.155), (0.235, -0.155), (0.235, 0.155))
 _LEGS = ((-0.14, -0.13), (-0.14, 0.13), (0.14, -0.13), (0.14, 0.13))
 
 KINDS: dict[str, Piece] = {
@@ -120,7 +122,24 @@ KINDS: dict[str, Piece] = {
         footprint=Rectangle(0, 0, 0.17, 0.16),
         scanned=tuple(Disc(x, y, 0.015) for x, y in _LEGS),
     ),
+    "trolley": Piece(
+        solids=(
+            *(Box(x, y, 0.012, 0.012, 0.03, 0.75, _STEEL) for x, y in _POSTS),
+            Box(0, 0, 0.25, 0.17, 0.08, 0.13, _STEEL),
+            Box(0, 0, 0.25, 0.17, 0.48, 0.50, _STEEL),
+            Box(0.04, 0.02, 0.16, 0.12, 0.13, 0.38, _CARDBOARD),
+            Box(-0.08, 0, 0.12, 0.13, 0.50, 0.68, _CARDBOARD),
+        ),
+        footprint=Rectangle(0, 0, 0.25, 0.17),
+        scanned=(Rectangle(0, 0, 0.25, 0.17),),
+    ),
 }
+
+
+def reach(shape: Disc | Rectangle) -> float:
+    """Radius of the circle about the piece's middle that holds its footprint [m]."""
+    size = shape.radius if isinstance(shape, Disc) else math.hypot(shape.half_x, shape.half_y)
+    return math.hypot(shape.x, shape.y) + size
 
 
 def placed(shape: Disc | Rectangle, x: float, y: float, yaw: float) -> Disc | Rectangle:

@@ -11,7 +11,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from limo_sim.world.furniture import KINDS, Disc, Rectangle, distance_to, placed
+from limo_sim.world.furniture import KINDS, Disc, Rectangle, distance_to, placed, reach
 from limo_sim.world.people import ROBOT_RADIUS, WIDEST, Group, Person, Surroundings, Vary, check_person
 from limo_sim.world.schema import ScenarioError, build, check_fields, one_of, required, within
 
@@ -31,12 +31,14 @@ __all__ = [
     "Imu",
     "Lidar",
     "Light",
+    "Mover",
     "Person",
     "Robot",
     "Room",
     "Scenario",
     "Vary",
     "Wall",
+    "WallsTexture",
     "Wheels",
 ]
 
@@ -64,6 +66,53 @@ class Furniture:
     def footprint(self) -> Disc | Rectangle:
         """What the robot bumps into, in the arena's frame."""
         return placed(KINDS[self.kind].footprint, self.x, self.y, self.yaw)
+
+
+@dataclass(frozen=True, slots=True)
+class Mover:
+    """A piece of furniture that moves along a closed route, as a person with a timetable walks.
+
+    Attributes
+    ----------
+    kind
+        As of `Furniture`.
+    route
+        Corners (x, y, pause) [m, m, s].
+    speed
+        On the way [m/s].
+    """
+
+    kind: str = one_of(tuple(KINDS))
+    route: tuple[tuple[float, float, float], ...] = required(-WIDEST, 3600.0)
+    speed: float = within(0.3, 0.05, 2.0)
+
+    @property
+    def timetable(self) -> Person:
+        """A person as broad as the piece, who walks its route."""
+        person = Person(route=self.route, speed=self.speed, facing=0.0)
+        return dataclasses.replace(person, height=person.height * reach(KINDS[self.kind].footprint) / person.radius)
+
+
+@dataclass(frozen=True, slots=True)
+class WallsTexture:
+    """What is on the walls.
+
+    Attributes
+    ----------
+    kind
+        "plain", "bricks" or "boards" (upright).
+    contrast
+        By how much tiles and joints are darker than a plain wall, at most [1].
+    posters
+        Posters for each metre of wall [1/m].
+    seed
+        Of the tiles' shades and of what the posters show.
+    """
+
+    kind: str = one_of(("plain", "bricks", "boards"), "plain")
+    contrast: float = within(0.15, 0.0, 0.6)
+    posters: float = within(0.0, 0.0, 1.5)
+    seed: int = within(0, 0, 1_000_000)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,6 +274,8 @@ class Scenario:
     room: Room = dataclasses.field(default_factory=Room)
     walls: tuple[Wall, ...] = ()
     vary: Vary = dataclasses.field(default_factory=Vary)
+    movers: tuple[Mover, ...] = ()
+    walls_texture: WallsTexture = dataclasses.field(default_factory=WallsTexture)
 
     @property
     def surroundings(self) -> Surroundings:
@@ -298,6 +349,8 @@ class Scenario:
         around = self.surroundings
         for index, person in enumerate(self.people):
             check_person(person, around, f"{where}people[{index}]")
+        for index, mover in enumerate(self.movers):
+            check_person(mover.timetable, around, f"{where}movers[{index}]")
 
     def _with_groups(self, groups: tuple[Group, ...], where: str) -> Scenario:
         """Return this scenario with the members of groups among its people; refuse groups that do not fit."""

@@ -64,14 +64,16 @@ class SocialForce:
 
 @dataclass(frozen=True, slots=True)
 class People:
-    """The people at one instant; the first n of them are those who feel forces.
+    """Who and what moves in the room at one instant; the first n are the people who feel forces.
 
     Attributes
     ----------
     position, velocity
-        float64 (m, 2), of all people in the room [m], [m/s].
+        float64 (m, 2) [m], [m/s].
+    radius
+        float64 (m,), of the bodies [m].
     height
-        float64 (m,), statures [m].
+        float64 (n,), statures of those who feel forces [m].
     wanted
         float64 (n, 2): the velocities that those who feel forces want [m/s].
     ahead
@@ -80,6 +82,7 @@ class People:
 
     position: F64
     velocity: F64
+    radius: F64
     height: F64
     wanted: F64
     ahead: F64
@@ -91,18 +94,18 @@ def acceleration(people: People, away: F64, hidden: NDArray[np.bool_], model: So
     Parameters
     ----------
     people
-        Everybody in the room.
+        Who and what moves in the room.
     away
         float64 (n, k, 2): from the nearest point of each obstacle to each person [m]; inf where one does not count.
     hidden
-        bool (n, m): the person does not see the other, who then has no effect.
+        bool (n, m): the person does not see the other, or does not care, so that it has no effect.
     model
         The parameters.
     """
     count = len(people.wanted)
     driven = (people.wanted - people.velocity[:count]) / model.relaxation_s
-    scale = people.height[:count] / model.adult_m
-    return driven + from_people(people, scale, hidden, model) + from_borders(away, scale, model)
+    scale = people.height / model.adult_m
+    return driven + from_others(people, scale, hidden, model) + from_borders(away, scale, model)
 
 
 def from_borders(away: F64, scale: F64, model: SocialForce) -> F64:
@@ -116,8 +119,8 @@ def from_borders(away: F64, scale: F64, model: SocialForce) -> F64:
     return pushes
 
 
-def from_people(people: People, scale: F64, hidden: NDArray[np.bool_], model: SocialForce) -> F64:
-    """Return the repulsion by other people: float64 (n, 2) [m/s²]; `hidden` as in `acceleration`."""
+def from_others(people: People, scale: F64, hidden: NDArray[np.bool_], model: SocialForce) -> F64:
+    """Return the repulsion by what else moves: float64 (n, 2) [m/s²]; `hidden` as in `acceleration`."""
     count, everyone = len(people.wanted), len(people.position)
     size = scale[:, None]
     apart = people.position[:count, None] - people.position[None, :]
@@ -134,7 +137,7 @@ def from_people(people: People, scale: F64, hidden: NDArray[np.bool_], model: So
     towards = -(people.ahead[:, None] * force).sum(axis=2)
     seen = towards >= np.hypot(force[..., 0], force[..., 1]) * math.cos(model.sight)
     force *= np.where(seen, 1.0, model.behind)[..., None]
-    touching = model.body * (people.height[:count, None] + people.height[None, :]) - gap
+    touching = people.radius[:count, None] + people.radius[None, :] - gap
     force += (model.stiffness * np.maximum(touching, 0.0) / gap)[..., None] * apart
     itself = np.arange(everyone)[None, :] == np.arange(count)[:, None]
     pushes: F64 = np.where((itself | hidden)[..., None], 0.0, force).sum(axis=1)

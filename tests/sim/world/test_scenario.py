@@ -10,7 +10,7 @@ import pytest
 
 from limo_hog.exceptions import LimoHogError
 from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import Camera, Furniture, Group, Person, Scenario, Wall
+from limo_sim.world.scenario import Camera, Furniture, Group, Mover, Person, Scenario, Wall
 from limo_sim.world.schema import ScenarioError
 
 NAMES = ("crossing", "empty", "followable", "furniture", "late", "occlusion", "two_people", "workshop", "zigzag")
@@ -176,7 +176,7 @@ def test_the_page_about_the_arena_tells_the_truth(tmp_path: Path) -> None:
     assert scenario.camera.drop_probability == 0.3
     for name in Scenario.names():
         assert f"| `{name}` |" in page
-    known = {"people[]": Person, "groups[]": Group, "furniture[]": Furniture, "walls[]": Wall} | {
+    known = {"people[]": Person, "groups[]": Group, "furniture[]": Furniture, "walls[]": Wall, "movers[]": Mover} | {
         field.name: type(getattr(scenario, field.name)) for field in dataclasses.fields(scenario)
     }
     told = set()

@@ -23,7 +23,8 @@ def two(at: tuple[float, float], velocity: tuple[float, float], wanted: tuple[fl
     return People(
         position=np.array([at, (0.0, 0.0)]),
         velocity=np.array([wanted, velocity]),
-        height=np.full(2, ADULT),
+        radius=np.full(2, 0.13 * ADULT),
+        height=np.full(1, ADULT),
         wanted=np.array([wanted]),
         ahead=np.array([[1.0, 0.0]]),
     )
@@ -63,7 +64,8 @@ def test_what_is_behind_counts_half_and_what_a_wall_hides_not_at_all() -> None:
 def test_a_wall_pushes_with_the_papers_strength_and_a_child_feels_it_in_proportion() -> None:
     for height in (ADULT, ADULT / 2):
         scale = height / ADULT
-        alone = People(np.zeros((1, 2)), np.zeros((1, 2)), np.array([height]), np.zeros((1, 2)), np.array([[1.0, 0.0]]))
+        rest = np.zeros((1, 2))
+        alone = People(rest, rest, np.array([0.13 * height]), np.array([height]), rest, np.array([[1.0, 0.0]]))
         felt = acceleration(alone, np.array([[[0.0, 0.4 * scale]]]), np.zeros((1, 1), bool), MODEL)[0]
         np.testing.assert_allclose(felt, [0.0, scale * 50.0 * math.exp(-2.0)])
 

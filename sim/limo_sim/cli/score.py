@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from limo_sim.run.suite import Suite
     from limo_sim.run.sweep import Run
 
+#: Those of `limo_sim.run.baselines`, which is not imported before it is needed.
+_BASELINES = ("pursuit", "ppo")
 #: Simulated time of a run that is not of a suite [s].
 _SECONDS = 60.0
 
@@ -42,6 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--controller",
         nargs="+",
+        type=_controller,
         metavar="NAME",
         default=CONTROLLERS,
         help="only these, of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)",
@@ -62,6 +65,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help="draw the comparison"
     )
+
+
+def _controller(text: str) -> str:
+    if text not in CONTROLLERS and text not in _BASELINES and not text.startswith("policy:"):
+        known = ", ".join((*CONTROLLERS, *_BASELINES))
+        raise argparse.ArgumentTypeError(f"{text!r} is no controller; wanted is one of {known}, policy:FILE.npz")
+    return text
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,6 +1,6 @@
 """Learn to follow a person from where the person was last seen: PPO on `LimoFollow-v1`, without images.
 
-    pip install 'limo-hog[sim,cv,plot]' stable-baselines3
+    pip install 'limo-hog[sim,cv]' stable-baselines3
     python examples/train_ppo.py --out mine.npz
     limo-hog score --scenario followable --controller policy:mine.npz approach --against approach
 
@@ -35,7 +35,7 @@ def main() -> None:
     """Train, and write the policy."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("ppo.npz"), help="where the weights go (ppo.npz)")
-    parser.add_argument("--steps", type=int, default=600_000, help="actions to learn from (600000)")
+    parser.add_argument("--steps", type=int, default=300_000, help="actions to learn from (300000)")
     parser.add_argument("--seed", type=int, default=0, help="of everything random (0)")
     args = parser.parse_args()
     # The networks are small: more threads would wait for each other.
@@ -64,7 +64,8 @@ def main() -> None:
         arrays[f"b{index}"] = layer.bias.detach().numpy().astype(np.float32)
     with whole_file(args.out) as part:
         np.savez(part, **arrays)
-    print(f"{args.out}: learnt from {model.num_timesteps} actions in {time.monotonic() - began:.0f} s")
+    took = f"{time.monotonic() - began:.0f} s, {time.process_time():.0f} s of CPU time"
+    print(f"{args.out}: learnt from {model.num_timesteps} actions in {took}")
 
 
 if __name__ == "__main__":

@@ -8,12 +8,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import output_file
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
-from limo_sim.cli.options import add_scenario
+from limo_sim.cli.options import add_json, add_scenario
 from limo_sim.cli.watching import add_watching, watching
 
 if TYPE_CHECKING:
@@ -35,9 +34,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("node", metavar="NODE.py", type=Path, help="the script, or a launch file FILE.launch.py")
     parser.add_argument("words", metavar="NAME:=VALUE", nargs="*", help="arguments of a launch file")
     add_scenario(parser, 60.0, "simulated time (60)")
-    parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write the score card as JSON; - is standard output"
-    )
+    add_json(parser)
     parser.add_argument("--real", action="store_true", help="with this computer's own rclpy: in real time, no score")
     add_watching(parser)
     parser.add_argument(

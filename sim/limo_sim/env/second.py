@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from limo_hog.extras import needed
 from limo_hog.follow.twist import Twist
 from limo_sim.env.first import ACTIONS_PER_SECOND
 from limo_sim.env.glimpse import Glimpse, glimpse, hiding
@@ -25,6 +25,9 @@ from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.schema import ScenarioError
 from limo_sim.world.variants import made_up
+
+with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
 
 #: What an observation may be.
 KINDS = ("camera", "gray", "state")

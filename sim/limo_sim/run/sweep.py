@@ -10,8 +10,8 @@ from multiprocessing import get_context
 from statistics import NormalDist, fmean, stdev
 
 import limo_hog
-from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.run.baselines import controller_of
 from limo_sim.run.catalogue import load
 from limo_sim.run.episode import run_episode
 from limo_sim.run.score import ScoreCard, score
@@ -96,7 +96,7 @@ def play(run: Run) -> ScoreCard:
 
     limo_hog.set_num_threads(1)
     cv2.setNumThreads(1)
-    controller = controller_named(run.controller, run.target)
+    controller = controller_of(run.controller, run.target)
     names = (run.controller, run.detector)
     scenario, detector = load(run.scenario), detector_named(run.detector)
     return score(run_episode(scenario, controller, detector, run.seconds, run.seed, names=names))

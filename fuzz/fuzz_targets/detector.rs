@@ -137,7 +137,8 @@ fuzz_target!(|case: Case| {
     for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
         let hog = Hog::with_backend(&params, Some(&coefficients), backend).expect("the geometry fits");
         let hits = hog.detect(image, &search, None, &Interrupt::NEVER).expect("it fits the memory");
-        assert_eq!(hits.iter().map(|hit| (hit.x, hit.y)).collect::<Vec<_>>(), wanted, "{}", backend.name());
+        let found: Vec<(i64, i64)> = hits.iter().map(|hit| (hit.x, hit.y)).collect();
+        assert_eq!(found, wanted, "{}: {params:?}, {search:?}, {:?}, scores {scores:?}", backend.name(), image.size());
         let found = hog.detect_multi_scale(image, &search, scale, grouping, 1, &Interrupt::NEVER);
         let rects: Vec<_> = found.expect("it fits the memory").into_iter().map(|(rect, _)| rect).collect();
         assert_eq!(*first.get_or_insert_with(|| rects.clone()), rects, "{}", backend.name());

@@ -288,6 +288,16 @@ fn a_detector_with_a_weight_that_is_no_number_has_no_hits() {
 }
 
 #[test]
+fn a_gaussian_too_narrow_or_too_wide_for_single_precision_is_scored_alike() {
+    for sigma in [1e-38, 1e-22, 2e-20, 1e-10, 1e-3, 1e18, 1e30] {
+        let mut detector = Detector::people();
+        detector.params.win_sigma = sigma;
+        let search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (0, 0) };
+        compare(&detector, (80, 144), 1, search, 5);
+    }
+}
+
+#[test]
 fn a_threshold_that_is_no_number_has_no_hits_and_minus_infinity_has_all() {
     let picture = Picture::new(80, 136, 1, 3);
     for backend in available() {

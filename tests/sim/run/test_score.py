@@ -254,6 +254,29 @@ def test_the_pixel_error_reached_in_95_of_100_frames() -> None:
     assert result.pixel_error_p95 == 95.0
 
 
+def test_the_pixel_error_is_of_the_frames_with_the_subject_in_view() -> None:
+    behind = step(1, person(visible=0.4, box=(0, 100, 60, 120)))
+    result = card(step(0, person(box=(300, 100, 60, 120))), behind, step(2, person(box=(250, 100, 60, 120))))
+    assert result.pixel_error_mean == 25.0
+
+
+def test_the_shares_of_modes_and_reasons_add_up_to_one_however_short_the_log() -> None:
+    for count in (1, 2, 5):
+        result = card(*(step(k, person()) for k in range(count)))
+        assert sum(result.modes.values()) == sum(result.reasons.values()) == 1.0
+        assert result.modes["follow"] == result.reasons["because"] == 1.0
+
+
+@pytest.mark.parametrize(("searched", "found_again"), [(3.0, 1.0), (3.25, 0.0)])
+def test_a_search_of_up_to_three_seconds_counts_as_found_again(searched: float, found_again: float) -> None:
+    # Times whose sums are exact.
+    times = [0.0, *np.arange(0.25, searched, 0.25), searched]
+    steps = [replace(step(0, person(), boxes=[ON], target=0), time=time) for time in times]
+    empty = [replace(one, decision=replace(one.decision, target=None)) for one in steps[1:-1]]
+    result = card(steps[0], *empty, steps[-1])
+    assert (result.lost, result.found_again) == (1, found_again)
+
+
 def test_the_longest_gap_is_between_two_detections_of_the_subject() -> None:
     seen = {0, 1, 5, 7}
     steps = [step(k, person(), boxes=[ON] if k in seen else [OFF], target=0 if k in seen else None) for k in range(9)]

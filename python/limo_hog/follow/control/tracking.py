@@ -9,7 +9,7 @@ from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.search import Search
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.control.steer import Aim, Steering
-from limo_hog.follow.decision import Belief, Decision, Mode
+from limo_hog.follow.decision import Belief, Believed, Decision, Mode
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import scan_points
@@ -94,7 +94,7 @@ class TrackingController:
         state = replace(state, tracks=tracks, choice=choice)
         person = tracks.person(choice.number)
         if person is None:
-            return self._search(state)
+            return self._search(state, observation)
         unseen_s = observation.stamp - person.seen
         person, tracks = self.tracker.follow_legs(person, tracks)
         state = replace(state, tracks=tracks)
@@ -105,7 +105,7 @@ class TrackingController:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
             state = replace(state, side=self.steering.side_of(aim))
         if lost_s > (self.tracker.forget_s if aim.hidden else self.search.after_s):
-            return self._search(state)
+            return self._search(state, observation)
         twist, mode, reason = self.steering.command(
             aim,
             keeps,
@@ -125,15 +125,15 @@ class TrackingController:
             since_full=0 if region is None else state.since_full + 1,
             detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
         )
-        belief = Belief(keeps, self._believed(state, observation))
+        belief = Belief(keeps, self._believed(state, observation), followed=person.number)
         return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief)
 
-    def _search(self, state: TrackingState) -> Decision[TrackingState]:
+    def _search(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
         tracks, choice, appearance = state.tracks, state.choice, self.tracker.association.appearance
         other = any(self.selection.is_stranger(one, tracks, choice, appearance) for one in tracks.in_view)
         lost = choice.measured is not None
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
-        return Decision(twist, state, mode, reason)
+        return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
 
     def _aim(self, person: Person, keeps: float, state: TrackingState, observation: Observation) -> Aim:
         """Return where the person is at the newest stamp, and which way leads there."""
@@ -156,14 +156,27 @@ class TrackingController:
         least = self.tracker.visibility.least_distance(person.window, person.centre, observation.height)
         return max(self.target_distance, least - self.robot.camera_x)
 
-    def _believed(self, state: TrackingState, observation: Observation) -> tuple[tuple[float, float, float], ...]:
-        """Return everyone tracked in the base frame, with the probability of being a person."""
-        pose = pose_at(state.tracks.poses, observation.now)
-        places = []
+    def _believed(self, state: TrackingState, observation: Observation) -> tuple[Believed, ...]:
+        """Return everyone tracked, in the base frame, as of the newest stamp."""
+        now, boxes = observation.now, dict(state.tracks.boxes)
+        pose = pose_at(state.tracks.poses, now)
+        people = []
         for one in state.tracks.people:
-            bearing, distance = bearing_range(one.track, pose)
-            places.append((distance * math.cos(bearing), distance * math.sin(bearing), one.existence))
-        return tuple(places)
+            track = predict(one.track, now, self.tracker.noise)
+            bearing, distance = bearing_range(track, pose)
+            speed, heading = math.hypot(*track.mean[2:]), math.atan2(track.mean[3], track.mean[2]) - pose.yaw
+            people.append(
+                Believed(
+                    distance * math.cos(bearing),
+                    distance * math.sin(bearing),
+                    one.existence,
+                    one.number,
+                    speed * math.cos(heading),
+                    speed * math.sin(heading),
+                    boxes.get(one.number),
+                )
+            )
+        return tuple(people)
 
     def _is_worth_nearing(self, person: Person, aim: Aim) -> bool:
         """Whether a track is too far away for HOG to confirm it, and likely enough to be one to drive there."""

@@ -14,7 +14,7 @@ from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.ros2.mcap_reading import check_type, mcap_messages
-from limo_hog.ros2.messages import default_message, serialize, to_time, typestore
+from limo_hog.ros2.messages import serialize, typestore
 from limo_hog.ros2.names import DETECTIONS_TYPE
 
 with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
@@ -32,23 +32,6 @@ class Record(NamedTuple):
     topic: str
     time: float
     message: Any
-
-
-def detections_message(stamp: float, found: Detections, frame: str) -> Any:
-    """Return boxes as vision_msgs/Detection2DArray: centre and size [px], score as the SVM gave it."""
-    array = default_message(DETECTIONS_TYPE)
-    array.header.stamp, array.header.frame_id = to_time(stamp), frame
-    for box, score in found:
-        one = default_message("vision_msgs/msg/Detection2D")
-        result = default_message("vision_msgs/msg/ObjectHypothesisWithPose")
-        result.hypothesis.class_id, result.hypothesis.score = "person", score
-        x, y, w, h = (float(value) for value in box)
-        one.header = array.header
-        one.results = [result]
-        one.bbox.center.position.x, one.bbox.center.position.y = x + w / 2, y + h / 2
-        one.bbox.size_x, one.bbox.size_y = w, h
-        array.detections.append(one)
-    return array
 
 
 def to_detections(message: Any) -> Detections:

@@ -35,8 +35,17 @@ TYPES = {
     TF_STATIC: "tf2_msgs/msg/TFMessage",
 }
 
+PERSON = "/followed_person"
+DETECTIONS = "/detections"
+PEOPLE = "/people"
+DETECTIONS_TYPE = "vision_msgs/msg/Detection2DArray"
+
+#: What the follower finds, beside its commands.
+FINDINGS = {
+    PERSON: "geometry_msgs/msg/PoseStamped",
+    DETECTIONS: DETECTIONS_TYPE,
+    PEOPLE: "people_msgs/msg/People",
+}
+
 #: What else drives a robot by `COMMAND`: from ROS 2 Jazzy on many expect a stamp.
 STAMPED_COMMAND_TYPE = "geometry_msgs/msg/TwistStamped"
-
-#: Boxes, in recordings alone.
-DETECTIONS_TYPE = "vision_msgs/msg/Detection2DArray"

@@ -15,9 +15,10 @@ from limo_sim.run.episode import FrameRecord, Moment, Step
 from limo_sim.world.scenario import Scenario
 
 if TYPE_CHECKING:
-    from limo_hog.ros2.dds import Bus
+    from limo_hog.ros2.dds import Bus, Subscription
     from limo_sim.ros.outlet import Outlet
 
+_STAMPED = names.STAMPED_COMMAND_TYPE
 #: After a delay the arena runs faster until this much is made up for [s]; more is dropped. Chosen: two camera frames.
 _CATCH_UP = 0.2
 
@@ -51,7 +52,7 @@ def run_live(
     arena = Arena(scenario, seed)
     outlet: Outlet | None = None
     writers = {}
-    commands = None
+    commands: list[Subscription] = []
     if bus is not None:
         # An arena that is only watched needs neither DDS nor messages.
         from limo_hog.ros2.messages import to_twist
@@ -60,12 +61,12 @@ def run_live(
         outlet = Outlet(arena)
         spoken = [topic for topic in names.TYPES if topic not in (names.COMMAND, names.ANNOTATED)]
         writers = {topic: bus.publisher(topic, names.TYPES[topic], kept=topic == names.TF_STATIC) for topic in spoken}
-        commands = bus.subscription(names.COMMAND, names.TYPES[names.COMMAND])
+        commands = [bus.subscription(names.COMMAND, kind) for kind in (names.TYPES[names.COMMAND], _STAMPED)]
     twist, shown = Twist(), -1.0
     began = time.monotonic()
     while arena.time < seconds:
-        for message in commands.take() if commands is not None else ():
-            twist = to_twist(message)
+        for message in [message for reader in commands for message in reader.take()]:
+            twist = to_twist(message.twist if message.__msgtype__ == _STAMPED else message)
             arena.command(twist)
         for topic, make in outlet.new() if outlet is not None else ():
             writer = writers.get(topic)

@@ -12,7 +12,7 @@ from limo_hog.follow.control.lookout import Hunt, Lookout
 from limo_hog.follow.control.search import Search
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.control.steer import Aim, Steering
-from limo_hog.follow.decision import Belief, Decision, Mode
+from limo_hog.follow.decision import Belief, Believed, Decision, Mode
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, Points, scan_points, to_odometry
@@ -158,7 +158,7 @@ class TrackingController:
             since_full=0 if region is None else state.since_full + 1,
             detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
         )
-        belief = Belief(keeps, self._believed(state, observation))
+        belief = Belief(keeps, self._believed(state, observation), followed=person.number)
         return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief)
 
     def _map(self, state: TrackingState, observation: Observation) -> TrackingState:
@@ -185,7 +185,7 @@ class TrackingController:
             if now - state.known.stamp < self.lookout.give_up_s:
                 return self._look_round(state, state.known, state.ground, observation.scan, now)
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
-        return Decision(twist, state, mode, reason)
+        return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
 
     def _look_round(
         self, state: TrackingState, known: Track, ground: Ground, scan: Scan, now: float
@@ -228,14 +228,27 @@ class TrackingController:
                 return self.near_hiding
         return keeps
 
-    def _believed(self, state: TrackingState, observation: Observation) -> tuple[tuple[float, float, float], ...]:
-        """Return everyone tracked in the base frame, with the probability of being a person."""
-        pose = pose_at(state.tracks.poses, observation.now)
-        places = []
+    def _believed(self, state: TrackingState, observation: Observation) -> tuple[Believed, ...]:
+        """Return everyone tracked, in the base frame, as of the newest stamp."""
+        now, boxes = observation.now, dict(state.tracks.boxes)
+        pose = pose_at(state.tracks.poses, now)
+        people = []
         for one in state.tracks.people:
-            bearing, distance = bearing_range(one.track, pose)
-            places.append((distance * math.cos(bearing), distance * math.sin(bearing), one.existence))
-        return tuple(places)
+            track = predict(one.track, now, self.tracker.noise)
+            bearing, distance = bearing_range(track, pose)
+            speed, heading = math.hypot(*track.mean[2:]), math.atan2(track.mean[3], track.mean[2]) - pose.yaw
+            people.append(
+                Believed(
+                    distance * math.cos(bearing),
+                    distance * math.sin(bearing),
+                    one.existence,
+                    one.number,
+                    speed * math.cos(heading),
+                    speed * math.sin(heading),
+                    boxes.get(one.number),
+                )
+            )
+        return tuple(people)
 
     def _along(self, way: Points, obstacles: Points, pose: Odometry) -> float | None:
         """Return the direction along a way [rad]; None where none is free."""

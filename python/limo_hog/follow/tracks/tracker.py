@@ -29,6 +29,8 @@ class Tracks:
     ----------
     people
         Everyone tracked.
+    boxes
+        Number and index of the box of each person found in the last frame.
     next_number
         Number of the next new person.
     poses, scans
@@ -40,6 +42,7 @@ class Tracks:
     """
 
     people: tuple[Person, ...] = ()
+    boxes: tuple[tuple[int, int], ...] = ()
     next_number: int = 1
     poses: tuple[Odometry, ...] = ()
     scans: tuple[Returns, ...] = ()
@@ -138,7 +141,8 @@ class Tracker:
                 people.append(initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds))
                 boxes[number] = which
                 number += 1
-        return replace(tracks, people=tuple(people), next_number=number, recall=recall), boxes
+        found = tuple(boxes.items())
+        return replace(tracks, people=tuple(people), next_number=number, recall=recall, boxes=found), boxes
 
     def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
         """Update a person by their box; the track is at the box's stamp.

@@ -155,7 +155,7 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
         assert!(counts.iter().zip([50, 3, 3]).all(|(count, least)| *count >= least), "too few: {counts:?}");
         for backend in available() {
             let hog = hog(&detector, backend);
-            for threads in [1, 2, 5] {
+            for threads in [1, 2, 5, 64] {
                 let detect = |grouping| {
                     hog.detect_multi_scale(image, &search, &PYRAMID, grouping, threads, &Interrupt::NEVER)
                         .unwrap()

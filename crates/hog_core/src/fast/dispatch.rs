@@ -8,12 +8,12 @@ use crate::params::HogSpec;
 use crate::pyramid::Grid;
 
 use super::backend::Backend;
+use super::lane::Lane;
 #[cfg(target_arch = "aarch64")]
 use super::lane::neon::Neon;
 use super::lane::portable::Portable;
 #[cfg(target_arch = "x86_64")]
-use super::lane::{Kernel, Lane, avx2::Avx2, avx512::Avx512};
-use super::level::{Scratch, Task, level};
+use super::lane::{Kernel, avx2::Avx2, avx512::Avx512};
 use super::plan::Plan;
 use super::rows::Planes;
 
@@ -58,27 +58,26 @@ pub(crate) fn serves(grid: &Grid) -> bool {
     grid.stride.width.is_multiple_of(4) && grid.stride.height.is_multiple_of(4)
 }
 
-/// Puts into `scratch.found` every window whose exact score may be at least the task's threshold, row by row: x, y in
-/// padded pixels.
-pub(crate) fn detect(backend: Backend, task: Task, scratch: &mut Scratch) -> Result<()> {
-    scratch.found.clear();
-    if task.grid.is_empty() {
-        return Ok(());
-    }
+/// Work that is the same on every instruction set but for the lane that it hands to the kernels.
+pub(super) trait OnLane {
+    type Output;
+    fn run<L: Lane>(self, l: L) -> Self::Output;
+}
+
+/// Runs `work` with the lane of `backend`.
+pub(super) fn on_lane<W: OnLane>(backend: Backend, work: W) -> W::Output {
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => level(unsafe { Avx512::new() }, task, scratch)?,
+        Backend::Avx512 => work.run(unsafe { Avx512::new() }),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => level(unsafe { Avx2::new() }, task, scratch)?,
+        Backend::Avx2 => work.run(unsafe { Avx2::new() }),
         #[cfg(target_arch = "aarch64")]
         // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
-        Backend::Neon => level(unsafe { Neon::new() }, task, scratch)?,
-        _ => level(Portable, task, scratch)?,
+        Backend::Neon => work.run(unsafe { Neon::new() }),
+        _ => work.run(Portable),
     }
-    scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
-    Ok(())
 }
 
 /// Fills `planes` with the pixels of `image`.
@@ -88,7 +87,7 @@ pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageVie
         // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2.
         Backend::Avx512 | Backend::Avx2 => planes.fill(unsafe { Avx2::new() }, image),
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: as in `detect`.
+        // SAFETY: as in `on_lane`.
         Backend::Neon => planes.fill(unsafe { Neon::new() }, image),
         _ => planes.fill(Portable, image),
     }
@@ -100,19 +99,13 @@ pub(crate) fn resize_planes(
     source: &Planes,
     resized: &mut Planes,
     size: Size,
-    scratch: &mut Scratch,
 ) -> Result<()> {
-    let band = &mut scratch.band;
-    match backend {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => resized.resize(unsafe { Avx512::new() }, source, size, band),
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Backend::Avx2 => resized.resize(unsafe { Avx2::new() }, source, size, band),
-        #[cfg(target_arch = "aarch64")]
-        // SAFETY: as in `detect`.
-        Backend::Neon => resized.resize(unsafe { Neon::new() }, source, size, band),
-        _ => resized.resize(Portable, source, size, band),
+    struct Resize<'a>(&'a Planes, &'a mut Planes, Size);
+    impl OnLane for Resize<'_> {
+        type Output = Result<()>;
+        fn run<L: Lane>(self, l: L) -> Result<()> {
+            self.1.resize(l, self.0, self.2)
+        }
     }
+    on_lane(backend, Resize(source, resized, size))
 }

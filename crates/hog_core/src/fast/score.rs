@@ -13,16 +13,32 @@ use super::plan::Plan;
 /// Rows of windows that the prefilter scores at a time.
 const ROWS: usize = 8;
 
-/// The windows of a level's lattice and the blocks they are made of.
+/// The windows of a band and the blocks they are made of.
 pub(super) struct WindowGrid<'a> {
     pub plan: &'a Plan,
-    pub blocks: *const f32,
-    pub bytes: *const u32,
+    /// Of the first rows of blocks, and of those after them.
+    pub blocks: [*const f32; 2],
+    pub bytes: [*const u32; 2],
+    /// How many rows the first ones are.
+    pub rows: usize,
     /// Lanes of a row of blocks.
     pub lanes: usize,
     /// Windows along x and y.
     pub width: usize,
     pub height: usize,
+}
+
+impl WindowGrid<'_> {
+    /// Row `y` of one of `blocks` and `bytes`, whose rows have `elements` of each lane.
+    ///
+    /// # Safety
+    /// There is such a row.
+    #[inline(always)]
+    unsafe fn row<T>(&self, parts: [*const T; 2], y: usize, elements: usize) -> *const T {
+        let (part, y) = if y < self.rows { (parts[0], y) } else { (parts[1], y - self.rows) };
+        // SAFETY: the caller's promise.
+        unsafe { part.add(y * elements * self.lanes) }
+    }
 }
 
 /// Adds (x, y, score) to `found` for every window whose exact score may be at least `threshold`, row by row, and for
@@ -129,7 +145,7 @@ unsafe fn score_window<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) 
     let mut score = plan.bias;
     for (block_y, weights) in plan.weights.chunks_exact(BLOCK * padded).enumerate() {
         // SAFETY: promised by the caller of `score`; lanes beyond the window's have the weight 0.
-        let blocks = unsafe { windows.blocks.add((y + block_y) * BLOCK * windows.lanes + x) };
+        let blocks = unsafe { windows.row(windows.blocks, y + block_y, BLOCK).add(x) };
         for part in (0..plan.blocks.width).step_by(L::LANES) {
             let mut sums = [l.splat(0.0); 4];
             for (i, weights) in weights.chunks_exact(padded).enumerate() {
@@ -170,7 +186,7 @@ unsafe fn prefilter<L: Lane, const V: usize>(
         // Row y of blocks takes part in window rows from..to, as their block row y - window row.
         let (from, to) = ((y + 1).saturating_sub(height), (y + 1).min(rows));
         // SAFETY: promised by the caller of `score`.
-        let bytes = unsafe { windows.bytes.add((top + y) * WORDS * windows.lanes + group * L::LANES) };
+        let bytes = unsafe { windows.row(windows.bytes, top + y, WORDS).add(group * L::LANES) };
         macro_rules! step {
             ($($from:literal $to:literal),*) => {
                 match (from, to) {

@@ -24,8 +24,12 @@ pub(super) struct Job<'a> {
     pub origin: [*const u8; 3],
     /// Bytes from one row of pixels to the next.
     pub stride: usize,
-    /// Rows of cells to be added to the blocks; those above them have been.
+    /// Rows of cells to be added to the blocks.
     pub cells: Range<usize>,
+    /// The row of blocks that `blocks` begins with.
+    pub top: usize,
+    /// Whether the row of cells above them has been added.
+    pub carried: bool,
     /// Sums of the cells above, for the blocks that begin there: [`CARRY`] numbers for each lane.
     pub carry: *mut f32,
     /// Room for one strip: [`ROOM`] numbers for each of its lanes.
@@ -99,7 +103,7 @@ unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, f
     let Room { rows, gradients, sums } = unsafe { &mut *job.room.cast::<Room<L, CHANNELS>>() };
     // SAFETY: aligned room for the strip's lanes is the caller's promise; any bits are numbers.
     let carry = unsafe { &mut *job.carry.add(CARRY * first).cast::<[[[L::F; 2]; BINS]; CELL]>() };
-    if job.cells.start == 0 {
+    if !job.carried {
         *carry = [[[zero; 2]; BINS]; CELL];
     }
     let mut votes = [vote(l, [zero; 2]); CELL];
@@ -134,9 +138,9 @@ unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, f
         if CHANNELS == 1 {
             rows.copy_within(CELL.., 0);
         }
-        if cell_y > 0 {
+        if job.carried || i > 0 {
             // SAFETY: the strip's lanes of this row of blocks are the caller's promise.
-            unsafe { finish(l, job, sums, cell_y - 1, first) };
+            unsafe { finish(l, job, sums, cell_y - 1 - job.top, first) };
         }
     }
 }

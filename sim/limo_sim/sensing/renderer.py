@@ -304,16 +304,13 @@ def _model(piece: Furniture) -> tuple[list[Frustum | Box], U32, tuple[float, flo
     """Solids of a piece where it stands, their colours, and the radius and height of all of it [m]."""
     cos, sin = math.cos(piece.yaw), math.sin(piece.yaw)
     solids: list[Frustum | Box] = []
-    radius = 0.0
     for solid in KINDS[piece.kind].solids:
         x, y = piece.x + cos * solid.x - sin * solid.y, piece.y + sin * solid.x + cos * solid.y
-        reach = math.hypot(solid.half_x, solid.half_y) if isinstance(solid, Box) else max(solid.r0, solid.r1)
-        radius = max(radius, math.hypot(solid.x, solid.y) + reach)
         if isinstance(solid, Box):
             solids.append(dataclasses.replace(solid, x=x, y=y, yaw=solid.yaw + piece.yaw))
         else:
             solids.append(dataclasses.replace(solid, x=x, y=y))
-    return solids, _palette([solid.colour for solid in solids]), (radius, max(solid.z1 for solid in solids))
+    return solids, _palette([solid.colour for solid in solids]), KINDS[piece.kind].extent
 
 
 def _bytes(pixels: U32) -> U8:

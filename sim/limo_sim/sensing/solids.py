@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -291,7 +292,7 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
     for at in canvas.bands(*bounds):
         right, down = (canvas.xs[at[1]] - CENTRE_X) / FOCAL_PX, (canvas.ys[at[0]] - CENTRE_Y) / FOCAL_PX
         # a cylinder's rays differ by column only: `lift` is then a number, and most of this one row
-        lift = taper * down if taper else 0.0
+        lift: Any = taper * down if taper else 0.0
         a = right * right + (1.0 - lift * lift)
         b = right * x0 + (z0 - level * lift)
         with np.errstate(invalid="ignore"):
@@ -304,9 +305,9 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
             below_top, above_foot = FOCAL_PX * down + 0.5, 0.5 - FOCAL_PX * down
             cover = np.minimum(cover, (solid.z1 - MOUNT_HEIGHT) * pixels + below_top)
             np.minimum(cover, (MOUNT_HEIGHT - solid.z0) * pixels + above_foot, out=cover)
+            tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)
             depth = np.where((cover > 0) & (depth > NEAR), depth, np.float32(np.nan))
-        tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)
-        canvas.put(at, depth, cover, tone)
+        canvas.put(at, depth, cover, tone if tone.ndim > 1 else tone[None])
 
 
 def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int) -> None:

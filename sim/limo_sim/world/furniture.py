@@ -68,6 +68,16 @@ class Piece:
     footprint: Disc | Rectangle
     scanned: tuple[Disc | Rectangle, ...]
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Radius and height of the upright cylinder about the piece's middle that holds its solids [m]."""
+        reaches = (
+            math.hypot(solid.x, solid.y)
+            + (math.hypot(solid.half_x, solid.half_y) if isinstance(solid, Box) else max(solid.r0, solid.r1))
+            for solid in self.solids
+        )
+        return max(reaches), max(solid.z1 for solid in self.solids)
+
 
 _STONE: Colour = (176, 172, 164)
 _WOOD: Colour = (150, 108, 72)

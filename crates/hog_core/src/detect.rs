@@ -9,7 +9,7 @@ use crate::image::ImageView;
 use crate::interrupt::Interrupt;
 use crate::memory::{self, Pool};
 use crate::params::{HogParams, HogSpec};
-use crate::pyramid::{Level, Steps, levels, to_image};
+use crate::pyramid::{Level, Pyramid, Steps, check, levels, to_image};
 use crate::rescore::{Fast, Hit, SCRATCH, Scorer};
 use crate::threads::in_order;
 
@@ -158,7 +158,7 @@ impl Hog {
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
             let find = |scorer: &Scorer| scorer.hits(image.size(), &grid, interrupt);
-            return self.with_scorer(image, svm, search, false, find);
+            return self.with_scorer(image, image.size(), svm, search, false, find);
         };
         let inside = memory::collect(locations.iter().filter_map(|&at| grid.to_padded(at, &self.spec)))?;
         let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables, interrupt)?;
@@ -173,7 +173,7 @@ impl Hog {
         Ok(hits)
     }
 
-    /// Rectangles of all hits of the pyramid whose levels shrink by `scale`, grouped and clipped to the image.
+    /// Rectangles of all hits of the pyramid, grouped and clipped to its first level, in whose pixels they are.
     ///
     /// Levels are shared among `threads` threads; hits are in level order, whatever their number. The stride (0, 0)
     /// is the block stride.
@@ -181,14 +181,16 @@ impl Hog {
         &self,
         image: ImageView,
         search: &Search,
-        scale: f64,
+        pyramid: &Pyramid,
         grouping: Grouping,
         threads: usize,
         interrupt: &Interrupt,
     ) -> Result<Vec<(Rect, f64)>> {
         let steps = self.steps(search, self.spec.stride)?;
         let Some(svm) = &self.svm else { return Ok(Vec::new()) };
-        let levels = levels(image.size(), scale, &self.spec, interrupt)?;
+        let first = pyramid.first.unwrap_or(image.size());
+        check(first)?;
+        let levels = levels(first, pyramid.scale, &self.spec, interrupt)?;
         // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
         let exact_weights = matches!(grouping, Grouping::MeanShift(_));
         let search_levels = |scorer: &Scorer| -> Result<Vec<Candidate>> {
@@ -202,7 +204,7 @@ impl Hog {
             }
             Ok(candidates)
         };
-        let candidates = self.with_scorer(image, svm, search, exact_weights, search_levels)?;
+        let candidates = self.with_scorer(image, first, svm, search, exact_weights, search_levels)?;
         let win = self.spec.win;
         let found = match grouping {
             Grouping::Similar(threshold) => group_candidates(&candidates, threshold, interrupt)?,
@@ -210,17 +212,18 @@ impl Hog {
                 mean_shift(&candidates, threshold, (win.width as i32, win.height as i32), interrupt)?
             }
         };
-        Ok(clip(found, image.width() as i32, image.height() as i32))
+        Ok(clip(found, first.width as i32, first.height as i32))
     }
 
     fn steps(&self, search: &Search, default_stride: Size) -> Result<Steps> {
         Steps::new(search.win_stride, search.padding, default_stride, &self.spec)
     }
 
-    /// Runs `work` with a scorer of the image: by the fast path, where the geometry has one.
+    /// Runs `work` with a scorer of the image at the size `first`: by the fast path, where the geometry has one.
     fn with_scorer<R>(
         &self,
         image: ImageView,
+        first: Size,
         svm: &Svm,
         search: &Search,
         exact_weights: bool,
@@ -228,13 +231,25 @@ impl Hog {
     ) -> Result<R> {
         let Self { spec, tables, plan, backend, .. } = self;
         let hit_threshold = search.hit_threshold;
-        let exact = Scorer { image, spec, tables, svm, hit_threshold, fast: None };
+        let exact = Scorer { image, first, spec, tables, svm, hit_threshold, fast: None };
         let Some(plan) = plan else { return work(&exact) };
         let error = plan.score_error_bound();
         let rescore_margin = if exact_weights || error > SCORE_ERROR_MAX { f64::INFINITY } else { error };
         let found = PLANES.with(|planes| {
+            let search = |planes: &Planes| {
+                work(&Scorer {
+                    fast: Some(Fast { backend: *backend, plan, planes, rescore_margin }),
+                    ..exact
+                })
+            };
             fast::fill_planes(*backend, planes, image)?;
-            work(&Scorer { fast: Some(Fast { backend: *backend, plan, planes, rescore_margin }), ..exact })
+            if first == image.size() {
+                return search(planes);
+            }
+            PLANES.with(|resized| {
+                SCRATCH.with(|scratch| fast::resize_planes(*backend, planes, resized, first, scratch))?;
+                search(resized)
+            })
         });
         // Not after each level: the levels of a large image use large workspaces again.
         PLANES.trim();

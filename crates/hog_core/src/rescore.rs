@@ -48,6 +48,8 @@ type Found = (usize, usize, f64);
 #[derive(Clone, Copy)]
 pub(crate) struct Scorer<'a> {
     pub image: ImageView<'a>,
+    /// Size of the first level, of which the others are made.
+    pub first: Size,
     pub spec: &'a HogSpec,
     pub tables: &'a Tables,
     pub svm: &'a Svm,
@@ -57,7 +59,7 @@ pub(crate) struct Scorer<'a> {
 }
 
 impl Scorer<'_> {
-    /// The hits among all windows of the image shrunk to `size`, row by row.
+    /// The hits among all windows of the level of `size` pixels, row by row.
     pub(crate) fn hits(&self, size: Size, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Hit>> {
         match &self.fast {
             Some(fast) if fast::serves(grid) => self.fast_hits(fast, size, grid, interrupt),
@@ -67,7 +69,7 @@ impl Scorer<'_> {
 
     /// The hits by the exact path alone.
     fn exact_hits(&self, size: Size, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Hit>> {
-        let level = LevelImage::new(self.image, size)?;
+        let level = LevelImage::new(self.image, self.first, size)?;
         let scores = exact::scores(level.view()?, grid, self.spec, self.tables, self.svm, interrupt)?;
         let place = |index: usize| {
             let (column, row) = (index % grid.windows.width, index / grid.windows.width);
@@ -105,7 +107,7 @@ impl Scorer<'_> {
         if close == 0 {
             return Ok(());
         }
-        let level = LevelImage::new(self.image, size)?;
+        let level = LevelImage::new(self.image, self.first, size)?;
         let level = level.view()?;
         let Self { spec, tables, svm, .. } = self;
         // Neighbouring windows share pixels and blocks: scoring all at once is cheaper than scoring many one by one.
@@ -131,9 +133,16 @@ struct LevelImage<'a> {
 }
 
 impl<'a> LevelImage<'a> {
-    fn new(image: ImageView<'a>, size: Size) -> Result<Self> {
-        let pixels = if size == image.size() { None } else { Some((size, resize(image, size)?)) };
-        Ok(Self { image, pixels })
+    /// The image resized to `first`, and that to `size`.
+    fn new(image: ImageView<'a>, first: Size, size: Size) -> Result<Self> {
+        let mut level = Self { image, pixels: None };
+        for size in [first, size] {
+            let view = level.view()?;
+            if size != view.size() {
+                level.pixels = Some((size, resize(view, size)?));
+            }
+        }
+        Ok(level)
     }
 
     fn view(&self) -> Result<ImageView<'_>> {

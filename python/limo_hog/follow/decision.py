@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
 
@@ -29,6 +29,29 @@ class Mode(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class Belief:
+    """What a controller takes to be true, for those who watch; nothing is decided by it.
+
+    Attributes
+    ----------
+    keeps
+        Distance it holds now [m]; more than its target where nearer the camera would not show the whole person. None
+        for a controller that holds none, and while no person is followed.
+    people
+        Everyone tracked: x, y in the base frame [m], and the probability of being a person.
+    places
+        Where a lost person may be, each as likely: x, y in the base frame [m].
+    way
+        The way it means to drive: x, y in the base frame [m].
+    """
+
+    keeps: float | None = None
+    people: tuple[tuple[float, float, float], ...] = ()
+    places: tuple[tuple[float, float], ...] = ()
+    way: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Decision(Generic[S]):
     """A controller's answer to one observation.
 
@@ -44,6 +67,8 @@ class Decision(Generic[S]):
         Index into `observation.detections` of the person followed; None where there is none.
     region
         Where to look in the next frame; None asks for the whole image.
+    belief
+        What the controller takes to be true.
     """
 
     twist: Twist
@@ -52,6 +77,7 @@ class Decision(Generic[S]):
     reason: str
     target: int | None = None
     region: Region | None = None
+    belief: Belief = field(default_factory=Belief)
 
 
 class Controller(Protocol[S]):

@@ -110,10 +110,10 @@ def _dds_field(desc: Any) -> Any:
     return generic.array[_dds_field(item), length] if kind == Nodetype.ARRAY else generic.sequence[_dds_field(item)]
 
 
-def _qos(type_name: str, depth: int, *, reliable: bool = True) -> Qos:
+def _qos(type_name: str, depth: int, *, reliable: bool = True, kept: bool = False) -> Qos:
     return Qos(
         Policy.Reliability.Reliable(duration(milliseconds=100)) if reliable else Policy.Reliability.BestEffort,
-        Policy.Durability.Volatile,
+        Policy.Durability.TransientLocal if kept else Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
         Policy.DataRepresentation(use_cdrv0_representation=True),
         # ROS 2 Jazzy and later tell each other the type's hash in this way.
@@ -124,9 +124,9 @@ def _qos(type_name: str, depth: int, *, reliable: bool = True) -> Qos:
 class Publisher:
     """Sends messages of one topic."""
 
-    def __init__(self, participant: Any, topic: str, type_name: str, depth: int) -> None:
+    def __init__(self, participant: Any, topic: str, type_name: str, depth: int, *, kept: bool) -> None:
         self._type = dds_type(type_name)
-        qos = _qos(type_name, depth)
+        qos = _qos(type_name, depth, kept=kept)
         self._writer = DataWriter(participant, Topic(participant, _PREFIX + topic, self._type), qos=qos)
 
     @property
@@ -211,9 +211,9 @@ class Bus:
             raise BusError(f"DDS does not start in domain {self.domain}: {error}") from error
         self._wakers = WaitSet(self._participant)
 
-    def publisher(self, topic: str, type_name: str, depth: int = 10) -> Publisher:
-        """Begin to publish."""
-        return Publisher(self._participant, topic, type_name, depth)
+    def publisher(self, topic: str, type_name: str, depth: int = 10, *, kept: bool = False) -> Publisher:
+        """Begin to publish; of what is `kept` (transient local), later readers get the last `depth` messages."""
+        return Publisher(self._participant, topic, type_name, depth, kept=kept)
 
     def subscription(self, topic: str, type_name: str, depth: int = 10) -> Subscription:
         """Begin to listen; `wait` wakes up for it."""

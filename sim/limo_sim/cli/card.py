@@ -32,7 +32,7 @@ def picture(card: ScoreCard) -> Panel:
     figures.add_column(style="dim", no_wrap=True)
     figures.add_column(no_wrap=True)
     contacts = card.contacts_person + card.contacts_wall
-    error = "error to target" if card.target_m is None else f"error to {card.target_m:g} m"
+    error = "error to target" if card.kept_m is None else f"error to {card.kept_m:.3g} m"
     for row in (
         ("success", _success(card), "distance, mean", _unit(card.distance_mean_m, "m", 2)),
         ("first detected", _unit(card.first_detection_s, "s"), "distance, least", _unit(card.distance_min_m, "m", 2)),

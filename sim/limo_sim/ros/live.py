@@ -59,7 +59,7 @@ def run_live(
 
         outlet = Outlet(arena)
         spoken = [topic for topic in names.TYPES if topic not in (names.COMMAND, names.ANNOTATED)]
-        writers = {topic: bus.publisher(topic, names.TYPES[topic]) for topic in spoken}
+        writers = {topic: bus.publisher(topic, names.TYPES[topic], kept=topic == names.TF_STATIC) for topic in spoken}
         commands = bus.subscription(names.COMMAND, names.TYPES[names.COMMAND])
     twist, shown = Twist(), -1.0
     began = time.monotonic()
@@ -69,7 +69,7 @@ def run_live(
             arena.command(twist)
         for topic, make in outlet.new() if outlet is not None else ():
             writer = writers.get(topic)
-            if writer is not None and writer.has_readers:
+            if writer is not None and (writer.has_readers or topic == names.TF_STATIC):
                 writer.publish(make())
         if watch is not None and arena.frame().stamp > shown:
             shown = arena.frame().stamp

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pymunk
@@ -19,11 +20,11 @@ from limo_hog.follow.twist import Twist
 from limo_sim.sensing import imu, lidar
 from limo_sim.sensing.camera import CameraPose, Frame
 from limo_sim.sensing.delivery import Channel, Exposure
-from limo_sim.sensing.renderer import Renderer, Seen
+from limo_sim.sensing.renderer import Past, Renderer, Seen
 from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
 from limo_sim.world.movers import Movers
-from limo_sim.world.person import Pose, legs_at, trunk_radius
+from limo_sim.world.person import Pose, earlier, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
 from limo_sim.world.scenario import Furniture, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
@@ -53,6 +54,7 @@ class _State:
     odometry: Odometry
     contacts: Contacts
     people: tuple[Pose | None, ...]
+    people_before: tuple[Pose | None, ...]
 
     @property
     def time(self) -> float:
@@ -81,7 +83,7 @@ class Arena:
         scenario.check(f"scenario {scenario.name!r}: ")
         self.scenario = scenario = of_run(scenario, seed)
         self.seed = seed
-        self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario)
+        self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario.movers)
         robot = scenario.robot
         self._drive = Drive(robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
         self._slip = self._stream(_SLIP_STREAM)
@@ -97,7 +99,16 @@ class Arena:
         for other in (_OBSTACLE, _PERSON):
             self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
         self._state = self._before = _State(
-            0, robot.x, robot.y, robot.yaw, (0.0, 0.0), 0.0, Odometry(), Contacts(), self._crowd.poses
+            0,
+            robot.x,
+            robot.y,
+            robot.yaw,
+            (0.0, 0.0),
+            0.0,
+            Odometry(),
+            Contacts(),
+            self._crowd.poses,
+            self._crowd.poses,
         )
         camera = scenario.camera
         self._camera = Channel(
@@ -168,6 +179,7 @@ class Arena:
             odometry=Odometry(step / STEPS_PER_SECOND, x, y, yaw, twist.linear, twist.angular),
             contacts=self.contacts,
             people=self._crowd.poses,
+            people_before=before.people,
         )
         for channel in (self._camera, self._lidar, self._wheels):
             channel.advance(step, self._state)
@@ -181,6 +193,8 @@ class Arena:
                 exposure.state.people,
                 self._stream(_CAMERA_STREAM, exposure),
                 self._movers.at(exposure.state.time),
+                time=exposure.state.time,
+                past=Past(partial(self._earlier, exposure.state), exposure.state.turn_rate),
             )
             self._frame = Frame(exposure.state.time, image, depth, self._truth_at(exposure.state, seen))
         return self._frame
@@ -229,6 +243,11 @@ class Arena:
         seen = self._render().look(_camera_at(self._state), self._state.people, self._movers.at(self.time))
         return self._truth_at(self._state, seen)
 
+    def furniture_in_frame(self) -> list[Seen]:
+        """Return the visible share and the box [px] of each piece of furniture in the newest frame; movers last."""
+        state = self._camera.newest.state
+        return self._render().look_at_furniture(_camera_at(state), state.people, self._movers.at(state.time))
+
     def plan(self, *, of_frame: bool = False) -> Plan:
         """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
         state = self._camera.newest.state if of_frame else self._state
@@ -238,6 +257,15 @@ class Arena:
         if self._renderer is None:
             self._renderer = Renderer(self.scenario, self._stream(_PATTERN_STREAM))
         return self._renderer
+
+    def _earlier(self, state: _State, age: float) -> tuple[CameraPose, list[Pose | None], tuple[Furniture, ...]]:
+        """Return what there was some seconds before a state, within a step or a few of it."""
+        (speed_x, speed_y), share = state.velocity, age / STEP_S
+        camera = CameraPose.on_robot(
+            state.x - age * speed_x, state.y - age * speed_y, state.yaw - age * state.turn_rate
+        )
+        people = [earlier(was, now, share) for was, now in zip(state.people_before, state.people, strict=True)]
+        return camera, people, self._movers.at(max(state.time - age, 0.0))
 
     def _stream(self, sensor: int, exposure: Exposure[_State] | None = None) -> np.random.Generator:
         return np.random.default_rng([self.seed, sensor, exposure.index if exposure else 0])

@@ -42,6 +42,9 @@ class ScoreCard:
         What was run, as `limo_sim.run.provenance` tells it: cards with both equal are of the same arena and code.
     target_m
         Distance that the controller holds [m]; None for one that holds none, such as `approach`.
+    kept_m
+        Mean of the distance it held at each time [m]: more than `target_m` where nearer the camera would not show the
+        whole person.
     success
         Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
         view for more than 10 s after being first in view; None where no person ever was in the arena.
@@ -60,8 +63,8 @@ class ScoreCard:
     distance_min_m, distance_mean_m
         From the robot's centre to the subject's axis [m].
     distance_rms_error_m
-        Of the distance that controllers hold, from the camera to the subject's surface, to `target_m` [m]; None without
-        a target distance.
+        Of the distance that controllers hold, from the camera to the subject's surface, to the one they held at the
+        time (`kept_m`) [m]; None without a target distance.
     zone_intimate, zone_personal, zone_social, zone_public
         Share of time in each of Hall's zones, by the distance from the robot's centre to the subject's axis.
     clearance_min_m
@@ -104,6 +107,7 @@ class ScoreCard:
     scenario_hash: str
     code_version: str
     target_m: float | None
+    kept_m: float | None
     success: bool | None
     frames: int
     first_detection_s: float | None
@@ -163,8 +167,9 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
     counted = [step for step in steps if first < len(frames) and step.time >= frames[first].time]
     people = [person for step in counted if (person := _person(step.truth, subject))]
     distances = [person.distance for person in people]
-    held = np.array([person.surface_distance for person in people])
     target = episode.target_distance
+    kept = np.array(_kept([step for step in counted if _person(step.truth, subject)], target))
+    held = np.array([person.surface_distance for person in people])
     after = slice(first, None)
     boxed = [hit for step, hit in zip(frames, hits, strict=True) if len(step.detections)]
     errors = [_pixel_error(view) for view, ok in zip(views[after], visible[after], strict=True) if ok and view]
@@ -184,6 +189,7 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         scenario_hash=scenario_hash(episode.scenario),
         code_version=code_version(),
         target_m=target,
+        kept_m=_mean(kept),
         success=_success(episode, [step.time for step in frames[first:]], visible[after], criteria),
         frames=len(frames),
         first_detection_s=stamps[0] if stamps else None,
@@ -195,7 +201,7 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         pixel_error_p95=float(np.percentile(errors, 95)) if errors else None,
         distance_min_m=min(distances, default=None),
         distance_mean_m=_mean(distances),
-        distance_rms_error_m=None if target is None else _rms(held - target),
+        distance_rms_error_m=None if target is None else _rms(held - kept),
         zone_intimate=_share(zones, Zone.INTIMATE, zones.total()),
         zone_personal=_share(zones, Zone.PERSONAL, zones.total()),
         zone_social=_share(zones, Zone.SOCIAL, zones.total()),
@@ -295,6 +301,17 @@ def _clearance(episode: Episode) -> float | None:
             beside = abs(dy * math.cos(yaw) - dx * math.sin(yaw)) - LIMO.half_width
             gaps.append(math.hypot(max(ahead, 0), max(beside, 0)) - settings.radius)
     return min(gaps, default=None)
+
+
+def _kept(steps: Sequence[Step], target: float | None) -> list[float]:
+    """Return the distance that the controller held at each step [m]; nothing for one that holds none."""
+    if target is None:
+        return []
+    kept, last = [], target
+    for step in steps:
+        last = step.decision.belief.keeps or last
+        kept.append(last)
+    return kept
 
 
 def _path(steps: Sequence[Step]) -> float:

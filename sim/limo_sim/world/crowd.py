@@ -247,7 +247,7 @@ class Crowd:
             for index, person in enumerate(people)
             if person.yields
         }
-        self._movers = Movers(scenario)
+        self._movers = Movers(scenario.movers)
         self._plan = around.plan(max((person.way_margin for person in people if person.yields), default=0.0))
         self.poses: tuple[Pose | None, ...] = ()
         self._time = 0.0

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from limo_sim.world.schema import WIDEST, one_of, required, within
+
 Colour = tuple[float, float, float]
 
 
@@ -160,3 +162,18 @@ def distance_to(shape: Disc | Rectangle, x: float, y: float) -> float:
     across_x = abs(cos * dx + sin * dy) - shape.half_x
     across_y = abs(cos * dy - sin * dx) - shape.half_y
     return math.hypot(max(across_x, 0.0), max(across_y, 0.0)) + min(max(across_x, across_y), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Furniture:
+    """A piece of one of the known kinds, standing at (x, y)."""
+
+    kind: str = one_of(tuple(KINDS))
+    x: float = required(-WIDEST, WIDEST)
+    y: float = required(-WIDEST, WIDEST)
+    yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
+
+    @property
+    def footprint(self) -> Disc | Rectangle:
+        """What the robot bumps into, in the arena's frame."""
+        return placed(KINDS[self.kind].footprint, self.x, self.y, self.yaw)

@@ -9,10 +9,8 @@ from functools import cached_property
 
 from limo_sim.world.furniture import Disc, Rectangle, distance_to
 from limo_sim.world.paths import FloorPlan
-from limo_sim.world.schema import ScenarioError, one_of, required, within
+from limo_sim.world.schema import WIDEST, ScenarioError, one_of, required, within
 
-WIDEST = 15.0
-"""Half of the widest room [m]. Chosen: 30 m, nearly twice as far as the depth camera sees in any direction."""
 ROBOT_RADIUS = 0.19
 """The circle about the base centre that holds the robot's 0.29 × 0.22 m body [m]."""
 # Corners of routes keep this distance from the walls [m]: the first, or a person's radius and the second, if that is

@@ -57,6 +57,19 @@ class Pose:
     swing: float = 0.0
 
 
+def earlier(before: Pose | None, now: Pose | None, steps: float) -> Pose | None:
+    """Return where a person was some steps before `now`, who walked on from `before` in the last of them."""
+    if before is None or now is None:
+        return now
+    return Pose(
+        x=now.x - steps * (now.x - before.x),
+        y=now.y - steps * (now.y - before.y),
+        yaw=now.yaw - steps * math.remainder(now.yaw - before.yaw, math.tau),
+        phase=now.phase - steps * math.remainder(now.phase - before.phase, math.tau),
+        swing=now.swing,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class _RouteLeg:
     """The way from one corner of a route to the next, and the pauses at both.

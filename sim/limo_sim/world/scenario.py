@@ -11,9 +11,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from limo_sim.world.furniture import KINDS, Disc, Rectangle, distance_to, placed, reach
-from limo_sim.world.people import ROBOT_RADIUS, WIDEST, Group, Person, Surroundings, Vary, check_person
-from limo_sim.world.schema import ScenarioError, build, check_fields, one_of, required, within
+from limo_sim.world.furniture import Disc, Furniture, Rectangle, distance_to
+from limo_sim.world.movers import Mover
+from limo_sim.world.people import ROBOT_RADIUS, Group, Person, Surroundings, Vary, check_person
+from limo_sim.world.schema import WIDEST, ScenarioError, build, check_fields, one_of, required, within
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -51,46 +52,6 @@ _FURNITURE_DISTANCE, _ROBOT_DISTANCE = 0.2, 0.3
 # Inner walls are at least this long [m]: shorter than thick they would have no direction to speak of.
 _SHORTEST_WALL = 0.05
 _FOLDER = Path(__file__).parents[1] / "scenarios"
-
-
-@dataclass(frozen=True, slots=True)
-class Furniture:
-    """A piece of one of the known kinds, standing at (x, y)."""
-
-    kind: str = one_of(tuple(KINDS))
-    x: float = required(-WIDEST, WIDEST)
-    y: float = required(-WIDEST, WIDEST)
-    yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
-
-    @property
-    def footprint(self) -> Disc | Rectangle:
-        """What the robot bumps into, in the arena's frame."""
-        return placed(KINDS[self.kind].footprint, self.x, self.y, self.yaw)
-
-
-@dataclass(frozen=True, slots=True)
-class Mover:
-    """A piece of furniture that moves along a closed route, as a person with a timetable walks.
-
-    Attributes
-    ----------
-    kind
-        As of `Furniture`.
-    route
-        Corners (x, y, pause) [m, m, s].
-    speed
-        On the way [m/s].
-    """
-
-    kind: str = one_of(tuple(KINDS))
-    route: tuple[tuple[float, float, float], ...] = required(-WIDEST, 3600.0)
-    speed: float = within(0.3, 0.05, 2.0)
-
-    @property
-    def timetable(self) -> Person:
-        """A person as broad as the piece, who walks its route."""
-        person = Person(route=self.route, speed=self.speed, facing=0.0)
-        return dataclasses.replace(person, height=person.height * reach(KINDS[self.kind].footprint) / person.radius)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,12 +118,30 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """The colour camera: rate [Hz], age of a frame on arrival [s], share of frames lost, noise [of 255]."""
+    """The colour camera.
+
+    Attributes
+    ----------
+    rate_hz, latency_s, drop_probability
+        Rate [Hz], age of a frame on arrival [s], share of frames lost.
+    noise
+        Of brightness [of 255].
+    exposure_s
+        How long each row is exposed: what moves is blurred [s].
+    readout_s
+        Between the first row and the last, of a rolling shutter [s].
+    k1, k2
+        Radial distortion, as in OpenCV's camera model; the limits keep it one to one within the image.
+    """
 
     rate_hz: float = within(10.0, 0.5, 50.0)
     latency_s: float = within(0.0, 0.0, 5.0)
     drop_probability: float = within(0.0, 0.0, 1.0)
     noise: float = within(1.0, 0.0, 20.0)
+    exposure_s: float = within(0.0, 0.0, 0.1)
+    readout_s: float = within(0.0, 0.0, 0.1)
+    k1: float = within(0.0, -0.15, 0.3)
+    k2: float = within(0.0, -0.02, 0.1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +224,10 @@ class DetectorFaults:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """The sun's direction and strengths, and the brightness of sky, floor and walls, 0 … 1."""
+    """The sun's direction and strengths, and the brightness of sky, floor and walls, 0 … 1.
+
+    All of it goes down by the share `swing` and up again, once in `swing_s` [s].
+    """
 
     sun: tuple[float, float, float] = within((-0.5, 0.1, -0.9), -1.0, 1.0)
     diffuse: float = within(0.8, 0.0, 1.2)
@@ -253,6 +235,12 @@ class Light:
     sky: float = within(0.70, 0.2, 1.0)
     floor: float = within(0.45, 0.1, 0.9)
     wall: float = within(0.95, 0.3, 1.0)
+    swing: float = within(0.0, 0.0, 0.9)
+    swing_s: float = within(20.0, 0.1, 3600.0)
+
+    def strength(self, time: float) -> float:
+        """Return the brightness at a time [s], relative to that at the start."""
+        return 1.0 - self.swing * (0.5 - 0.5 * math.cos(math.tau * time / self.swing_s))
 
 
 @dataclass(frozen=True, slots=True)

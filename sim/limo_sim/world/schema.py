@@ -12,6 +12,9 @@ from limo_hog.exceptions import LimoHogError
 
 T = TypeVar("T")
 
+WIDEST = 15.0
+"""Half of the widest room [m]. Chosen: 30 m, nearly twice as far as the depth camera sees in any direction."""
+
 
 class ScenarioError(LimoHogError):
     """A scenario that cannot be run; the message names the file, the key and what is allowed."""

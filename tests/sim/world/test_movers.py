@@ -20,7 +20,7 @@ TROLLEY = Scenario(movers=(Mover("trolley", ((2.0, -1.0, 0), (2.0, 1.0, 0)), 0.5
 
 def test_a_mover_keeps_its_timetable() -> None:
     for time, y in ((0.0, -1.0), (2.0, 0.0), (4.0, 1.0), (6.0, 0.0), (10.0, 0.0)):
-        (piece,) = Movers(TROLLEY).at(time)
+        (piece,) = Movers(TROLLEY.movers).at(time)
         assert (piece.x, piece.y) == pytest.approx((2.0, y))
 
 
@@ -53,7 +53,7 @@ def test_who_yields_walks_round_a_mover() -> None:
         TROLLEY, people=(person,), robot=Robot(x=-4), movers=(Mover("trolley", ((4.2, 0, 0), (-2.0, 0, 0)), 0.4),)
     )
     scenario.check()
-    crowd, movers = Crowd(scenario, 0), Movers(scenario)
+    crowd, movers = Crowd(scenario, 0), Movers(scenario.movers)
     nearest = math.inf
     for step in range(1, 500):
         crowd.advance(step * STEP_S, (-4.0, 0.0, 0.0))

@@ -1,19 +1,18 @@
-//! Which kernels serve a call: every entry to the fast path, and the functions that enable an instruction set.
+//! Which kernels serve a call: every entry to the fast path.
 
 use crate::error::Result;
 use crate::exact::Svm;
+use crate::geometry::Size;
 use crate::image::ImageView;
 use crate::params::HogSpec;
 use crate::pyramid::Grid;
 
 use super::backend::Backend;
-#[cfg(target_arch = "x86_64")]
-use super::lane::Lane;
 #[cfg(target_arch = "aarch64")]
 use super::lane::neon::Neon;
 use super::lane::portable::Portable;
 #[cfg(target_arch = "x86_64")]
-use super::lane::{avx2::Avx2, avx512::Avx512};
+use super::lane::{Kernel, Lane, avx2::Avx2, avx512::Avx512};
 use super::level::{Scratch, Task, level};
 use super::plan::Plan;
 use super::rows::Planes;
@@ -27,36 +26,31 @@ pub(crate) fn plan(backend: Backend, spec: &HogSpec, svm: &Svm) -> Option<Plan> 
 fn sqrt_of_byte_is_exact(backend: Backend) -> bool {
     match backend {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => unsafe { avx512_sqrt_of_byte_is_exact() },
+        // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2, which a level's last strip is.
+        Backend::Avx512 => unsafe {
+            Avx512::new().compiled(SqrtIsExact) && Avx2::new().compiled(SqrtIsExact)
+        },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => unsafe { avx2_sqrt_of_byte_is_exact() },
+        Backend::Avx2 => unsafe { Avx2::new() }.compiled(SqrtIsExact),
         _ => false,
     }
 }
 
+/// Whether `sqrt_of_byte` is right for every pixel value.
 #[cfg(target_arch = "x86_64")]
-#[inline(always)]
-fn is_exact<L: Lane>(l: L) -> bool {
-    (0..=255u8).all(|value| {
-        let value = f32::from(value);
-        l.first(l.sqrt_of_byte(l.splat(value))) == value.sqrt()
-    })
-}
+struct SqrtIsExact;
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
-fn avx512_sqrt_of_byte_is_exact() -> bool {
-    // SAFETY: this function's features are the tokens'; a level's last strip is AVX2's.
-    unsafe { is_exact(Avx512::new()) && is_exact(Avx2::new()) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2_sqrt_of_byte_is_exact() -> bool {
-    // SAFETY: this function's features are the token's.
-    unsafe { is_exact(Avx2::new()) }
+impl Kernel for SqrtIsExact {
+    type Output = bool;
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) -> bool {
+        (0..=255u8).all(|value| {
+            let value = f32::from(value);
+            l.first(l.sqrt_of_byte(l.splat(value))) == value.sqrt()
+        })
+    }
 }
 
 /// Whether the kernels can serve windows of this stride.
@@ -74,13 +68,14 @@ pub(crate) fn detect(backend: Backend, task: Task, scratch: &mut Scratch) -> Res
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => unsafe { avx512(task, scratch) }?,
+        Backend::Avx512 => level(unsafe { Avx512::new() }, task, scratch)?,
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => unsafe { avx2(task, scratch) }?,
+        Backend::Avx2 => level(unsafe { Avx2::new() }, task, scratch)?,
         #[cfg(target_arch = "aarch64")]
-        Backend::Neon => neon(task, scratch)?,
-        _ => level(Portable, Portable, task, scratch)?,
+        // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
+        Backend::Neon => level(unsafe { Neon::new() }, task, scratch)?,
+        _ => level(Portable, task, scratch)?,
     }
     scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
     Ok(())
@@ -91,39 +86,33 @@ pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageVie
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2.
-        Backend::Avx512 | Backend::Avx2 => unsafe { avx2_fill_planes(planes, image) },
+        Backend::Avx512 | Backend::Avx2 => planes.fill(unsafe { Avx2::new() }, image),
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: as in `neon`.
+        // SAFETY: as in `detect`.
         Backend::Neon => planes.fill(unsafe { Neon::new() }, image),
         _ => planes.fill(Portable, image),
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2_fill_planes(planes: &mut Planes, image: ImageView) -> Result<()> {
-    // SAFETY: this function's features are the token's.
-    planes.fill(unsafe { Avx2::new() }, image)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
-fn avx512(task: Task, scratch: &mut Scratch) -> Result<()> {
-    // SAFETY: this function's features are the tokens'.
-    unsafe { level(Avx512::new(), Avx2::new(), task, scratch) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2(task: Task, scratch: &mut Scratch) -> Result<()> {
-    // SAFETY: this function's features are the token's.
-    let l = unsafe { Avx2::new() };
-    level(l, l, task, scratch)
-}
-
-#[cfg(target_arch = "aarch64")]
-fn neon(task: Task, scratch: &mut Scratch) -> Result<()> {
-    // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
-    let l = unsafe { Neon::new() };
-    level(l, l, task, scratch)
+/// Fills `resized` with the pixels of `source`, resized to `size`.
+pub(crate) fn resize_planes(
+    backend: Backend,
+    source: &Planes,
+    resized: &mut Planes,
+    size: Size,
+    scratch: &mut Scratch,
+) -> Result<()> {
+    let band = &mut scratch.band;
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available.
+        Backend::Avx512 => resized.resize(unsafe { Avx512::new() }, source, size, band),
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Avx2 => resized.resize(unsafe { Avx2::new() }, source, size, band),
+        #[cfg(target_arch = "aarch64")]
+        // SAFETY: as in `detect`.
+        Backend::Neon => resized.resize(unsafe { Neon::new() }, source, size, band),
+        _ => resized.resize(Portable, source, size, band),
+    }
 }

@@ -11,13 +11,14 @@ use super::layout::{BAND, BLOCK, CARRY, CELL, WORDS};
 use super::plan::Plan;
 use super::rows::{Band, Planes};
 use super::score::{WindowGrid, score};
-use super::strip::{Job, strip};
+use super::strip::{Job, ROOM, strip};
 
 /// Scratch memory of one level, used again from level to level and call to call.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    band: Band,
+    pub(super) band: Band,
     carry: Lines,
+    room: Lines,
     blocks: Lines,
     bytes: Lines,
     edge: Vec<[f32; BLOCK]>,
@@ -53,6 +54,7 @@ impl Workspace for Scratch {
     fn bytes(&self) -> usize {
         self.band.bytes()
             + self.carry.bytes()
+            + self.room.bytes()
             + self.blocks.bytes()
             + self.bytes.bytes()
             + self.edge.capacity() * size_of::<[f32; BLOCK]>()
@@ -72,29 +74,21 @@ pub(crate) struct Task<'a> {
     pub interrupt: &'a Interrupt<'a>,
 }
 
-/// `tail` is the narrower vector: for single windows, and for a level's last strip where its lanes are enough.
-#[inline(always)]
-pub(super) fn level<L: Lane, T: Lane>(l: L, tail: T, task: Task, scratch: &mut Scratch) -> Result<()> {
+/// Adds the windows that the search finds to `scratch.found`.
+pub(super) fn level<L: Lane>(l: L, task: Task, scratch: &mut Scratch) -> Result<()> {
     scratch.band.begin(task.source, task.size, task.grid.pad.width, L::GROUP, L::REACH)?;
     let Task { grid, .. } = task;
     // Windows whose distance is no multiple of 8 lie on several lattices of blocks.
     let lattices = |stride: usize| if stride.is_multiple_of(8) { 0..1 } else { 0..2 };
     for y in lattices(grid.stride.height) {
         for x in lattices(grid.stride.width) {
-            lattice(l, tail, task, (4 * x, 4 * y), scratch)?;
+            lattice(l, task, (4 * x, 4 * y), scratch)?;
         }
     }
     Ok(())
 }
 
-#[inline(always)]
-fn lattice<L: Lane, T: Lane>(
-    l: L,
-    tail: T,
-    task: Task,
-    (left, top): (usize, usize),
-    scratch: &mut Scratch,
-) -> Result<()> {
+fn lattice<L: Lane>(l: L, task: Task, (left, top): (usize, usize), scratch: &mut Scratch) -> Result<()> {
     let Task { plan, source, grid, threshold, interrupt, .. } = task;
     let along = |padded: usize, blocks: usize, origin: usize| {
         (padded - origin).checked_sub(8 * (blocks + 1)).map_or(0, |room| room / 8 + 1)
@@ -106,10 +100,11 @@ fn lattice<L: Lane, T: Lane>(
     }
     let (cells_x, cells_y) = (width + plan.blocks.width, height + plan.blocks.height);
     let lanes = cells_x.next_multiple_of(32) + 32 + plan.blocks.width.next_multiple_of(16);
-    let Scratch { band, carry, blocks, bytes, edge, masks, found } = scratch;
+    let Scratch { band, carry, room, blocks, bytes, edge, masks, found } = scratch;
     let blocks: *mut f32 = blocks.reserve((cells_y - 1) * BLOCK * lanes + 64)?.cast();
     let bytes = bytes.reserve((cells_y - 1) * WORDS * lanes + 64)?;
     let carry: *mut f32 = carry.reserve(cells_x.div_ceil(L::LANES) * CARRY * L::LANES)?.cast();
+    let room: *mut f32 = room.reserve(ROOM * L::LANES)?.cast();
     edge.clear();
     memory::resize(edge, cells_y, [0.0; BLOCK])?;
     let at_once = (BAND / (CELL * band.stride)).max(1);
@@ -117,33 +112,34 @@ fn lattice<L: Lane, T: Lane>(
         interrupt.check()?;
         let cells = begin..(begin + at_once).min(cells_y);
         let above = (top + CELL * begin) as i64 - 1 - grid.pad.height as i64;
-        match source.channels() {
-            1 => band.fill::<L, 1>(l, source, above, CELL * cells.len() + 2)?,
-            _ => band.fill::<L, 3>(l, source, above, CELL * cells.len() + 2)?,
-        }
+        band.fill(l, source, above, CELL * cells.len() + 2)?;
         let mut origin = [band.pixels().as_ptr(); 3];
         for (channel, origin) in origin.iter_mut().enumerate().take(source.channels()) {
             *origin = band.pixels()[channel * band.plane + band.left + left - grid.pad.width..].as_ptr();
         }
         let stride = band.stride;
-        let mut job = Job { plan, origin, stride, cells, carry, blocks, bytes, lanes, edge };
+        let mut job = Job { plan, origin, stride, cells, carry, room, blocks, bytes, lanes, edge };
         // From right to left: a strip adds to the last blocks of the strip left of it.
         let rest = cells_x % L::LANES;
         let mut end = cells_x - rest;
-        if rest > T::LANES {
-            strip_of(l, &mut job, end, source.channels());
-        } else if rest > 0 {
-            strip_of(tail, &mut job, end, source.channels());
-        }
-        while end > 0 {
-            end -= L::LANES;
-            strip_of(l, &mut job, end, source.channels());
+        // SAFETY: the level's rows have 16 bytes more on the left and OVERREAD on the right than the padded image;
+        // blocks and bytes were reserved for all lanes.
+        unsafe {
+            if rest > L::Narrow::LANES {
+                strip(l, &mut job, end, source.channels());
+            } else if rest > 0 {
+                strip(l.narrow(), &mut job, end, source.channels());
+            }
+            while end > 0 {
+                end -= L::LANES;
+                strip(l, &mut job, end, source.channels());
+            }
         }
     }
     let before = found.len();
     let windows = WindowGrid { plan, blocks, bytes, lanes, width, height };
     // SAFETY: the strips have filled the blocks of all windows; `lanes` is as wide as wanted.
-    unsafe { score(l, tail, &windows, threshold, interrupt, masks, found) }?;
+    unsafe { score(l, &windows, threshold, interrupt, masks, found) }?;
     let mut kept = before;
     for index in before..found.len() {
         let (x, y, score) = found[index];
@@ -155,17 +151,4 @@ fn lattice<L: Lane, T: Lane>(
     }
     found.truncate(kept);
     Ok(())
-}
-
-#[inline(always)]
-fn strip_of<L: Lane>(l: L, job: &mut Job, first: usize, channels: usize) {
-    // SAFETY: the level's rows have 16 bytes more on the left and OVERREAD on the right than the padded image;
-    // blocks and bytes were reserved for all lanes.
-    unsafe {
-        if channels == 1 {
-            strip::<L, 1>(l, job, first);
-        } else {
-            strip::<L, 3>(l, job, first);
-        }
-    }
 }

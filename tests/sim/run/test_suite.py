@@ -54,3 +54,9 @@ def test_a_hash_is_that_of_the_text_whatever_its_line_ends(tmp_path: Path) -> No
     assert file_hash(unix) == file_hash(windows)
     unix.write_bytes(b"a = 1\nb = 3\n")
     assert file_hash(unix) != file_hash(windows)
+
+
+def test_the_page_of_the_benchmark_is_about_these_files() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    for entry in V1.scenarios:
+        assert f"| `{entry.name}` | {load(V1.path(entry)).summary} | `{entry.sha256[:16]}` |" in page

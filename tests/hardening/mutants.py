@@ -128,8 +128,8 @@ def changes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, Any]]:
             becomes = COMPUTED[type(node.op)]
             yield node, f"{name(node.op)} becomes {name(becomes)}", lambda n=node, o=becomes: setattr(n, "op", o())
         elif isinstance(node, ast.BoolOp):
-            other = ast.Or if isinstance(node.op, ast.And) else ast.And
-            yield node, f"{name(node.op)} becomes {name(other)}", lambda n=node, o=other: setattr(n, "op", o())
+            joined: Any = ast.Or if isinstance(node.op, ast.And) else ast.And
+            yield node, f"{name(node.op)} becomes {name(joined)}", lambda n=node, o=joined: setattr(n, "op", o())
         elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
             yield node, f"{node.value} is inverted", lambda n=node: setattr(n, "value", not n.value)
         elif isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):

@@ -145,6 +145,16 @@ def test_a_way_that_is_free_half_as_far_is_taken_and_a_shorter_one_is_not() -> N
     assert detour.heading(wall(1.1), 0.0, 4.0, 0.0, LIMO) is None
 
 
+def test_the_way_to_the_person_is_looked_at_no_further_than_the_look_ahead_and_up_to_their_legs() -> None:
+    # 1.2 m of way, .145 m of robot and .65 m of margin: a wall at 2 m is as good as none, one at 1.98 m is not.
+    detour = Detour(steps=0)
+    assert detour.heading(wall(2.0), 0.0, 4.0, 0.0, LIMO) == 0.0
+    assert detour._free(wall(1.98), 0.0, 0.0, 1.2, LIMO) is None
+    # A person at 1.7 m: what is free up to .9 m before them is enough.
+    assert detour.heading(wall(1.6), 0.0, 1.7, 0.0, LIMO) == 0.0
+    assert detour.heading(wall(1.19), 0.0, 1.7, 0.0, LIMO) is None
+
+
 def test_of_two_ways_around_the_preferred_one_is_taken() -> None:
     post = np.array([[1.2, 0.0]])
     left, right = (Detour().heading(post, 0.0, 4.0, side, LIMO) for side in (0.3, -0.3))

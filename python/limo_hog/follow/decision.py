@@ -26,6 +26,10 @@ class Mode(str, Enum):
     """An obstacle is in the way, or an input is faulty: the robot may not do what the controller asked for."""
     LOST = "lost"
     """A person was followed and is not found any more."""
+    DRIVE = "drive"
+    """The robot is commanded by a node that does not say what it is doing: it moves."""
+    STAND = "stand"
+    """The same, and it does not move."""
 
 
 class Believed(NamedTuple):

@@ -87,7 +87,7 @@ def run_live(
 
 def _moment(arena: Arena, twist: Twist) -> Moment:
     frame = arena.frame()
-    mode = Mode.HOLD if twist == Twist() else Mode.FOLLOW
+    mode = Mode.STAND if twist == Twist() else Mode.DRIVE
     decision = Decision(twist, None, mode, "driven by /cmd_vel")
     step = Step(arena.time, arena.truth(), decision, FrameRecord(frame.truth, Detections.none()))
     return Moment(step, frame, arena.scan(), arena.odometry())

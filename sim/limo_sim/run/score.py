@@ -221,7 +221,10 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         mean_abs_domega=_mean(np.abs(np.diff(_turn_rates(episode)))) or 0.0,
         jerk_mean=_jerk_mean(steps),
         path_m=_path(steps),
-        modes=_shares([step.decision.mode.value for step in steps], [mode.value for mode in Mode]),
+        modes=_shares(
+            [step.decision.mode.value for step in steps],
+            [mode.value for mode in Mode if mode not in (Mode.DRIVE, Mode.STAND)],
+        ),
         reasons=_shares([step.decision.reason for step in steps], []),
         detect_ms_p50=float(np.percentile(detect_ms, 50)) if detect_ms else None,
         detect_ms_p95=float(np.percentile(detect_ms, 95)) if detect_ms else None,

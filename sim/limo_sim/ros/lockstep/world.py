@@ -393,7 +393,11 @@ class World:
             detect_ms = sum(found.ms for found in self.found)
             record = FrameRecord(frame.truth, found, detect_ms=detect_ms, render_ms=self._render_ms)
         twist = self.commands[-1].twist if self.commands else Twist()
-        mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
+        if self.asked:
+            mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
+        else:
+            # Whether a node with a detector of its own searches or follows is not known.
+            mode = Mode.STAND if twist == Twist() else Mode.DRIVE
         self._seen_before |= target is not None
         decision = Decision(twist, None, mode, f"as {self.script.name} says", target)
         step = Step(self.time, self.arena.truth(), decision, record)

@@ -149,7 +149,7 @@ def test_the_way_to_the_person_is_looked_at_no_further_than_the_look_ahead_and_u
     # 1.2 m of way, .145 m of robot and .65 m of margin: a wall at 2 m is as good as none, one at 1.98 m is not.
     detour = Detour(steps=0)
     assert detour.heading(wall(2.0), 0.0, 4.0, 0.0, LIMO) == 0.0
-    assert detour._free(wall(1.98), 0.0, 0.0, 1.2, LIMO) is None
+    assert detour.free(wall(1.98), 0.0, 0.0, 1.2, LIMO) is None
     # A person at 1.7 m: what is free up to .9 m before them is enough.
     assert detour.heading(wall(1.6), 0.0, 1.7, 0.0, LIMO) == 0.0
     assert detour.heading(wall(1.19), 0.0, 1.7, 0.0, LIMO) is None

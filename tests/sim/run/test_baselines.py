@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_the_person_is_the_one_nearest_to_the_last_sighting_not_the_surest() -> 
 
 
 def network(path: Path, *layers: tuple[NDArray[np.float32], NDArray[np.float32]]) -> Path:
-    arrays: dict[str, NDArray[np.float32]] = {}
+    arrays: dict[str, Any] = {}
     for index, (weights, biases) in enumerate(layers):
         arrays |= {f"w{index}": weights, f"b{index}": biases}
     np.savez(path, **arrays)

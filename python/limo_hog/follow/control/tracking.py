@@ -195,7 +195,8 @@ class TrackingController:
         hunt = self.lookout.step(hunt, scan, now, pose, self.grid, ground)
         points, turn = scan_points(scan, self.robot), Twist(0.0, state.side * self.search.rate)
         twist, reason = self.lookout.command(hunt, pose, points, self.detour, self.robot, turn)
-        belief = Belief(None, (), *self.lookout.ways(hunt, pose))
+        places, way = self.lookout.ways(hunt, pose)
+        belief = Belief(None, (), places, way)
         return Decision(twist, replace(state, hunt=hunt), Mode.LOST, reason, belief=belief)
 
     def _aim(self, person: Person, keeps: float, state: TrackingState, observation: Observation) -> Aim:

@@ -6,12 +6,15 @@ import math
 from collections.abc import Callable
 from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, WIDTH
 from limo_sim.world.scenario import Camera
+
+with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]

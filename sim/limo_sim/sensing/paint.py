@@ -11,14 +11,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, MOUNT_HEIGHT, WIDTH, CameraPose
 from limo_sim.world.furniture import Rectangle
 from limo_sim.world.people import doors
 from limo_sim.world.scenario import WALL_HEIGHT, Scenario
+
+with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
 
 U8 = NDArray[np.uint8]
 F64 = NDArray[np.float64]

@@ -103,8 +103,8 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
         f"limo-hog score --suite {suite.name} --seeds {args.seeds} --controller tracking approach --against approach",
         "```",
         "",
-        f"Mean ± half of the 95 % interval over {args.seeds} seeds, each the mean over {len(groups)} scenarios of "
-        f"{suite.seconds:g} s; detector `hog`; least clearance: the worst run.",
+        f"{shown_for(args.seeds)} Means over {len(groups)} scenarios of {suite.seconds:g} s; detector `hog`; "
+        "least clearance: the worst run.",
         "",
         *table(overall),
         "",
@@ -139,6 +139,13 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
     ]
     with whole_file(DOCS / "benchmark.md") as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def shown_for(seeds: int) -> str:
+    """Return what the tables show of so many seeds."""
+    if seeds == 1:
+        return "One seed, and therefore no intervals: small differences may be chance."
+    return f"Mean ± half of the 95 % interval over {seeds} seeds."
 
 
 def table(summaries: Sequence[Summary]) -> list[str]:

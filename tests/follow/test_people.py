@@ -208,3 +208,12 @@ def test_misses_are_counted_since_the_last_evidence() -> None:
         person = Trust().update_trust(person, evidence)
         counted.append((person.misses, person.age))
     assert counted == [(0, 2), (1, 3), (2, 4), (3, 5), (0, 6), (1, 7)]
+
+
+def test_clothes_of_which_one_number_is_missing_are_unknown() -> None:
+    clothes = np.stack([IN_RED, IN_GREEN])
+    clothes[0, 1, 2] = np.nan
+    view = replace(look(boxes((300, 100, 60, 120), (100, 100, 60, 120))), depth=flat(2.0), clothes=clothes)
+    first, second = measure(view, LIMO)
+    assert first.clothes is None
+    np.testing.assert_array_equal(second.clothes, IN_GREEN)

@@ -50,13 +50,17 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "tracks": (
         [f"{FOLLOW}/tracks/*.py"],
-        ["tests/follow/test_kalman.py", "tests/follow/test_people.py", "tests/follow/test_tracking.py"],
+        [
+            *("tests/follow/test_kalman.py", "tests/follow/test_poses.py", "tests/follow/test_people.py"),
+            "tests/follow/test_tracking.py",
+        ],
     ),
     "sense": (
         [f"{FOLLOW}/sense/{name}.py" for name in ("appearance", "measurement", "ranging", "region", "visibility")],
         [
-            *("tests/follow/test_appearance.py", "tests/follow/test_people.py", "tests/follow/test_tracking.py"),
-            *("tests/follow/test_workshop_controllers.py", "tests/follow/test_pipeline.py"),
+            *("tests/follow/test_appearance.py", "tests/follow/test_region.py", "tests/follow/test_people.py"),
+            *("tests/follow/test_workshop_controllers.py", "tests/follow/test_tracking.py"),
+            "tests/follow/test_pipeline.py",
         ],
     ),
     "run": (

@@ -77,7 +77,8 @@ def test_who_watches_is_given_the_same_pictures(script: Callable[[str], Path]) -
         ("import ctypes; ctypes.string_at(0)", "died at 0.90 s: its process was ended by SIGSEGV"),
         ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "its process was ended by SIGKILL"),
         (
-            "import os, time\nif os.fork() == 0:\n    import signal; signal.pause()\nos._exit(1)",
+            "import os, signal\nif os.fork() == 0:\n    signal.signal(signal.SIGALRM, signal.SIG_DFL)\n"
+            "    signal.alarm(20); signal.pause()\nos._exit(1)",
             "its process ended with status 1",
         ),
         ("1 / 0", "failed with ZeroDivisionError at 0.90 s"),

@@ -97,7 +97,7 @@ def run_apart(
     ours, theirs = spawning.Pipe()
     # (A process that dies has told its time.)
     clock = spawning.Value("d", 0.0, lock=False)
-    job = _Job(script, scenario, seconds, seed, list(arguments), patience, pictures, clock)
+    job = _Job(script, scenario, seconds, seed, list(arguments), patience, pictures and watch is not None, clock)
     child = spawning.Process(target=_run, args=(theirs, job), name=script.name, daemon=True)
     past = Past()
     child.start()

@@ -72,5 +72,7 @@ def test_thirty_submissions_three_of_them_hostile_are_graded_in_five_minutes(tmp
     assert [row["points"] for row in rows[:27]] == ["100", "80", "0"] * 9
     assert "the sign is swapped" in rows[1]["first_mistake"]
     assert [row["points"] for row in rows[27:]] == ["0", "0", "0"]
-    assert "more than 100 s" in rows[28]["first_mistake"]
+    # The loop catches what interrupts it, unless it is interrupted between two rounds.
+    loop = rows[28]["first_mistake"]
+    assert "more than 100 s" in loop or "a loop or a call that never ends" in loop
     assert took < 300, f"{took:.0f} s"

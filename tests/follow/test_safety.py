@@ -10,6 +10,8 @@ from tests.follow.views import boxes, flat, look, scan, scan_of
 
 from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Twist
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.safety.unseen import Look, room_seen_behind
 from limo_hog.follow.sense.clearance import speed_within
 
 
@@ -84,6 +86,26 @@ def test_what_was_seen_behind_counts_for_ten_seconds(age: float, stopped: bool) 
     turned = Odometry(700.0 + age, yaw=np.pi)
     later = replace(look(stamp=700.0 + age), scan=scan(stamp=700.0 + age), odometry=turned)
     assert (guard.step(later, state).twist.linear == 0) is stopped
+
+
+def test_it_backs_fast_only_onto_ground_that_was_seen_to_be_free() -> None:
+    guard = Guard(Headstrong(Twist(-0.4, 0.0)))
+    free = np.full(292, 8.0, np.float32)
+    # At the start nothing behind has been seen.
+    first = guard.step(replace(look(), scan=scan(free), odometry=Odometry()), guard.start())
+    assert first.twist.linear == -guard.unseen_speed
+    # Turned about: what was ahead is behind now.
+    turned = replace(look(stamp=1.0), scan=scan(free, 1.0), odometry=Odometry(1.0, yaw=np.pi))
+    assert guard.step(turned, first.state).twist.linear < -0.35
+    long_after = replace(look(stamp=31.0), scan=scan(free, 31.0), odometry=Odometry(31.0, yaw=np.pi))
+    assert guard.step(long_after, first.state).twist.linear == -guard.unseen_speed
+
+
+def test_ground_behind_something_was_not_seen() -> None:
+    looks = [Look(scan_of([(0.3, 0.0)]), Odometry())]
+    # Turned about, 0.8 m further on: the thing is behind at 0.8 - 0.3 m of the centre; what is behind it was hidden.
+    assert room_seen_behind(looks, Odometry(x=0.8), LIMO) < 0.4
+    assert room_seen_behind([Look(scan(), Odometry())], Odometry(x=0.8), LIMO) == pytest.approx(0.6, abs=0.11)
 
 
 def test_an_obstacle_that_has_left_the_lidars_view_empty_is_forgotten() -> None:

@@ -72,6 +72,9 @@ class Lookout:
     half_view
         So far to either side of straight ahead the camera shows a whole person [rad]. Chosen: the Limo's .62, less half
         a person at 2.5 m.
+    same_goal, stay
+        Places within this of the one driven to are worth so much more [m, 1]. Chosen: the distance of candidates in a
+        room; to change the goal, another must be half as good again.
     settle_s
         Time that looking from a place takes, however near it is [s]. Chosen: a turn by half a right angle and a few
         frames.
@@ -92,6 +95,8 @@ class Lookout:
     candidates: int = 40
     view: float = 3.5
     half_view: float = 0.5
+    same_goal: float = 0.5
+    stay: float = 1.5
     settle_s: float = 1.5
     least: float = 0.05
     give_up_s: float = bounded(60.0, 0, 3600)
@@ -177,6 +182,10 @@ class Lookout:
         shown = near & grid.sees(ground, origins, points)
         share = shown.mean(axis=1)
         worth = share / (self.settle_s + far / self.speed)
+        if len(hunt.way):
+            # Two places of about the same worth would be driven to in turns.
+            goal = np.hypot(*(origins - hunt.way[-1]).T)
+            worth[(goal < self.same_goal) & (share >= self.least)] *= self.stay
         best = int(np.argmax(worth))
         if share[best] < self.least:
             return replace(hunt, way=np.empty((0, 2)), facing=None, planned=now)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from limo_hog.follow.control.company import Company, Walker
 from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.lookout import Hunt, Lookout
 from limo_hog.follow.control.search import Search
@@ -75,6 +76,9 @@ class TrackingController:
         Distance to hold, as the depth image measures it [m].
     full_every
         Every so many frames the whole image is searched [1]. Chosen: another person is noticed within 1.5 s.
+    back_s
+        Ground behind the robot that was seen to be free within this is backed onto [s]. Chosen: less than the memory
+        of `Guard`, which stops the robot where it has seen nothing.
     near_hiding, foresight_s
         Distance to hold to a person who will be out of sight after so long [m, s]. Chosen: the edge of Hall's personal
         zone; the time in which the robot comes up by that much.
@@ -90,6 +94,8 @@ class TrackingController:
         How much of the image to search.
     tracker
         Where all people are.
+    company
+        How to give way to people.
     lookout, grid, depth_grid
         How to look for a lost person, how the ground is mapped, and which depth pixels are looked at for it.
     robot
@@ -98,6 +104,7 @@ class TrackingController:
 
     target_distance: float = bounded(1.5, 0.1, 8)
     full_every: int = bounded(15, 1, 1000)
+    back_s: float = bounded(29.0, 0, 600)
     near_hiding: float = bounded(1.2, 0.5, 8)
     foresight_s: float = bounded(1.0, 0, 5)
     steering: Steering = field(default_factory=Steering)
@@ -106,6 +113,7 @@ class TrackingController:
     detour: Detour = field(default_factory=Detour)
     region: RegionSize = field(default_factory=RegionSize)
     tracker: Tracker = field(default_factory=Tracker)
+    company: Company = field(default_factory=Company)
     lookout: Lookout = field(default_factory=Lookout)
     grid: Grid = field(default_factory=Grid)
     depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))
@@ -127,15 +135,19 @@ class TrackingController:
         unseen_s = observation.stamp - person.seen
         person, tracks = self.tracker.follow_legs(person, tracks, self.grid, state.ground)
         state = replace(state, tracks=tracks)
-        state = self._planned(state, person, observation)
         keeps = self._keeps(person, state, observation)
-        aim = self._aim(person, keeps, state, observation)
+        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
+        aim, state = self._aim(person, keeps, points, state, observation)
         lost_s = min(unseen_s, observation.now - person.felt)
         if lost_s <= self.tracker.scan_period_s:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
             known = person.track if person.confirmed else state.known
             state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None)
         can_look = state.ground is not None and state.known is not None and person.confirmed
+        if can_look and aim.hidden and state.ground is not None:
+            # Behind another person one is hidden for a moment; waiting is better than driving round people.
+            pose = pose_at(state.tracks.poses, observation.now)
+            can_look = self._hides(state.ground, pose, person.track.mean[:2])
         patience = self.lookout.after_s if can_look else self.tracker.forget_s if aim.hidden else self.search.after_s
         if lost_s > patience:
             return self._search(state, observation)
@@ -152,6 +164,13 @@ class TrackingController:
             reason = "following another person: the lost one was not found"
         elif keeps > self.target_distance + self.steering.distance_tolerance and mode in (Mode.HOLD, Mode.FOLLOW):
             reason += ", further off than asked: nearer the camera would not show all of them"
+        walkers = self._walkers(person, state, observation)
+        wheels = observation.odometry or Odometry()
+        driven = Twist(wheels.linear, wheels.angular)
+        may_back = self._may_back(state, observation)
+        way_out = self.company.command(twist, driven, walkers, points, self.robot, may_back)
+        if way_out is not None:
+            twist, mode, reason = way_out, Mode.FOLLOW, "giving way to a person"
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(
             state,
@@ -166,10 +185,12 @@ class TrackingController:
         scan, tracks = observation.scan, state.tracks
         if scan is None or observation.odometry is None:
             return state
-        if state.ground is not None and scan.stamp <= state.ground.stamp:
+        if state.ground is not None and scan.stamp < state.ground.stamp + self.grid.period_s:
             return state
         pose = pose_at(tracks.poses, scan.stamp)
-        people = np.array([one.track.mean[:2] for one in tracks.people if one.confirmed]).reshape(-1, 2)
+        lately = observation.now - self.steering.coast_s
+        known = [one.track.mean[:2] for one in tracks.people if one.confirmed and one.measured > lately]
+        people = np.array(known).reshape(-1, 2)
         depth_points = NO_POINTS
         if observation.depth is not None:
             near = self.depth_grid.points(observation.depth, observation.focal_px, self.lookout.view, self.robot)
@@ -199,22 +220,63 @@ class TrackingController:
         belief = Belief(None, (), places, way)
         return Decision(twist, replace(state, hunt=hunt), Mode.LOST, reason, belief=belief)
 
-    def _aim(self, person: Person, keeps: float, state: TrackingState, observation: Observation) -> Aim:
-        """Return where the person is at the newest stamp, and which way leads there."""
+    def _aim(
+        self, person: Person, keeps: float, points: Points, state: TrackingState, observation: Observation
+    ) -> tuple[Aim, TrackingState]:
+        """Return where the person is at the newest stamp and which way leads there, and the state with that way."""
         now, poses = observation.now, state.tracks.poses
         pose, track = pose_at(poses, now), predict(person.track, now, self.tracker.noise)
         bearing, distance = bearing_range(track, pose)
         aim = Aim(bearing, distance, *rates(track, pose), heading=bearing, hidden=False)
         if observation.scan is None or not person.confirmed:
-            return aim
-        obstacles = self.detour.obstacles(scan_points(observation.scan, self.robot), bearing, distance)
+            return aim, state
+        obstacles = self.detour.obstacles(points, bearing, distance)
         if distance - self.robot.camera_x > keeps - self.steering.distance_tolerance:
             preferred = state.detour or self.detour.lean_s * aim.bearing_rate
             heading = self.detour.heading(obstacles, bearing, distance, preferred, self.robot)
             aim = replace(aim, heading=heading)
-            if heading != bearing and len(state.way):
+            if heading == bearing or state.ground is None or self._is_passing(state.ground, obstacles, aim, pose):
+                state = replace(state, way=NO_POINTS, way_at=-math.inf)
+            elif now - state.way_at >= self.lookout.replan_s:
+                way = self.lookout.router.way_towards(self.grid, state.ground, pose, track.mean[:2])
+                state = replace(state, way=way if len(way) > 1 else NO_POINTS, way_at=now)
+            if len(state.way):
                 aim = replace(aim, heading=self._along(state.way, obstacles, pose))
-        return replace(aim, hidden=self.detour.hides(obstacles, bearing, distance))
+        return replace(aim, hidden=self.detour.hides(obstacles, bearing, distance)), state
+
+    def _is_passing(self, ground: Ground, obstacles: Points, aim: Aim, pose: Odometry) -> bool:
+        """Whether only what came lately is in the direct way: that goes away as well, and needs no other way."""
+        lasting = obstacles[self.grid.is_blocked(ground, to_odometry(obstacles, pose), lasting=True)]
+        reach = min(aim.distance - 2 * self.detour.person_radius, self.detour.look_ahead)
+        return self.detour.free(lasting, aim.bearing, 0.0, reach, self.robot, 0) is not None
+
+    def _may_back(self, state: TrackingState, observation: Observation) -> bool:
+        """Whether the ground behind the robot was seen to be free lately, as `Guard` wants it."""
+        ground = state.ground
+        if ground is None:
+            return True
+        behind = np.array([(-self.robot.half_length - far, 0.0) for far in (0.1, 0.2, 0.3)])
+        cells = self.grid.flat(ground, to_odometry(behind, pose_at(state.tracks.poses, observation.now)))
+        return bool((ground.freed.flat[cells] > observation.now - self.back_s).all())
+
+    def _hides(self, ground: Ground, pose: Odometry, place: Points) -> bool:
+        """Whether something that lasts is between the robot and a place (2,) in the odometry frame."""
+        return not self.grid.sees(ground, np.array([[pose.x, pose.y]]), place[None], lasting=True)[0, 0]
+
+    def _walkers(self, person: Person, state: TrackingState, observation: Observation) -> list[Walker]:
+        """Return everybody measured lately, with the followed person as measured last, in the base frame."""
+        now = observation.now
+        pose = pose_at(state.tracks.poses, now)
+        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+        walkers = []
+        for one in state.tracks.people:
+            one = person if one.number == person.number else one
+            if not one.confirmed or now - one.measured > self.steering.coast_s:
+                continue
+            x, y, vx, vy = predict(one.track, now, self.tracker.noise).mean.tolist()
+            dx, dy = x - pose.x, y - pose.y
+            walkers.append(Walker(cos * dx + sin * dy, cos * dy - sin * dx, cos * vx + sin * vy, cos * vy - sin * vx))
+        return walkers
 
     def _keeps(self, person: Person, state: TrackingState, observation: Observation) -> float:
         """Return the distance to hold from the camera [m]: the target, but none from which a person is cut off."""
@@ -225,7 +287,7 @@ class TrackingController:
         if keeps > self.near_hiding and state.ground is not None:
             pose = pose_at(state.tracks.poses, observation.now)
             soon = predict(person.track, observation.now + self.foresight_s, self.tracker.noise).mean[:2]
-            if not self.grid.sees(state.ground, np.array([[pose.x, pose.y]]), soon[None])[0, 0]:
+            if self._hides(state.ground, pose, soon):
                 return self.near_hiding
         return keeps
 
@@ -251,27 +313,12 @@ class TrackingController:
             )
         return tuple(people)
 
-    def _along(self, way: Points, obstacles: Points, pose: Odometry) -> float | None:
-        """Return the direction along a way [rad]; None where none is free."""
+    def _along(self, way: Points, obstacles: Points, pose: Odometry) -> float:
+        """Return the direction along a way [rad], or one near it that is free."""
         x, y = point_ahead(way, pose, self.lookout.ahead)
         off = wrap(math.atan2(y - pose.y, x - pose.x) - pose.yaw)
-        return off if abs(off) > self.lookout.aside else self.detour.near(obstacles, off, self.robot)
-
-    def _planned(self, state: TrackingState, person: Person, observation: Observation) -> TrackingState:
-        """Return the state with a way to the person where the direct one is not free; a way is kept for a while."""
-        now, ground, scan = observation.now, state.ground, observation.scan
-        if ground is None or scan is None or not person.confirmed:
-            return state
-        pose, track = pose_at(state.tracks.poses, now), predict(person.track, now, self.tracker.noise)
-        bearing, distance = bearing_range(track, pose)
-        obstacles = self.detour.obstacles(scan_points(scan, self.robot), bearing, distance)
-        reach = min(distance - 2 * self.detour.person_radius, self.detour.look_ahead)
-        if self.detour.free(obstacles, bearing, 0.0, reach, self.robot, 0) is not None:
-            return replace(state, way=NO_POINTS, way_at=-math.inf)
-        if now - state.way_at < self.lookout.replan_s:
-            return state
-        way = self.lookout.router.way_towards(self.grid, ground, pose, track.mean[:2])
-        return replace(state, way=way if len(way) > 1 else NO_POINTS, way_at=now)
+        near = self.detour.near(obstacles, off, self.robot) if abs(off) < self.lookout.aside else None
+        return off if near is None else near
 
     def _is_worth_nearing(self, person: Person, aim: Aim) -> bool:
         """Whether a track is too far away for HOG to confirm it, and likely enough to be one to drive there."""

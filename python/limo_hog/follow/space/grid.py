@@ -32,6 +32,8 @@ class Ground:
         float32 (N, N): log-odds of each cell's being occupied; rows along x, columns along y.
     seen
         float32 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never.
+    freed
+        float32 (N, N): when each cell was last seen to be free [s]; -inf for never.
     stamp
         Of the last scan [s].
     """
@@ -39,6 +41,7 @@ class Ground:
     corner: tuple[int, int]
     occupied: NDArray[np.float32]
     seen: NDArray[np.float32]
+    freed: NDArray[np.float32]
     stamp: float = -math.inf
 
 
@@ -64,6 +67,11 @@ class Grid:
         Limits of the log-odds. Chosen: what has moved away is forgotten after seven scans, about a second.
     person_radius
         Returns nearer than this to a tracked person are the person's and fill no cell [m]. Chosen: as `Detour`'s.
+    period_s
+        A scan sooner after the last one entered is left out [s]. Chosen: half the computing, and nothing that stands is
+        missed.
+    lasts_s
+        What stands for so long is taken to last [s]. Chosen: people stop for a few seconds.
     own_radius
         The ground under the robot is free [m]: the circle around its outline.
     """
@@ -78,12 +86,15 @@ class Grid:
     lowest: float = -1.2
     highest: float = 2.5
     person_radius: float = 0.45
+    period_s: float = 0.2
+    lasts_s: float = 6.0
     own_radius: float = 0.2
 
     def start(self, pose: Odometry) -> Ground:
         """Return ground of which nothing is known, around the robot."""
         shape = self.cells, self.cells
-        return Ground(self._corner(pose), np.zeros(shape, np.float32), np.full(shape, -np.inf, np.float32))
+        never = np.full(shape, -np.inf, np.float32)
+        return Ground(self._corner(pose), np.zeros(shape, np.float32), never, never.copy())
 
     def update(
         self,
@@ -110,7 +121,7 @@ class Grid:
             Where the lidar sits.
         """
         ground = self._moved(ground or self.start(pose), pose)
-        occupied, seen = ground.occupied.copy(), ground.seen.copy()
+        occupied, seen, freed = ground.occupied.copy(), ground.seen.copy(), ground.freed.copy()
         ranges = scan.ranges.astype(np.float64)
         angles = pose.yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
         at = np.array([pose.x + robot.lidar_x * math.cos(pose.yaw), pose.y + robot.lidar_x * math.sin(pose.yaw)])
@@ -119,7 +130,8 @@ class Grid:
         clear = np.where(np.isnan(ranges) | (ranges < scan.range_min), 0.0, np.minimum(ranges, scan.range_max))
         steps = np.arange(0.5, self.reach / self.cell) * self.cell
         beams = slice(None, None, self.every)
-        free = steps[None, :] < clear[beams, None] - self.cell
+        # So far before the end that it is in another cell.
+        free = steps[None, :] < clear[beams, None] - 1.5 * self.cell
         directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
         points = (at + steps[None, :, None] * directions[beams, None, :])[free]
         ends = at + ranges[returned & (ranges < self.reach), None] * directions[returned & (ranges < self.reach)]
@@ -134,7 +146,9 @@ class Grid:
         occupied.flat[filled] = np.minimum(ground.occupied.flat[filled] + self.hit, self.highest)
         seen.flat[cleared] = scan.stamp
         seen.flat[filled] = scan.stamp
-        return Ground(ground.corner, occupied, seen, scan.stamp)
+        clear_now = cleared[occupied.flat[cleared] <= 0]
+        freed.flat[clear_now] = scan.stamp
+        return Ground(ground.corner, occupied, seen, freed, scan.stamp)
 
     def index(self, ground: Ground, points: Points) -> tuple[Cells, NDArray[np.bool_]]:
         """Return the cell of each point, int64 (N, 2), and whether it is in the square, bool (N,)."""
@@ -152,11 +166,17 @@ class Grid:
         """Return the middle of each cell [m], float64 (N, 2)."""
         return np.asarray((cells + ground.corner + 0.5) * self.cell, np.float64)
 
-    def is_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
-        """Return whether each point is in an occupied cell, bool (N,); outside of the square none is."""
+    def is_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
+        """Return whether each point is in an occupied cell, bool (N,); outside of the square none is.
+
+        With `lasting`, only cells count that were not free within `lasts_s`: what came in since can go away as well.
+        """
         cells, inside = self.index(ground, points)
         blocked = np.zeros(len(points), bool)
-        blocked[inside] = ground.occupied[cells[inside, 0], cells[inside, 1]] > 0
+        rows, columns = cells[inside].T
+        blocked[inside] = ground.occupied[rows, columns] > 0
+        if lasting:
+            blocked[inside] &= ground.freed[rows, columns] < ground.stamp - self.lasts_s
         return blocked
 
     def is_near_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
@@ -166,14 +186,19 @@ class Grid:
         around = (points[:, None] + corners).reshape(-1, 2)
         return np.asarray(self.is_blocked(ground, around).reshape(-1, 4).any(axis=1))
 
-    def sees(self, ground: Ground, origins: Points, places: Points, samples: int = 24) -> NDArray[np.bool_]:
+    def sees(
+        self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24
+    ) -> NDArray[np.bool_]:
         """Return whether nothing occupied is between each of (K, 2) origins and each of (N, 2) places, bool (K, N).
 
-        `samples` points on each line are looked at [1]; chosen: at 3 m one in every cell.
+        `samples` points on each line are looked at [1]; chosen: at 3 m one in every cell. `lasting` is that of
+        `is_blocked`.
         """
         shares = (np.arange(samples) + 0.5) / samples
         way = origins[:, None, None, :] + shares[None, None, :, None] * (places[None, :] - origins[:, None])[:, :, None]
-        blocked = self.is_blocked(ground, way.reshape(-1, 2)).reshape(len(origins), len(places), samples)
+        blocked = self.is_blocked(ground, way.reshape(-1, 2), lasting=lasting).reshape(
+            len(origins), len(places), samples
+        )
         return np.asarray(~blocked.any(axis=2))
 
     def _corner(self, pose: Odometry) -> tuple[int, int]:
@@ -190,7 +215,8 @@ class Grid:
         (to_x, from_x), (to_y, from_y) = (_overlap(step, self.cells) for step in by)
         fresh.occupied[to_x, to_y] = ground.occupied[from_x, from_y]
         fresh.seen[to_x, to_y] = ground.seen[from_x, from_y]
-        return replace(ground, corner=corner, occupied=fresh.occupied, seen=fresh.seen)
+        fresh.freed[to_x, to_y] = ground.freed[from_x, from_y]
+        return replace(ground, corner=corner, occupied=fresh.occupied, seen=fresh.seen, freed=fresh.freed)
 
 
 def _overlap(step: int, cells: int) -> tuple[slice, slice]:

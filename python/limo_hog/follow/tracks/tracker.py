@@ -200,6 +200,9 @@ class Tracker:
         now = person
         for returns in tracks.scans:
             # The track of an unseen person already contains the scans up to `felt`: each may count only once.
+            if returns.stamp - now.measured > self.restart_s:
+                # Legs continue a track; after a gap, whatever stands there could be taken for them.
+                break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
                 if ground is not None:
                     # Walls and furniture that are known already are nobody's legs.

@@ -60,7 +60,15 @@ fn fast_path(criterion: &mut Criterion) {
             let grouping = Grouping::Similar(2);
             group.bench_function("pyramid", |b| {
                 b.iter(|| {
-                    hog.detect_multi_scale(black_box(image), &SEARCH, 1.05, grouping, 1, &Interrupt::NEVER)
+                    hog.detect_multi_scale(
+                        black_box(image),
+                        &SEARCH,
+                        1.05,
+                        grouping,
+                        None,
+                        1,
+                        &Interrupt::NEVER,
+                    )
                 });
             });
         }

@@ -155,7 +155,8 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
             let hog = hog(&detector, backend);
             for threads in [1, 2, 5, 64] {
                 let detect = |grouping| {
-                    hog.detect_multi_scale(image, &search, 1.1, grouping, threads, &Interrupt::NEVER).unwrap()
+                    hog.detect_multi_scale(image, &search, 1.1, grouping, None, threads, &Interrupt::NEVER)
+                        .unwrap()
                 };
                 let found = detect(Grouping::Similar(0));
                 assert_eq!(rects(&found), rects(&every), "{}", backend.name());
@@ -165,7 +166,7 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
             }
             // Mean-shift is given exact weights: not a bit differs.
             let found = hog
-                .detect_multi_scale(image, &search, 1.1, Grouping::MeanShift(0.1), 2, &Interrupt::NEVER)
+                .detect_multi_scale(image, &search, 1.1, Grouping::MeanShift(0.1), None, 2, &Interrupt::NEVER)
                 .unwrap();
             assert_eq!(found, modes, "{}", backend.name());
         }

@@ -31,7 +31,7 @@ fn a_search_finds_what_opencv_finds_grouped_by_similarity_and_by_mean_shift() {
     for backend in available() {
         let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
         let search = |grouping| {
-            hog.detect_multi_scale(picture.view(), &STEPS, 1.1, grouping, 1, &Interrupt::NEVER).unwrap()
+            hog.detect_multi_scale(picture.view(), &STEPS, 1.1, grouping, None, 1, &Interrupt::NEVER).unwrap()
         };
         assert_eq!(search(Grouping::Similar(0)).len(), 51);
         assert_found(

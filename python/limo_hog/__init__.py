@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from limo_hog._core import get_num_threads, set_num_threads
+from limo_hog.crops import describe
 from limo_hog.cv2_api.functions import (
     HOGDESCRIPTOR_DEFAULT_NLEVELS,
     HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL,
@@ -63,6 +64,7 @@ __all__ = [
     "ParameterError",
     "ParameterTypeError",
     "PeopleDetector",
+    "describe",
     "get_num_threads",
     "groupRectangles",
     "install_into_cv2",

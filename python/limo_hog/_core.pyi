@@ -138,6 +138,25 @@ class Hog:
             The image is none of those above; a stride is not positive, the padding or the result too large.
         """
 
+    def describe(self, crops: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Descriptors of crops of the window's size, on all threads, within 1e-6 of those that `compute` gives.
+
+        Parameters
+        ----------
+        crops
+            (N, H, W), (N, H, W, 1) or (N, H, W, 3).
+
+        Returns
+        -------
+        descriptors
+            float32 (N, `descriptor_len`), each as of `compute`.
+
+        Raises
+        ------
+        ImageError
+            The crops are none of those above.
+        """
+
     def detect(
         self,
         image: NDArray[np.uint8],
@@ -174,6 +193,8 @@ class Hog:
         group_threshold: float,
         mean_shift: bool,
         first_level: _Pair | None = None,
+        guide: tuple[int, float, int] | None = None,
+        threads: int | None = None,
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Hits on all levels of a pyramid, grouped, and clipped to the image.
 
@@ -195,6 +216,11 @@ class Hog:
         first_level
             Width and height [px]: the image is resized to this before all else, as `resize` does; boxes are in its
             pixels.
+        guide
+            Search every guide[0]-th level whole, with the threshold lowered by guide[1], and the others only within
+            guide[2] windows of what was found: faster, and some hits may be missed. None: search all levels whole.
+        threads
+            How many share the work, at least 1; None: as `set_num_threads` says.
 
         Returns
         -------

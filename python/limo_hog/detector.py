@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -21,6 +22,8 @@ from limo_hog.models import Model, load_model
 from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     from PIL.Image import Image as PilImage
 
 #: Ways to make one box of a person's many hits, and the default `overlap` of each.
@@ -31,6 +34,9 @@ _NMS = {"overlap": 0.65, "iou": 0.3, "soft": 0.3, "group": None}
 _LARGE_WINDOW_FROM_PX = 64.0
 #: Hits that OpenCV's sample asks a group to have more than.
 _GROUP_THRESHOLD = 2
+#: Every how many levels one is searched whole, by how much the threshold is lowered there [SVM margin], and how many
+#: windows around are searched on the others; `benches/guided.py` measures others, docs/simd.md shows them.
+_GUIDES: dict[str, tuple[int, float, int] | None] = {"exact": None, "guided": (4, 0.5, 1)}
 #: More levels than a pyramid of the finest `scale` and the largest image can have.
 _LEVELS = 2048
 #: Bounds of arguments, so that no image grows, and no pyramid is cut, beyond what memory and `_LEVELS` hold.
@@ -74,6 +80,10 @@ class PeopleDetector:
         Mirrored border around each level (x, y) [px], at most the window's size.
     scale
         How much each level is smaller than the one before, 1.005 or more.
+    search
+        "exact": all levels, every window. "guided": every fourth level, with a threshold lower by 0.5, and the levels
+        between only around what was found there: about twice as fast, and a few hits in a thousand are missed
+        (docs/simd.md). Geometries without kernels are searched whole.
 
     Raises
     ------
@@ -93,6 +103,7 @@ class PeopleDetector:
     win_stride: tuple[int, int] = (8, 8)
     padding: tuple[int, int] = (4, 4)
     scale: float = 1.05
+    search: Literal["exact", "guided"] = "exact"
     _model: Model = field(init=False, repr=False, compare=False)
     _hogs: tuple[_core.Hog, ...] = field(init=False, repr=False, compare=False)
 
@@ -107,6 +118,9 @@ class PeopleDetector:
             win_stride=_pair("win_stride", self.win_stride, 1, None),
             padding=_pair("padding", self.padding, 0, self._model.geometry.winSize),
         )
+        if not isinstance(self.search, str) or self.search not in _GUIDES:
+            kind = ParameterError if isinstance(self.search, str) else ParameterTypeError
+            raise kind(f"search is {shown(self.search)}; one of {', '.join(_GUIDES)} is wanted")
         self._set(_hogs=tuple(self._compiled()))
 
     def _compiled(self) -> Iterator[_core.Hog]:
@@ -181,6 +195,39 @@ class PeopleDetector:
         OSError
             The file cannot be read.
         """
+        return self._detect(image, None)
+
+    def detect_many(
+        self, images: Iterable[NDArray[np.uint8] | str | os.PathLike[str] | PilImage]
+    ) -> Iterator[Detections]:
+        """People in each of many images, in their order: as `detect`, but every core works on an image of its own.
+
+        Small images leave cores idle that share one; here they do not. Files are read by the same threads. Images are
+        taken as results are, twice as many ahead as there are threads (`set_num_threads`).
+
+        Raises
+        ------
+        ImageError, MissingExtraError, OSError
+            As `detect`, at the image's turn.
+        """
+        from concurrent.futures import ThreadPoolExecutor  # imported here: it takes longer than this package
+
+        threads = _core.get_num_threads()
+        waiting: deque[Future[Detections]] = deque()
+        with ThreadPoolExecutor(threads, thread_name_prefix="limo-hog") as pool:
+            try:
+                for image in images:
+                    waiting.append(pool.submit(self._detect, image, 1))
+                    if len(waiting) > 2 * threads:
+                        yield waiting.popleft().result()
+                while waiting:
+                    yield waiting.popleft().result()
+            finally:
+                for job in waiting:
+                    job.cancel()
+
+    def _detect(self, image: NDArray[np.uint8] | str | os.PathLike[str] | PilImage, threads: int | None) -> Detections:
+        """Return the people in `image`, found by so many threads (None: by as many as `set_num_threads` allows)."""
         searched = remembered(image)
         if not isinstance(image, np.ndarray):
             # Imported here, as programs that read pictures themselves do not need it.
@@ -194,7 +241,16 @@ class PeopleDetector:
         grouping = group_threshold if self.nms == "group" else 0
         hits = [
             hog.detect_multi_scale(
-                image, threshold, self.win_stride, self.padding, self.scale, grouping, False, first_level
+                image,
+                threshold,
+                self.win_stride,
+                self.padding,
+                self.scale,
+                grouping,
+                False,
+                first_level,
+                _GUIDES[self.search],
+                threads,
             )
             for hog in self._hogs
         ]

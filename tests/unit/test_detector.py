@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import FrozenInstanceError, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -193,6 +193,51 @@ def test_a_copy_is_equal_and_finds_the_same(again: Any) -> None:
     twin = again(detector)
     assert twin == detector and hash(twin) == hash(detector) and repr(twin) == repr(detector)
     np.testing.assert_array_equal(twin.detect(picture()).boxes, detector.detect(picture()).boxes)
+
+
+def test_a_guided_search_finds_people_and_only_what_the_exact_search_finds() -> None:
+    exact, guided = (
+        {
+            tuple(box)
+            for box in PeopleDetector(nms="group", group_threshold=0, search=search).detect(picture()).boxes.tolist()
+        }
+        for search in ("exact", "guided")
+    )
+    assert guided <= exact
+    assert len(guided) > 0.9 * len(exact) > 0
+
+
+@pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="photographs lie in ../shared")
+def test_on_photographs_a_guided_search_misses_few_hits() -> None:
+    hits: dict[Literal["exact", "guided"], int] = {"exact": 0, "guided": 0}
+    for file in sorted(PHOTOGRAPHS.iterdir()):
+        image = cv2.imread(str(file))
+        for search in hits:
+            detector = PeopleDetector(min_height=None, nms="group", group_threshold=0, search=search)
+            hits[search] += 0 if image is None else len(detector.detect(np.asarray(image, np.uint8)))
+    assert hits["exact"] > 100
+    assert 0.97 * hits["exact"] < hits["guided"] <= hits["exact"]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_many_images_are_searched_in_their_order(threads: int) -> None:
+    images = [street(200 + 40 * number, 240, 1 + 2 * (number % 2)) for number in range(9)]
+    detector = PeopleDetector(min_height=None)
+    wanted = [detector.detect(image).boxes.tolist() for image in images]
+    before = limo_hog.get_num_threads()
+    limo_hog.set_num_threads(threads)
+    try:
+        assert [found.boxes.tolist() for found in detector.detect_many(iter(images))] == wanted
+    finally:
+        limo_hog.set_num_threads(before)
+    assert any(wanted)
+
+
+def test_an_image_among_many_that_is_none_is_named_at_its_turn() -> None:
+    found = PeopleDetector(min_height=None).detect_many([picture(), np.zeros((4, 4), np.float32), picture()])
+    assert len(next(found)) >= 0
+    with pytest.raises(limo_hog.ImageTypeError):
+        next(found)
 
 
 def test_threads_share_a_detector() -> None:

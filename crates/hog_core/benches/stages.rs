@@ -66,6 +66,7 @@ fn fast_path(criterion: &mut Criterion) {
                         &SEARCH,
                         &Pyramid { first: None, scale: 1.05 },
                         grouping,
+                        None,
                         1,
                         &Interrupt::NEVER,
                     )

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use crate::error::{BackendError, ParameterError, Result};
 use crate::exact::{self, Gradient, Svm, Tables};
-use crate::fast::{self, Backend, Plan, Planes};
+use crate::fast::{self, Backend, Found, Plan, Planes, Region};
 use crate::geometry::{Padding, Rect, Size};
 use crate::group::{Candidate, clip, group_candidates, mean_shift};
+use crate::guided::Guide;
 use crate::image::{Image, ImageView};
 use crate::interrupt::Interrupt;
 use crate::memory::{self, Pool};
@@ -18,17 +19,18 @@ use crate::threads::in_order;
 /// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
 #[derive(Debug, Clone)]
 pub struct Hog {
-    exact: Arc<Exact>,
-    /// The fast path, where the geometry has one.
+    pub(crate) exact: Arc<Exact>,
+    /// The fast path, where the geometry has one, and the search by it, where the SVM has one too.
+    pub(crate) geometry: Option<fast::Geometry>,
     plan: Option<Arc<Plan>>,
-    backend: Backend,
+    pub(crate) backend: Backend,
 }
 
 /// What the exact path needs.
 #[derive(Debug)]
-struct Exact {
+pub(crate) struct Exact {
     spec: HogSpec,
-    tables: Tables,
+    pub tables: Tables,
     svm: Option<Svm>,
 }
 
@@ -71,9 +73,11 @@ impl Hog {
         }
         let spec = HogSpec::new(params)?;
         let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
-        let plan = svm.as_ref().and_then(|svm| fast::plan(backend, &spec, svm));
+        let geometry = fast::geometry(backend, &spec);
+        let plan = geometry.as_ref().zip(svm.as_ref());
+        let plan = plan.and_then(|(geometry, svm)| fast::plan(backend, geometry, svm));
         let exact = Exact { tables: Tables::new(&spec)?, spec, svm };
-        Ok(Self { exact: Arc::new(exact), plan: plan.map(Arc::new), backend })
+        Ok(Self { exact: Arc::new(exact), geometry, plan: plan.map(Arc::new), backend })
     }
 
     /// The checked geometry.
@@ -166,11 +170,14 @@ impl Hog {
         interrupt: &Interrupt,
     ) -> Result<Vec<Hit>> {
         let Exact { spec, tables, svm } = &*self.exact;
-        let grid = self.steps(search, spec.cell)?.grid(image.size(), spec);
+        let steps = self.steps(search, spec.cell)?;
+        let grid = steps.grid(image.size(), spec);
         let Some(svm) = svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
-            let level = memory::collect([(image.size(), grid)])?;
-            let mut hits = self.hits(image, image.size(), level, svm, search, false, 1, interrupt)?;
+            let level = memory::collect([Level { scale: 1.0, size: image.size() }])?;
+            let how =
+                How { search: *search, first: image.size(), exact_weights: false, guide: None, threads: 1 };
+            let mut hits = self.hits(image, &level, &steps, svm, &how, interrupt)?;
             return Ok(hits.pop().unwrap_or_default());
         };
         let inside = memory::collect(locations.iter().filter_map(|&at| grid.to_padded(at, spec)))?;
@@ -189,13 +196,15 @@ impl Hog {
     /// Rectangles of all hits of the pyramid, grouped and clipped to its first level, in whose pixels they are.
     ///
     /// The work is shared among `threads` threads; hits are in level order, whatever their number. The stride (0, 0)
-    /// is the block stride.
+    /// is the block stride. With a `guide`, some hits may be missed; a geometry without a fast path is searched whole.
+    #[allow(clippy::too_many_arguments, reason = "they are OpenCV's, and how the work is done")]
     pub fn detect_multi_scale(
         &self,
         image: ImageView,
         search: &Search,
         pyramid: &Pyramid,
         grouping: Grouping,
+        guide: Option<Guide>,
         threads: usize,
         interrupt: &Interrupt,
     ) -> Result<Vec<(Rect, f64)>> {
@@ -207,8 +216,8 @@ impl Hog {
         let levels = levels(first, pyramid.scale, spec, interrupt)?;
         // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
         let exact_weights = matches!(grouping, Grouping::MeanShift(_));
-        let windows = memory::collect(levels.iter().map(|level| (level.size, steps.grid(level.size, spec))))?;
-        let hits = self.hits(image, first, windows, svm, search, exact_weights, threads, interrupt)?;
+        let how = How { search: *search, first, exact_weights, guide, threads };
+        let hits = self.hits(image, &levels, &steps, svm, &how, interrupt)?;
         let mut candidates = memory::with_room(hits.iter().map(Vec::len).sum())?;
         for (level, hits) in levels.iter().zip(&hits) {
             candidates.extend(hits.iter().map(|hit| self.candidate(level, hit)));
@@ -232,24 +241,24 @@ impl Hog {
         Candidate { rect, weight: hit.weight, scale: level.scale }
     }
 
-    /// The hits of each of `levels` of the image resized to `first`: by the fast path, where the geometry has one.
-    #[allow(clippy::too_many_arguments, reason = "a search is named by all of them")]
+    /// The hits of each of `levels`: by the fast path, where the geometry has one.
     fn hits(
         &self,
         image: ImageView,
-        first: Size,
-        levels: Vec<(Size, Grid)>,
+        levels: &[Level],
+        steps: &Steps,
         svm: &Svm,
-        search: &Search,
-        exact_weights: bool,
-        threads: usize,
+        how: &How,
         interrupt: &Interrupt,
     ) -> Result<Vec<Vec<Hit>>> {
-        let hit_threshold = search.hit_threshold;
-        let fast = self.plan.as_ref().filter(|_| levels.iter().all(|(_, grid)| fast::serves(grid)));
+        let How { threads, exact_weights, first, .. } = *how;
+        let hit_threshold = how.search.hit_threshold;
+        let grids =
+            memory::collect(levels.iter().map(|level| (level.size, steps.grid(level.size, self.spec()))))?;
         let mut windows =
-            memory::collect(levels.iter().map(|&(size, grid)| LevelWindows { size, grid, found: None }))?;
+            memory::collect(grids.iter().map(|&(size, grid)| LevelWindows { size, grid, found: None }))?;
         let mut margin = f64::INFINITY;
+        let fast = self.plan.as_ref().filter(|_| grids.iter().all(|(_, grid)| fast::serves(grid)));
         if let Some(plan) = fast {
             let error = plan.score_error_bound();
             if !exact_weights && error <= SCORE_ERROR_MAX {
@@ -263,14 +272,7 @@ impl Hog {
                 PLANES.give(std::mem::replace(&mut planes, resized));
             }
             let planes = Arc::new(planes);
-            let task = fast::Task {
-                backend: self.backend,
-                plan: Arc::clone(plan),
-                planes: Arc::clone(&planes),
-                levels,
-                threshold: hit_threshold,
-            };
-            let found = fast::search(task, threads, interrupt);
+            let found = self.find(&planes, plan, levels, Arc::new(grids), how, interrupt);
             if let Ok(planes) = Arc::try_unwrap(planes) {
                 PLANES.give(planes);
             }
@@ -306,4 +308,54 @@ impl Hog {
             scorer.hits(image.view()?, level, interrupt)
         })
     }
+
+    /// What the fast path finds on each of `levels`.
+    fn find(
+        &self,
+        planes: &Arc<Planes>,
+        plan: &Arc<Plan>,
+        levels: &[Level],
+        grids: Arc<Vec<(Size, Grid)>>,
+        how: &How,
+        interrupt: &Interrupt,
+    ) -> Result<Vec<Vec<Found>>> {
+        let task = |regions: Vec<Region>, threshold: f64| fast::Task {
+            backend: self.backend,
+            plan: Arc::clone(plan),
+            planes: Arc::clone(planes),
+            levels: Arc::clone(&grids),
+            regions,
+            threshold,
+        };
+        let threshold = how.search.hit_threshold;
+        let whole = |(level, (_, grid)): (usize, &(Size, Grid))| Region::whole(level, grid);
+        let Some(guide) = how.guide else {
+            let regions = memory::collect(grids.iter().enumerate().map(whole))?;
+            return fast::search(task(regions, threshold), how.threads, interrupt);
+        };
+        let some = grids.iter().enumerate().filter(|&(level, _)| guide.is_whole(level));
+        let regions = memory::collect(some.map(whole))?;
+        let mut found = fast::search(task(regions, threshold - guide.margin), how.threads, interrupt)?;
+        let regions = guide.between(levels, &grids, &found, self.spec())?;
+        let between = fast::search(task(regions, threshold), how.threads, interrupt)?;
+        for (found, mut between) in found.iter_mut().zip(between) {
+            // Regions may share windows.
+            between.dedup();
+            if !between.is_empty() {
+                *found = between;
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// How hits are looked for.
+struct How {
+    search: Search,
+    /// The size that the image is resized to before all else.
+    first: Size,
+    /// Whether every hit's weight is to be the exact path's.
+    exact_weights: bool,
+    guide: Option<Guide>,
+    threads: usize,
 }

@@ -19,8 +19,10 @@ pub mod model;
 pub mod params;
 pub mod pyramid;
 
+mod describe;
 mod detect;
 mod fast;
+mod guided;
 mod interrupt;
 mod memory;
 mod rescore;
@@ -34,6 +36,7 @@ pub use error::{HogError, Result};
 pub use fast::Backend;
 pub use geometry::{Rect, Size};
 pub use group::Candidate;
+pub use guided::Guide;
 pub use image::ImageView;
 pub use interrupt::Interrupt;
 pub use params::{HogParams, HogSpec};

@@ -14,7 +14,9 @@ use pyo3::prelude::*;
 
 use crate::error::{ImageError, ParameterError};
 use crate::pyramid::Pyramid;
-use crate::{Backend, Grouping, HogError, HogParams, ImageView, Interrupt, Rect, Search, Size, memory};
+use crate::{
+    Backend, Grouping, Guide, HogError, HogParams, ImageView, Interrupt, Rect, Search, Size, memory,
+};
 
 type Pair = (i64, i64);
 type Array1<'py, T> = Bound<'py, PyArray1<T>>;
@@ -96,6 +98,30 @@ fn array1<T: numpy::Element>(py: Python<'_>, values: impl IntoIterator<Item = T>
     Ok(PyArray1::from_vec(py, values))
 }
 
+/// `len` zeros in memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
+///
+/// (`PyArray1::zeros` would panic where there is none.)
+fn zeros(py: Python<'_>, len: usize) -> PyResult<Array1<'_, f32>> {
+    match py.import("numpy")?.call_method1("zeros", (len, "float32")) {
+        Err(error) if error.is_instance_of::<PyMemoryError>(py) => {
+            Err(raised(py, &HogError::Memory { bytes: len.saturating_mul(size_of::<f32>()) }))
+        }
+        zeros => Ok(zeros?.cast_into()?),
+    }
+}
+
+/// The bytes of an array in C order: borrowed where they lie so, else copied.
+fn contiguous<'a>(py: Python<'_>, array: &'a PyReadonlyArrayDyn<'_, u8>) -> PyResult<Cow<'a, [u8]>> {
+    // `as_slice` also succeeds on Fortran order, with the pixels in that order.
+    match array.as_slice() {
+        Ok(slice) if array.is_c_contiguous() => Ok(Cow::Borrowed(slice)),
+        _ => {
+            let copy = memory::collect(array.as_array().iter().copied());
+            Ok(Cow::Owned(copy.map_err(|error| raised(py, &error))?))
+        }
+    }
+}
+
 /// The pixels of a numpy image: borrowed where it is contiguous, else copied.
 struct Pixels<'a> {
     data: Cow<'a, [u8]>,
@@ -113,15 +139,7 @@ impl<'a> Pixels<'a> {
                 return Err(raised(py, &ImageError::Dimensions { got: shape.len() }.into()));
             }
         };
-        // `as_slice` also succeeds on Fortran order, with the pixels in that order.
-        let data = match array.as_slice() {
-            Ok(slice) if array.is_c_contiguous() => Cow::Borrowed(slice),
-            _ => {
-                let copy = memory::collect(array.as_array().iter().copied());
-                Cow::Owned(copy.map_err(|error| raised(py, &error))?)
-            }
-        };
-        Ok(Self { data, width, height, channels })
+        Ok(Self { data: contiguous(py, array)?, width, height, channels })
     }
 
     fn view(&self) -> crate::Result<ImageView<'_>> {
@@ -213,18 +231,33 @@ impl Hog {
         let pixels = Pixels::new(py, &image)?;
         let (view, locations) = (pixels.view().map_err(raise)?, locations.as_deref());
         let len = self.inner.compute_len(view, &search, locations).map_err(raise)?;
-        // In memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
-        // (`PyArray1::zeros` would panic where there is none.)
-        let zeros = py.import("numpy")?.call_method1("zeros", (len, "float32"));
-        let memory = || raise(HogError::Memory { bytes: len.saturating_mul(size_of::<f32>()) });
-        let descriptors = match zeros {
-            Err(error) if error.is_instance_of::<PyMemoryError>(py) => return Err(memory()),
-            zeros => zeros?.cast_into::<PyArray1<f32>>()?,
-        };
+        let descriptors = zeros(py, len)?;
         let mut out = descriptors.readwrite();
         let out = out.as_slice_mut()?;
         detached(py, |interrupt| self.inner.compute(view, &search, locations, interrupt, out))?;
         Ok(descriptors)
+    }
+
+    fn describe<'py>(&self, crops: PyReadonlyArrayDyn<'py, u8>) -> PyResult<Array2<'py, f32>> {
+        let py = crops.py();
+        let spec = self.inner.spec();
+        let (count, channels) = match *crops.shape() {
+            [count, height, width] if (width, height) == (spec.win.width, spec.win.height) => (count, 1),
+            [count, height, width, channels] if (width, height) == (spec.win.width, spec.win.height) => {
+                (count, channels)
+            }
+            ref shape => {
+                let got = shape.len();
+                return Err(raised(py, &ImageError::Dimensions { got }.into()));
+            }
+        };
+        let elements = spec.descriptor_len();
+        let data = contiguous(py, &crops)?;
+        let descriptors = zeros(py, count.saturating_mul(elements))?;
+        let mut out = descriptors.readwrite();
+        let out = out.as_slice_mut()?;
+        detached(py, |interrupt| self.inner.describe(&data, channels, threads(), interrupt, out))?;
+        descriptors.reshape([count, elements])
     }
 
     fn detect<'py>(
@@ -244,8 +277,9 @@ impl Hog {
         Ok((places.reshape([hits.len(), 2])?, array1(py, hits.iter().map(|hit| hit.weight))?))
     }
 
-    #[allow(clippy::too_many_arguments, reason = "they are OpenCV's detectMultiScale arguments")]
-    #[pyo3(signature = (image, hit_threshold, win_stride, padding, scale, group_threshold, mean_shift, first_level=None))]
+    #[allow(clippy::too_many_arguments, reason = "they are OpenCV's detectMultiScale arguments, and ours")]
+    #[pyo3(signature = (image, hit_threshold, win_stride, padding, scale, group_threshold, mean_shift, first_level = None,
+        guide = None, threads = None))]
     fn detect_multi_scale<'py>(
         &self,
         image: PyReadonlyArrayDyn<'py, u8>,
@@ -256,6 +290,8 @@ impl Hog {
         group_threshold: f64,
         mean_shift: bool,
         first_level: Option<Pair>,
+        guide: Option<(usize, f64, usize)>,
+        threads: Option<usize>,
     ) -> PyResult<(Array2<'py, i32>, Array1<'py, f64>)> {
         let search = Search { hit_threshold, win_stride, padding };
         let pyramid = Pyramid { first: first_level.map(size), scale };
@@ -264,8 +300,10 @@ impl Hog {
         } else {
             Grouping::Similar(group_threshold as i32)
         };
+        let guide = guide.map(|(every, margin, reach)| Guide { every, margin, reach });
+        let threads = threads.map_or_else(self::threads, |threads| threads.clamp(1, THREADS_MAX));
         let find = |hog: &crate::Hog, view: ImageView, interrupt: &Interrupt| {
-            hog.detect_multi_scale(view, &search, &pyramid, grouping, threads(), interrupt)
+            hog.detect_multi_scale(view, &search, &pyramid, grouping, guide, threads, interrupt)
         };
         let (py, found) = (image.py(), self.on(&image, find)?);
         Ok((rect_array(py, &found)?, array1(py, found.iter().map(|&(_, weight)| weight))?))

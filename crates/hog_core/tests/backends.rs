@@ -157,8 +157,16 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
             let hog = hog(&detector, backend);
             for threads in [1, 2, 5, 64] {
                 let detect = |grouping| {
-                    hog.detect_multi_scale(image, &search, &PYRAMID, grouping, threads, &Interrupt::NEVER)
-                        .unwrap()
+                    hog.detect_multi_scale(
+                        image,
+                        &search,
+                        &PYRAMID,
+                        grouping,
+                        None,
+                        threads,
+                        &Interrupt::NEVER,
+                    )
+                    .unwrap()
                 };
                 let found = detect(Grouping::Similar(0));
                 assert_eq!(rects(&found), rects(&every), "{}", backend.name());
@@ -168,7 +176,15 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
             }
             // Mean-shift is given exact weights: not a bit differs.
             let found = hog
-                .detect_multi_scale(image, &search, &PYRAMID, Grouping::MeanShift(0.1), 2, &Interrupt::NEVER)
+                .detect_multi_scale(
+                    image,
+                    &search,
+                    &PYRAMID,
+                    Grouping::MeanShift(0.1),
+                    None,
+                    2,
+                    &Interrupt::NEVER,
+                )
                 .unwrap();
             assert_eq!(found, modes, "{}", backend.name());
         }
@@ -193,7 +209,7 @@ fn a_search_at_another_size_is_that_of_the_resized_image_on_every_backend() {
         for backend in available() {
             let hog = hog(&detector, backend);
             let search = |image, pyramid, grouping| {
-                hog.detect_multi_scale(image, &STEPS, pyramid, grouping, 1, &Interrupt::NEVER).unwrap()
+                hog.detect_multi_scale(image, &STEPS, pyramid, grouping, None, 1, &Interrupt::NEVER).unwrap()
             };
             let found = search(picture.view(), &pyramid, Grouping::Similar(0));
             assert_eq!(rects(&found), rects(&wanted), "{}", backend.name());

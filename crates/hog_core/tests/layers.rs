@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The top modules from the lowest to the highest; a module may use those of lower layers alone.
-const LAYERS: [&[&str]; 11] = [
+const LAYERS: [&[&str]; 12] = [
     &["geometry", "model"],
     &["error"],
     &["interrupt", "memory"],
@@ -14,8 +14,9 @@ const LAYERS: [&[&str]; 11] = [
     &["pyramid"],
     &["exact"],
     &["fast"],
-    &["rescore"],
+    &["rescore", "guided"],
     &["detect"],
+    &["describe"],
     &["python"],
 ];
 

@@ -37,6 +37,7 @@ fn a_search_finds_what_opencv_finds_grouped_by_similarity_and_by_mean_shift() {
                 &STEPS,
                 &Pyramid { first: None, scale: 1.1 },
                 grouping,
+                None,
                 1,
                 &Interrupt::NEVER,
             )

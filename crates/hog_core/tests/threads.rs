@@ -20,6 +20,7 @@ fn threads_that_share_a_detector_find_what_one_alone_finds() {
             &SEARCH,
             &Pyramid { first: None, scale: 1.1 },
             Grouping::Similar(0),
+            None,
             threads,
             &Interrupt::NEVER,
         )

@@ -14,12 +14,17 @@ use super::lane::neon::Neon;
 use super::lane::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::lane::{Kernel, avx2::Avx2, avx512::Avx512};
-use super::plan::Plan;
+use super::plan::{Geometry, Plan};
 use super::rows::Planes;
 
+/// The kernels' constants of this geometry, if they can serve it.
+pub(crate) fn geometry(backend: Backend, spec: &HogSpec) -> Option<Geometry> {
+    Geometry::new(spec, sqrt_of_byte_is_exact(backend))
+}
+
 /// The plan of the fast path for this geometry and SVM, if the kernels can serve them.
-pub(crate) fn plan(backend: Backend, spec: &HogSpec, svm: &Svm) -> Option<Plan> {
-    Plan::new(spec, svm, sqrt_of_byte_is_exact(backend), backend != Backend::Avx2)
+pub(crate) fn plan(backend: Backend, geometry: &Geometry, svm: &Svm) -> Option<Plan> {
+    Plan::new(geometry.clone(), svm, backend != Backend::Avx2)
 }
 
 /// Whether the backend's estimated square root is right for every pixel value; CPUs differ in their estimates.

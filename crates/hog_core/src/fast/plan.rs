@@ -34,9 +34,9 @@ const BYTE_ERROR: f64 = 0.5 + 255.0 * 8.0 * f32::EPSILON as f64;
 /// from half of it on.
 const SCORE_ERROR: f64 = 4e-7;
 
-/// The constants of the fast path of one detector.
+/// The constants of a geometry: what the kernels need to make blocks.
 #[derive(Debug, Clone)]
-pub(crate) struct Plan {
+pub(crate) struct Geometry {
     pub(super) gamma: Gamma,
     /// The value of each pixel after gamma correction.
     pub(super) table: [f32; 256],
@@ -49,6 +49,14 @@ pub(crate) struct Plan {
     pub(super) down: [[f32; 3]; 8],
     /// The same across, not doubled.
     pub(super) across: [[f32; 3]; 8],
+}
+
+/// The constants of the fast path of one detector.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan {
+    pub(super) geometry: Geometry,
+    /// Blocks of a window.
+    pub(super) blocks: Size,
     /// `[block row][element][block column]`, padded with zeros to [`ACROSS`] columns.
     pub(super) weights: Vec<f32>,
     pub(super) bias: f64,
@@ -74,12 +82,11 @@ pub(super) struct Prefilter {
     pub bound: f64,
 }
 
-impl Plan {
-    /// The plan of `spec` and `svm`, if the kernels can serve them.
+impl Geometry {
+    /// The constants of `spec`, if the kernels can serve it.
     ///
-    /// `gamma_is_exact`: the estimated square root is right for every pixel value. `wide_sums`: the prefilter sums in
-    /// 32 bits, not in 16.
-    pub(super) fn new(spec: &HogSpec, svm: &Svm, gamma_is_exact: bool, wide_sums: bool) -> Option<Self> {
+    /// `gamma_is_exact`: the estimated square root is right for every pixel value.
+    pub(super) fn new(spec: &HogSpec, gamma_is_exact: bool) -> Option<Self> {
         let eight = Size::new(8, 8);
         let served = spec.block == Size::new(16, 16)
             && spec.cell == eight
@@ -92,13 +99,10 @@ impl Plan {
             && spec.blocks.height > 0
             && spec.blocks.width * spec.blocks.height <= BLOCKS_MAX
             // What the exact path divides by in single precision; the weights of a narrower Gaussian are no numbers.
-            && (spec.sigma * spec.sigma).is_normal()
-            && svm.bias().is_finite()
-            && svm.weights().iter().all(|w| w.is_finite() && w.abs() < 1e6);
+            && (spec.sigma * spec.sigma).is_normal();
         if !served {
             return None;
         }
-        let norms: f64 = svm.weights().as_chunks::<BLOCK>().0.iter().map(|block| norm(block)).sum();
         let across = profile(spec.sigma);
         Some(Self {
             gamma: match (spec.gamma_correction, gamma_is_exact) {
@@ -111,9 +115,26 @@ impl Plan {
             blocks: spec.blocks,
             down: across.map(|row| row.map(|weight| 2.0 * weight)),
             across,
-            weights: by_rows(svm.weights(), spec.blocks),
+        })
+    }
+}
+
+impl Plan {
+    /// The plan of `geometry` and `svm`, if the kernels can serve it.
+    ///
+    /// `wide_sums`: the prefilter sums in 32 bits, not in 16.
+    pub(super) fn new(geometry: Geometry, svm: &Svm, wide_sums: bool) -> Option<Self> {
+        if !(svm.bias().is_finite() && svm.weights().iter().all(|w| w.is_finite() && w.abs() < 1e6)) {
+            return None;
+        }
+        let norms: f64 = svm.weights().as_chunks::<BLOCK>().0.iter().map(|block| norm(block)).sum();
+        let blocks = geometry.blocks;
+        Some(Self {
+            geometry,
+            blocks,
+            weights: by_rows(svm.weights(), blocks),
             bias: f64::from(svm.bias()),
-            prefilter: Prefilter::new(svm.weights(), spec.blocks, wide_sums),
+            prefilter: Prefilter::new(svm.weights(), blocks, wide_sums),
             score_error_bound: SCORE_ERROR * norms,
         })
     }

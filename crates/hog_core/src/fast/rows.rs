@@ -84,7 +84,7 @@ impl Kernel for Deinterleave<'_> {
     #[inline(always)]
     fn run<L: Lane>(self, l: L) {
         // SAFETY: there is room in each plane.
-        unsafe { l.deinterleave(self.row.as_ptr(), self.to, self.row.len() / 3) }
+        unsafe { l.deinterleave::<0x80>(self.row.as_ptr(), self.to, self.row.len() / 3) }
     }
 }
 

@@ -4,6 +4,7 @@
 //! the bands that another one has before it. Where the two meet, the windows of the upper one's last band end in the lower
 //! one's first: whichever is there last has the blocks of both, and scores them (a [`Seam`]). So nothing waits.
 
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::Result;
@@ -39,21 +40,35 @@ pub(crate) struct Task {
     pub plan: Arc<Plan>,
     pub planes: Arc<Planes>,
     /// The size and the windows of each level.
-    pub levels: Vec<(Size, Grid)>,
+    pub levels: Arc<Vec<(Size, Grid)>>,
+    pub regions: Vec<Region>,
     pub threshold: f64,
 }
 
-/// For each level of `task`, every window whose exact score may be at least the threshold, row by row.
-pub(crate) fn search(task: Task, threads: usize, interrupt: &Interrupt) -> Result<Vec<Vec<Found>>> {
-    let mut tiles = Vec::new();
-    for (level, (_, grid)) in task.levels.iter().enumerate() {
-        tiles_of(level, grid, &task.plan, &mut tiles)?;
-    }
-    run(task, tiles, threads, interrupt)
+/// A part of a level: the windows whose corners lie in it.
+#[derive(Debug, Clone)]
+pub(crate) struct Region {
+    pub level: usize,
+    /// Padded pixels.
+    pub x: Range<usize>,
+    pub y: Range<usize>,
 }
 
-/// The search of `tiles`.
-fn run(task: Task, tiles: Vec<Tile>, threads: usize, interrupt: &Interrupt) -> Result<Vec<Vec<Found>>> {
+impl Region {
+    /// All of a level.
+    pub(crate) fn whole(level: usize, grid: &Grid) -> Self {
+        Self { level, x: 0..grid.padded.width, y: 0..grid.padded.height }
+    }
+}
+
+/// For each level of `task`, every window of its regions whose exact score may be at least the threshold, row by row.
+pub(crate) fn search(task: Task, threads: usize, interrupt: &Interrupt) -> Result<Vec<Vec<Found>>> {
+    let mut tiles = Vec::new();
+    for region in &task.regions {
+        if let Some((_, grid)) = task.levels.get(region.level) {
+            tiles_of(region, grid, &task.plan, &mut tiles)?;
+        }
+    }
     let bands = tiles.iter().map(|tile| tile.bands(&task.plan)).sum();
     let found = memory::filled(task.levels.len(), Vec::new())?;
     let search = Arc::new(Search {
@@ -74,28 +89,31 @@ fn run(task: Task, tiles: Vec<Tile>, threads: usize, interrupt: &Interrupt) -> R
     Ok(found)
 }
 
-/// Adds the tiles of all windows of `grid` to `tiles`.
-fn tiles_of(level: usize, grid: &Grid, plan: &Plan, tiles: &mut Vec<Tile>) -> Result<()> {
+/// Adds the tiles of a region's windows to `tiles`.
+fn tiles_of(region: &Region, grid: &Grid, plan: &Plan, tiles: &mut Vec<Tile>) -> Result<()> {
     if grid.is_empty() {
         return Ok(());
     }
     // Windows whose distance is no multiple of 8 lie on several lattices of blocks.
     let origins = |stride: usize| if stride.is_multiple_of(8) { 0..1 } else { 0..2 };
-    let along = |padded: usize, blocks: usize, origin: usize| {
-        (padded - origin).checked_sub(8 * (blocks + 1)).map_or(0, |room| room / 8 + 1)
+    let along = |padded: usize, blocks: usize, origin: usize, wanted: &Range<usize>| {
+        let all = (padded - origin).checked_sub(8 * (blocks + 1)).map_or(0, |room| room / 8 + 1);
+        let at = |end: usize| end.saturating_sub(origin).div_ceil(8).min(all);
+        at(wanted.start)..at(wanted.end)
     };
     for y in origins(grid.stride.height) {
         for x in origins(grid.stride.width) {
             let origin = (4 * x, 4 * y);
-            let width = along(grid.padded.width, plan.blocks.width, origin.0);
-            let height = along(grid.padded.height, plan.blocks.height, origin.1);
-            if width == 0 || height == 0 {
+            let all = along(grid.padded.width, plan.blocks.width, origin.0, &region.x);
+            let rows = along(grid.padded.height, plan.blocks.height, origin.1, &region.y);
+            if all.is_empty() || rows.is_empty() {
                 continue;
             }
-            let parts = width.div_ceil(COLUMNS_MAX);
+            let parts = all.len().div_ceil(COLUMNS_MAX);
             for part in 0..parts {
-                let columns = part * width / parts..(part + 1) * width / parts;
-                memory::push(tiles, Tile { level, origin, columns, rows: 0..height })?;
+                let at = |part: usize| all.start + part * all.len() / parts;
+                let columns = at(part)..at(part + 1);
+                memory::push(tiles, Tile { level: region.level, origin, columns, rows: rows.clone() })?;
             }
         }
     }

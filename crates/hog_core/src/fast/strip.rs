@@ -15,11 +15,11 @@ use std::ops::Range;
 
 use super::lane::{Kernel, Lane, ODD};
 use super::layout::{BINS, BLOCK, CARRY, CELL, Gamma};
-use super::plan::Plan;
+use super::plan::Geometry;
 
 /// What the strips of a level read and write.
 pub(super) struct Job<'a> {
-    pub plan: &'a Plan,
+    pub geometry: &'a Geometry,
     /// The pixel above the first cell's upper left one, of each channel.
     pub origin: [*const u8; 3],
     /// Bytes from one row of pixels to the next.
@@ -39,6 +39,8 @@ pub(super) struct Job<'a> {
     pub bytes: *mut u32,
     /// Lanes of a row of blocks.
     pub lanes: usize,
+    /// Of crops side by side: 1 for the first (last) cell of every crop, else 0.
+    pub ends: Option<[&'a [f32]; 2]>,
     /// For each row of blocks, the sums that the first cells of the strip to the right add to the blocks left of them.
     pub edge: &'a mut [[f32; BLOCK]],
 }
@@ -69,31 +71,37 @@ pub(super) struct LaneVotes<L: Lane> {
 ///
 /// # Safety
 /// For every channel and row of `job`, the bytes from 8 before to 8 behind the strip's cells are readable; `blocks`
-/// and `bytes` have `cells_y - 1` rows of `lanes` lanes, the strip's among them.
+/// and `bytes` have `cells_y - 1` rows of `lanes` lanes, the strip's among them; `ends` have the strip's lanes.
 pub(super) unsafe fn strip<L: Lane>(l: L, job: &mut Job, first: usize, channels: usize) {
-    match channels {
-        1 => l.compiled(Strip::<1> { job, first }),
-        _ => l.compiled(Strip::<3> { job, first }),
+    match (channels, job.ends.is_some()) {
+        (1, false) => l.compiled(Strip::<1, false> { job, first }),
+        (_, false) => l.compiled(Strip::<3, false> { job, first }),
+        (1, true) => l.compiled(Strip::<1, true> { job, first }),
+        (_, true) => l.compiled(Strip::<3, true> { job, first }),
     }
 }
 
 /// The work of [`strip`], which alone makes it.
-struct Strip<'a, 'b, const CHANNELS: usize> {
+struct Strip<'a, 'b, const CHANNELS: usize, const CROPS: bool> {
     job: &'a mut Job<'b>,
     first: usize,
 }
 
-impl<const CHANNELS: usize> Kernel for Strip<'_, '_, CHANNELS> {
+impl<const CHANNELS: usize, const CROPS: bool> Kernel for Strip<'_, '_, CHANNELS, CROPS> {
     type Output = ();
     #[inline(always)]
     fn run<L: Lane>(self, l: L) {
         // SAFETY: promised to `strip`.
-        unsafe { blocks_of_strip::<L, CHANNELS>(l, self.job, self.first) }
+        unsafe { blocks_of_strip::<L, CHANNELS, CROPS>(l, self.job, self.first) }
     }
 }
 
 #[inline(always)]
-unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, first: usize) {
+unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize, const CROPS: bool>(
+    l: L,
+    job: &mut Job,
+    first: usize,
+) {
     let zero = l.splat(0.0);
     // Two rows from the cell above, eight of the cell, each with one neighbour on both sides. In colour only the last
     // three are kept, in turn in three places: all would not leave room for the rest in the first-level cache.
@@ -109,14 +117,14 @@ unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, f
     let mut votes = [vote(l, [zero; 2]); CELL];
     // SAFETY: promised by the caller.
     unsafe {
-        fill(l, job, first, 0, &mut rows[0]);
-        fill(l, job, first, 1, &mut rows[1]);
+        fill::<L, CHANNELS, CROPS>(l, job, first, 0, &mut rows[0]);
+        fill::<L, CHANNELS, CROPS>(l, job, first, 1, &mut rows[1]);
     }
     for (i, cell_y) in job.cells.clone().enumerate() {
         for y in 0..CELL {
             let place = |y: usize| if CHANNELS > 1 { (CELL * i + y) % 3 } else { y };
             // SAFETY: promised by the caller.
-            unsafe { fill(l, job, first, CELL * i + y + 2, &mut rows[place(y + 2)]) };
+            unsafe { fill::<L, CHANNELS, CROPS>(l, job, first, CELL * i + y + 2, &mut rows[place(y + 2)]) };
             if CHANNELS > 1 {
                 let around = [&rows[place(y)], &rows[place(y + 1)], &rows[place(y + 2)]];
                 for phase in 0..CELL {
@@ -133,7 +141,7 @@ unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, f
                 };
                 *votes = vote(l, gradient);
             }
-            spread_all(l, &job.plan.down, &votes, &mut carry[phase], sums, phase);
+            spread_all(l, &job.geometry.down, &votes, &mut carry[phase], sums, phase);
         }
         if CHANNELS == 1 {
             rows.copy_within(CELL.., 0);
@@ -147,7 +155,7 @@ unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, f
 
 /// The pixels of row `y` of the band, of every channel.
 #[inline(always)]
-pub(super) unsafe fn fill<L: Lane, const CHANNELS: usize>(
+unsafe fn fill<L: Lane, const CHANNELS: usize, const CROPS: bool>(
     l: L,
     job: &Job,
     first: usize,
@@ -156,13 +164,20 @@ pub(super) unsafe fn fill<L: Lane, const CHANNELS: usize>(
 ) {
     for (channel, to) in to.iter_mut().enumerate() {
         // SAFETY: promised by the caller of `strip`.
-        unsafe { row(l, job.plan, job.origin[channel].add(y * job.stride + CELL * first), to) };
+        unsafe { row(l, job.geometry, job.origin[channel].add(y * job.stride + CELL * first), to) };
+        if CROPS && let Some(ends) = job.ends {
+            // A crop is mirrored at its edges.
+            // SAFETY: promised by the caller of `strip`.
+            let end = ends.map(|end| unsafe { l.less(l.splat(0.0), l.load(end.as_ptr().add(first))) });
+            to[0] = l.select(end[0], to[2], to[0]);
+            to[CELL + 1] = l.select(end[1], to[CELL - 1], to[CELL + 1]);
+        }
     }
 }
 
 /// One row of pixels as ten vectors: columns -1..=8 of every cell, after gamma.
 #[inline(always)]
-unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL + 2]) {
+unsafe fn row<L: Lane>(l: L, geometry: &Geometry, from: *const u8, to: &mut [L::F; CELL + 2]) {
     // SAFETY: the strip and 8 bytes on both sides are readable.
     let (low, high, before, after) =
         unsafe { (l.low_words(from), l.high_words(from), *from.sub(1), *from.add(CELL * L::LANES)) };
@@ -176,7 +191,7 @@ unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL 
         l.byte::<2>(high),
         l.byte::<3>(high),
     ];
-    match plan.gamma {
+    match geometry.gamma {
         Gamma::Off => {}
         Gamma::Estimated => {
             for value in &mut columns {
@@ -191,8 +206,8 @@ unsafe fn row<L: Lane>(l: L, plan: &Plan, from: *const u8, to: &mut [L::F; CELL 
     }
     to[1..=CELL].copy_from_slice(&columns);
     // The neighbours are the same columns one cell on; only the outermost pixels are new.
-    to[0] = l.shift_up(columns[7], plan.table[usize::from(before)]);
-    to[CELL + 1] = l.shift_in(columns[0], plan.table[usize::from(after)]);
+    to[0] = l.shift_up(columns[7], geometry.table[usize::from(before)]);
+    to[CELL + 1] = l.shift_in(columns[0], geometry.table[usize::from(after)]);
 }
 
 /// The gradient (dx, dy) of pixel column `phase` of every cell in its strongest channel, from the rows above, of and
@@ -367,7 +382,7 @@ pub(super) unsafe fn finish<L: Lane>(
     let zero = l.splat(0.0);
     let mut block = [zero; BLOCK];
     let mut squares = [zero; 4];
-    let across = &job.plan.across;
+    let across = &job.geometry.across;
     let edge = &mut job.edge[block_y];
     for (i, sums) in sums.iter().enumerate() {
         // Left cell from this and the next column of cells, right cell likewise.
@@ -391,7 +406,7 @@ pub(super) unsafe fn finish<L: Lane>(
     }
     let total = l.add(l.add(squares[0], squares[1]), l.add(squares[2], squares[3]));
     let scale = l.div(l.splat(1.0), l.add(l.sqrt(total), l.splat(BLOCK as f32 * 0.1)));
-    let limit = l.splat(job.plan.l2_hys_threshold);
+    let limit = l.splat(job.geometry.l2_hys_threshold);
     let mut squares = [zero; 4];
     for (i, value) in block.iter_mut().enumerate() {
         *value = l.min(l.mul(*value, scale), limit);

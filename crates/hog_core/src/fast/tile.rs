@@ -102,7 +102,7 @@ pub(super) struct Scratch {
 
 /// Words in cache lines, so that vectors do not straddle them.
 #[derive(Debug, Default)]
-struct Lines(Vec<Line>);
+pub(super) struct Lines(Vec<Line>);
 
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
@@ -110,7 +110,7 @@ struct Line(#[allow(dead_code, reason = "read through a pointer")] [u32; 16]);
 
 impl Lines {
     /// Room for `len` words; old ones stay.
-    fn reserve(&mut self, len: usize) -> Result<*mut u32> {
+    pub fn reserve(&mut self, len: usize) -> Result<*mut u32> {
         let lines = len.div_ceil(16);
         if self.0.len() < lines {
             memory::resize(&mut self.0, lines, Line([0; 16]))?;
@@ -118,11 +118,17 @@ impl Lines {
         Ok(self.0.as_mut_ptr().cast())
     }
 
-    fn pointer(&self) -> *const u32 {
+    pub fn pointer(&self) -> *const u32 {
         self.0.as_ptr().cast()
     }
 
-    fn bytes(&self) -> usize {
+    /// The words as numbers.
+    pub fn numbers(&self) -> &[f32] {
+        // SAFETY: as many numbers as there are words, of the same size; any bits are a number.
+        unsafe { std::slice::from_raw_parts(self.pointer().cast(), 16 * self.0.len()) }
+    }
+
+    pub fn bytes(&self) -> usize {
         self.0.capacity() * size_of::<Line>()
     }
 }
@@ -189,7 +195,7 @@ pub(super) fn make<L: Lane>(
         let origin = band.origin();
         let stride = band.stride;
         let mut job = Job {
-            plan,
+            geometry: &plan.geometry,
             origin,
             stride,
             cells: now,
@@ -200,6 +206,7 @@ pub(super) fn make<L: Lane>(
             blocks: numbers,
             bytes,
             lanes,
+            ends: None,
             edge,
         };
         // From right to left: a strip adds to the last blocks of the strip left of it.

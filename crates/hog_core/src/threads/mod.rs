@@ -1,7 +1,9 @@
 //! Work shared among threads.
 
+mod borrowed;
 mod team;
 
+pub(crate) use borrowed::for_each;
 pub(crate) use team::{Shared, together};
 
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -218,11 +218,11 @@ impl Lane for Avx2 {
         });
     }
     #[inline(always)]
-    unsafe fn deinterleave(self, from: *const u8, to: [*mut u8; 3], len: usize) {
+    unsafe fn deinterleave<const FLIP: u8>(self, from: *const u8, to: [*mut u8; 3], len: usize) {
         // 16 pixels are three vectors; each plane takes its bytes from all three.
         isa!({
             let whole = len - len % 16;
-            let flip = _mm_set1_epi8(-128);
+            let flip = _mm_set1_epi8(FLIP.cast_signed());
             let shuffle = |channel: usize, vector: usize| {
                 let mut index = [0x80u8; 16];
                 let mut i = 0;
@@ -247,7 +247,7 @@ impl Lane for Avx2 {
                     _mm_storeu_si128(to.add(at).cast(), plane);
                 }
             }
-            super::portable::Portable.deinterleave(
+            super::portable::Portable.deinterleave::<FLIP>(
                 from.add(3 * whole),
                 to.map(|to| to.add(whole)),
                 len - whole,

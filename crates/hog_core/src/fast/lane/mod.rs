@@ -230,15 +230,15 @@ pub(super) trait Lane: Copy {
     /// room for all groups.
     unsafe fn resize_row<const C: usize>(self, rows: [RowPointers; C], weight: i16, columns: &Columns);
 
-    /// Splits `len` interleaved pixels of three channels into planes, flipping every byte by 0x80.
+    /// Splits `len` interleaved pixels of three channels into planes, every byte xor `FLIP`.
     /// # Safety
     /// `from` has 3 · `len` bytes, each of `to` has `len`.
     #[inline(always)]
-    unsafe fn deinterleave(self, from: *const u8, to: [*mut u8; 3], len: usize) {
+    unsafe fn deinterleave<const FLIP: u8>(self, from: *const u8, to: [*mut u8; 3], len: usize) {
         for i in 0..len {
             for (channel, to) in to.iter().enumerate() {
                 // SAFETY: the caller's promise.
-                unsafe { to.add(i).write(*from.add(3 * i + channel) ^ 0x80) };
+                unsafe { to.add(i).write(*from.add(3 * i + channel) ^ FLIP) };
             }
         }
     }

@@ -218,17 +218,17 @@ impl Lane for Neon {
     }
 
     #[inline(always)]
-    unsafe fn deinterleave(self, from: *const u8, to: [*mut u8; 3], len: usize) {
+    unsafe fn deinterleave<const FLIP: u8>(self, from: *const u8, to: [*mut u8; 3], len: usize) {
         isa!({
             let whole = len - len % 16;
-            let flip = vdupq_n_u8(0x80);
+            let flip = vdupq_n_u8(FLIP);
             for at in (0..whole).step_by(16) {
                 let planes = vld3q_u8(from.add(3 * at));
                 vst1q_u8(to[0].add(at), veorq_u8(planes.0, flip));
                 vst1q_u8(to[1].add(at), veorq_u8(planes.1, flip));
                 vst1q_u8(to[2].add(at), veorq_u8(planes.2, flip));
             }
-            super::portable::Portable.deinterleave(
+            super::portable::Portable.deinterleave::<FLIP>(
                 from.add(3 * whole),
                 to.map(|to| to.add(whole)),
                 len - whole,

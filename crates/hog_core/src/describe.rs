@@ -1,0 +1,53 @@
+//! Descriptors of many crops: by the fast path, where the geometry has one.
+
+use crate::detect::Hog;
+use crate::error::{ImageError, ParameterError, Result};
+use crate::exact;
+use crate::fast::{self, Crops};
+use crate::image::ImageView;
+use crate::interrupt::Interrupt;
+use crate::memory;
+use crate::pyramid::Steps;
+use crate::threads::for_each;
+
+/// Crops that a thread takes at a time: half a millisecond's work, ten times as much as making a thread.
+const AT_ONCE: usize = 16;
+
+impl Hog {
+    /// Writes the descriptors of the crops in `pixels`, one after the other, into `out`: within 1e-6 of those that
+    /// [`Hog::compute`] gives.
+    ///
+    /// Crops are windows: rows of interleaved pixels without gaps, crop after crop.
+    pub fn describe(
+        &self,
+        pixels: &[u8],
+        channels: usize,
+        threads: usize,
+        interrupt: &Interrupt,
+        out: &mut [f32],
+    ) -> Result<()> {
+        let spec = self.spec();
+        let (win, elements) = (spec.win, spec.descriptor_len());
+        if channels != 1 && channels != 3 {
+            return Err(ImageError::Channels { got: channels }.into());
+        }
+        let crop = win.area() * channels;
+        let count = pixels.len() / crop;
+        if out.len() / elements.max(1) != count || !pixels.len().is_multiple_of(crop) {
+            return Err(ParameterError::Descriptors { windows: count, elements }.into());
+        }
+        let parts = pixels.chunks(AT_ONCE * crop).zip(out.chunks_mut((AT_ONCE * elements).max(1)));
+        let grid = Steps::new((0, 0), (0, 0), spec.cell, spec)?.grid(win, spec);
+        for_each(memory::collect(parts)?, threads, interrupt, |(pixels, out), interrupt| {
+            if let Some(geometry) = &self.geometry {
+                let crops = Crops { pixels, size: win, channels };
+                return fast::describe(self.backend, geometry, crops, interrupt, out);
+            }
+            for (pixels, out) in pixels.chunks(crop).zip(out.chunks_mut(elements.max(1))) {
+                let view = ImageView::new(pixels, win.width, win.height, channels, win.width * channels)?;
+                exact::descriptors(view, &grid, spec, &self.exact.tables, interrupt, out)?;
+            }
+            Ok(())
+        })
+    }
+}

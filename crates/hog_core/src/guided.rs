@@ -1,0 +1,140 @@
+//! A faster search that may miss some hits: a few levels are searched whole, those between them around what was found.
+//!
+//! A person's hits lie on several neighbouring levels, at nearly the same place in the image. So where nothing came near to
+//! the threshold on the levels around it, a level has rarely a hit. What is searched, is searched exactly.
+
+use std::ops::Range;
+
+use crate::error::Result;
+use crate::fast::{Found, Region};
+use crate::geometry::Size;
+use crate::memory;
+use crate::params::HogSpec;
+use crate::pyramid::{Grid, Level};
+
+/// How the search is guided.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Guide {
+    /// Every how many levels one is searched whole; below 2 all are.
+    pub every: usize,
+    /// By how much the threshold is lowered there [SVM margin].
+    pub margin: f64,
+    /// How many windows around a place are searched on the levels between.
+    pub reach: usize,
+}
+
+impl Guide {
+    /// Whether this level is searched whole.
+    pub(crate) fn is_whole(&self, level: usize) -> bool {
+        self.every < 2 || level.is_multiple_of(self.every)
+    }
+
+    /// Where to search on the levels between those that were searched whole, and where these `found` what they did.
+    pub(crate) fn between(
+        &self,
+        levels: &[Level],
+        grids: &[(Size, Grid)],
+        found: &[Vec<Found>],
+        spec: &HogSpec,
+    ) -> Result<Vec<Region>> {
+        let mut regions = Vec::new();
+        for (number, (level, (_, grid))) in levels.iter().zip(grids).enumerate() {
+            if self.is_whole(number) || grid.is_empty() {
+                continue;
+            }
+            let before = number - number % self.every;
+            let first = regions.len();
+            for guide in [before, before + self.every] {
+                let (Some(guiding), Some((_, from)), Some(found)) =
+                    (levels.get(guide), grids.get(guide), found.get(guide))
+                else {
+                    continue;
+                };
+                for &(x, y, _) in found {
+                    let along = |at: usize, pads: [usize; 2], win: usize, stride: usize, windows: usize| {
+                        let half = win as f64 / 2.0;
+                        let centre = (at as f64 - pads[0] as f64 + half) * guiding.scale;
+                        let at = centre / level.scale - half + pads[1] as f64;
+                        around((at / stride as f64).round(), self.reach, windows, stride)
+                    };
+                    let pads = [from.pad.width, grid.pad.width];
+                    let x = along(x, pads, spec.win.width, grid.stride.width, grid.windows.width);
+                    let pads = [from.pad.height, grid.pad.height];
+                    let y = along(y, pads, spec.win.height, grid.stride.height, grid.windows.height);
+                    memory::push(&mut regions, Region { level: number, x, y })?;
+                }
+            }
+            merge(&mut regions, first, spec.win);
+            let whole = Region::whole(number, grid);
+            let cost: usize = regions[first..].iter().map(|region| cost(region, spec.win)).sum();
+            if cost >= grid.padded.area() {
+                regions.truncate(first);
+                memory::push(&mut regions, whole)?;
+            }
+        }
+        Ok(regions)
+    }
+}
+
+/// The corners of the windows within `reach` of window `at` [px], as far as there are any.
+fn around(at: f64, reach: usize, windows: usize, stride: usize) -> Range<usize> {
+    let last = (windows - 1) as f64;
+    let (from, to) = ((at - reach as f64).clamp(0.0, last), (at + reach as f64).clamp(0.0, last));
+    from as usize * stride..to as usize * stride + 1
+}
+
+/// Makes one of two regions from `first` on, until no two cost less together.
+fn merge(regions: &mut Vec<Region>, first: usize, win: Size) {
+    regions[first..].sort_unstable_by_key(|region| (region.y.start, region.x.start));
+    let mut at = first;
+    while at < regions.len() {
+        let mut other = at + 1;
+        while other < regions.len() {
+            let both = union(&regions[at], &regions[other]);
+            if cost(&both, win) <= cost(&regions[at], win) + cost(&regions[other], win) {
+                regions[at] = both;
+                regions.swap_remove(other);
+                other = at + 1;
+            } else {
+                other += 1;
+            }
+        }
+        at += 1;
+    }
+}
+
+fn union(a: &Region, b: &Region) -> Region {
+    let along = |a: &Range<usize>, b: &Range<usize>| a.start.min(b.start)..a.end.max(b.end);
+    Region { level: a.level, x: along(&a.x, &b.x), y: along(&a.y, &b.y) }
+}
+
+/// What a region costs: the pixels of its windows, in whole vectors of 16 cells, and a row of cells and of pixels more.
+fn cost(region: &Region, win: Size) -> usize {
+    (region.x.len() + win.width).next_multiple_of(128) * (region.y.len() + win.height + 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIN: Size = Size { width: 64, height: 128 };
+
+    fn region(x: usize, y: usize) -> Region {
+        Region { level: 1, x: x..x + 17, y: y..y + 17 }
+    }
+
+    #[test]
+    fn neighbouring_regions_become_one_and_distant_ones_stay_apart() {
+        let mut regions = vec![region(0, 0), region(600, 0), region(24, 8), region(8, 0)];
+        merge(&mut regions, 0, WIN);
+        assert_eq!(regions.len(), 2);
+        assert!(regions.iter().any(|region| region.x == (0..41) && region.y == (0..25)));
+    }
+
+    #[test]
+    fn windows_around_a_place_stay_on_the_level() {
+        assert_eq!(around(3.0, 1, 10, 8), 16..33);
+        assert_eq!(around(-5.0, 1, 10, 8), 0..1);
+        assert_eq!(around(12.0, 2, 10, 8), 72..73);
+    }
+}

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from limo_hog.follow.tracks.trust import Trust
 from numpy.typing import NDArray
 from tests.follow.views import boxes, flat, look
 
@@ -19,7 +20,6 @@ from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to, initiate, predict
 from limo_hog.follow.tracks.tracker import Tracker
-from limo_hog.follow.tracks.trust import Trust
 
 NOISE, POSE, TRACKER = Noise(), Odometry(), Tracker()
 APPEARANCE = TRACKER.association.appearance

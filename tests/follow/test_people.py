@@ -31,12 +31,13 @@ def somebody(number: int, distance: float, bearing: float = 0.0, clothes: NDArra
     """A person who is known well, last seen at time 0."""
     sharp = replace(NOISE, range=0.05, bearing=0.01, velocity=0.1)
     track = kalman.initiate(0.0, bearing, distance, POSE, sharp)
-    return Person(number, track, 0.0, 1.0, WINDOW, -120.0, confirmed=True, age=50, clothes=clothes)
+    return Person(number, track, 0.0, 5.0, WINDOW, -120.0, confirmed=True, age=50, clothes=clothes)
 
 
 def box(distance: float, bearing: float = 0.0, clothes: NDArray[np.float64] | None = None) -> Measurement:
     """A box on the whole of somebody."""
-    return Measurement(bearing, distance, round(WINDOW / distance), -120.0 / distance, 2.0, clothes)
+    height, centre = round(WINDOW / distance), -120.0 / distance
+    return Measurement(bearing, distance, height, centre, 2.0, clothes, window=WINDOW, middle=-120.0)
 
 
 def pairs(people: tuple[Person, ...], *boxes: Measurement) -> dict[int, int]:
@@ -83,10 +84,11 @@ def test_a_box_behind_somebody_that_is_not_their_size_is_not_theirs() -> None:
     assert pairs((somebody(1, 1.6),), before) == {0: 0}
 
 
-def test_a_person_grows_no_smaller_for_the_parts_of_them_seen_near_by() -> None:
-    person, part = somebody(1, 1.5), replace(box(1.5), height=200)
-    assert TRACKER.correct(person, part, POSE).window == WINDOW
-    assert TRACKER.correct(replace(person, confirmed=False), part, POSE).window < WINDOW
+def test_a_person_grows_no_smaller_for_being_cut_off_by_the_image() -> None:
+    cut_off = replace(box(1.5), window=0.8 * WINDOW, whole=False)
+    assert TRACKER.correct(somebody(1, 1.5), cut_off, POSE).window == WINDOW
+    assert TRACKER.correct(somebody(1, 1.5), replace(cut_off, whole=True), POSE).window < WINDOW
+    assert TRACKER.correct(somebody(1, 1.5), replace(cut_off, window=1.5 * WINDOW), POSE).window == 1.5 * WINDOW
 
 
 def test_clothes_are_averaged_until_somebody_is_known_and_then_kept() -> None:

@@ -142,6 +142,22 @@ def test_the_depth_image_limits_the_speed_as_far_as_its_reach(depth: float) -> N
     assert linear == pytest.approx(speed_within(room, guard.braking, guard.reaction_s), abs=1e-3)
 
 
+def test_depth_beyond_its_reach_is_left_to_the_lidar() -> None:
+    # The robot's length, the margin and a metre: 1.89 m from the camera.
+    for depth, free in ((1.85, False), (1.93, True)):
+        view = replace(look(), scan=scan(), depth=flat(depth))
+        assert (ahead(2.0).step(view, ahead().start()).twist.linear == 2.0) is free
+
+
+def test_a_fault_of_the_same_instant_forgets_nothing() -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    there = replace(look(stamp=1.0), scan=scan_of([(0.6, 0.0)], 1.0), odometry=Odometry(1.0))
+    state = guard.step(there, guard.start()).state
+    faulty = guard.step(replace(look(stamp=1.0), fault="dark"), state).state
+    assert len(faulty.scan_points) == len(state.scan_points) > 0
+    assert faulty.inner == state.inner == 1
+
+
 def test_backwards_it_goes_slowly_for_it_does_not_look_there() -> None:
     guard = Guard(Headstrong(Twist(-0.7, 0.2)))
     decision = guard.step(replace(look(), scan=scan()), guard.start())

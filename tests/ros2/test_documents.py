@@ -6,23 +6,19 @@ import re
 from pathlib import Path
 
 from limo_hog.ros2 import names
-from limo_sim.ros.lockstep.world import World
-from limo_sim.ros.rclpy_stub.context import Context
-from limo_sim.ros.rclpy_stub.front import _offered
-from limo_sim.world.scenario import Scenario
+from limo_sim.ros.offer import offered
 
 TEXT = (Path(__file__).parents[2] / "docs" / "ros2.md").read_text(encoding="utf-8")
 
 
 def test_every_module_and_name_that_is_offered_is_listed() -> None:
-    world = World(Scenario(name="empty"), 0, 1.0, script=Path("node.py"), log=lambda *_: None)
-    listed = set(re.findall(r"`([A-Za-z_.]+)`", TEXT))
-    for module, content in _offered(Context(world)).items():
+    listed = set(re.findall(r"`([A-Za-z0-9_.]+)`", TEXT))
+    for module, content in offered().items():
         if content:
-            assert module in listed, module
-        if not module.endswith(("_msgs.msg", "builtin_interfaces.msg", "rclpy.qos")):
+            assert module in listed or module.removesuffix(".msg") in listed, module
+        if not module.endswith(("_msgs.msg", ".srv", "builtin_interfaces.msg", "rclpy.qos")):
             assert set(content) <= listed, (module, set(content) - listed)
 
 
 def test_every_topic_is_listed() -> None:
-    assert [topic for topic in names.TYPES if f"`{topic}`" not in TEXT] == []
+    assert [topic for topic in names.TYPES | names.FINDINGS if f"`{topic}`" not in TEXT] == []

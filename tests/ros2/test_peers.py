@@ -14,35 +14,38 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
 
+from limo_hog.detections import Detections
+from limo_hog.follow.decision import Believed
 from limo_hog.follow.twist import Twist
-from limo_hog.ros2 import dds, messages, names
+from limo_hog.ros2 import dds, findings, messages, names
 
 HERE = Path(__file__).parent / "peer"
 
-#: How a peer is built from ros.idl, beside it, and which Debian packages that takes.
+#: How a peer is built from ros.idl and its source, beside it, and which Debian packages that takes.
 BUILDS = {
     "cyclone": (
         "cyclonedds-tools, cyclonedds-dev and gcc",
         ["idlc", "ros.idl"],
-        ["cc", "-O1", str(HERE / "peer.c"), "ros.c", "-I.", "-lddsc", "-o", "peer"],
+        ["cc", "-O1", "SOURCE.c", "ros.c", "-I.", "-lddsc", "-o", "peer"],
     ),
     "fast": (
         "fastddsgen, libfastrtps-dev and g++",
         ["fastddsgen", "-replace", "ros.idl"],
         [
-            *("c++", "-O1", "-std=c++17", str(HERE / "peer.cpp"), "ros.cxx", "rosPubSubTypes.cxx", "-I."),
+            *("c++", "-O1", "-std=c++17", "SOURCE.cpp", "ros.cxx", "rosPubSubTypes.cxx", "-I."),
             *("-lfastrtps", "-lfastcdr", "-o", "peer"),
         ],
     ),
 }
 
 
-def built(kind: str, folder: Path) -> Path:
+def built(kind: str, folder: Path, source: str = "peer") -> Path:
     """Build a peer."""
     packages, generate, compile_ = BUILDS[kind]
     if shutil.which(generate[0]) is None or shutil.which(compile_[0]) is None:
         pytest.skip(f"needs Debian's {packages}")
     shutil.copy(HERE / "ros.idl", folder)
+    compile_ = [word.replace("SOURCE", str(HERE / source)) for word in compile_]
     for command in (generate, compile_):
         subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
     return folder / "peer"
@@ -83,3 +86,44 @@ def test_a_peer_receives_every_image_and_twist_and_its_twists_arrive(
     assert got
     assert set(got) == {Twist(0.5, -0.25)}
     assert commands.dropped == 0
+
+
+@pytest.mark.parametrize("kind", ["cyclone", pytest.param("fast", marks=pytest.mark.slow)])
+def test_a_peer_receives_what_the_follower_finds_and_its_stamped_commands_arrive(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    peer = built(kind, tmp_path, "findings")
+    domain = str(123 + list(BUILDS).index(kind))
+    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+    bus = dds.Bus()
+    commands = bus.subscription(names.COMMAND, names.STAMPED_COMMAND_TYPE)
+    person = Believed(2.0, 0.0, 0.875, 7, 0.5, -0.25, 1)
+    boxes = Detections(np.array([[10, 20, 64, 128], [300, 20, 50, 100]], np.int32), np.array([1.5, 0.5]))
+    sent = {
+        names.PERSON: findings.person_pose(12.5, person),
+        names.DETECTIONS: findings.detections_message(12.5, boxes, "depth_link", {1: 7}),
+        names.PEOPLE: findings.people_message(12.5, [person]),
+        names.TF: findings.person_frames(12.5, [person], 7),
+    }
+    writers = {topic: bus.publisher(topic, message.__msgtype__) for topic, message in sent.items()}
+    environment = {**os.environ, "CYCLONEDDS_URI": dds.LOOPBACK}
+    other = subprocess.Popen([str(peer), domain, "200"], stdout=subprocess.PIPE, text=True, env=environment)
+    assert other.stdout is not None
+    assert other.stdout.readline() == "ready\n"
+    until = time.monotonic() + 5
+    while not all(writer.has_readers for writer in writers.values()) and time.monotonic() < until:
+        time.sleep(0.01)
+    for _ in range(5):
+        for topic, message in sent.items():
+            writers[topic].publish(message)
+        time.sleep(0.1)
+    assert json.loads(other.communicate(timeout=60)[0].splitlines()[-1]) == [
+        "12.500000000 base_link 2 0 1",
+        "2  person 1.5 42 128 7",
+        "1 7 2 -0.25 0.875",
+        "2 base_link person_7 2",
+    ]
+    heard = commands.take()
+    assert heard
+    assert all(message.header.stamp.sec == 12 and message.header.frame_id == "base_link" for message in heard)
+    assert {messages.to_twist(message.twist) for message in heard} == {Twist(0.5, -0.25)}

@@ -25,7 +25,8 @@ from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
-from limo_hog.ros2.bag import BagError, bag_writer, detections_message, read_bag
+from limo_hog.ros2.bag import BagError, bag_writer, read_bag
+from limo_hog.ros2.findings import detections_message
 from limo_hog.ros2.mcap_reading import MAX_RECORD, mcap_messages
 from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
 from limo_hog.ros2.replay import replay

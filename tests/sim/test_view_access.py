@@ -122,7 +122,7 @@ def test_a_mapped_loopback_address_is_loopback() -> None:
     assert not Access.at("localhost", ["127.0.0.1", "192.0.2.7"]).loopback
 
 
-@pytest.mark.parametrize("path", ["/", "/view.js", "/view.css", "/live", "/nothing", "/../server.py"])
+@pytest.mark.parametrize("path", ["/", "/view.js", "/plots.js", "/view.css", "/live", "/nothing", "/../server.py"])
 def test_every_answer_has_the_headers_that_keep_other_code_out(path: str) -> None:
     with View(WORKSHOP) as view:
         _, headers = _status(view, path, {"Host": urlsplit(view.url).netloc})

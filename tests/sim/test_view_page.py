@@ -132,6 +132,28 @@ async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
 async def _see_it_end(tab: Tab) -> None:
     await tab.until("document.querySelector('#notice').textContent.startsWith('The run has ended')", 60)
     await tab.screenshot(PICTURES / "ended.png")
+    # The timeline goes back over the finished run: numbers, map and camera are those of then.
+    await tab.value("document.querySelector('#span').onchange({target: {value: '0'}})")
+    newest = await tab.value("[document.querySelector('#camera').src, document.querySelector('#distance').innerText]")
+    await tab.value("document.querySelector('#timeline').oninput({target: {valueAsNumber: 5}})")
+    assert await tab.value("document.querySelector('#shown').textContent") == "5.0 s"
+    then = await tab.value("[document.querySelector('#camera').src, document.querySelector('#distance').innerText]")
+    assert then[0] != newest[0]
+    assert then[1] != newest[1]
+    at = await tab.value("number(nearest(history, 5)[DISTANCE], 2)")
+    assert then[1].split()[0] == at
+    # A cursor on a plot reads the values, the wheel zooms.
+    await tab.value(
+        "(() => { const c = document.querySelector('#plot-distance'), b = c.getBoundingClientRect();"
+        "c.onpointermove({currentTarget: c, clientX: b.left + LEFT + (b.width - LEFT - 4) / 2}); })()"
+    )
+    await tab.screenshot(PICTURES / "timeline.png")
+    begin, end = await tab.value("shownTimes()")
+    assert await tab.value("cursor") == pytest.approx((begin + end) / 2, abs=0.1)
+    await tab.value("document.querySelector('#plot-speed').dispatchEvent(new WheelEvent('wheel', {deltaY: -1}))")
+    assert (end - begin) * 0.8 == pytest.approx(await tab.value("shownTimes()[1] - shownTimes()[0]"))
+    await tab.value("document.querySelector('#live').click()")
+    assert await tab.value("document.querySelector('#shown').textContent") == "now"
     # The page keeps what it showed last.
     assert await tab.value("document.querySelector('#camera').naturalWidth") == 640
     assert await tab.value("document.querySelector('#pause').disabled") is True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import time
 from pathlib import Path
 
 import pytest
@@ -52,3 +53,24 @@ def test_a_folder_becomes_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_a_folder_without_nodes_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["workshop", "grade", str(tmp_path)]) == 2
     assert "no Python file" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_thirty_submissions_three_of_them_hostile_are_graded_in_five_minutes(tmp_path: Path) -> None:
+    good, empty = solution("follower"), template("follower")
+    wrong = good.replace("middle - cx", "cx - middle")
+    for number in range(27):
+        (tmp_path / f"s{number:02}.py").write_text((good, wrong, empty)[number % 3])
+    for name in ("loop", "memory", "exit"):
+        (tmp_path / f"x_{name}.py").write_text(HOSTILE[name])
+    table = tmp_path / "points.csv"
+    began = time.monotonic()
+    assert main(["workshop", "grade", str(tmp_path), "--csv", str(table)]) == 0
+    took = time.monotonic() - began
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    assert [row["points"] for row in rows[:27]] == ["100", "80", "0"] * 9
+    assert "the sign is swapped" in rows[1]["first_mistake"]
+    assert [row["points"] for row in rows[27:]] == ["0", "0", "0"]
+    assert "more than 100 s" in rows[28]["first_mistake"]
+    assert took < 300, f"{took:.0f} s"

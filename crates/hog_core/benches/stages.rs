@@ -8,6 +8,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use hog_core::pyramid::Pyramid;
 use hog_core::{Backend, Grouping, Hog, HogParams, ImageView, Interrupt, Search, Size, model, pyramid};
 
 const WIDTH: usize = 640;
@@ -63,7 +64,7 @@ fn fast_path(criterion: &mut Criterion) {
                     hog.detect_multi_scale(
                         black_box(image),
                         &SEARCH,
-                        1.05,
+                        &Pyramid { first: None, scale: 1.05 },
                         grouping,
                         None,
                         1,

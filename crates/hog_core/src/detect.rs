@@ -12,7 +12,7 @@ use crate::image::{Image, ImageView};
 use crate::interrupt::Interrupt;
 use crate::memory::{self, Pool};
 use crate::params::{HogParams, HogSpec};
-use crate::pyramid::{Grid, Level, Steps, levels, to_image};
+use crate::pyramid::{Grid, Level, Pyramid, Steps, check, levels, resize, to_image};
 use crate::rescore::{Hit, LevelWindows, Scorer};
 use crate::threads::in_order;
 
@@ -192,7 +192,7 @@ impl Hog {
         Ok(hits)
     }
 
-    /// Rectangles of all hits of the pyramid whose levels shrink by `scale`, grouped and clipped to the image.
+    /// Rectangles of all hits of the pyramid, grouped and clipped to its first level, in whose pixels they are.
     ///
     /// The work is shared among `threads` threads; hits are in level order, whatever their number. The stride (0, 0)
     /// is the block stride. With a `guide`, some hits may be missed; a geometry without a fast path is searched whole.
@@ -201,7 +201,7 @@ impl Hog {
         &self,
         image: ImageView,
         search: &Search,
-        scale: f64,
+        pyramid: &Pyramid,
         grouping: Grouping,
         guide: Option<Guide>,
         threads: usize,
@@ -210,7 +210,9 @@ impl Hog {
         let spec = self.spec();
         let steps = self.steps(search, spec.stride)?;
         let Some(svm) = &self.exact.svm else { return Ok(Vec::new()) };
-        let levels = levels(image.size(), scale, spec, interrupt)?;
+        let first = pyramid.first.unwrap_or(image.size());
+        check(first)?;
+        let levels = levels(first, pyramid.scale, spec, interrupt)?;
         // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
         let exact_weights = matches!(grouping, Grouping::MeanShift(_));
         let how = How { search: *search, exact_weights, guide, threads };
@@ -226,7 +228,7 @@ impl Hog {
                 mean_shift(&candidates, threshold, (win.width as i32, win.height as i32), interrupt)?
             }
         };
-        Ok(clip(found, image.width() as i32, image.height() as i32))
+        Ok(clip(found, first.width as i32, first.height as i32))
     }
 
     fn steps(&self, search: &Search, default_stride: Size) -> Result<Steps> {
@@ -238,7 +240,8 @@ impl Hog {
         Candidate { rect, weight: hit.weight, scale: level.scale }
     }
 
-    /// The hits of each of `levels`: by the fast path, where the geometry has one.
+    /// The hits of each of `levels` of the image at the size of the first one: by the fast path, where the geometry has
+    /// one.
     fn hits(
         &self,
         image: ImageView,
@@ -250,6 +253,7 @@ impl Hog {
     ) -> Result<Vec<Vec<Hit>>> {
         let How { threads, exact_weights, .. } = *how;
         let hit_threshold = how.search.hit_threshold;
+        let first = levels.first().map_or(image.size(), |level| level.size);
         let grids =
             memory::collect(levels.iter().map(|level| (level.size, steps.grid(level.size, self.spec()))))?;
         let mut windows =
@@ -263,6 +267,11 @@ impl Hog {
             }
             let mut planes = PLANES.take();
             fast::fill_planes(self.backend, &mut planes, image)?;
+            if first != image.size() {
+                let mut resized = PLANES.take();
+                fast::resize_planes(self.backend, &planes, &mut resized, first)?;
+                PLANES.give(std::mem::replace(&mut planes, resized));
+            }
             let planes = Arc::new(planes);
             let found = self.find(&planes, plan, levels, Arc::new(grids), how, interrupt);
             if let Ok(planes) = Arc::try_unwrap(planes) {
@@ -276,7 +285,14 @@ impl Hog {
         }
         let Exact { spec, tables, .. } = &*self.exact;
         let scorer = Scorer { spec, tables, svm, hit_threshold, margin };
-        if threads == 1 || !windows.iter().any(|level| scorer.is_needed(level)) {
+        let is_needed = windows.iter().any(|level| scorer.is_needed(level));
+        let resized = if is_needed && first != image.size() {
+            Some(Image { data: resize(image, first)?, size: first, channels: image.channels() })
+        } else {
+            None
+        };
+        let image = resized.as_ref().map_or(Ok(image), Image::view)?;
+        if threads == 1 || !is_needed {
             let mut hits = memory::with_room(windows.len())?;
             for level in &windows {
                 interrupt.check()?;

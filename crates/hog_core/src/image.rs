@@ -4,6 +4,9 @@ use crate::error::{ImageError, Result};
 use crate::geometry::Size;
 use crate::memory;
 
+/// The longest side of an image [px]: with its padding it is an `i32`, as OpenCV's.
+pub(crate) const SIDE_MAX: usize = i32::MAX as usize / 4;
+
 /// A borrowed 8-bit image: rows of interleaved pixels, `row_stride` bytes apart.
 #[derive(Debug, Clone, Copy)]
 pub struct ImageView<'a> {
@@ -29,7 +32,7 @@ impl<'a> ImageView<'a> {
         if width == 0 || height == 0 {
             return Err(ImageError::Empty { width, height }.into());
         }
-        if width > i32::MAX as usize / 4 || height > i32::MAX as usize / 4 {
+        if width > SIDE_MAX || height > SIDE_MAX {
             return Err(ImageError::TooLarge { width, height }.into());
         }
         let row = width * channels;

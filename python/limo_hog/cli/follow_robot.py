@@ -8,6 +8,8 @@ import sys
 import time
 from typing import Any
 
+import numpy as np
+
 from limo_hog.cli.support.arguments import add_follower, output_file, seconds
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
@@ -31,6 +33,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--json", type=output_file, metavar="FILE", help="write what happened as JSON; - is standard output"
     )
+    parser.add_argument(
+        "--no-drive", action="store_true", help="publish what is found and no commands: a planner, such as Nav2, drives"
+    )
     parser.add_argument("--ros2", action="store_true", help="follow on a ROS 2 robot instead of in the arena")
 
 
@@ -48,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
                 task, completed=time.monotonic() - began, description=f"{decision.mode.value}: {decision.reason}"
             )
 
-        report = drive(bus, controller, detector, args.seconds, watch)
+        report = drive(bus, controller, detector, args.seconds, watch, moves=not args.no_drive)
     answer = statistics.median(report.answer_ms) if report.answer_ms else None
     card = {
         "controller": args.controller,
@@ -58,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
         "found": report.found,
         "dropped": report.dropped,
         "answer_ms_p50": answer,
+        "answer_ms_p95": float(np.percentile(report.answer_ms, 95)) if report.answer_ms else None,
         "modes": report.modes,
     }
     if args.json:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from limo_hog.follow.sense.observation import Observation
 from limo_hog.follow.sense.region import Region
@@ -26,6 +26,62 @@ class Mode(str, Enum):
     """An obstacle is in the way, or an input is faulty: the robot may not do what the controller asked for."""
     LOST = "lost"
     """A person was followed and is not found any more."""
+    DRIVE = "drive"
+    """The robot is commanded by a node that does not say what it is doing: it moves."""
+    STAND = "stand"
+    """The same, and it does not move."""
+
+
+class Believed(NamedTuple):
+    """A tracked person: where, how surely, and which of the frame's boxes is theirs.
+
+    Attributes
+    ----------
+    x, y
+        Position in the base frame [m].
+    probability
+        That it is a person, 0 … 1.
+    number
+        Identifies the person; never used twice.
+    vx, vy
+        Velocity over the ground, along the base frame's axes [m/s].
+    box
+        Index into `observation.detections`; None where HOG did not find them in this frame.
+    """
+
+    x: float
+    y: float
+    probability: float
+    number: int = 0
+    vx: float = 0.0
+    vy: float = 0.0
+    box: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What a controller takes to be true, for those who watch; nothing is decided by it.
+
+    Attributes
+    ----------
+    keeps
+        Distance it holds now [m]; more than its target where nearer the camera would not show the whole person. None
+        for a controller that holds none, and while no person is followed.
+    people
+        Everyone tracked.
+    places
+        Where a lost person may be, each as likely: x, y in the base frame [m].
+    way
+        The way it means to drive: x, y in the base frame [m].
+    followed
+        Number of the person followed; None while there is none.
+    """
+
+    keeps: float | None = None
+    people: tuple[Believed, ...] = ()
+    places: tuple[tuple[float, float], ...] = ()
+    way: tuple[tuple[float, float], ...] = ()
+    followed: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +100,8 @@ class Decision(Generic[S]):
         Index into `observation.detections` of the person followed; None where there is none.
     region
         Where to look in the next frame; None asks for the whole image.
+    belief
+        What the controller takes to be true.
     """
 
     twist: Twist
@@ -52,6 +110,7 @@ class Decision(Generic[S]):
     reason: str
     target: int | None = None
     region: Region | None = None
+    belief: Belief = field(default_factory=Belief)
 
 
 class Controller(Protocol[S]):

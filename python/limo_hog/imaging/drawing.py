@@ -12,7 +12,8 @@ from limo_hog.extras import needed
 with needed(by="drawing on pictures", what="OpenCV", install="'limo-hog[cv]'"):
     import cv2
 
-GREEN, RED, BLUE = (80, 200, 60), (60, 60, 235), (255, 120, 30)
+#: Okabe and Ito's vermillion, bluish green and blue, which the colour-blind tell apart, as BGR.
+CHOSEN, OTHER, BLUE = (0, 94, 213), (115, 158, 0), (178, 114, 0)
 _DARK, _LIGHT = (20, 20, 20), (250, 250, 250)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
@@ -49,13 +50,13 @@ def annotate(
     unit = (max(canvas.shape[:2]) / 640) ** 0.7
     thick = max(1, round(2 * unit))
     for i, (x, y, w, h) in enumerate(boxes.tolist()):
-        colour = RED if i == target else GREEN
+        colour = CHOSEN if i == target else OTHER
         cv2.rectangle(canvas, (x, y), (x + w - 1, y + h - 1), colour, thick, cv2.LINE_AA)
         if i == target:
             cv2.circle(canvas, (x + w // 2, y + h // 2), round(5 * unit), BLUE, cv2.FILLED, cv2.LINE_AA)
     # Labels last, so that no box crosses them.
     for label, (x, y, _, _), i in zip(labels, boxes.tolist(), range(len(labels)), strict=False):
-        _text(canvas, label, x, y, unit, RED if i == target else GREEN)
+        _text(canvas, label, x, y, unit, CHOSEN if i == target else OTHER)
     if caption:
         _text(canvas, caption, 0, canvas.shape[0], unit, _DARK)
     return canvas

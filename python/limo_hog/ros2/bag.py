@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,29 +14,12 @@ from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.ros2.mcap_reading import check_type, mcap_messages
-from limo_hog.ros2.messages import default_message, serialize, to_time, typestore
+from limo_hog.ros2.messages import serialize, typestore
 from limo_hog.ros2.names import DETECTIONS_TYPE
 
 with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
     from mcap.writer import CompressionType, Writer
     from rosbags.highlevel import AnyReader
-    from rosbags.typesys import get_types_from_msg
-
-#: The parts of vision_msgs that hold boxes: name -> definition (ROS 2 Humble on). rosbags does not bring them.
-_VISION = {
-    "vision_msgs/msg/Point2D": "float64 x\nfloat64 y",
-    "vision_msgs/msg/Pose2D": "vision_msgs/Point2D position\nfloat64 theta",
-    "vision_msgs/msg/BoundingBox2D": "vision_msgs/Pose2D center\nfloat64 size_x\nfloat64 size_y",
-    "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score",
-    "vision_msgs/msg/ObjectHypothesisWithPose": (
-        "vision_msgs/ObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose"
-    ),
-    "vision_msgs/msg/Detection2D": (
-        "std_msgs/Header header\nvision_msgs/ObjectHypothesisWithPose[] results\n"
-        "vision_msgs/BoundingBox2D bbox\nstring id"
-    ),
-    DETECTIONS_TYPE: "std_msgs/Header header\nvision_msgs/Detection2D[] detections",
-}
 
 
 class BagError(LimoHogError):
@@ -50,31 +32,6 @@ class Record(NamedTuple):
     topic: str
     time: float
     message: Any
-
-
-@cache
-def _with_vision() -> None:
-    """Teach the message definitions about boxes, once."""
-    for name, definition in _VISION.items():
-        typestore().register(get_types_from_msg(definition, name))
-
-
-def detections_message(stamp: float, found: Detections, frame: str) -> Any:
-    """Return boxes as vision_msgs/Detection2DArray: centre and size [px], score as the SVM gave it."""
-    _with_vision()
-    array = default_message(DETECTIONS_TYPE)
-    array.header.stamp, array.header.frame_id = to_time(stamp), frame
-    for box, score in found:
-        one = default_message("vision_msgs/msg/Detection2D")
-        result = default_message("vision_msgs/msg/ObjectHypothesisWithPose")
-        result.hypothesis.class_id, result.hypothesis.score = "person", score
-        x, y, w, h = (float(value) for value in box)
-        one.header = array.header
-        one.results = [result]
-        one.bbox.center.position.x, one.bbox.center.position.y = x + w / 2, y + h / 2
-        one.bbox.size_x, one.bbox.size_y = w, h
-        array.detections.append(one)
-    return array
 
 
 def to_detections(message: Any) -> Detections:
@@ -106,7 +63,6 @@ def bag_writer(path: Path) -> Iterator[Callable[[str, float, Any], None]]:
 
     The file has its name only when it is whole.
     """
-    _with_vision()
     with whole_file(path) as part, ExitStack() as stack:
         with about(path):
             file = part.open("wb")
@@ -164,7 +120,6 @@ def read_bag(path: Path) -> Iterator[Record]:
 
 
 def _messages(path: Path) -> Iterator[tuple[str, int, Any]]:
-    _with_vision()
     # The parts of a rosbag2 folder are numbered: _9 comes before _10.
     parts = sorted(path.glob("*.mcap"), key=lambda part: (len(part.name), part.name)) if path.is_dir() else [path]
     if parts and all(part.suffix == ".mcap" for part in parts):

@@ -110,10 +110,10 @@ def _dds_field(desc: Any) -> Any:
     return generic.array[_dds_field(item), length] if kind == Nodetype.ARRAY else generic.sequence[_dds_field(item)]
 
 
-def _qos(type_name: str, depth: int, *, reliable: bool = True) -> Qos:
+def _qos(type_name: str, depth: int, *, reliable: bool = True, kept: bool = False) -> Qos:
     return Qos(
         Policy.Reliability.Reliable(duration(milliseconds=100)) if reliable else Policy.Reliability.BestEffort,
-        Policy.Durability.Volatile,
+        Policy.Durability.TransientLocal if kept else Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
         Policy.DataRepresentation(use_cdrv0_representation=True),
         # ROS 2 Jazzy and later tell each other the type's hash in this way.
@@ -124,9 +124,9 @@ def _qos(type_name: str, depth: int, *, reliable: bool = True) -> Qos:
 class Publisher:
     """Sends messages of one topic."""
 
-    def __init__(self, participant: Any, topic: str, type_name: str, depth: int) -> None:
+    def __init__(self, participant: Any, topic: str, type_name: str, depth: int, *, kept: bool) -> None:
         self._type = dds_type(type_name)
-        qos = _qos(type_name, depth)
+        qos = _qos(type_name, depth, kept=kept)
         self._writer = DataWriter(participant, Topic(participant, _PREFIX + topic, self._type), qos=qos)
 
     @property
@@ -163,15 +163,18 @@ class Subscription:
         How many samples were no message of the topic's type.
     """
 
-    def __init__(self, participant: Any, wakers: WaitSet, topic: str, type_name: str, depth: int) -> None:
+    def __init__(
+        self, participant: Any, wakers: WaitSet, topic: str, type_name: str, depth: int, *, kept: bool
+    ) -> None:
         self._participant, self._wakers, self._type_name, self._depth = participant, wakers, type_name, depth
+        self._kept = kept
         self._topic = Topic(participant, _PREFIX + topic, dds_type(type_name))
         self._mismatch = _Mismatch()
         self.dropped = 0
         self._open(reliable=True)
 
     def _open(self, *, reliable: bool) -> None:
-        qos = _qos(self._type_name, self._depth, reliable=reliable)
+        qos = _qos(self._type_name, self._depth, reliable=reliable, kept=self._kept)
         listener = self._mismatch if reliable else None
         self._reader = DataReader(self._participant, self._topic, qos=qos, listener=listener)
         self._unread = ReadCondition(self._reader, ViewState.Any | SampleState.NotRead | Instance.Any)
@@ -211,13 +214,13 @@ class Bus:
             raise BusError(f"DDS does not start in domain {self.domain}: {error}") from error
         self._wakers = WaitSet(self._participant)
 
-    def publisher(self, topic: str, type_name: str, depth: int = 10) -> Publisher:
-        """Begin to publish."""
-        return Publisher(self._participant, topic, type_name, depth)
+    def publisher(self, topic: str, type_name: str, depth: int = 10, *, kept: bool = False) -> Publisher:
+        """Begin to publish; of what is `kept` (transient local), later readers get the last `depth` messages."""
+        return Publisher(self._participant, topic, type_name, depth, kept=kept)
 
-    def subscription(self, topic: str, type_name: str, depth: int = 10) -> Subscription:
-        """Begin to listen; `wait` wakes up for it."""
-        return Subscription(self._participant, self._wakers, topic, type_name, depth)
+    def subscription(self, topic: str, type_name: str, depth: int = 10, *, kept: bool = False) -> Subscription:
+        """Begin to listen; `wait` wakes up for it. With `kept`, what a publisher kept before comes, too."""
+        return Subscription(self._participant, self._wakers, topic, type_name, depth, kept=kept)
 
     def wait(self, seconds: float) -> None:
         """Return when a subscription has something, or after so long."""
@@ -238,6 +241,15 @@ class Bus:
                 return found
             time.sleep(0.05)
 
+    def subscribed_types(self, topic: str) -> set[str]:
+        """Return the ROS types with which others subscribe to a topic, as known now."""
+        reader = builtin.BuiltinDataReader(self._participant, builtin.BuiltinTopicDcpsSubscription)
+        return {
+            _ros_type(sample.type_name)
+            for sample in reader.read(1000)
+            if sample.sample_info.instance_state == Instance.Alive and sample.topic_name == _PREFIX + topic
+        }
+
     def _endpoints(self, readers: list[Any]) -> dict[str, Endpoints]:
         counts: dict[str, tuple[str, list[int]]] = {}
         for index, reader in enumerate(readers):
@@ -245,10 +257,15 @@ class Bus:
                 alive = sample.sample_info.instance_state == Instance.Alive
                 if not alive or not sample.topic_name.startswith(f"{_PREFIX}/"):
                     continue
-                kind = sample.type_name.replace("::", "/").replace("/dds_/", "/").removesuffix("_")
-                known = counts.setdefault(sample.topic_name.removeprefix(_PREFIX), (kind, [0, 0]))
+                name, kind = sample.topic_name.removeprefix(_PREFIX), _ros_type(sample.type_name)
+                known = counts.setdefault(name, (kind, [0, 0]))
                 known[1][index] += 1
         return {name: Endpoints(kind, *numbers) for name, (kind, numbers) in sorted(counts.items())}
+
+
+def _ros_type(type_name: str) -> str:
+    """Return ROS's name of a type: "geometry_msgs::msg::dds_::Twist_" is "geometry_msgs/msg/Twist"."""
+    return type_name.replace("::", "/").replace("/dds_/", "/").removesuffix("_")
 
 
 @cache

@@ -15,10 +15,10 @@ from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower
 from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.twist import Twist
-from limo_hog.imaging.drawing import annotate
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.dds import Bus, Endpoints
 from limo_hog.ros2.messages import MessageError
+from limo_hog.ros2.outputs import Commands, Findings
 from limo_hog.ros2.senses import Senses, picture_of
 
 S = TypeVar("S")
@@ -126,8 +126,12 @@ def drive(
     detector: Detector,
     seconds: float,
     watch: Callable[[Decision[Any]], None] | None = None,
+    *,
+    moves: bool = True,
 ) -> Report:
     """Follow the person the camera sees until the time is up; the last command is always to stand.
+
+    With `moves` False no command is sent: a planner drives to what is found.
 
     Raises
     ------
@@ -135,8 +139,7 @@ def drive(
         If there is no camera, or no image comes for 10 s.
     """
     inputs = Inputs(bus, camera_topic(bus))
-    commands = bus.publisher(names.COMMAND, names.TYPES[names.COMMAND])
-    annotated = bus.publisher(names.ANNOTATED, names.TYPES[names.ANNOTATED])
+    commands, findings = Commands(bus) if moves else None, Findings(bus)
     follower = Follower(controller, detector)
     senses, report = inputs.senses, Report()
     began = heard = commanded = time.monotonic()
@@ -162,19 +165,17 @@ def drive(
                         f"no image on {names.IMAGE} in ROS domain {bus.domain} for {SILENT_AFTER:g} s"
                     )
                 continue
-            commands.publish(messages.twist(decision.twist))
+            if commands is not None:
+                commands.publish(stamp + came - heard, decision.twist)
             commanded = time.monotonic()
             report.dropped = inputs.dropped
             report.modes[decision.mode.value] = report.modes.get(decision.mode.value, 0) + 1
             if newest is not None:
                 report.answer_ms.append(1e3 * (commanded - came))
-                if annotated.has_readers:
-                    found = sighting.detections
-                    labels = [f"{score:.1f}" for score in found.scores]
-                    drawn = annotate(picture, found.boxes, labels, decision.target, decision.reason)
-                    annotated.publish(messages.image(stamp, drawn))
+                findings.publish(stamp, senses.newest(stamp), picture, sighting)
             if watch is not None:
                 watch(decision)
     finally:
-        commands.publish(messages.twist(Twist()))
+        if commands is not None:
+            commands.publish(stamp, Twist())
     return report

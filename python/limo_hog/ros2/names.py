@@ -15,6 +15,8 @@ ODOMETRY = "/odom"
 IMU = "/imu"
 COMMAND = "/cmd_vel"
 CLOCK = "/clock"
+TF = "/tf"
+TF_STATIC = "/tf_static"
 
 TYPES = {
     IMAGE: "sensor_msgs/msg/Image",
@@ -29,7 +31,21 @@ TYPES = {
     IMU: "sensor_msgs/msg/Imu",
     COMMAND: "geometry_msgs/msg/Twist",
     CLOCK: "rosgraph_msgs/msg/Clock",
+    TF: "tf2_msgs/msg/TFMessage",
+    TF_STATIC: "tf2_msgs/msg/TFMessage",
 }
 
-#: Boxes, in recordings alone.
+PERSON = "/followed_person"
+DETECTIONS = "/detections"
+PEOPLE = "/people"
 DETECTIONS_TYPE = "vision_msgs/msg/Detection2DArray"
+
+#: What the follower finds, beside its commands.
+FINDINGS = {
+    PERSON: "geometry_msgs/msg/PoseStamped",
+    DETECTIONS: DETECTIONS_TYPE,
+    PEOPLE: "people_msgs/msg/People",
+}
+
+#: What else drives a robot by `COMMAND`: from ROS 2 Jazzy on many expect a stamp.
+STAMPED_COMMAND_TYPE = "geometry_msgs/msg/TwistStamped"

@@ -63,6 +63,11 @@ class Senses:
         elif kind == "sensor_msgs/msg/Image":
             self._depths.append((messages.to_seconds(message.header.stamp), _metres(message)))
 
+    def newest(self, stamp: float) -> float:
+        """Return the newest of the stamps of an image, of the scan and of the odometry [s]."""
+        others = [reading.stamp for reading in (self.scan, self.odometry) if reading is not None]
+        return max([stamp, *others])
+
     def at(self, stamp: float, image: NDArray[np.uint8]) -> Sensors:
         """Return what belongs to a camera image.
 

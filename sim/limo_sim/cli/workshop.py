@@ -53,6 +53,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                 help="show N hints for the first checkpoint that does not hold (1)",
             )
             one.add_argument("--json", metavar="FILE", help="write points and evidence as JSON; - is standard output")
+            one.add_argument("--html", metavar="FILE", help="write a report with the node's pictures as one page")
+            one.add_argument("--stretch", choices=tuple("abcde"), help="a stretch task instead of tasks 1 to 4")
             one.add_argument("--gradescope", metavar="FILE", help="write results.json for a Gradescope autograder")
         one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
     words = "check every node in a folder, each in a process of its own, and write a table of points"
@@ -62,6 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     one.add_argument("--seconds", type=float, default=100.0, metavar="S", help="wall time of a node (100)")
     one.add_argument("--memory", type=int, default=4000, metavar="MB", help="memory of a node, not on Windows (4000)")
     one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
+    one.add_argument("--stretch", choices=tuple("abcde"), help="a stretch task instead of tasks 1 to 4")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -69,13 +72,22 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.workshop import solution, template
 
     node = "proxemic" if args.sequel else "follower"
+    if getattr(args, "stretch", None):
+        if args.sequel:
+            raise UsageError("--sequel and --stretch: one of them")
+        node = f"stretch {args.stretch}"
     if args.action == "grade":
         return _grade(args, node)
     if args.action == "check":
         with needed(by="limo-hog workshop", what="rosbags", install="'limo-hog[record]'"):
-            from limo_sim.workshop.check import check
+            from limo_sim.workshop.check import examine
+            from limo_sim.workshop.html_report import to_html
             from limo_sim.workshop.report import to_gradescope, to_json
-        verdicts = check(args.file, node)
+        examination = examine(args.file, node)
+        verdicts = examination.verdicts
+        if args.html:
+            with whole_file(Path(args.html)) as part:
+                part.write_text(to_html(args.file, node, examination), encoding="utf-8")
         if args.json:
             write_json(args.json, to_json(args.file, node, verdicts))
         if args.gradescope:
@@ -124,6 +136,7 @@ def _show(verdicts: list[Verdict], hints: int) -> None:
     from rich.padding import Padding
     from rich.text import Text
 
+    from limo_sim.workshop.checkpoints import task_name
     from limo_sim.workshop.report import by_task, evidence, total
 
     marks = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "dim")}
@@ -131,17 +144,19 @@ def _show(verdicts: list[Verdict], hints: int) -> None:
     width = min(console.width, WIDTH)
     for verdict in verdicts:
         won = f"{verdict.points:3d}/{verdict.worth:<3d}" if verdict.worth else " " * 7
-        console.print(Text.assemble(marks[verdict.holds], f" task {verdict.task} {won} {verdict.checkpoint}"))
+        console.print(
+            Text.assemble(marks[verdict.holds], f" task {task_name(verdict.task)} {won} {verdict.checkpoint}")
+        )
         style = "" if verdict.holds is False else "dim"
         console.print(
             Padding(Text(evidence(verdict), style=style, overflow="fold"), (0, 0, 0, 4), expand=False), width=width
         )
     points, worth = total(verdicts)
-    tasks = ", ".join(f"task {task}: {won} of {of}" for task, (won, of) in by_task(verdicts).items())
+    tasks = ", ".join(f"task {task_name(task)}: {won} of {of}" for task, (won, of) in by_task(verdicts).items())
     console.print(f"{points} of {worth} points ({tasks})", width=width)
     missed = next((verdict for verdict in verdicts if not verdict.holds and verdict.hints), None)
     if hints and missed is not None:
-        console.print(f"Hints for task {missed.task}, {missed.checkpoint}:", width=width)
+        console.print(f"Hints for task {task_name(missed.task)}, {missed.checkpoint}:", width=width)
         for hint in missed.hints[:hints]:
             console.print(Padding(Text(hint), (0, 0, 0, 4), expand=False), width=width)
         if hints < len(missed.hints):

@@ -14,11 +14,26 @@ from typing import Any, ClassVar
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.typesys import get_types_from_msg
 
 from limo_hog.ros2.messages import element_type, typestore
 
 #: What `import` finds.
-PACKAGES = ("builtin_interfaces", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs")
+PACKAGES = (
+    *("builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "nav_msgs", "people_msgs", "rosgraph_msgs"),
+    *("sensor_msgs", "shape_msgs", "std_msgs", "stereo_msgs", "tf2_msgs", "trajectory_msgs", "vision_msgs"),
+    *("unique_identifier_msgs", "visualization_msgs"),
+)
+
+#: Services that `import` finds, by package and name: the fields of request and response.
+SERVICES = {
+    ("std_srvs", "Empty"): ("", ""),
+    ("std_srvs", "SetBool"): ("bool data", "bool success\nstring message"),
+    ("std_srvs", "Trigger"): ("", "bool success\nstring message"),
+    ("example_interfaces", "AddTwoInts"): ("int64 a\nint64 b", "int64 sum"),
+    ("example_interfaces", "SetBool"): ("bool data", "bool success\nstring message"),
+    ("example_interfaces", "Trigger"): ("", "bool success\nstring message"),
+}
 
 _TEXT = ("string", "wstring")
 
@@ -170,8 +185,7 @@ class Message:
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={getattr(self, name)!r}" for name in self._fields)
-        package, name = self._type_name.split("/msg/")
-        return f"{package}.msg.{name}({values})"
+        return f"{type(self).__module__}.{type(self).__name__}({values})"
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
@@ -218,7 +232,20 @@ def from_wire(message: Any) -> Message:
     return new
 
 
+@cache
+def service_class(package: str, name: str) -> type:
+    """Return a service's class: it has `Request` and `Response`."""
+    parts = {}
+    for part, definition in zip(("Request", "Response"), SERVICES[package, name], strict=True):
+        type_name = f"{package}/msg/{name}_{part}"
+        typestore().register(get_types_from_msg(definition, type_name))
+        parts[part] = message_class(type_name)
+        parts[part].__module__ = f"{package}.srv"
+    return type(name, (), {"__doc__": f"{package}/srv/{name}.", "__module__": f"{package}.srv", **parts})
+
+
 def class_names(package: str) -> list[str]:
     """Return the names of a package's messages."""
     prefix = f"{package}/msg/"
-    return [name.removeprefix(prefix) for name in typestore().fielddefs if name.startswith(prefix)]
+    found = [name.removeprefix(prefix) for name in typestore().fielddefs if name.startswith(prefix)]
+    return [name for name in found if not name.endswith(("_Request", "_Response"))]

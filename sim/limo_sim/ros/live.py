@@ -15,9 +15,10 @@ from limo_sim.run.episode import FrameRecord, Moment, Step
 from limo_sim.world.scenario import Scenario
 
 if TYPE_CHECKING:
-    from limo_hog.ros2.dds import Bus
+    from limo_hog.ros2.dds import Bus, Subscription
     from limo_sim.ros.outlet import Outlet
 
+_STAMPED = names.STAMPED_COMMAND_TYPE
 #: After a delay the arena runs faster until this much is made up for [s]; more is dropped. Chosen: two camera frames.
 _CATCH_UP = 0.2
 
@@ -41,11 +42,17 @@ def run_live(
         Carries the topics; None for an arena without ROS.
     watch
         Called with every camera frame.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario asks for faults of the detector: those of the nodes are out of reach.
     """
+    scenario.check_detector_is_plain("the nodes on the network bring their own detectors")
     arena = Arena(scenario, seed)
     outlet: Outlet | None = None
     writers = {}
-    commands = None
+    commands: list[Subscription] = []
     if bus is not None:
         # An arena that is only watched needs neither DDS nor messages.
         from limo_hog.ros2.messages import to_twist
@@ -53,17 +60,17 @@ def run_live(
 
         outlet = Outlet(arena)
         spoken = [topic for topic in names.TYPES if topic not in (names.COMMAND, names.ANNOTATED)]
-        writers = {topic: bus.publisher(topic, names.TYPES[topic]) for topic in spoken}
-        commands = bus.subscription(names.COMMAND, names.TYPES[names.COMMAND])
+        writers = {topic: bus.publisher(topic, names.TYPES[topic], kept=topic == names.TF_STATIC) for topic in spoken}
+        commands = [bus.subscription(names.COMMAND, kind) for kind in (names.TYPES[names.COMMAND], _STAMPED)]
     twist, shown = Twist(), -1.0
     began = time.monotonic()
     while arena.time < seconds:
-        for message in commands.take() if commands is not None else ():
-            twist = to_twist(message)
+        for message in [message for reader in commands for message in reader.take()]:
+            twist = to_twist(message.twist if message.__msgtype__ == _STAMPED else message)
             arena.command(twist)
         for topic, make in outlet.new() if outlet is not None else ():
             writer = writers.get(topic)
-            if writer is not None and writer.has_readers:
+            if writer is not None and (writer.has_readers or topic == names.TF_STATIC):
                 writer.publish(make())
         if watch is not None and arena.frame().stamp > shown:
             shown = arena.frame().stamp
@@ -80,7 +87,7 @@ def run_live(
 
 def _moment(arena: Arena, twist: Twist) -> Moment:
     frame = arena.frame()
-    mode = Mode.HOLD if twist == Twist() else Mode.FOLLOW
+    mode = Mode.STAND if twist == Twist() else Mode.DRIVE
     decision = Decision(twist, None, mode, "driven by /cmd_vel")
     step = Step(arena.time, arena.truth(), decision, FrameRecord(frame.truth, Detections.none()))
     return Moment(step, frame, arena.scan(), arena.odometry())

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from limo_hog.ros2 import messages, names
+from limo_hog.ros2 import frames, messages, names
 from limo_sim.run.arena import Arena
 from limo_sim.sensing.camera import FOCAL_PX, HEIGHT, WIDTH
 from limo_sim.sensing.imu import ImuReading
@@ -22,15 +22,20 @@ class Outlet:
     def __init__(self, arena: Arena) -> None:
         self._arena = arena
         self._camera = self._lidar = self._wheels = -math.inf
+        self._began = False
 
     def new(self) -> list[Outgoing]:
         """Return the new messages: the clock first, depth before colour, so that a colour image finds its depth."""
         arena = self._arena
         out: list[Outgoing] = [(names.CLOCK, lambda: messages.clock(arena.time))]
+        if not self._began:
+            self._began = True
+            out.append((names.TF_STATIC, lambda: frames.static_transforms(arena.time)))
         out += [(names.IMU, partial(_imu, reading)) for reading in arena.imu()]
         odometry, scan, frame = arena.odometry(), arena.scan(), arena.frame()
         if odometry.stamp > self._wheels:
             self._wheels = odometry.stamp
+            out.append((names.TF, lambda: frames.odometry_transform(odometry)))
             out.append((names.ODOMETRY, lambda: messages.odometry(odometry)))
         if scan.stamp > self._lidar:
             self._lidar = scan.stamp
@@ -38,9 +43,10 @@ class Outlet:
             out.append((names.SCAN, lambda: messages.laser_scan(scan, period)))
         if frame.stamp > self._camera:
             self._camera = stamp = frame.stamp
+            bent = arena.scenario.camera.k1, arena.scenario.camera.k2
             out += [
-                (names.CAMERA_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX)),
-                (names.DEPTH_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX)),
+                (names.CAMERA_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX, bent)),
+                (names.DEPTH_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX, bent)),
                 (names.DEPTH, lambda: messages.image(stamp, frame.depth)),
                 (names.DEPTH_LCAS, lambda: messages.image(stamp, frame.depth)),
                 (names.IMAGE, lambda: messages.image(stamp, frame.image)),

@@ -42,6 +42,9 @@ class ScoreCard:
         What was run, as `limo_sim.run.provenance` tells it: cards with both equal are of the same arena and code.
     target_m
         Distance that the controller holds [m]; None for one that holds none, such as `approach`.
+    kept_m
+        Mean of the distance it held at each time [m]: more than `target_m` where nearer the camera would not show the
+        whole person.
     success
         Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
         view for more than 10 s after being first in view; None where no person ever was in the arena.
@@ -60,17 +63,23 @@ class ScoreCard:
     distance_min_m, distance_mean_m
         From the robot's centre to the subject's axis [m].
     distance_rms_error_m
-        Of the distance that controllers hold, from the camera to the subject's surface, to `target_m` [m]; None without
-        a target distance.
+        Of the distance that controllers hold, from the camera to the subject's surface, to the one they held at the
+        time (`kept_m`) [m]; None without a target distance.
     zone_intimate, zone_personal, zone_social, zone_public
         Share of time in each of Hall's zones, by the distance from the robot's centre to the subject's axis.
     clearance_min_m
         Smallest gap between the robot's outline and the cylinder around any person [m].
+    intrusion_intimate, intrusion_personal, intrusion_social
+        Share of the whole run in which the nearest of all people is in this zone of Hall's, by the distance from the
+        robot's centre to the person's axis; None where no person ever was in the arena.
     contacts_person, contacts_wall
         How often the robot touched a person; a wall or furniture.
     lost, found_again
         How often the subject was not the target for more than 0.5 s; share of these in which the subject was the target
         again within 3 s, not counting the time hidden behind something.
+    time_to_find_again_s
+        Mean time from such a loss until the subject is the target again, counted alike; a search that the run's end cut
+        off counts as far as it got, if it took longer than 3 s [s].
     follows_first
         Share of frames with a target in which the target is the subject.
     identity_switches
@@ -98,6 +107,7 @@ class ScoreCard:
     scenario_hash: str
     code_version: str
     target_m: float | None
+    kept_m: float | None
     success: bool | None
     frames: int
     first_detection_s: float | None
@@ -115,10 +125,14 @@ class ScoreCard:
     zone_social: float | None
     zone_public: float | None
     clearance_min_m: float | None
+    intrusion_intimate: float | None
+    intrusion_personal: float | None
+    intrusion_social: float | None
     contacts_person: int
     contacts_wall: int
     lost: int
     found_again: float | None
+    time_to_find_again_s: float | None
     follows_first: float | None
     identity_switches: int | None
     path_wrong_m: float
@@ -153,8 +167,9 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
     counted = [step for step in steps if first < len(frames) and step.time >= frames[first].time]
     people = [person for step in counted if (person := _person(step.truth, subject))]
     distances = [person.distance for person in people]
-    held = np.array([person.surface_distance for person in people])
     target = episode.target_distance
+    kept = np.array(_kept([step for step in counted if _person(step.truth, subject)], target))
+    held = np.array([person.surface_distance for person in people])
     after = slice(first, None)
     boxed = [hit for step, hit in zip(frames, hits, strict=True) if len(step.detections)]
     errors = [_pixel_error(view) for view, ok in zip(views[after], visible[after], strict=True) if ok and view]
@@ -164,6 +179,7 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
     stamps = [step.seen.stamp for step, ok in zip(frames, found, strict=True) if ok and step.seen]
     known = [person for person in targets if person is not None]
     zones = Counter(zone_of(distance) for distance in distances)
+    nearest = Counter(zone_of(distance) for step in steps if (distance := _nearest(step)) is not None)
     return ScoreCard(
         scenario=episode.scenario.name,
         controller=episode.controller,
@@ -173,6 +189,7 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         scenario_hash=scenario_hash(episode.scenario),
         code_version=code_version(),
         target_m=target,
+        kept_m=_mean(kept),
         success=_success(episode, [step.time for step in frames[first:]], visible[after], criteria),
         frames=len(frames),
         first_detection_s=stamps[0] if stamps else None,
@@ -184,23 +201,30 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         pixel_error_p95=float(np.percentile(errors, 95)) if errors else None,
         distance_min_m=min(distances, default=None),
         distance_mean_m=_mean(distances),
-        distance_rms_error_m=None if target is None else _rms(held - target),
-        zone_intimate=_share(zones, Zone.INTIMATE),
-        zone_personal=_share(zones, Zone.PERSONAL),
-        zone_social=_share(zones, Zone.SOCIAL),
-        zone_public=_share(zones, Zone.PUBLIC),
+        distance_rms_error_m=None if target is None else _rms(held - kept),
+        zone_intimate=_share(zones, Zone.INTIMATE, zones.total()),
+        zone_personal=_share(zones, Zone.PERSONAL, zones.total()),
+        zone_social=_share(zones, Zone.SOCIAL, zones.total()),
+        zone_public=_share(zones, Zone.PUBLIC, zones.total()),
         clearance_min_m=_clearance(episode),
+        intrusion_intimate=_share(nearest, Zone.INTIMATE, len(steps)),
+        intrusion_personal=_share(nearest, Zone.PERSONAL, len(steps)),
+        intrusion_social=_share(nearest, Zone.SOCIAL, len(steps)),
         contacts_person=episode.contacts.person,
         contacts_wall=episode.contacts.wall,
         lost=len(gaps),
         found_again=_mean([gap <= criteria.found_within_s for gap in gaps]),
+        time_to_find_again_s=_mean(gaps),
         follows_first=_mean([person == subject for person in known]),
         identity_switches=sum(one != other for one, other in itertools.pairwise(chosen)),
         path_wrong_m=_path_wrong(steps, criteria),
         mean_abs_domega=_mean(np.abs(np.diff(_turn_rates(episode)))) or 0.0,
         jerk_mean=_jerk_mean(steps),
         path_m=_path(steps),
-        modes=_shares([step.decision.mode.value for step in steps], [mode.value for mode in Mode]),
+        modes=_shares(
+            [step.decision.mode.value for step in steps],
+            [mode.value for mode in Mode if mode not in (Mode.DRIVE, Mode.STAND)],
+        ),
         reasons=_shares([step.decision.reason for step in steps], []),
         detect_ms_p50=float(np.percentile(detect_ms, 50)) if detect_ms else None,
         detect_ms_p95=float(np.percentile(detect_ms, 95)) if detect_ms else None,
@@ -282,6 +306,17 @@ def _clearance(episode: Episode) -> float | None:
     return min(gaps, default=None)
 
 
+def _kept(steps: Sequence[Step], target: float | None) -> list[float]:
+    """Return the distance that the controller held at each step [m]; nothing for one that holds none."""
+    if target is None:
+        return []
+    kept, last = [], target
+    for step in steps:
+        last = step.decision.belief.keeps or last
+        kept.append(last)
+    return kept
+
+
 def _path(steps: Sequence[Step]) -> float:
     places = np.array([step.truth.robot[:2] for step in steps]).reshape(-1, 2)
     return float(np.hypot(*np.diff(places, axis=0).T).sum())
@@ -328,8 +363,13 @@ def _rms(values: NDArray[np.float64]) -> float | None:
     return float(np.sqrt(np.mean(values**2))) if len(values) else None
 
 
-def _share(zones: Counter[Zone], zone: Zone) -> float | None:
-    return zones[zone] / zones.total() if zones else None
+def _nearest(step: Step) -> float | None:
+    """Return the distance from the robot's centre to the axis of the nearest person [m]."""
+    return min((person.distance for person in step.truth.people if person), default=None)
+
+
+def _share(zones: Counter[Zone], zone: Zone, total: int) -> float | None:
+    return zones[zone] / total if zones else None
 
 
 def _shares(values: Sequence[str], always: Sequence[str]) -> dict[str, float]:

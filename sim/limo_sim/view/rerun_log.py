@@ -18,7 +18,7 @@ with needed(by="--rerun", what="the Rerun SDK", install="'limo-hog[viz]'"):
     import rerun as rr
 
 _ROBOT, _PERSON, _WALL = (31, 111, 235), (209, 36, 47), (138, 148, 158)
-_GREEN, _RED = (60, 200, 80), (235, 60, 60)
+_OTHER, _CHOSEN = (0, 158, 115), (213, 94, 0)
 
 
 @contextmanager
@@ -39,7 +39,7 @@ def logged(path: Path, room_half: float) -> Iterator[Callable[[Moment], None]]:
                 # Every second pixel in millimetres, a tenth of the bytes: this is to look at.
                 depth = np.nan_to_num(1000 * frame.depth[::2, ::2], nan=0, posinf=0, neginf=0).astype(np.uint16)
                 log.log("depth", rr.DepthImage(depth, meter=1000))
-                colours = [_RED if i == step.decision.target else _GREEN for i in range(len(step.detections))]
+                colours = [_CHOSEN if i == step.decision.target else _OTHER for i in range(len(step.detections))]
                 labels = [f"{score:.1f}" for score in step.detections.scores]
                 boxes = rr.Boxes2D(
                     array=step.detections.boxes, array_format=rr.Box2DFormat.XYWH, labels=labels, colors=colours

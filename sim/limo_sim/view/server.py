@@ -29,7 +29,7 @@ from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.zones import ZONE_ENDS
 from limo_hog.imaging.writing import jpeg
-from limo_sim.run.episode import Moment
+from limo_sim.run.episode import Moment, Step
 from limo_sim.sensing.camera import FIELD
 from limo_sim.sensing.lidar import MOUNT_AHEAD
 from limo_sim.view.access import HEADERS, Access, QuietLogger
@@ -156,10 +156,10 @@ class View:
         """Show a moment, and return when the run may go on."""
         if moment.frame is not None:
             self._pictured = moment
-        now, (x, y, _) = reading(moment.step), moment.step.truth.robot
+        now, robot = reading(moment.step), moment.step.truth.robot
         people = [(None, None) if p is None else (p.x, p.y) for p in moment.step.truth.people]
         measured = measured_m(moment.frame, moment.step)
-        self._rows.append([*asdict(now).values(), measured, x, y, *itertools.chain(*people)])
+        self._rows.append([*asdict(now).values(), measured, *robot, *itertools.chain(*people)])
         if moment.step.decision.mode is Mode.SEARCH:
             self._followed = None
         elif (followed := followed_person(moment.step)) is not None:
@@ -201,6 +201,7 @@ class View:
         app.router.add_get("/", _page("index.html", "text/html"))
         app.router.add_get("/view.css", _page("view.css", "text/css"))
         app.router.add_get("/view.js", _page("view.js", "text/javascript"))
+        app.router.add_get("/plots.js", _page("plots.js", "text/javascript"))
         app.router.add_get("/live", self._live)
         logger: Any = QuietLogger(logging.getLogger("limo_sim.view"), {})
         # Connections that ask nothing, or never finish asking, do not hold up the end.
@@ -326,6 +327,7 @@ class View:
             "robot": step.truth.robot,
             "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
             "followed": self._followed,
+            "believed": _believed(step),
             "measured_m": measured_m(moment.frame, step),
             "scan": _hits(moment.scan, list(self._poses)),
             "detect_ms": step.frame.detect_ms or None if step.frame else None,
@@ -380,6 +382,16 @@ def _hits(scan: Scan | None, poses: list[tuple[float, float, float, float]]) -> 
     )
     rounded: list[list[float]] = np.round(points, 2).tolist()
     return rounded
+
+
+def _believed(step: Step) -> list[list[float]]:
+    """Return where the follower takes people to be, x, y [m] in the arena's frame, and with which probability."""
+    x, y, yaw = step.truth.robot
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return [
+        [round(x + cos * one.x - sin * one.y, 2), round(y + sin * one.x + cos * one.y, 2), round(one.probability, 2)]
+        for one in step.decision.belief.people
+    ]
 
 
 def _finite(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from limo_sim.ros.script import run_script, score_of
-from limo_sim.workshop import checkpoints as points
 from limo_sim.workshop.checkpoints import Checkpoint
+from limo_sim.workshop.exercises import EXERCISES, FOUND, STANDS, Exercise
 from limo_sim.workshop.mistakes import Finding, camera_read, no_command, no_detection, no_picture
-from limo_sim.workshop.scenes import FOLLOWER_SCENES, PROXEMIC_SCENES, Take, play
+from limo_sim.workshop.scenes import Take, play
 from limo_sim.world.scenario import Scenario
 
 
@@ -45,145 +45,67 @@ class Verdict:
     hints: tuple[str, ...] = ()
 
 
-SHOWN = Checkpoint(
-    1,
-    "the camera image is shown",
-    10,
-    points.shown,
-    (
-        "Which function of cv2 shows a picture in a window?",
-        "Call self.show(picture) once for every image; picture is a copy of image.",
-    ),
-)
-FOUND = Checkpoint(
-    2,
-    "people are found",
-    15,
-    points.found,
-    (
-        "The detector is self.hog; which of its methods searches at many scales?",
-        "boxes, weights = self.hog.detectMultiScale(image, winStride=(8, 8), scale=1.05)",
-    ),
-)
-LOGGED = Checkpoint(
-    2,
-    "the number of boxes is logged",
-    5,
-    points.logged,
-    ("len(boxes) is their number.", "self.get_logger().info(f'Detections: {len(boxes)}')"),
-)
-SCALED = Checkpoint(
-    2,
-    "boxes are in the camera's pixels",
-    5,
-    points.scaled_back,
-    ("A box found in an image of half the size has half the coordinates.",),
-)
-STANDS = Checkpoint(
-    3,
-    "the robot stands while no person is found",
-    10,
-    points.stands,
-    ("What should the robot do when boxes is empty?", "Publish Twist() and return from the callback."),
-)
-BEST = Checkpoint(
-    3,
-    "the surest box is chosen and drawn",
-    15,
-    points.best,
-    (
-        "The surest box is the one with the greatest weight.",
-        "best = int(np.argmax(weights)); draw it last, in (0, 0, 255), with a dot in (255, 0, 0), and show it.",
-    ),
-)
-TURNS = Checkpoint(
-    4,
-    "the robot turns towards the person",
-    10,
-    points.turns,
-    (
-        "A positive angular.z turns left. What sign has the error of a person on the left?",
-        "error = middle - cx; twist.angular.z = 0.005 * float(error)",
-    ),
-)
-DEAD_BAND = Checkpoint(
-    4,
-    "a person in the middle does not turn it",
-    5,
-    points.dead_band,
-    ("Leave angular.z at 0.0 while abs(error) is smaller than the dead-band.",),
-)
-DRIVES = Checkpoint(4, "it drives to the person", 5, points.drives, ("Set twist.linear.x to 0.2.",))
-SPEAKS = Checkpoint(
-    4, "a command comes at least every 0.5 s", 5, points.speaks, ("Publish a command after every image.",)
-)
-RETURNS = Checkpoint(
-    4, "callbacks return in time", 5, points.returns, ("Do not call time.sleep in a callback; use a timer.",)
-)
-KEEPS = Checkpoint(
-    5,
-    "it keeps its distance",
-    40,
-    points.keeps,
-    (
-        "Take the median of the depths around the box's centre; the error is distance - self.target.",
-        "twist.linear.x = float(np.clip(self.linear_gain * (distance - self.target), -0.3, 0.3))",
-    ),
-)
-LIMITS = Checkpoint(
-    5, "its speeds keep within the limits", 20, points.limits, ("Clip both speeds with np.clip before publishing.",)
-)
+#: The walk's checkpoint.
+WALK = "the robot follows a walking person"
 
-FOLLOWER = (SHOWN, FOUND, LOGGED, SCALED, STANDS, BEST, TURNS, DEAD_BAND, DRIVES, SPEAKS, RETURNS)
-#: The sequel's template does tasks 1 to 3, which therefore are worth no points there.
-GIVEN = (SHOWN, FOUND, LOGGED, SCALED, STANDS, BEST)
-PROXEMIC = (*GIVEN, TURNS, SPEAKS, RETURNS, KEEPS, LIMITS)
-#: Points for the walk, which is tried when all other checkpoints hold.
-WALK, WALK_POINTS = "the robot follows a walking person", {"follower": 10, "proxemic": 20}
+
+@dataclass(frozen=True, slots=True)
+class Examination:
+    """A node's verdicts, and its takes: what it did in each scene."""
+
+    verdicts: list[Verdict]
+    takes: list[Take]
 
 
 def check(script: Path, node: str = "follower", patience: float = 20.0) -> list[Verdict]:
-    """Try a node in the workshop's scenes, and if all checkpoints hold there, with a walking person for 20 s.
+    """Return the verdicts of `examine`."""
+    return examine(script, node, patience).verdicts
+
+
+def examine(script: Path, node: str = "follower", patience: float = 20.0) -> Examination:
+    """Try a node in an exercise's scenes, and if all checkpoints hold there, with a walking person for 20 s.
 
     The points of all verdicts add up to 100. A node that raises or hangs has one more verdict, the first, that says so.
     """
-    checkpoints = FOLLOWER if node == "follower" else PROXEMIC
+    exercise = EXERCISES[node]
+    checkpoints = exercise.checkpoints
     takes: list[Take] = []
     fault: Verdict | None = None
-    for scene in FOLLOWER_SCENES if node == "follower" else PROXEMIC_SCENES:
+    for scene in exercise.scenes:
         takes.append(play(script, scene, patience))
         fault = _fault(script, takes[-1])
         if fault is not None:
             break
     verdicts = []
     for checkpoint in checkpoints:
-        worth = 0 if node == "proxemic" and checkpoint in GIVEN else checkpoint.points
-        finding = _judged(script, checkpoint, checkpoints[0], takes) if fault is None else NOT_REACHED
+        worth = 0 if checkpoint in exercise.given else checkpoint.points
+        finding = _judged(script, checkpoint, exercise, takes) if fault is None else NOT_REACHED
         verdicts.append(_verdict(checkpoint, finding, worth))
-    last, worth = checkpoints[-1].task, WALK_POINTS[node]
-    walk = Finding(None, "tried when all checkpoints above hold")
-    if fault is None and all(verdict.holds for verdict in verdicts):
-        walk = _walk(script)
-    verdicts.append(_verdict(Checkpoint(last, WALK, worth, lambda _: walk), walk, worth))
-    return verdicts if fault is None else [fault, *verdicts]
+    if exercise.walk:
+        walk = Finding(None, "tried when all checkpoints above hold")
+        if fault is None and all(verdict.holds for verdict in verdicts):
+            walk = _walk(script)
+        verdicts.append(_verdict(Checkpoint(checkpoints[-1].task, WALK, 0, lambda _: walk), walk, exercise.walk))
+    return Examination(verdicts if fault is None else [fault, *verdicts], takes)
 
 
 NOT_REACHED = Finding(None, "not tried: see the first mistake above")
 
 
-def _judged(script: Path, checkpoint: Checkpoint, first: Checkpoint, takes: Sequence[Take]) -> Finding:
+def _judged(script: Path, checkpoint: Checkpoint, exercise: Exercise, takes: Sequence[Take]) -> Finding:
     """Judge one checkpoint, or name the mistake that keeps the node from it."""
+    first = exercise.checkpoints[0]
     no_image = no_picture(script, takes)
     if no_image is not None:
         return no_image if checkpoint is first else NOT_REACHED
-    if checkpoint.task > 1:
+    if checkpoint.task > 1 and exercise.hog:
         blind = no_detection(script, takes)
         if blind is not None:
-            return blind if checkpoint is FOUND else NOT_REACHED
+            return blind if checkpoint in (FOUND, first) else NOT_REACHED
     if checkpoint is STANDS or checkpoint.task > 3:
         silent = no_command(takes)
         if silent is not None:
-            return silent if checkpoint is STANDS else NOT_REACHED
+            return silent if checkpoint in (STANDS, first) else NOT_REACHED
     return checkpoint.judge(takes)
 
 

@@ -32,6 +32,11 @@ NOBODY_FOUND = Finding(None, "not tried: no box was found")
 NEVER_MOVES = Finding(None, "not tried: no command with a speed answers a person in view")
 
 
+def task_name(task: int) -> str:
+    """Return a task's name: its number; A to E for the stretch tasks, which are numbered from 6 on."""
+    return str(task) if task < 6 else "ABCDE"[task - 6]
+
+
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
     """One checkpoint: its task, its name, its points, how it is judged, and hints from vague to plain."""

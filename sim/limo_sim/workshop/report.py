@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from limo_sim.workshop.check import Verdict
+from limo_sim.workshop.checkpoints import task_name
 
 
 def total(verdicts: Sequence[Verdict]) -> tuple[int, int]:
@@ -58,7 +59,7 @@ def to_gradescope(script: Path, verdicts: Sequence[Verdict]) -> dict[str, Any]:
         "output": f"limo-hog workshop check {script.name}: {points} of {worth} points",
         "tests": [
             {
-                "name": f"Task {verdict.task}: {verdict.checkpoint}",
+                "name": f"Task {task_name(verdict.task)}: {verdict.checkpoint}",
                 "score": verdict.points,
                 "max_score": verdict.worth,
                 "status": "passed" if verdict.holds else "failed",

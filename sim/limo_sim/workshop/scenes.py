@@ -14,6 +14,7 @@ from limo_sim.ros.lockstep.world import LOGGER, Command, Found, Shown, World
 from limo_sim.ros.script import Outcome, run_script
 from limo_sim.run.episode import Moment
 from limo_sim.world.scenario import Person, Scenario
+from limo_sim.world.truth import Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,22 +28,23 @@ class Scene:
     arguments: tuple[str, ...] = ()
 
 
-def _standing(*places: tuple[float, float]) -> Scenario:
+def standing(*places: tuple[float, float]) -> Scenario:
+    """Return an arena with people who stand at (x, y) [m], facing the world's +x."""
     return Scenario(name="workshop check", people=tuple(Person(route=((x, y, 3600.0),), facing=0.0) for x, y in places))
 
 
-LEFT = Scene("left", "a person stands on the left", _standing((2.1, 0.6)))
-RIGHT = Scene("right", "a person stands on the right", _standing((2.1, -0.6)))
+LEFT = Scene("left", "a person stands on the left", standing((2.1, 0.6)))
+RIGHT = Scene("right", "a person stands on the right", standing((2.1, -0.6)))
 #: Longer than 30 frames, since many nodes log every thirtieth.
-AHEAD = Scene("ahead", "a person stands straight ahead", _standing((3.2, 0.0)), 3.3)
-NOBODY = Scene("nobody", "the room is empty", _standing())
+AHEAD = Scene("ahead", "a person stands straight ahead", standing((3.2, 0.0)), 3.3)
+NOBODY = Scene("nobody", "the room is empty", standing())
 #: Two people, of whom OpenCV's detector lists the less sure one first.
-TWO = Scene("two", "two people stand there", _standing((2.2, 0.7), (3.4, -1.0)), 0.6)
+TWO = Scene("two", "two people stand there", standing((2.2, 0.7), (3.4, -1.0)), 0.6)
 NEAR = Scene(
-    "near", "a person is nearer than the target distance", _standing((2.0, 0.0)), 1.0, ("-p", "target_distance:=2.5")
+    "near", "a person is nearer than the target distance", standing((2.0, 0.0)), 1.0, ("-p", "target_distance:=2.5")
 )
 FAR = Scene(
-    "far", "a person is farther than the target distance", _standing((3.2, 0.0)), 3.3, ("-p", "target_distance:=1.5")
+    "far", "a person is farther than the target distance", standing((3.2, 0.0)), 3.3, ("-p", "target_distance:=1.5")
 )
 
 FOLLOWER_SCENES = (LEFT, RIGHT, AHEAD, NOBODY, TWO)
@@ -69,6 +71,8 @@ class Look:
         The newest picture of each window, shown for this frame or before.
     said
         What was logged.
+    truth
+        The arena when the frame was taken.
     """
 
     time: float
@@ -78,6 +82,7 @@ class Look:
     commands: tuple[Command, ...]
     windows: dict[str, Shown]
     said: tuple[str, ...]
+    truth: Truth
 
 
 @dataclass
@@ -118,6 +123,7 @@ def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
                 commands,
                 dict(world.shown),
                 tuple(said),
+                moment.frame.truth,
             )
         )
         said.clear()

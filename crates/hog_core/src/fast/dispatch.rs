@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::exact::Svm;
+use crate::geometry::Size;
 use crate::image::ImageView;
 use crate::params::HogSpec;
 use crate::pyramid::Grid;
@@ -95,4 +96,21 @@ pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageVie
         Backend::Neon => planes.fill(unsafe { Neon::new() }, image),
         _ => planes.fill(Portable, image),
     }
+}
+
+/// Fills `resized` with the pixels of `source`, resized to `size`.
+pub(crate) fn resize_planes(
+    backend: Backend,
+    source: &Planes,
+    resized: &mut Planes,
+    size: Size,
+) -> Result<()> {
+    struct Resize<'a>(&'a Planes, &'a mut Planes, Size);
+    impl OnLane for Resize<'_> {
+        type Output = Result<()>;
+        fn run<L: Lane>(self, l: L) -> Result<()> {
+            self.1.resize(l, self.0, self.2)
+        }
+    }
+    on_lane(backend, Resize(source, resized, size))
 }

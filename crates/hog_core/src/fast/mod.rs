@@ -20,7 +20,7 @@ mod tile;
 
 pub use backend::Backend;
 pub(crate) use describe::{Crops, describe};
-pub(crate) use dispatch::{fill_planes, geometry, plan, serves};
+pub(crate) use dispatch::{fill_planes, geometry, plan, resize_planes, serves};
 pub(crate) use plan::{Geometry, Plan};
 pub(crate) use rows::Planes;
 pub(crate) use search::{Region, Task, search, trim};

@@ -43,6 +43,26 @@ impl Planes {
         Ok(())
     }
 
+    /// Takes the pixels of `source`, resized to `size`.
+    pub(super) fn resize<L: Lane>(&mut self, l: L, source: &Self, size: Size) -> Result<()> {
+        let mut band = Band::default();
+        self.channels = source.channels;
+        self.size = size;
+        memory::resize(&mut self.data, size.area() * source.channels + SLACK, 0)?;
+        band.begin(source, size, 0..size.width as i64, L::GROUP, L::REACH)?;
+        for y in 0..size.height {
+            band.fill(l, source, y as i64, 1)?;
+            for channel in 0..source.channels {
+                let from = &band.data[channel * band.plane + band.left..][..size.width];
+                let to = &mut self.data[(channel * size.height + y) * size.width..][..size.width];
+                for (to, from) in to.iter_mut().zip(from) {
+                    *to = from ^ 0x80;
+                }
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn channels(&self) -> usize {
         self.channels
     }

@@ -35,12 +35,12 @@ class Selection:
 
     Attributes
     ----------
-    min_trust
-        Trust from which a person too far away for HOG is worth driving nearer, and waiting for [1]. Chosen: five
-        frames of full evidence.
+    min_existence
+        Probability from which a person too far away for HOG is worth driving nearer, and waiting for [1]. Chosen: three
+        clear frames.
     max_unconfirmed_frames
-        A track that is not confirmed after so many frames, and trusted less than `min_trust`, is given up [1]. Chosen:
-        3 s, more than twice as long as a person takes to be confirmed.
+        A track that is not confirmed after so many frames, and less likely than `min_existence`, is given up [1].
+        Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
     reidentify_s
         How long to look for a lost person before one in other clothes is followed [s]. Chosen: two full turns of the
         search.
@@ -48,10 +48,10 @@ class Selection:
         A new track nearer than this to the lost person, and so much more for each second, may be the same person [m,
         m/s]. Chosen: a body's width, and a walk.
     lead
-        Trust by which another must exceed the track that is faced already [1]. Chosen: one frame of evidence.
+        Probability by which another must exceed the track that is faced already [1]. Chosen: one frame of evidence.
     """
 
-    min_trust: float = bounded(0.4, 0, 1)
+    min_existence: float = bounded(0.4, 0, 1)
     max_unconfirmed_frames: int = bounded(30, 1, 1000)
     reidentify_s: float = bounded(20.0, 0, 600)
     same_place: float = bounded(0.5, 0, 5)
@@ -59,7 +59,7 @@ class Selection:
     lead: float = bounded(0.1, 0, 1)
 
     def choose(self, tracks: Tracks, choice: Choice, wait_s: float, appearance: Appearance) -> Choice:
-        """Stay with a confirmed person while they are tracked; else take the most trusted track in view.
+        """Stay with a confirmed person while they are tracked; else take the likeliest track in view.
 
         Parameters
         ----------
@@ -91,12 +91,12 @@ class Selection:
             candidates.append(followed)
         if not candidates:
             return replace(choice, number=None)
-        best = max(candidates, key=lambda one: one.trust + self.lead * (one is followed))
+        best = max(candidates, key=lambda one: one.existence + self.lead * (one is followed))
         return replace(choice, number=best.number)
 
     def is_candidate(self, person: Person) -> bool:
         """Whether a track is a person, or may yet turn out to be one."""
-        return person.confirmed or person.age < self.max_unconfirmed_frames or person.trust > self.min_trust
+        return person.confirmed or person.age < self.max_unconfirmed_frames or person.existence > self.min_existence
 
     def is_stranger(self, person: Person, tracks: Tracks, choice: Choice, appearance: Appearance) -> bool:
         """Whether a person wears other clothes than the lost one, and it is too early to follow another."""

@@ -167,7 +167,7 @@ class Guard(Generic[S]):
             state = self._remember(state, scan, pose)
 
         def decision(twist: Twist, mode: Mode, reason: str) -> Decision[GuardState[S]]:
-            return Decision(twist, state, mode, reason, proposed.target, proposed.region)
+            return Decision(twist, state, mode, reason, proposed.target, proposed.region, proposed.belief)
 
         if not proposed.twist.is_finite:
             return decision(Twist(), Mode.BLOCKED, "the controller's command is not a number")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,3 +34,125 @@ def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int =
     patch = depth[max(y - half, 0) : max(y + half, 0), max(x - half, 0) : max(x + half, 0)]
     valid = patch[np.isfinite(patch) & (patch > 0)]
     return float(np.median(valid)) if valid.size else None
+
+
+@dataclass(frozen=True, slots=True)
+class Strips:
+    """Where a detection window shows a person's chest, and what is beside it.
+
+    Attributes
+    ----------
+    top, bottom
+        Of the rows looked at [window heights]. Chosen: the chest, .27 to .5 of HOG's window.
+    chest
+        Half the width of the strip in the middle [window widths]. Chosen: narrower than a person seen from the side.
+    inner, outer
+        Edges of the two strips beside it, from the middle [window widths]. Chosen: outside of the arms, which reach to
+        .25, and inside of the window, in which HOG was trained to find background.
+    beyond
+        Depth taken where the camera sees none [m]: further than it reaches.
+    known
+        Share of pixels that must be valid for a depth to be known [1].
+    """
+
+    top: float = 0.27
+    bottom: float = 0.5
+    chest: float = 0.06
+    inner: float = 0.36
+    outer: float = 0.46
+    beyond: float = 20.0
+    known: float = 0.2
+
+
+STRIPS = Strips()
+
+
+def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strips = STRIPS) -> float | None:
+    """Return how far the surroundings of a box are behind its middle [m]; None where the depth does not tell.
+
+    The inverse depth of a plane is linear in the image, so the plane through the strips left and right of the person
+    has, in the middle between them, the mean of their inverse depths. A picture on a wall is in that plane, seen from
+    whatever side: 0.
+
+    Parameters
+    ----------
+    depth
+        float32 (H, W) [m], not finite or <= 0 where unknown.
+    box
+        int32 (4,): x, y, w, h [px].
+    strips
+        Where to look.
+    """
+    x, y, w, h = (int(value) for value in box)
+    band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
+    centre = x + w / 2
+
+    def median(left: float, right: float) -> float | None:
+        strip = band[:, max(round(centre + left * w), 0) : max(round(centre + right * w), 0)]
+        if strip.size == 0:
+            return None
+        valid = strip[np.isfinite(strip) & (strip > 0)]
+        return float(np.median(valid)) if valid.size > strips.known * strip.size else strips.beyond
+
+    middle = median(-strips.chest, strips.chest)
+    sides = [median(-strips.outer, -strips.inner), median(strips.inner, strips.outer)]
+    seen = [side for side in sides if side is not None]
+    if middle is None or not seen:
+        return None
+    return len(seen) / sum(1.0 / side for side in seen) - middle
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """How a person's outline is followed upwards in the depth image.
+
+    Attributes
+    ----------
+    half_width
+        Half the width of the strip looked at [window widths]. Chosen: a head is a quarter of HOG's window wide.
+    least_half_px
+        And at least this [px]: the middle of a box strays by 3 px.
+    tolerance
+        Depth within which a pixel is the person's [m]. Chosen: a trunk and an arm; people keep more from walls.
+    share
+        Part of the valid pixels of a row that must be the person's [1].
+    gap_px
+        So many rows without the person end the outline [px]. Chosen: more than the depth image's holes.
+    """
+
+    half_width: float = 0.08
+    least_half_px: int = 4
+    tolerance: float = 0.35
+    share: float = 0.25
+    gap_px: int = 5
+
+
+OUTLINE = Outline()
+
+
+def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, outline: Outline = OUTLINE) -> int:
+    """Return the highest image row [px] of the person in a box; 0 where they reach the image's edge or beyond.
+
+    Parameters
+    ----------
+    depth
+        float32 (H, W) [m], not finite or <= 0 where unknown.
+    box
+        int32 (4,): x, y, w, h [px].
+    person
+        Depth of the person [m].
+    outline
+        How to follow the outline.
+    """
+    column, row = box_centre(box)
+    half = max(round(outline.half_width * int(box[2])), outline.least_half_px)
+    strip = depth[: max(row, 1), max(column - half, 0) : max(column + half, 1)]
+    known = (np.isfinite(strip) & (strip > 0)).sum(axis=1)
+    with np.errstate(invalid="ignore"):
+        near = (np.abs(strip - person) < outline.tolerance).sum(axis=1)
+    empty = near[::-1] < np.maximum(outline.share * known[::-1], 1)
+    # The first row, from the box's middle upwards, that begins a gap.
+    runs = np.convolve(empty, np.ones(outline.gap_px), "valid") >= outline.gap_px
+    if not runs.any():
+        return 0
+    return max(len(empty) - int(np.argmax(runs)), 0)

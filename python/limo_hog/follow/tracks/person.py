@@ -26,13 +26,12 @@ class Person:
         Position and velocity.
     seen, felt
         Stamp of the last frame in which HOG found them, and of the last scan with their legs [s].
-    trust
-        0..1: share of recent frames that are evidence for a person, of those in which one should have been found. A
-        pillar looks like a person in some frames, and not much like one; a person in all.
+    log_odds
+        Of being a person, by all frames in which one should have been found (`existence`).
     window, centre
         Height of the detection window, and its middle below the image's, times the distance [px m].
     confirmed
-        Whether the trust has been high enough, and not too low since.
+        Whether the log-odds have been high enough, and not too low since.
     age, misses
         Frames in which the person should have been found, and those since they were.
     clothes
@@ -42,7 +41,7 @@ class Person:
     number: int
     track: Track
     seen: float
-    trust: float
+    log_odds: float
     window: float
     centre: float
     confirmed: bool = False
@@ -50,6 +49,11 @@ class Person:
     misses: int = 0
     felt: float = -math.inf
     clothes: Clothes | None = None
+
+    @property
+    def existence(self) -> float:
+        """Probability of being a person [0 … 1]."""
+        return 1.0 / (1.0 + math.exp(-self.log_odds))
 
     @property
     def measured(self) -> float:
@@ -73,14 +77,22 @@ class UnknownRange:
 
 
 def initiate(
-    number: int, seen: Measurement, stamp: float, pose: Odometry, noise: Noise, unknown: UnknownRange
+    number: int,
+    seen: Measurement,
+    stamp: float,
+    pose: Odometry,
+    noise: Noise,
+    unknown: UnknownRange,
+    log_odds: float = 0.0,
 ) -> Person:
     """Begin to track a box that belongs to no known person."""
     distance = unknown.distance if seen.range is None else seen.range
     if seen.range is None:
         noise = replace(noise, range=unknown.sigma)
     track = kalman.initiate(stamp, seen.bearing, distance, pose, noise)
-    return Person(number, track, stamp, 0.0, seen.height * distance, seen.centre * distance, clothes=seen.clothes)
+    window = seen.window or seen.height * distance
+    centre = seen.middle if seen.window else seen.centre * distance
+    return Person(number, track, stamp, log_odds, window, centre, clothes=seen.clothes)
 
 
 def predict(person: Person, stamp: float, noise: Noise) -> Person:

@@ -11,13 +11,14 @@ from limo_hog.follow.sense.appearance import Clothes
 from limo_hog.follow.sense.measurement import Measurement, measure
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_hog.follow.sense.visibility import Visibility
+from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Association
+from limo_hog.follow.tracks.existence import Existence, Recall
 from limo_hog.follow.tracks.kalman import Noise, bearing_range, innovation
 from limo_hog.follow.tracks.legs import Legs, Returns, returns_of
 from limo_hog.follow.tracks.person import Person, initiate, predict
 from limo_hog.follow.tracks.poses import pose_at
-from limo_hog.follow.tracks.trust import Trust
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,20 +29,26 @@ class Tracks:
     ----------
     people
         Everyone tracked.
+    boxes
+        Number and index of the box of each person found in the last frame.
     next_number
         Number of the next new person.
     poses, scans
         Where the robot was and what the lidar hit lately, oldest first.
     stamp, period
         Stamp of the last frame, None before the first, and the time between the last two [s].
+    recall
+        How often people are found, as learnt so far.
     """
 
     people: tuple[Person, ...] = ()
+    boxes: tuple[tuple[int, int], ...] = ()
     next_number: int = 1
     poses: tuple[Odometry, ...] = ()
     scans: tuple[Returns, ...] = ()
     stamp: float | None = None
     period: float = 0.1
+    recall: Recall = field(default_factory=Recall)
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
@@ -59,7 +66,7 @@ class Tracker:
 
     Attributes
     ----------
-    noise, association, trust, legs, visibility
+    noise, association, existence, legs, visibility
         The parts, each with its parameters.
     forget_s
         An unmeasured person is forgotten after so long [s]. Chosen: the time the
@@ -67,9 +74,6 @@ class Tracker:
     legs_only_s
         A person not found by HOG is followed by their legs alone for so long [s]. Chosen: a chair's legs may have been
         taken for theirs, so not as long as `forget_s`.
-    max_misses
-        Legs are not believed after so many frames in which HOG should have found the person and did not [1]. Chosen:
-        at one miss in ten, four in a row happen to 1 person in 10,000.
     restart_s
         A person measured again after so long has a new track: the old velocity tells nothing [s]. Chosen: people turn
         within a second.
@@ -90,12 +94,11 @@ class Tracker:
 
     noise: Noise = field(default_factory=Noise)
     association: Association = field(default_factory=Association)
-    trust: Trust = field(default_factory=Trust)
+    existence: Existence = field(default_factory=Existence)
     legs: Legs = field(default_factory=Legs)
     visibility: Visibility = field(default_factory=Visibility)
     forget_s: float = 8.0
     legs_only_s: float = 4.0
-    max_misses: int = 3
     restart_s: float = 1.0
     size_rate: float = 0.2
     turn_speed: float = 1.0
@@ -117,30 +120,48 @@ class Tracker:
         measured = measure(observation, self.robot)
         pairs = self.association.pair(known, measured, pose, self.noise)
         people: list[Person] = []
+        recall = tracks.recall
         for who, person in enumerate(known):
+            expected = self._expected(person, pose, observation)
+            height = person.window / max(bearing_range(person.track, pose)[1], 0.3)
+            chance = self.existence.recall_of(tracks.recall, height)
+            if expected and person.confirmed:
+                recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
-                people.append(self.correct(person, measured[pairs[who]], pose))
-            elif self._expected(person, pose, observation):
-                people.append(self.trust.update_trust(person, 0.0))
+                people.append(self.correct(person, measured[pairs[who]], pose, chance))
+            elif expected:
+                people.append(self.existence.update(person, self.existence.of_miss(chance), found=False))
             else:
                 people.append(person)
         boxes = {people[who].number: which for who, which in pairs.items()}
         number = tracks.next_number
         for which, seen in enumerate(measured):
             if which not in boxes.values() and self.association.is_new(seen, people, pose):
-                people.append(initiate(number, seen, stamp, pose, self.noise, self.association.unknown))
+                odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
+                people.append(initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds))
                 boxes[number] = which
                 number += 1
-        return replace(tracks, people=tuple(people), next_number=number), boxes
+        found = tuple(boxes.items())
+        return replace(tracks, people=tuple(people), next_number=number, recall=recall, boxes=found), boxes
 
-    def correct(self, person: Person, seen: Measurement, pose: Odometry) -> Person:
-        """Update a person by their box; the track is at the box's stamp."""
+    def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
+        """Update a person by their box; the track is at the box's stamp.
+
+        `recall` is the share of frames in which a person of this size is found.
+        """
         window, centre = person.window, person.centre
-        if seen.range is not None and (seen.range > self.visibility.near or not person.confirmed):
+        if seen.range is not None and self.existence.is_solid(seen):
             # A range that contradicts the size counts too: the size may have been wrong from the beginning.
-            window += self.size_rate * (seen.height * seen.range - window)
-            centre += self.size_rate * (seen.centre * seen.range - centre)
+            if seen.whole:
+                window += self.size_rate * (seen.window - window)
+                centre += self.size_rate * (seen.middle - centre)
+            elif seen.window > window:
+                window, centre = seen.window, seen.middle
         clothes = self._clothes(person, seen)
+        evidence = self.existence.of_box(seen, recall)
+        if person.confirmed and self.existence.is_solid(seen):
+            # Near by, and on parts of the body, HOG's scores are low for people, too.
+            evidence = max(evidence, 0.0)
         seen = self.association.without_bad_range(person, seen)
         track = person.track
         if seen.range is not None and track.stamp - person.measured > self.restart_s:
@@ -152,7 +173,7 @@ class Tracker:
             track = replace(track, covariance=loose)
             fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
         return replace(
-            self.trust.update_trust(person, self.trust.evidence(seen.score, person)),
+            self.existence.update(person, evidence, found=True),
             track=kalman.update(track, fit),
             seen=track.stamp,
             window=window,
@@ -160,8 +181,10 @@ class Tracker:
             clothes=clothes,
         )
 
-    def follow_legs(self, person: Person, tracks: Tracks) -> tuple[Person, Tracks]:
+    def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
         """Bring a person up to the newest scan, if their legs are in it.
+
+        `ground` is what stands around, where that is known: its returns are not legs.
 
         Returns the person at the newest scan's stamp, and the tracks. There, a person found in the last frame stays at
         the frame's stamp, since the next frame may be older than the scans.
@@ -169,12 +192,19 @@ class Tracker:
         if tracks.stamp is None:
             return person, tracks
         unseen = tracks.stamp - person.seen
-        if not person.confirmed or person.misses > self.max_misses or unseen > self.legs_only_s:
+        if not person.confirmed or unseen > self.legs_only_s:
+            return person, tracks
+        height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
+        if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
             return person, tracks
         now = person
         for returns in tracks.scans:
             # The track of an unseen person already contains the scans up to `felt`: each may count only once.
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
+                if ground is not None:
+                    # Walls and furniture that are known already are nobody's legs.
+                    known = grid.is_near_blocked(ground, returns.points)
+                    returns = replace(returns, points=returns.points[~known])
                 track = self.legs.update(now.track, returns, self.noise)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
         kept = now if unseen > 0 else replace(person, felt=now.felt)

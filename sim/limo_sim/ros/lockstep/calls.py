@@ -17,8 +17,8 @@ class Calls:
 
     Attributes
     ----------
-    nodes, readers, writers, windows
-        Lines by the node's name, by topic, and by the window's name.
+    nodes, readers, writers, clients, windows
+        Lines by the node's name, by topic, by the service's name, and by the window's name.
     spun
         Whether `spin` or `spin_once` ran, of rclpy or of an executor.
     images
@@ -30,6 +30,7 @@ class Calls:
     nodes: dict[str, int | None] = field(default_factory=dict)
     readers: dict[str, int | None] = field(default_factory=dict)
     writers: dict[str, int | None] = field(default_factory=dict)
+    clients: dict[str, int | None] = field(default_factory=dict)
     windows: dict[str, int | None] = field(default_factory=dict)
     spun: bool = False
     images: int = 0

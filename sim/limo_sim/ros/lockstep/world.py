@@ -9,8 +9,9 @@ import copy
 import math
 import sys
 import time
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol
@@ -28,6 +29,7 @@ from limo_hog.ros2.messages import to_twist
 from limo_sim.ros.interfaces import Message, from_wire
 from limo_sim.ros.lockstep.calls import PUBLISHED, Calls, nearest_topic
 from limo_sim.ros.lockstep.patience import Patience
+from limo_sim.ros.lockstep.turns import RunOver, ThreadEnded, Turns
 from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import Episode, FrameRecord, Moment, Step
@@ -47,14 +49,11 @@ class StubError(LimoHogError):
     """A script uses something that `limo-hog run` does not offer, or sends a command that is not finite."""
 
 
-class RunOver(KeyboardInterrupt):
-    """The run's time is up."""
-
-
 class Reader(Protocol):
-    """A subscription."""
+    """A subscription; one that `keeps` is given what was published before it."""
 
     topic: str
+    keeps: bool
 
     def offer(self, message: Message) -> None:
         """Queue a message, which is the reader's own."""
@@ -96,6 +95,24 @@ class Callback:
     worked: float
 
 
+@dataclass
+class Past:
+    """What is known of a run that another process began: enough to go on with it.
+
+    Attributes
+    ----------
+    steps, commands
+        Every control period, and every command.
+    asked, target_distance
+        As `World` has them.
+    """
+
+    steps: list[Step] = field(default_factory=list)
+    commands: list[Command] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+    target_distance: float | None = None
+
+
 class World:
     """One run: the arena, the subscriptions, and the log that is scored.
 
@@ -117,6 +134,18 @@ class World:
         What the script called, and where.
     shown
         The newest picture of each window with its time; closing a window removes it.
+    writers
+        The topic of each of the script's publishers.
+    services
+        What the script's nodes offer, by name.
+    kept
+        Topics whose messages later subscriptions get, and these messages.
+    turns
+        The script's threads.
+    scripts
+        Files whose lines are named: the script, and the nodes of a launch file.
+    advances
+        How often the arena advanced.
     """
 
     def __init__(
@@ -129,20 +158,27 @@ class World:
         log: Log,
         watch: Callable[[Moment], None] | None = None,
         patience: float = 20.0,
+        began: float | None = None,
     ) -> None:
+        scenario.check_detector_is_plain("a node brings its own detector")
         self.arena = Arena(scenario, seed)
         self.seconds = seconds
         self.log = log
         self.script = script
+        self.scripts = {str(script)}
         self.watch = watch
         self.patience = Patience(patience)
         self.readers: list[Reader] = []
         self.published: dict[str, str] = {}
+        self.writers: list[str] = []
+        self.services: dict[str, Any] = {}
+        self.kept: list[tuple[str, deque[Message]]] = []
         self.commands: list[Command] = []
         self.found: list[Found] = []
         self.shown: dict[str, Shown] = {}
         self.calls = Calls()
         self._unheard: dict[str, float] = {}
+        self._unanswered: dict[str, float] = {}
         self.fault: BaseException | None = None
         self.callbacks: list[Callback] = []
         self.asked: list[str] = []
@@ -153,8 +189,13 @@ class World:
         self._render_ms = 0.0
         self._logged = self._logged_frame = -math.inf
         self._seen_before = False
-        self._began = time.perf_counter()
+        self._began = time.perf_counter() if began is None else began
         self._collected = False
+        self.advances = 0
+        self.turns = Turns(self.advance, lambda: self.time, lambda: self.over, self._fail)
+
+    def _fail(self, error: BaseException) -> None:
+        self.fault = self.fault or error
 
     @property
     def windows(self) -> dict[str, NDArray[np.uint8]]:
@@ -164,7 +205,7 @@ class World:
     def line(self) -> int | None:
         """Return the line of the script that runs now; None where the script is not in the call."""
         frame: FrameType | None = sys._getframe(1)
-        while frame is not None and frame.f_code.co_filename != str(self.script):
+        while frame is not None and frame.f_code.co_filename not in self.scripts:
             frame = frame.f_back
         return None if frame is None else frame.f_lineno
 
@@ -192,22 +233,21 @@ class World:
             self._log()
             self.arena.step()
         self._collected = True
+        self.advances += 1
         self._collect()
         self._warn()
         self.patience.progress()
 
     def sleep(self, seconds: float) -> None:
         """Let simulated time pass, as a script's `time.sleep` does: messages are queued, callbacks wait."""
-        until = self.time + seconds
-        while self.time < until - 1e-9:
-            self.advance()
+        self.turns.wait(lambda: False, self.time + seconds)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Call back into the script; an exception is kept in `fault`."""
         began, since = time.perf_counter(), self.time
         try:
             function(*arguments)
-        except (RunOver, SystemExit):
+        except (RunOver, ThreadEnded, SystemExit):
             raise
         except BaseException as error:
             self.fault = self.fault or error
@@ -229,6 +269,14 @@ class World:
         self.readers.append(reader)
         self.calls.readers.setdefault(reader.topic, self.line())
         self._unheard.setdefault(reader.topic, self.time + UNHEARD_AFTER)
+        if reader.keeps:
+            for message in [m for topic, messages in self.kept if topic == reader.topic for m in messages]:
+                reader.offer(copy.deepcopy(message))
+
+    def expect_service(self, name: str) -> None:
+        """Note a client; it is warned of if no node offers its service."""
+        self.calls.clients.setdefault(name, self.line())
+        self._unanswered.setdefault(name, self.time + UNHEARD_AFTER)
 
     def _warn(self) -> None:
         """Name each subscription to a topic that nobody publishes, once."""
@@ -241,6 +289,13 @@ class World:
             where = "" if line is None else f", subscribed to at line {line}"
             said = f"nobody publishes {topic!r}{where}; did you mean {nearest_topic(topic)!r}?"
             self.log(self.time, "WARN", LOGGER, said)
+        for name in [name for name, at in self._unanswered.items() if self.time >= at - 1e-9]:
+            del self._unanswered[name]
+            if name not in self.services:
+                line = self.calls.clients[name]
+                where = "" if line is None else f", asked for at line {line}"
+                there = ", ".join(sorted(self.services)) or "none"
+                self.log(self.time, "WARN", LOGGER, f"no node offers the service {name!r}{where}; offered: {there}")
 
     def publish(self, topic: str, message: Message) -> None:
         """Take a message from the script: a command drives the robot, and the script's own subscriptions get it.
@@ -251,11 +306,27 @@ class World:
             If a command is not a number.
         """
         self.published[topic] = message._type_name
-        if topic == names.COMMAND and message._type_name == names.TYPES[topic]:
-            self._drive(message)
+        if topic == names.COMMAND:
+            self._drive(message.twist if message._type_name == names.STAMPED_COMMAND_TYPE else message)  # type: ignore[attr-defined]
         for reader in self.readers:
             if reader.topic == topic:
                 reader.offer(copy.deepcopy(message))
+
+    def take_over(self, past: Past, until: float) -> None:
+        """Bring a new world to the time `until` [s] at which another process left its own, by the same commands."""
+        arena = self.arena
+        for command in past.commands:
+            while arena.time < command.time - 1e-9:
+                arena.step()
+            arena.command(command.twist)
+        while arena.time < until - 1e-9:
+            arena.step()
+        self._steps, self.commands = list(past.steps), list(past.commands)
+        self.asked, self.parameters = list(past.asked), {"target_distance": past.target_distance}
+        self._logged = max((step.time for step in past.steps), default=-math.inf)
+        frames = (step.frame.truth.stamp for step in past.steps if step.frame is not None)
+        self._logged_frame = max(frames, default=-math.inf)
+        self._seen_before = any(step.decision.target is not None for step in past.steps)
 
     def episode(self) -> Episode:
         """Return the log."""
@@ -268,11 +339,12 @@ class World:
             steps=tuple(self._steps),
             contacts=self.arena.contacts,
             wall_seconds=time.perf_counter() - self._began,
-            target_distance=self._target_distance(),
+            target_distance=self.target_distance,
         )
 
-    def _target_distance(self) -> float | None:
-        """Return the node's parameter `target_distance` [m], None where no node has one that is a distance."""
+    @property
+    def target_distance(self) -> float | None:
+        """The node's parameter `target_distance` [m], None where no node has one that is a distance."""
         value = self.parameters.get("target_distance")
         return value if isinstance(value, float) and math.isfinite(value) and value > 0 else None
 
@@ -297,6 +369,8 @@ class World:
             self._frame, self.found = frame, []
         wanted = {reader.topic for reader in self.readers}
         for topic, make in self._outlet.new():
+            if topic == names.TF_STATIC:
+                self.kept.append((topic, deque([from_wire(make())])))
             if topic not in wanted:
                 continue
             message = make()
@@ -319,7 +393,11 @@ class World:
             detect_ms = sum(found.ms for found in self.found)
             record = FrameRecord(frame.truth, found, detect_ms=detect_ms, render_ms=self._render_ms)
         twist = self.commands[-1].twist if self.commands else Twist()
-        mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
+        if self.asked:
+            mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
+        else:
+            # Whether a node with a detector of its own searches or follows is not known.
+            mode = Mode.STAND if twist == Twist() else Mode.DRIVE
         self._seen_before |= target is not None
         decision = Decision(twist, None, mode, f"as {self.script.name} says", target)
         step = Step(self.time, self.arena.truth(), decision, record)

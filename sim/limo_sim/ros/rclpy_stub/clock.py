@@ -7,7 +7,9 @@ from enum import IntEnum
 from typing import Any
 
 from limo_sim.ros.interfaces import message_class
+from limo_sim.ros.lockstep.world import UNHEARD_AFTER, StubError
 from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.offered import Offered
 
 
@@ -19,8 +21,10 @@ class ClockType(IntEnum):
     STEADY_TIME = 3
 
 
-class Duration:
+class Duration(Offered):
     """A difference of times; `nanoseconds` holds it exactly."""
+
+    _not_offered = ("get_c_duration",)
 
     def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None:
         self.nanoseconds = int(seconds * 1e9) + int(nanoseconds)
@@ -123,7 +127,7 @@ class Time:
 class Clock(Offered):
     """Tells the arena's time."""
 
-    _not_offered = ("create_jump_callback", "sleep_until", "ros_time_is_active", "set_ros_time_override", "handle")
+    _not_offered = ("create_jump_callback", "ros_time_is_active", "set_ros_time_override", "handle")
 
     def __init__(self, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> None:
         self.clock_type = clock_type
@@ -132,31 +136,48 @@ class Clock(Offered):
         """Return the time."""
         return Time(nanoseconds=round(current().world.time * 1e9), clock_type=self.clock_type)
 
-    def sleep_for(self, rel_time: Duration) -> bool:
+    def sleep_for(self, rel_time: Duration, context: Any = None) -> bool:  # noqa: ARG002 — rclpy's signature
         """Let time pass."""
         current().world.sleep(rel_time.nanoseconds * 1e-9)
+        return True
+
+    def sleep_until(self, until: Time, context: Any = None) -> bool:  # noqa: ARG002 — rclpy's signature
+        """Let time pass until a point in time."""
+        world = current().world
+        world.sleep(until.nanoseconds * 1e-9 - world.time)
         return True
 
 
 class Timer(Offered):
     """Calls back again and again; after a blocked while, the calls that were missed are left out, as in ROS."""
 
-    _not_offered = ("time_since_last_call", "time_until_next_call", "clock", "handle", "callback_group")
+    _not_offered = ("handle",)
 
-    def __init__(self, period_s: float, callback: Callable[[], Any], autostart: bool = True) -> None:
-        self.callback = callback
-        self.timer_period_ns = int(period_s * 1e9)
-        self._period = max(period_s, 0.0)
+    def __init__(
+        self,
+        callback: Callable[[], Any],
+        callback_group: CallbackGroup | None,
+        timer_period_ns: int,
+        clock: Clock,
+        *,
+        context: Any = None,  # noqa: ARG002 — rclpy's signature
+        autostart: bool = True,
+    ) -> None:
+        self.callback, self.callback_group, self.clock = callback, callback_group, clock
+        self.timer_period_ns = timer_period_ns
+        self._period = max(timer_period_ns * 1e-9, 0.0)
         self._cancelled = not autostart
-        self._due = current().world.time + self._period
+        self._world = current().world
+        self._called = self._world.time
+        self._due = self._world.time + self._period
 
     def is_ready(self) -> bool:
         """Whether the call is due."""
-        return not self._cancelled and current().world.time >= self._due - 1e-9
+        return not self._cancelled and self._world.time >= self._due - 1e-9
 
-    def take(self) -> None:
-        """Set the next call."""
-        now = current().world.time
+    def take(self) -> Callable[[], Any]:
+        """Set the next call and return this one."""
+        now = self._called = self._world.time
         self._due += self._period
         if self._period > 0:
             while self._due <= now - 1e-9:
@@ -164,6 +185,7 @@ class Timer(Offered):
         else:
             # A period of nothing calls at every step.
             self._due = now + 1e-6
+        return self.callback
 
     def cancel(self) -> None:
         """Call no more."""
@@ -172,12 +194,52 @@ class Timer(Offered):
     def reset(self) -> None:
         """Begin the period again, also after `cancel`."""
         self._cancelled = False
-        self._due = current().world.time + self._period
+        self._due = self._world.time + self._period
 
     def is_canceled(self) -> bool:
         """Whether it was cancelled."""
         return self._cancelled
 
+    def time_since_last_call(self) -> int:
+        """Return the time since the last call, or since the start [ns]."""
+        return round((self._world.time - self._called) * 1e9)
+
+    def time_until_next_call(self) -> int | None:
+        """Return the time until the next call [ns]; None where it is cancelled."""
+        return None if self._cancelled else round((self._due - self._world.time) * 1e9)
+
     def destroy(self) -> None:
         """Call no more."""
         self.cancel()
+
+
+class Rate:
+    """Sleeps until the next period of a timer, which an executor in another thread must run, as in ROS."""
+
+    def __init__(self, timer: Timer, *, context: Any = None) -> None:  # noqa: ARG002 — rclpy's signature
+        self._timer = timer
+        self._calls = 0
+        timer.callback = self._call
+
+    def _call(self) -> None:
+        self._calls += 1
+
+    def sleep(self) -> None:
+        """Wait for the next period.
+
+        Raises
+        ------
+        StubError
+            If nothing spins the node, where ROS would wait for ever.
+        """
+        world, before = current().world, self._calls
+        patience = 2 * self._timer.timer_period_ns * 1e-9 + UNHEARD_AFTER
+        if not world.turns.wait(lambda: self._calls != before, world.time + patience):
+            raise StubError(
+                f"Rate.sleep() has waited for {patience:g} s: its timer runs while the node spins. Spin it in another "
+                "thread, threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start(), or use a timer"
+            )
+
+    def destroy(self) -> None:
+        """End the rate."""
+        self._timer.destroy()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import sys
-import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -61,9 +60,9 @@ def parse_ros_arguments(arguments: list[str]) -> RosArguments:
             if word in ("-r", "--remap"):
                 parsed.remaps[name] = value
             else:
-                parsed.parameters.setdefault(node or "/**", {})[name] = _yaml(value, f"{word} {rule}")
+                parsed.parameters.setdefault(node or "/**", {})[name] = yaml_value(value, f"{word} {rule}")
         elif word == "--params-file":
-            _read_parameters(Path(next(words, "")), parsed)
+            read_parameters(Path(next(words, "")), parsed)
         elif word in ("--log-level", "--log-config-file"):
             next(words, "")
         elif word not in ("--enable-rosout-logs", "--disable-rosout-logs", "--disable-stdout-logs"):
@@ -71,10 +70,11 @@ def parse_ros_arguments(arguments: list[str]) -> RosArguments:
     return parsed
 
 
-def _read_parameters(path: Path, into: RosArguments) -> None:
+def read_parameters(path: Path, into: RosArguments) -> None:
+    """Add the content of a parameter file."""
     if not path.is_file():
         raise StubError(f"--params-file {path}: no such file")
-    content = _yaml(path.read_text(encoding="utf-8"), f"--params-file {path}")
+    content = yaml_value(path.read_text(encoding="utf-8"), f"--params-file {path}")
     if not isinstance(content, dict):
         raise StubError(f"--params-file {path}: want NODE: ros__parameters: name: value")
     for node, section in content.items():
@@ -91,7 +91,8 @@ def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
-def _yaml(text: str, where: str) -> Any:
+def yaml_value(text: str, where: str) -> Any:
+    """Return what a text in YAML says; `where` names it in the error."""
     # rosbags brings ruamel.yaml along
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
@@ -103,48 +104,60 @@ def _yaml(text: str, where: str) -> Any:
 
 
 class Context:
-    """The state that `rclpy.init` makes and `rclpy.shutdown` ends."""
+    """The state that `rclpy.init` makes and `rclpy.shutdown` ends; `preset` is what a launch file gives the node."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, preset: RosArguments | None = None) -> None:
         self.world = world
+        self._preset = preset or RosArguments()
         self.is_initialized = False
         self.arguments = RosArguments()
+        #: The executor of `rclpy.spin` without one.
+        self.executor: Any = None
 
     def init(self, args: list[str] | None) -> None:
         """Begin, with the command line's arguments unless others are given."""
         if self.is_initialized:
             raise RuntimeError("rclpy.init() has been called before, without rclpy.shutdown()")
-        self.arguments = parse_ros_arguments(sys.argv if args is None else list(args))
+        given = parse_ros_arguments(sys.argv if args is None else list(args))
+        parameters = {name: dict(values) for name, values in self._preset.parameters.items()}
+        for name, values in given.parameters.items():
+            parameters.setdefault(name, {}).update(values)
+        self.arguments = RosArguments(parameters, self._preset.remaps | given.remaps)
         self.is_initialized = True
 
     def shutdown(self) -> None:
         """End."""
         self.is_initialized = False
+        self.executor = None
 
     def ok(self) -> bool:
         """Whether nodes may go on."""
         return self.is_initialized and not self.world.over
 
 
-_current: Context | None = None
+_world: World | None = None
 
 
-def enter(context: Context | None) -> None:
+def enter(world: World | None) -> None:
     """Set the run that scripts belong to; None when it is over."""
-    global _current
-    _current = context
+    global _world
+    _world = world
 
 
 def current() -> Context:
-    """Return the context of the run.
+    """Return the context of the program that calls.
 
     Raises
     ------
     StubError
-        Outside a run, or in a thread of the script.
+        Outside a run, or in a thread that the script did not start with `threading.Thread`.
     """
-    if _current is None:
+    if _world is None:
         raise StubError("this rclpy works inside `limo-hog run` alone")
-    if threading.current_thread() is not threading.main_thread():
-        raise StubError("`limo-hog run` is one process in lock step: call rclpy in the main thread alone")
-    return _current
+    seat = _world.turns.seat()
+    if seat is None:
+        raise StubError(
+            "limo-hog run offers rclpy in the main thread and in those of threading.Thread, not in a pool's"
+        )
+    context: Context = seat.owner
+    return context

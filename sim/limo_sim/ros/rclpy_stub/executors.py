@@ -1,113 +1,227 @@
-"""Executors: they advance the arena until a callback is due, and call one at a time."""
+"""Executors: they run what is due, timers first, then subscriptions, services and answers, as they were made."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from typing import Any
 
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.turns import ExternalShutdownException
 from limo_sim.ros.rclpy_stub.context import Context, current
+from limo_sim.ros.rclpy_stub.future import Future, Task
+from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.node import Node
+from limo_sim.ros.rclpy_stub.offered import Offered
+
+#: Threads of a MultiThreadedExecutor without a number. In ROS as many as the computer has processors; here always the
+#: same, since a run must not depend on the computer. Chosen: a workshop's laptop has four.
+_THREADS = 4
 
 
-class ExternalShutdownException(Exception):  # noqa: N818 — rclpy's name
-    """The context was shut down during a wait."""
+class Executor(Offered):
+    """Runs the callbacks of its nodes, one at a time."""
 
+    _not_offered = (
+        *("wait_for_ready_callbacks", "spin_once_until_future_complete", "can_execute"),
+        *("create_timer", "add_to_context", "guard_condition"),
+    )
 
-class Executor:
-    """Runs the callbacks of its nodes: timers first, then subscriptions, in the order they were made."""
-
-    def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:  # noqa: ARG002
+    def __init__(self, *, context: Any = None) -> None:
+        self.context = context or current()
         self._nodes: list[Node] = []
-        self._is_shutdown = False
+        self._tasks: list[Task] = []
+        self._is_shutdown = self._spins = False
 
     def add_node(self, node: Node) -> bool:
-        """Add a node; False if it was added before."""
+        """Add a node, which leaves the executor it had; False if it was added before."""
         if node in self._nodes:
             return False
+        if node.executor is not None:
+            node.executor.remove_node(node)
         self._nodes.append(node)
+        node.executor = self
         return True
 
     def remove_node(self, node: Node) -> None:
         """Remove a node."""
         if node in self._nodes:
             self._nodes.remove(node)
+            node.executor = None
 
     def get_nodes(self) -> list[Node]:
         """Return the nodes."""
         return list(self._nodes)
+
+    def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Task:
+        """Run a function or a coroutine while the executor spins; the task gets its result."""
+        task = Task(callback, args, kwargs, executor=self)
+        self._tasks.append(task)
+        return task
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:  # noqa: ARG002 — rclpy's signature
         """End `spin`."""
         self._is_shutdown = True
         return True
 
+    def wake(self) -> None:
+        """Look again for what is due; this happens by itself here."""
+
     def spin(self) -> None:
         """Run callbacks until the run is over or `rclpy.shutdown` was called."""
-        context = current()
-        while context.ok() and not self._is_shutdown:
-            self._wait(context, math.inf)
+        while self.context.ok() and not self._is_shutdown:
+            self._once(math.inf)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Run one callback; wait for it no longer than `timeout_sec` of the arena's time.
 
         A poll that finds nothing to do lets one step of the arena pass, else a polling loop would stand still.
         """
-        context = current()
-        if not context.ok():
+        if not self.context.ok():
             raise ExternalShutdownException("rclpy was shut down, or the run is over")
-        self._wait(context, math.inf if timeout_sec is None or timeout_sec < 0 else timeout_sec)
+        self._once(math.inf if timeout_sec is None or timeout_sec < 0 else timeout_sec)
 
-    def spin_until_future_complete(self, *_: Any, **__: Any) -> None:
-        """Refuse: services and actions are not offered."""
-        raise StubError("limo-hog run does not offer spin_until_future_complete")
+    def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
+        """Run callbacks until a future is done, or simulated time is up."""
+        world = self.context.world
+        until = math.inf if timeout_sec is None or timeout_sec < 0 else world.time + timeout_sec
+        while self.context.ok() and not self._is_shutdown and not future.done() and world.time < until - 1e-9:
+            self._once(until - world.time, future.done)
 
-    def _wait(self, context: Context, timeout: float) -> None:
-        world = context.world
+    def _once(self, timeout: float, enough: Callable[[], bool] = lambda: False) -> None:
+        """Wait for something that is due, and run it."""
+        world = self.context.world
         world.calls.spun = True
-        deadline = world.time + timeout
-        waited = False
-        while not world.over:
-            callback, arguments = self._next()
-            if callback is not None:
-                world.call(callback, *arguments)
-                return
-            if waited and world.time >= deadline - 1e-9:
-                return
-            world.advance()
-            waited = True
+        if self._spins:
+            raise RuntimeError(
+                "Executor is already spinning: a callback of it, or another thread, spins it again; in a callback, "
+                "use add_done_callback or await the future"
+            )
+        self._spins = True
+        try:
+            context = self.context
 
-    def _next(self) -> tuple[Callable[..., Any] | None, tuple[Any, ...]]:
-        for node in self._nodes:
-            for timer in node.timers:
-                if timer.is_ready():
-                    timer.take()
-                    return timer.callback, ()
-        for node in self._nodes:
-            for subscription in node.subscriptions:
-                if subscription.is_ready():
-                    return subscription.callback, (subscription.take(),)
-        return None, ()
+            def wanted() -> bool:
+                ended = world.over or not context.ok() or self._is_shutdown
+                return ended or enough() or next(self._due(), None) is not None or self._failed() is not None
+
+            polls, before = timeout <= 0 and not wanted(), world.advances
+            until = math.inf if polls else world.time + timeout
+            world.turns.wait(lambda: wanted() or (polls and world.advances > before), until)
+            failure = self._failed()
+            if failure is not None:
+                raise failure
+            due = next(self._due(), None)
+            if due is not None and not world.over:
+                group, take = due
+                self._run(group, take())
+        finally:
+            self._spins = False
+
+    def _run(self, group: CallbackGroup | None, work: Callable[[], Any]) -> None:
+        """Run a callback; one written as a coroutine becomes a task."""
+        if group is not None:
+            group.running += 1
+        try:
+            made: list[Any] = []
+            self.context.world.call(lambda: made.append(work()))
+            if made and hasattr(made[0], "send"):
+                self.create_task(made[0])
+        finally:
+            if group is not None:
+                group.running -= 1
+
+    def _failed(self) -> BaseException | None:
+        """Return what a callback in a thread has raised."""
+        return None
+
+    def _due(self) -> Iterator[tuple[CallbackGroup | None, Callable[[], Callable[[], Any]]]]:
+        """Yield what may run now, with its group."""
+        for kind in ("timers", "subscriptions", "services", "clients"):
+            for node in self._nodes:
+                for entity in getattr(node, kind):
+                    group = entity.callback_group
+                    if entity.is_ready() and (group is None or group.can_execute(entity)):
+                        yield group, entity.take
+        self._tasks = [task for task in self._tasks if not task.done()]
+        for task in self._tasks:
+            if task.is_ready():
+                yield None, task.take
 
 
 class SingleThreadedExecutor(Executor):
-    """One callback at a time."""
+    """One callback at a time, in the thread that spins."""
 
 
 class MultiThreadedExecutor(Executor):
-    """One callback at a time here, too: lock step has no threads."""
+    """Each callback in a thread of its own: where one waits, others go on, as their groups allow."""
+
+    def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:
+        super().__init__(context=context)
+        self._threads = num_threads or _THREADS
+        self._running = 0
+        self._failure: BaseException | None = None
+
+    def _due(self) -> Iterator[tuple[CallbackGroup | None, Callable[[], Callable[[], Any]]]]:
+        return super()._due() if self._running < self._threads else iter(())
+
+    def _failed(self) -> BaseException | None:
+        return self._failure
+
+    def _run(self, group: CallbackGroup | None, work: Callable[[], Any]) -> None:
+        if group is not None:
+            group.running += 1
+        self._running += 1
+
+        def run() -> None:
+            try:
+                super(MultiThreadedExecutor, self)._run(None, work)
+            except Exception as error:
+                self._failure = error
+            finally:
+                self._running -= 1
+                if group is not None:
+                    group.running -= 1
+
+        threading.Thread(target=run, daemon=True).start()
+
+
+def global_executor() -> Executor:
+    """Return the executor of `rclpy.spin` without one: one for each context."""
+    context: Context = current()
+    if context.executor is None:
+        context.executor = SingleThreadedExecutor()
+    executor: Executor = context.executor
+    return executor
 
 
 def spin(node: Node, executor: Executor | None = None) -> None:
     """Run a node's callbacks until the run is over."""
-    executor = executor or SingleThreadedExecutor()
+    executor = executor or global_executor()
     executor.add_node(node)
-    executor.spin()
+    try:
+        executor.spin()
+    finally:
+        executor.remove_node(node)
 
 
 def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None) -> None:
     """Run one callback of a node."""
-    executor = executor or SingleThreadedExecutor()
+    executor = executor or global_executor()
     executor.add_node(node)
-    executor.spin_once(timeout_sec=timeout_sec)
+    try:
+        executor.spin_once(timeout_sec=timeout_sec)
+    finally:
+        executor.remove_node(node)
+
+
+def spin_until_future_complete(
+    node: Node, future: Future, executor: Executor | None = None, timeout_sec: float | None = None
+) -> None:
+    """Run a node's callbacks until a future is done, or simulated time is up."""
+    executor = executor or global_executor()
+    executor.add_node(node)
+    try:
+        executor.spin_until_future_complete(future, timeout_sec)
+    finally:
+        executor.remove_node(node)

@@ -99,6 +99,6 @@ def get_logger(name: str) -> Logger:
     return Logger(name)
 
 
-def set_logger_level(name: str, level: LoggingSeverity) -> None:
+def set_logger_level(name: str, level: LoggingSeverity, detailed_error: bool = False) -> None:  # noqa: ARG001
     """Suppress the lines of a logger below a level."""
     Logger(name).set_level(level)

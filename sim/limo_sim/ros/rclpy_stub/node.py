@@ -1,109 +1,26 @@
-"""Nodes, and what they publish and subscribe to."""
+"""Nodes: what a script derives its own from."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from limo_hog.ros2 import names
 from limo_sim.ros.interfaces import Message
 from limo_sim.ros.lockstep.world import StubError
-from limo_sim.ros.rclpy_stub.clock import Clock, ClockType, Timer
+from limo_sim.ros.rclpy_stub.clock import Clock, ClockType, Rate, Timer
 from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from limo_sim.ros.rclpy_stub.logger import Logger
 from limo_sim.ros.rclpy_stub.offered import Offered
 from limo_sim.ros.rclpy_stub.parameters import Parameter, Parameters, SetParametersResult
-from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, to_profile
+from limo_sim.ros.rclpy_stub.qos import QoSProfile, qos_profile_services_default, to_profile
+from limo_sim.ros.rclpy_stub.services import Client, Service
+from limo_sim.ros.rclpy_stub.topics import Publisher, Subscription, check_topic, check_type, publishers_of
 
 
 class NotInitializedException(Exception):  # noqa: N818 — rclpy's name
     """A node was made before `rclpy.init`."""
-
-
-class CallbackGroup:
-    """A label for callbacks: they are run one after the other in any case."""
-
-
-class MutuallyExclusiveCallbackGroup(CallbackGroup):
-    """Callbacks of which one runs at a time."""
-
-
-class ReentrantCallbackGroup(CallbackGroup):
-    """Callbacks that may run at once; here they do not."""
-
-
-class Publisher(Offered):
-    """Sends messages of one type to one topic."""
-
-    _not_offered = ("assert_liveliness", "wait_for_all_acked", "handle", "event_handlers", "logger_name")
-
-    def __init__(self, msg_type: type[Message], topic: str, qos: QoSProfile) -> None:
-        self.msg_type = msg_type
-        self.topic_name = self.topic = topic
-        self.qos_profile = qos
-
-    def publish(self, msg: Message) -> None:
-        """Send a message.
-
-        Raises
-        ------
-        TypeError
-            If it is of another type.
-        StubError
-            If it is a command that is not a number.
-        """
-        if not isinstance(msg, self.msg_type):
-            raise TypeError(
-                f"{self.topic} carries {self.msg_type.__name__}, came {type(msg).__name__}: "
-                f"publish a {self.msg_type.__name__}"
-            )
-        current().world.publish(self.topic, msg)
-
-    def get_subscription_count(self) -> int:
-        """Return the number of subscriptions; the robot is one to /cmd_vel."""
-        world = current().world
-        return sum(reader.topic == self.topic for reader in world.readers) + (self.topic == names.COMMAND)
-
-    def destroy(self) -> None:
-        """Nothing is kept open."""
-
-
-class Subscription(Offered):
-    """Calls back with each message of a topic; the newest `depth` wait for a slow callback."""
-
-    _not_offered = ("get_publisher_count", "handle", "event_handlers", "callback_group", "raw", "logger_name")
-
-    def __init__(self, msg_type: type[Message], topic: str, callback: Callable[[Any], Any], qos: QoSProfile) -> None:
-        self.msg_type = msg_type
-        self.topic_name = self.topic = topic
-        self.callback = callback
-        self.qos_profile = qos
-        keep_all = qos.history == HistoryPolicy.KEEP_ALL
-        self._queue: deque[Message] = deque(maxlen=None if keep_all else max(qos.depth, 1))
-        # As in ROS, a transient-local subscription gets no message from a volatile publisher.
-        self._deaf = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL and topic in names.TYPES
-
-    def offer(self, message: Message) -> None:
-        """Queue a message; the oldest gives way."""
-        if not self._deaf:
-            self._queue.append(message)
-
-    def is_ready(self) -> bool:
-        """Whether a message waits."""
-        return bool(self._queue)
-
-    def take(self) -> Message:
-        """Return the oldest message that waits."""
-        if self.topic in (names.IMAGE, names.IMAGE_COMPRESSED):
-            current().world.calls.images += 1
-        return self._queue.popleft()
-
-    def destroy(self) -> None:
-        """End the subscription."""
-        world = current().world
-        if self in world.readers:
-            world.readers.remove(self)
 
 
 #: Options of rclpy's Node that change nothing here.
@@ -116,11 +33,17 @@ class Node(Offered):
     """What a script derives its node from."""
 
     _not_offered = (
-        *("create_client", "create_service", "create_rate", "create_guard_condition", "executor", "handle", "context"),
-        *("waitables", "services", "clients", "guards", "add_waitable", "destroy_client", "destroy_service"),
-        *("get_node_names", "get_service_names_and_types", "get_publishers_info_by_topic"),
-        *("get_subscriptions_info_by_topic", "describe_parameter", "list_parameters", "undeclare_parameter"),
-        *("set_parameters_atomically", "get_parameters_by_prefix", "wait_for_node"),
+        *("create_guard_condition", "destroy_guard_condition", "guards", "handle", "context", "wait_for_node"),
+        *("waitables", "add_waitable", "remove_waitable", "set_descriptor", "describe_parameter"),
+        *("describe_parameters", "list_parameters", "get_parameter_types", "get_parameter_type"),
+        *("set_parameters_atomically", "PARAM_REL_TOL", "get_service_names_and_types", "get_node_names"),
+        *("count_clients", "count_services"),
+        *("get_publishers_info_by_topic", "get_subscriptions_info_by_topic", "get_fully_qualified_node_names"),
+        *("get_publisher_names_and_types_by_node", "get_subscriber_names_and_types_by_node"),
+        *("get_service_names_and_types_by_node", "get_client_names_and_types_by_node"),
+        *("get_node_names_and_namespaces", "get_node_names_and_namespaces_with_enclaves"),
+        *("add_pre_set_parameters_callback", "remove_pre_set_parameters_callback"),
+        *("add_post_set_parameters_callback", "remove_post_set_parameters_callback"),
     )
 
     def __init__(
@@ -164,6 +87,10 @@ class Node(Offered):
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
         self._timers: list[Timer] = []
+        self._services: list[Service] = []
+        self._clients: list[Client] = []
+        #: The executor that runs the node's callbacks; None before it is spun.
+        self.executor: Any = None
 
     def get_name(self) -> str:
         """Return the node's name."""
@@ -200,25 +127,38 @@ class Node(Offered):
         """The node's timers."""
         return iter(self._timers)
 
-    def resolve_topic_name(self, topic: str) -> str:
-        """Return a topic's full name, after the command line's remaps."""
-        topic = self._remaps.get(topic, topic)
+    @property
+    def services(self) -> Iterable[Service]:
+        """The services the node offers."""
+        return iter(self._services)
+
+    @property
+    def clients(self) -> Iterable[Client]:
+        """The node's clients."""
+        return iter(self._clients)
+
+    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
+        """Return a topic's full name, after the command line's remaps unless `only_expand`."""
+        remaps = {} if only_expand else self._remaps
+        topic = remaps.get(topic, topic)
         if topic.startswith("~"):
             topic = f"{self.get_fully_qualified_name()}/{topic[1:].lstrip('/')}"
         elif not topic.startswith("/"):
             topic = f"{self._namespace.rstrip('/')}/{topic}"
-        return self._remaps.get(topic, topic)
+        return remaps.get(topic, topic)
+
+    def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
+        """Return a service's full name, after the command line's remaps unless `only_expand`."""
+        return self.resolve_topic_name(service, only_expand=only_expand)
 
     def create_publisher(
         self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int, **_: Any
     ) -> Publisher:
         """Return a new publisher of a topic."""
-        _check_type(msg_type)
+        check_type(msg_type)
         publisher = Publisher(msg_type, self.resolve_topic_name(topic), to_profile(qos_profile))
-        _check_topic(publisher.topic, msg_type)
+        check_topic(publisher.topic, msg_type)
         self._publishers.append(publisher)
-        world = current().world
-        world.calls.writers.setdefault(publisher.topic, world.line())
         return publisher
 
     def create_subscription(
@@ -227,12 +167,18 @@ class Node(Offered):
         topic: str,
         callback: Callable[[Any], Any],
         qos_profile: QoSProfile | int,
+        *,
+        callback_group: CallbackGroup | None = None,
+        raw: bool = False,
         **_: Any,
     ) -> Subscription:
         """Return a new subscription to a topic."""
-        _check_type(msg_type)
-        subscription = Subscription(msg_type, self.resolve_topic_name(topic), callback, to_profile(qos_profile))
-        _check_topic(subscription.topic, msg_type)
+        check_type(msg_type)
+        if raw:
+            raise StubError("limo-hog run does not offer create_subscription(raw=True): callbacks get messages")
+        group = self._group(callback_group)
+        subscription = Subscription(msg_type, self.resolve_topic_name(topic), callback, to_profile(qos_profile), group)
+        check_topic(subscription.topic, msg_type)
         self._subscriptions.append(subscription)
         current().world.subscribe(subscription)
         return subscription
@@ -241,14 +187,56 @@ class Node(Offered):
         self,
         timer_period_sec: float,
         callback: Callable[[], Any],
-        callback_group: CallbackGroup | None = None,  # noqa: ARG002 — rclpy's signature
-        clock: Clock | None = None,  # noqa: ARG002
+        callback_group: CallbackGroup | None = None,
+        clock: Clock | None = None,
         autostart: bool = True,
     ) -> Timer:
         """Call back every so many seconds."""
-        timer = Timer(float(timer_period_sec), callback, autostart)
+        nanoseconds = int(float(timer_period_sec) * 1e9)
+        timer = Timer(callback, self._group(callback_group), nanoseconds, clock or self._clock, autostart=autostart)
         self._timers.append(timer)
         return timer
+
+    def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
+        """Return what sleeps until the next of so many periods a second; another thread must spin the node."""
+        if frequency <= 0:
+            raise ValueError(f"the frequency must be greater than 0, came {frequency}")
+        return Rate(self.create_timer(1.0 / frequency, _nothing, ReentrantCallbackGroup(), clock))
+
+    def create_service(
+        self,
+        srv_type: Any,
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        *,
+        qos_profile: QoSProfile = qos_profile_services_default,
+        callback_group: CallbackGroup | None = None,
+    ) -> Service:
+        """Answer requests by `callback(request, response)`, which returns the response."""
+        _check_service(srv_type)
+        name = self.resolve_service_name(srv_name)
+        service = Service(srv_type, name, callback, self._group(callback_group), qos_profile)
+        self._services.append(service)
+        current().world.services[name] = service
+        return service
+
+    def create_client(
+        self,
+        srv_type: Any,
+        srv_name: str,
+        *,
+        qos_profile: QoSProfile = qos_profile_services_default,
+        callback_group: CallbackGroup | None = None,
+    ) -> Client:
+        """Return what sends requests to a service."""
+        _check_service(srv_type)
+        client = Client(srv_type, self.resolve_service_name(srv_name), qos_profile, self._group(callback_group))
+        self._clients.append(client)
+        current().world.expect_service(client.srv_name)
+        return client
+
+    def _group(self, given: CallbackGroup | None) -> CallbackGroup:
+        return self.default_callback_group if given is None else given
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """End a publisher."""
@@ -264,11 +252,30 @@ class Node(Offered):
         timer.cancel()
         return _take_out(self._timers, timer)
 
+    def destroy_rate(self, rate: Rate) -> bool:
+        """End a rate."""
+        return self.destroy_timer(rate._timer)
+
+    def destroy_service(self, service: Service) -> bool:
+        """End a service."""
+        service.destroy()
+        return _take_out(self._services, service)
+
+    def destroy_client(self, client: Client) -> bool:
+        """End a client."""
+        client.destroy()
+        return _take_out(self._clients, client)
+
     def destroy_node(self) -> None:
         """End everything the node has."""
         for subscription in self._subscriptions:
             subscription.destroy()
+        for service in self._services:
+            service.destroy()
         self._publishers, self._subscriptions, self._timers = [], [], []
+        self._services, self._clients = [], []
+        if self.executor is not None:
+            self.executor.remove_node(self)
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:  # noqa: ARG002
         """Return every topic of the arena and of the script."""
@@ -277,8 +284,7 @@ class Node(Offered):
 
     def count_publishers(self, topic_name: str) -> int:
         """Return how many publish on a topic, the arena being one."""
-        own = sum(publisher.topic == topic_name for publisher in self._publishers)
-        return own + (topic_name in names.TYPES and topic_name != names.COMMAND)
+        return publishers_of(topic_name)
 
     def count_subscribers(self, topic_name: str) -> int:
         """Return how many listen to a topic, the robot being one."""
@@ -314,6 +320,16 @@ class Node(Offered):
         """Return several declared parameters."""
         return [self._parameters.get(name) for name in names]
 
+    def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
+        """Return the parameters `prefix.name`, by name without the prefix."""
+        start = f"{prefix}." if prefix else ""
+        found = [name for name in self._parameters.names() if name.startswith(start)]
+        return {name.removeprefix(start): self._parameters.get(name) for name in found}
+
+    def undeclare_parameter(self, name: str) -> None:
+        """Forget a declared parameter."""
+        self._parameters.forget(name)
+
     def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
         """Return a parameter, or something else where it is not declared."""
         if self._parameters.has(name):
@@ -328,16 +344,23 @@ class Node(Offered):
         """Ask before a parameter changes."""
         self._parameters.callbacks.insert(0, callback)
 
+    def remove_on_set_parameters_callback(self, callback: Callable[[list[Parameter]], Any]) -> None:
+        """Ask no more; refuses a callback that was not added."""
+        self._parameters.callbacks.remove(callback)
 
-def _check_type(msg_type: Any) -> None:
-    if not (isinstance(msg_type, type) and issubclass(msg_type, Message)):
-        raise TypeError(f"want a message type such as geometry_msgs.msg.Twist, came {msg_type!r}")
+
+def create_node(node_name: str, **options: Any) -> Node:
+    """Return a plain node."""
+    return Node(node_name, **options)
 
 
-def _check_topic(topic: str, msg_type: type[Message]) -> None:
-    wanted = names.TYPES.get(topic)
-    if wanted is not None and wanted != msg_type._type_name:
-        raise StubError(f"{topic} carries {wanted}, the script uses {msg_type._type_name}")
+def _check_service(srv_type: Any) -> None:
+    if not (hasattr(srv_type, "Request") and hasattr(srv_type, "Response")):
+        raise TypeError(f"want a service type such as std_srvs.srv.Trigger, came {srv_type!r}")
+
+
+def _nothing() -> None:
+    """Do nothing, until a rate puts its own callback in place of this one."""
 
 
 def _take_out(items: list[Any], item: Any) -> bool:

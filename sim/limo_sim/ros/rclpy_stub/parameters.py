@@ -172,6 +172,12 @@ class Parameters:
             raise ParameterNotDeclaredException(name)
         return self._values[name]
 
+    def forget(self, name: str) -> None:
+        """Remove a declared parameter."""
+        if name not in self._values:
+            raise ParameterNotDeclaredException(name)
+        del self._values[name]
+
     def names(self) -> list[str]:
         """Return the names of all declared parameters."""
         return list(self._values)

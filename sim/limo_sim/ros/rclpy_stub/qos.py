@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import Any
+
+from limo_sim.ros.rclpy_stub.offered import Offered
 
 
 class ReliabilityPolicy(IntEnum):
@@ -13,6 +15,8 @@ class ReliabilityPolicy(IntEnum):
     SYSTEM_DEFAULT = 0
     RELIABLE = 1
     BEST_EFFORT = 2
+    UNKNOWN = 3
+    BEST_AVAILABLE = 4
 
 
 class DurabilityPolicy(IntEnum):
@@ -21,6 +25,8 @@ class DurabilityPolicy(IntEnum):
     SYSTEM_DEFAULT = 0
     TRANSIENT_LOCAL = 1
     VOLATILE = 2
+    UNKNOWN = 3
+    BEST_AVAILABLE = 4
 
 
 class HistoryPolicy(IntEnum):
@@ -29,6 +35,7 @@ class HistoryPolicy(IntEnum):
     SYSTEM_DEFAULT = 0
     KEEP_LAST = 1
     KEEP_ALL = 2
+    UNKNOWN = 3
 
 
 class LivelinessPolicy(IntEnum):
@@ -37,11 +44,15 @@ class LivelinessPolicy(IntEnum):
     SYSTEM_DEFAULT = 0
     AUTOMATIC = 1
     MANUAL_BY_TOPIC = 3
+    UNKNOWN = 4
+    BEST_AVAILABLE = 5
 
 
 @dataclass
-class QoSProfile:
+class QoSProfile(Offered):
     """What a writer offers and a reader asks for; lifespan, deadline and lease are taken and change nothing here."""
+
+    _not_offered = ("get_c_qos_profile",)
 
     depth: int = 10
     history: HistoryPolicy = HistoryPolicy.KEEP_LAST
@@ -71,7 +82,53 @@ def to_profile(given: QoSProfile | int) -> QoSProfile:
     return QoSProfile(depth=given)
 
 
+qos_profile_default = QoSProfile()
 qos_profile_system_default = QoSProfile()
 qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 qos_profile_services_default = QoSProfile()
 qos_profile_parameters = QoSProfile(depth=1000)
+
+
+class QoSPresetProfiles(Enum):
+    """The profiles by name."""
+
+    UNKNOWN = QoSProfile(reliability=ReliabilityPolicy.UNKNOWN)
+    DEFAULT = qos_profile_default
+    SYSTEM_DEFAULT = qos_profile_system_default
+    SENSOR_DATA = qos_profile_sensor_data
+    SERVICES_DEFAULT = qos_profile_services_default
+    PARAMETERS = qos_profile_parameters
+    PARAMETER_EVENTS = QoSProfile(depth=1000)
+    ACTION_STATUS_DEFAULT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    BEST_AVAILABLE = QoSProfile(reliability=ReliabilityPolicy.BEST_AVAILABLE)
+
+    @classmethod
+    def short_keys(cls) -> list[str]:
+        """Return the names in lower case."""
+        return [name.lower() for name in cls.__members__]
+
+    @classmethod
+    def get_from_short_key(cls, name: str) -> QoSProfile:
+        """Return a profile by its name."""
+        profile: QoSProfile = cls[name.upper()].value
+        return profile
+
+
+#: What `rclpy.qos` holds.
+OFFERED = {
+    "QoSProfile": QoSProfile,
+    "QoSPresetProfiles": QoSPresetProfiles,
+    "ReliabilityPolicy": ReliabilityPolicy,
+    "QoSReliabilityPolicy": ReliabilityPolicy,
+    "DurabilityPolicy": DurabilityPolicy,
+    "QoSDurabilityPolicy": DurabilityPolicy,
+    "HistoryPolicy": HistoryPolicy,
+    "QoSHistoryPolicy": HistoryPolicy,
+    "LivelinessPolicy": LivelinessPolicy,
+    "QoSLivelinessPolicy": LivelinessPolicy,
+    "qos_profile_default": qos_profile_default,
+    "qos_profile_system_default": qos_profile_system_default,
+    "qos_profile_sensor_data": qos_profile_sensor_data,
+    "qos_profile_services_default": qos_profile_services_default,
+    "qos_profile_parameters": qos_profile_parameters,
+}

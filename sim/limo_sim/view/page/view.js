@@ -2,13 +2,15 @@
 "use strict";
 
 const $ = (id) => document.getElementById(id);
-const WINDOW_S = 60; // what the plots show
+const KEPT_PICTURES = 400; // of the camera, for the timeline
 const KEPT = 6000; // control periods kept for the trails
 // Columns of a row; from PEOPLE on x and y of each person, in the scenario's order.
-const [TIME, ERROR, DISTANCE, LINEAR, ANGULAR, MEASURED, X, Y, PEOPLE] = [...Array(9).keys()];
+const [TIME, ERROR, DISTANCE, LINEAR, ANGULAR, MEASURED, X, Y, YAW, PEOPLE] = [...Array(10).keys()];
 
 let scene = null; // what stays the same: room, furniture, zones
 let now = null; // the newest state
+let past = null; // the row that the timeline shows; null for the newest
+let pictures = []; // camera pictures for the timeline: time and JPEG
 let history = []; // one row a control period
 let socket = null;
 let ended = false;
@@ -36,6 +38,8 @@ function read(message) {
 function welcome(message) {
   scene = message;
   history = [];
+  pictures = [];
+  past = null;
   ended = false;
   notice("");
   $("scenario").textContent = scene.scenario;
@@ -51,22 +55,29 @@ function state(next, rows) {
   $("reason").textContent = now.reason;
   $("pause").textContent = now.paused ? "Go on" : "Pause";
   if (document.activeElement !== $("speed")) $("speed").value = String(now.speed);
-  put("measured", now.measured_m, 2, "m");
-  $("seen").textContent = seen();
-  put("distance", now.distance_m, 2, "m");
-  $("zone").textContent = now.distance_m === null ? "–" : zone(now.distance_m);
-  put("error", now.error_px, 0, "px");
-  put("linear", now.linear_m_s, 2, "m/s");
-  put("angular", now.angular_rad_s, 2, "rad/s");
   $("boxes").textContent = now.boxes;
   if (now.detect_ms !== null) put("detect", now.detect_ms, 1, "ms");
   $("contacts").textContent = now.contacts.person + now.contacts.wall;
+  if (!past && history.length) numbers(history.at(-1));
+  $("timeline").max = now.time;
+  if (!past) $("timeline").value = now.time;
   redraw();
 }
 
-function seen() {
-  if (now.measured_m !== null) return `${number(now.measured_m, 2)} m by the depth image · ${zone(now.measured_m)}`;
-  return now.error_px === null ? "no box is followed in this image" : "the depth image does not tell how far";
+// The numbers of one control period: the newest, or that of the timeline.
+function numbers(row) {
+  put("measured", row[MEASURED], 2, "m");
+  $("seen").textContent = seen(row);
+  put("distance", row[DISTANCE], 2, "m");
+  $("zone").textContent = row[DISTANCE] === null ? "–" : zone(row[DISTANCE]);
+  put("error", row[ERROR], 0, "px");
+  put("linear", row[LINEAR], 2, "m/s");
+  put("angular", row[ANGULAR], 2, "rad/s");
+}
+
+function seen(row) {
+  if (row[MEASURED] !== null) return `${number(row[MEASURED], 2)} m by the depth image · ${zone(row[MEASURED])}`;
+  return row[ERROR] === null ? "no box is followed in this image" : "the depth image does not tell how far";
 }
 
 function show(data) {
@@ -76,10 +87,45 @@ function show(data) {
   const start = kind === "w" ? bytes.indexOf(10) + 1 : 1;
   const picture =
     kind === "w" ? nodeWindow(new TextDecoder().decode(bytes.subarray(1, start - 1))) : $({ c: "camera", d: "depth" }[kind]);
-  const old = picture.src;
-  picture.src = URL.createObjectURL(new Blob([bytes.subarray(start)], { type: "image/jpeg" }));
-  if (old) URL.revokeObjectURL(old);
+  const jpeg = new Blob([bytes.subarray(start)], { type: "image/jpeg" });
+  if (kind === "c") {
+    pictures.push([now.time, jpeg]);
+    // Of a long run every other is kept, then every fourth, and so on.
+    if (pictures.length > KEPT_PICTURES) pictures = pictures.filter((_, i) => i % 2 === 0 || i > KEPT_PICTURES - 50);
+  }
+  if (kind !== "c" || !past) putPicture(picture, jpeg);
   picture.dataset.count = Number(picture.dataset.count || 0) + 1;
+}
+
+function putPicture(picture, jpeg) {
+  const old = picture.src;
+  picture.src = URL.createObjectURL(jpeg);
+  if (old) URL.revokeObjectURL(old);
+}
+
+// The timeline
+
+function nearest(rows, time) {
+  let [low, high] = [0, rows.length - 1];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (rows[middle][TIME] < time) low = middle + 1;
+    else high = middle;
+  }
+  return rows[low];
+}
+
+function goTo(time) {
+  if (!history.length) return;
+  past = time >= now.time - 0.05 ? null : nearest(history, time);
+  const row = past || history.at(-1);
+  $("timeline").value = row[TIME];
+  $("shown").textContent = past ? `${row[TIME].toFixed(1)} s` : "now";
+  $("live").hidden = !past;
+  numbers(row);
+  const picture = pictures.length && nearest(pictures, row[TIME]);
+  if (picture) putPicture($("camera"), picture[1]);
+  redraw();
 }
 
 // The picture of one cv2.imshow window; its figure is made when it first shows something.
@@ -104,7 +150,7 @@ function end(card) {
     parts.push(`contacts ${card.contacts_person + card.contacts_wall}.`);
   }
   notice(parts.join(" "));
-  for (const control of document.querySelectorAll("button, select, input")) control.disabled = true;
+  for (const control of document.querySelectorAll("header :is(button, select), form input")) control.disabled = true;
 }
 
 function notice(text) {
@@ -132,7 +178,11 @@ const pause = () => send({ do: now && now.paused ? "resume" : "pause" });
 $("pause").onclick = pause;
 $("step").onclick = () => send({ do: "step" });
 $("speed").onchange = (event) => send({ do: "speed", value: Number(event.target.value) });
+$("timeline").oninput = (event) => goTo(event.target.valueAsNumber);
+$("live").onclick = () => goTo(Infinity);
+$("span").onchange = (event) => zoom(Number(event.target.value) || Infinity);
 document.onkeydown = (event) => {
+  if (event.key === "Escape") goTo(Infinity);
   if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName)) return;
   if (event.key === " ") pause();
   else if (event.key === ".") send({ do: "step" });
@@ -172,88 +222,21 @@ function redraw() {
     if (!now || !scene) return;
     drawMap();
     drawScale();
-    const seen = Math.max(...history.slice(-600).map((row) => Math.abs(row[ERROR] || 0)), 50);
-    plot("plot-error", [[ERROR, "error"]], -seen * 1.1, seen * 1.1);
-    const far = Math.max(...history.slice(-600).map((row) => row[DISTANCE] || 0), 4);
-    plot("plot-distance", [[DISTANCE, "distance"], [MEASURED, "measured"]], 0, far * 1.05, [0, ...scene.zones, far * 1.05]);
-    const fast = Math.max(...history.slice(-600).map((row) => Math.max(Math.abs(row[LINEAR]), Math.abs(row[ANGULAR]))), 0.3);
-    plot("plot-speed", [[LINEAR, "linear"], [ANGULAR, "angular"]], -fast * 1.1, fast * 1.1);
+    const most = (columns, least) => {
+      let high = least;
+      for (const row of rowsShown()) for (const column of columns) high = Math.max(high, Math.abs(row[column] || 0));
+      return high;
+    };
+    const side = most([ERROR], 50) * 1.1;
+    plot("plot-error", [[ERROR, "error", "px"]], -side, side);
+    const far = most([DISTANCE, MEASURED], 4) * 1.05;
+    plot("plot-distance", [[DISTANCE, "distance", "m"], [MEASURED, "measured", "m"]], 0, far, [0, ...scene.zones, far]);
+    const fast = most([LINEAR, ANGULAR], 0.3) * 1.1;
+    plot("plot-speed", [[LINEAR, "linear", "m/s"], [ANGULAR, "angular", "rad/s"]], -fast, fast);
   });
 }
 
-function sheet(id) {
-  const canvas = $(id);
-  const ratio = window.devicePixelRatio || 1;
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-  }
-  const pen = canvas.getContext("2d");
-  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.clearRect(0, 0, width, height);
-  pen.lineJoin = pen.lineCap = "round";
-  pen.font = "11px system-ui, sans-serif";
-  return [pen, width, height];
-}
-
-function plot(id, series, low, high, bands = []) {
-  const [pen, width, height] = sheet(id);
-  const [left, bottom] = [38, 16];
-  const end = Math.max(now.time, WINDOW_S);
-  const x = (t) => left + ((t - end + WINDOW_S) / WINDOW_S) * (width - left - 4);
-  const y = (v) => 4 + ((high - v) / (high - low)) * (height - bottom - 8);
-  for (let i = 0; i + 1 < bands.length; i++) {
-    pen.fillStyle = colours[`zone-${i}`];
-    const top = y(Math.min(bands[i + 1], high));
-    pen.fillRect(left, top, width - left - 4, y(bands[i]) - top);
-  }
-  // The names go where there is room for them, clear of the line above and below.
-  pen.fillStyle = colours.faint;
-  pen.textAlign = "right";
-  pen.textBaseline = "middle";
-  for (let i = 0; i + 1 < bands.length; i++) {
-    const [top, foot] = [y(Math.min(bands[i + 1], high)), y(bands[i])];
-    if (foot - top > 13) pen.fillText(ZONES[i], width - 10, (top + foot) / 2);
-  }
-  pen.lineWidth = 1;
-  const step = nice((high - low) / 6);
-  for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
-    pen.strokeStyle = Math.abs(v) < step / 2 ? colours.faint : colours.line;
-    line(pen, [[left, y(v)], [width - 4, y(v)]]);
-    pen.fillText(String(Number(v.toFixed(6))).replace("-", "−"), left - 5, y(v));
-  }
-  pen.textAlign = "center";
-  pen.textBaseline = "bottom";
-  for (let t = Math.ceil((end - WINDOW_S) / 15) * 15; t <= end; t += 15) {
-    pen.fillText(`${t} s`, Math.min(Math.max(x(t), left + 8), width - 14), height);
-  }
-  pen.lineWidth = 1.75;
-  for (const [column, colour] of series) {
-    pen.strokeStyle = colours[colour];
-    let points = [];
-    for (const row of history) {
-      if (row[TIME] < end - WINDOW_S) continue;
-      if (row[column] === null) {
-        line(pen, points);
-        points = [];
-      } else points.push([x(row[TIME]), y(row[column])]);
-    }
-    line(pen, points);
-  }
-}
-
-function nice(step) {
-  const power = 10 ** Math.floor(Math.log10(step));
-  return power * [1, 2, 5, 10].find((factor) => factor * power >= step);
-}
-
-function line(pen, points) {
-  if (points.length < 2) return;
-  pen.beginPath();
-  for (const [x, y] of points) pen.lineTo(x, y);
-  pen.stroke();
-}
+const personIn = (row, i) => (row[PEOPLE + 2 * i] === null ? null : row.slice(PEOPLE + 2 * i, PEOPLE + 2 * i + 2));
 
 function drawMap() {
   const [pen, width, height] = sheet("map");
@@ -295,9 +278,11 @@ function drawMap() {
   pen.beginPath();
   pen.rect(...at(-scene.room, scene.room), side, side);
   pen.clip();
-  const [robotX, robotY, yaw] = now.robot;
+  const [robotX, robotY, yaw] = past ? past.slice(X, PEOPLE) : now.robot;
+  const people = past ? now.people.map((_, i) => personIn(past, i)) : now.people;
+  const trail = past ? history.slice(0, history.indexOf(past) + 1) : history;
   const away = ([x, y]) => Math.hypot(x - robotX, y - robotY);
-  const middle = now.people[now.followed] || now.people.filter(Boolean).sort((a, b) => away(a) - away(b))[0];
+  const middle = people[now.followed] || people.filter(Boolean).sort((a, b) => away(a) - away(b))[0];
   if (middle) {
     const [x, y] = middle;
     scene.zones.forEach((radius, i) => {
@@ -318,19 +303,30 @@ function drawMap() {
   const trails = now.people.map((_, i) => [PEOPLE + 2 * i, i === now.followed ? "followed" : "other"]);
   for (const [column, colour] of [[X, "robot"], ...trails]) {
     pen.strokeStyle = colours[colour];
-    line(pen, history.filter((row) => row[column] !== null).slice(-1200).map((row) => at(row[column], row[column + 1])));
+    line(pen, trail.filter((row) => row[column] !== null).slice(-1200).map((row) => at(row[column], row[column + 1])));
   }
   pen.globalAlpha = 1;
   pen.fillStyle = colours.scan;
-  for (const [x, y] of now.scan) pen.fillRect(at(x, y)[0] - 1, at(x, y)[1] - 1, 2, 2);
+  for (const [x, y] of past ? [] : now.scan) pen.fillRect(at(x, y)[0] - 1, at(x, y)[1] - 1, 2, 2);
   pen.lineWidth = 2.5;
-  now.people.forEach((person, i) => {
+  people.forEach((person, i) => {
     if (!person) return;
     disc(...person, 0.15);
     pen.fillStyle = pen.strokeStyle = colours[i === now.followed ? "followed" : "other"];
     if (i === now.followed) pen.fill();
     else pen.stroke();
   });
+  // Where the follower takes people to be: a ring, and how sure it is.
+  pen.lineWidth = 1.5;
+  pen.setLineDash([4, 3]);
+  for (const [x, y, probability] of past ? [] : now.believed) {
+    disc(x, y, 0.3);
+    pen.strokeStyle = pen.fillStyle = colours.believed;
+    pen.stroke();
+    pen.textAlign = "left";
+    pen.fillText(percent(probability), at(x + 0.36, y)[0], at(x, y)[1] + 4);
+  }
+  pen.setLineDash([]);
   pen.save();
   pen.translate(...at(robotX, robotY));
   pen.rotate(-yaw);

@@ -1,0 +1,85 @@
+"""The follower's publishers: commands as the robot takes them, and what was found."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.pipeline import Sighting
+from limo_hog.follow.twist import Twist
+from limo_hog.imaging.drawing import annotate
+from limo_hog.ros2 import findings, messages, names
+from limo_hog.ros2.dds import Bus
+
+#: While nothing listens to the commands, the robot's type is looked for again after so long [s]. Chosen: discovery
+#: takes about a second.
+_LOOK_EVERY = 1.0
+
+
+class Commands:
+    """Publishes commands as `Twist`, or as `TwistStamped` where the robot subscribes to that."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self._looked = 0.0
+        self._open(names.TYPES[names.COMMAND])
+
+    def _open(self, kind: str) -> None:
+        self.kind = kind
+        self._publisher = self._bus.publisher(names.COMMAND, kind)
+
+    def publish(self, stamp: float, command: Twist) -> None:
+        """Send a command; `stamp` is on the robot's clock [s]."""
+        now = time.monotonic()
+        if now - self._looked > _LOOK_EVERY and not self._publisher.has_readers:
+            self._looked = now
+            taken = self._bus.subscribed_types(names.COMMAND)
+            if names.STAMPED_COMMAND_TYPE in taken and self.kind not in taken:
+                self._open(names.STAMPED_COMMAND_TYPE)
+        stamped = self.kind == names.STAMPED_COMMAND_TYPE
+        self._publisher.publish(findings.stamped_twist(stamp, command) if stamped else messages.twist(command))
+
+
+class Findings:
+    """Publishes what was made of a camera image, each topic only while something listens to it."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._annotated = bus.publisher(names.ANNOTATED, names.TYPES[names.ANNOTATED])
+        self._publishers = {topic: bus.publisher(topic, kind) for topic, kind in names.FINDINGS.items()}
+        self._frames = bus.publisher(names.TF, names.TYPES[names.TF], depth=100)
+
+    def publish(self, stamp: float, now: float, picture: NDArray[np.uint8], sighting: Sighting) -> None:
+        """Send what was found.
+
+        Parameters
+        ----------
+        stamp
+            Of the image [s].
+        now
+            The newest stamp of any sensor [s]: people's positions are as of then.
+        picture
+            uint8 (H, W, 3) BGR.
+        sighting
+            What the follower made of it.
+        """
+        found, belief = sighting.detections, sighting.decision.belief
+        ids = {one.box: one.number for one in belief.people if one.box is not None}
+        self._send(names.DETECTIONS, lambda: findings.detections_message(stamp, found, messages.CAMERA_FRAME, ids))
+        self._send(names.PEOPLE, lambda: findings.people_message(now, belief.people))
+        followed = next((one for one in belief.people if one.number == belief.followed), None)
+        if followed is not None:
+            self._send(names.PERSON, lambda: findings.person_pose(now, followed))
+        if belief.people and self._frames.has_readers:
+            self._frames.publish(findings.person_frames(now, belief.people, belief.followed))
+        if self._annotated.has_readers:
+            labels = [f"{score:.1f}" for score in found.scores]
+            drawn = annotate(picture, found.boxes, labels, sighting.decision.target, sighting.decision.reason)
+            self._annotated.publish(messages.image(stamp, drawn))
+
+    def _send(self, topic: str, make: Any) -> None:
+        publisher = self._publishers[topic]
+        if publisher.has_readers:
+            publisher.publish(make())

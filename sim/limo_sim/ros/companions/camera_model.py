@@ -1,0 +1,109 @@
+"""image_geometry: pixels and rays of a calibrated camera."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_sim.ros.rclpy_stub.offered import Offered
+
+
+class PinholeCameraModel(Offered):
+    """A rectified pinhole camera, read from a CameraInfo; rays are optical: X right, Y down, Z forward.
+
+    Attributes
+    ----------
+    width, height
+        Size of its images [px].
+    K, P
+        Intrinsic (3, 3) and projection (3, 4) matrices [px].
+    """
+
+    _not_offered = (
+        *("rectifyImage", "rectifyPoint", "unrectifyPoint", "rectify_image", "rectify_point", "unrectify_point"),
+        *("getDeltaU", "getDeltaV", "getDeltaX", "getDeltaY", "fullResolution", "fullIntrinsicMatrix"),
+        *("fullProjectionMatrix", "tfFrame_", "stamp_"),
+    )
+
+    def __init__(self) -> None:
+        self.K: Any = None
+        self.D: Any = None
+        self.R: Any = None
+        self.P: Any = None
+        self.width = self.height = 0
+        self.tf_frame = ""
+        self.stamp: Any = None
+
+    def fromCameraInfo(self, msg: Any) -> None:  # noqa: N802 — Humble's names
+        """Read a CameraInfo."""
+        self.K, self.R = np.array(msg.k).reshape(3, 3), np.array(msg.r).reshape(3, 3)
+        self.P, self.D = np.array(msg.p).reshape(3, 4), np.array(msg.d)
+        self.width, self.height = msg.width, msg.height
+        self.tf_frame, self.stamp = msg.header.frame_id, msg.header.stamp
+
+    def project3dToPixel(self, point: Any) -> tuple[float, float]:  # noqa: N802
+        """Return the pixel (u, v) of a point (x, y, z) [m]; nan where it is in the camera's plane."""
+        x, y, w = self.P @ np.array([*point, 1.0])
+        return (float(x / w), float(y / w)) if w != 0 else (math.nan, math.nan)
+
+    def projectPixelTo3dRay(self, uv: Any) -> tuple[float, float, float]:  # noqa: N802
+        """Return the ray of length 1 through a pixel (u, v)."""
+        ray = np.array([(uv[0] - self.cx()) / self.fx(), (uv[1] - self.cy()) / self.fy(), 1.0])
+        x, y, z = ray / np.linalg.norm(ray)
+        return float(x), float(y), float(z)
+
+    def intrinsicMatrix(self) -> NDArray[np.float64]:  # noqa: N802
+        """Return K."""
+        return self.K  # type: ignore[no-any-return]
+
+    def projectionMatrix(self) -> NDArray[np.float64]:  # noqa: N802
+        """Return P."""
+        return self.P  # type: ignore[no-any-return]
+
+    def distortionCoeffs(self) -> NDArray[np.float64]:  # noqa: N802
+        """Return D."""
+        return self.D  # type: ignore[no-any-return]
+
+    def rotationMatrix(self) -> NDArray[np.float64]:  # noqa: N802
+        """Return R."""
+        return self.R  # type: ignore[no-any-return]
+
+    def tfFrame(self) -> str:  # noqa: N802
+        """Return the camera's frame."""
+        return self.tf_frame
+
+    def fx(self) -> float:
+        """Return the focal length in columns [px]."""
+        return float(self.P[0, 0])
+
+    def fy(self) -> float:
+        """Return the focal length in rows [px]."""
+        return float(self.P[1, 1])
+
+    def cx(self) -> float:
+        """Return the principal point's column [px]."""
+        return float(self.P[0, 2])
+
+    def cy(self) -> float:
+        """Return the principal point's row [px]."""
+        return float(self.P[1, 2])
+
+    def fovX(self) -> float:  # noqa: N802
+        """Return the horizontal field of view [rad]."""
+        return 2 * math.atan(self.width / (2 * self.fx()))
+
+    def fovY(self) -> float:  # noqa: N802
+        """Return the vertical field of view [rad]."""
+        return 2 * math.atan(self.height / (2 * self.fy()))
+
+    # Jazzy's names
+    from_camera_info = fromCameraInfo
+    project_3d_to_pixel = project3dToPixel
+    project_pixel_to_3d_ray = projectPixelTo3dRay
+    intrinsic_matrix = intrinsicMatrix
+    projection_matrix = projectionMatrix
+    distortion_coeffs = distortionCoeffs
+    rotation_matrix = rotationMatrix

@@ -1,0 +1,99 @@
+"""Puts ROS 2's Python API into `sys.modules` for one run; a name that is not offered raises an error."""
+
+from __future__ import annotations
+
+import importlib.abc
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+from limo_sim.ros.lockstep.threads import in_turns
+from limo_sim.ros.lockstep.world import StubError, World
+from limo_sim.ros.offer import offered
+from limo_sim.ros.rclpy_stub import context
+
+
+class NotOfferedError(StubError, ImportError):
+    """A name of ROS 2 that limo-hog does not have."""
+
+
+class _Module(ModuleType):
+    """A module whose error for a missing name lists what it has."""
+
+    def __init__(self, name: str, content: dict[str, Any]) -> None:
+        super().__init__(name, f"Part of ROS 2's {name.partition('.')[0]}, as `limo-hog run` offers it.")
+        self.__path__: list[str] = []
+        self.__dict__.update(content)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        there = sorted(key for key in self.__dict__ if not key.startswith("_"))
+        raise NotOfferedError(
+            f"limo-hog run does not offer {self.__name__}.{name}; {self.__name__} has {', '.join(there)}"
+        )
+
+
+#: Tops of names that belong to ROS 2, whether offered or not.
+_ROS_TOPS = (
+    *("rclpy", "message_filters", "cv_bridge", "image_transport", "image_geometry", "laser_geometry", "rosbag2_py"),
+    *("tf2_ros", "tf2_py", "tf2_geometry_msgs", "tf_transformations", "launch", "launch_ros"),
+    *("ament_index_python", "rosidl_runtime_py", "nav2_simple_commander"),
+)
+
+
+class _Refuser(importlib.abc.MetaPathFinder):
+    """The last finder of modules: for one of ROS 2's, the error names what is offered."""
+
+    def find_spec(
+        self,
+        fullname: str,
+        path: Sequence[str] | None,  # noqa: ARG002 — the protocol's
+        target: ModuleType | None = None,  # noqa: ARG002
+    ) -> ModuleSpec | None:
+        top = fullname.partition(".")[0]
+        if top in _ROS_TOPS or top.endswith(("_msgs", "_srvs", "_interfaces")):
+            raise NotOfferedError(
+                f"limo-hog run does not offer {fullname}; what of ROS 2 it offers is listed at "
+                "https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
+                name=fullname,
+            )
+        return None
+
+
+@contextmanager
+def in_front(world: World) -> Iterator[None]:
+    """Let `import rclpy` and its companions find what belongs to `world`, and Python's waits take the arena's time."""
+    modules = _modules()
+    tops = {name.partition(".")[0] for name in modules}
+    # A real rclpy that was imported before is put aside for the run.
+    hidden = {name: module for name, module in sys.modules.items() if name.partition(".")[0] in tops}
+    for name in hidden:
+        del sys.modules[name]
+    sys.modules.update(modules)
+    refuser = _Refuser()
+    sys.meta_path.append(refuser)
+    context.enter(world)
+    try:
+        with in_turns(world.turns, lambda: world.time):
+            yield
+    finally:
+        context.enter(None)
+        sys.meta_path.remove(refuser)
+        for name in [name for name in sys.modules if name.partition(".")[0] in tops]:
+            del sys.modules[name]
+        sys.modules.update(hidden)
+
+
+def _modules() -> dict[str, ModuleType]:
+    made: dict[str, ModuleType] = {}
+    for name, content in offered().items():
+        made[name] = _Module(name, content)
+    for name, module in made.items():
+        parent, _, child = name.rpartition(".")
+        if parent:
+            setattr(made[parent], child, module)
+    return made

@@ -1,0 +1,1 @@
+"""Python launch files of the simple kind: nodes with parameters, remaps and launch arguments, in one run."""

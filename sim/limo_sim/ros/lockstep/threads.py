@@ -1,0 +1,96 @@
+"""Python's own waits, for one run: in a thread of the script they give the turn away and take simulated time."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from _thread import allocate_lock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from limo_sim.ros.lockstep.turns import Turns
+
+
+@contextmanager
+def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
+    """Replace what starts, joins, stops and times threads; other threads than the script's notice nothing.
+
+    Parameters
+    ----------
+    turns
+        The script's threads.
+    now
+        Simulated time [s]; `time.time` and `time.monotonic` go on with it, while `time.perf_counter` stays the wall's.
+    """
+    real_sleep, real_start, real_join = time.sleep, threading.Thread.start, threading.Thread.join
+    real_wait = threading.Condition.wait
+
+    def sleep(seconds: float) -> None:
+        if turns.inside:
+            turns.wait(lambda: False, now() + seconds)
+        else:
+            real_sleep(seconds)
+
+    def clock(real: Callable[[], float]) -> Callable[[], float]:
+        began = real()
+        return lambda: began + now() if turns.inside else real()
+
+    def start(thread: threading.Thread) -> None:
+        # The workers of a pool wait in C, where no turn can be given away: they are no threads of the script.
+        pooled = getattr(getattr(thread, "_target", None), "__module__", "") == "concurrent.futures.thread"
+        if turns.inside and not pooled:
+            turns.start(thread, real_start)
+        else:
+            real_start(thread)
+
+    def join(thread: threading.Thread, timeout: float | None = None) -> None:
+        seat = getattr(thread, "limo_seat", None)
+        if turns.inside and seat is not None:
+            if turns.wait(lambda: not turns.alive(seat), *_until(now, timeout)):
+                real_join(thread)
+        else:
+            real_join(thread, timeout)
+
+    def wait(condition: Any, timeout: float | None = None) -> bool:
+        if not turns.inside or (timeout is None and turns.alone):
+            # A thread of no other kind can notify the script's only one: that takes no simulated time, or hangs.
+            return real_wait(condition, timeout)
+        # As threading does it, with the turn given away where that blocks.
+        waiter = allocate_lock()
+        waiter.acquire()
+        condition._waiters.append(waiter)
+        saved = condition._release_save()
+        try:
+            notified = turns.wait(lambda: not waiter.locked(), *_until(now, timeout))
+        finally:
+            condition._acquire_restore(saved)
+            if waiter.locked():
+                condition._waiters.remove(waiter)
+        return notified
+
+    monotonic = clock(time.monotonic)
+    replaced: list[tuple[Any, str, Any]] = [
+        (time, "sleep", sleep),
+        (time, "time", clock(time.time)),
+        (time, "monotonic", monotonic),
+        # Modules that imported it by name: their timeouts are compared with it.
+        (threading, "_time", monotonic),
+        (queue, "time", monotonic),
+        (threading.Thread, "start", start),
+        (threading.Thread, "join", join),
+        (threading.Condition, "wait", wait),
+    ]
+    before = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced]
+    for owner, name, value in replaced:
+        setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        for owner, name, value in before:
+            setattr(owner, name, value)
+
+
+def _until(now: Callable[[], float], timeout: float | None) -> tuple[float, ...]:
+    return () if timeout is None else (now() + max(timeout, 0.0),)

@@ -1,0 +1,237 @@
+"""Turns: of a script's threads one runs at a time, so that a run with threads is as repeatable as one without.
+
+A thread that holds the turn keeps it until it waits: for a message, for simulated time, for another thread. The turn
+then goes to the next thread whose wait is over, in the order in which the threads were started; where no wait is over,
+the arena advances by one step.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+from _thread import allocate_lock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+class RunOver(KeyboardInterrupt):
+    """The run's time is up."""
+
+
+class ThreadEnded(BaseException):
+    """The script has ended, and with it its daemon threads; not an Exception, so that scripts let it through."""
+
+
+class ExternalShutdownException(Exception):  # noqa: N818 — rclpy's name
+    """The context was shut down during a wait."""
+
+
+class Seat:
+    """One thread of the script.
+
+    Attributes
+    ----------
+    owner, argv
+        The rclpy context and the command line that the thread's program has; a new thread inherits them.
+    daemon
+        Whether the script's end waits for the thread.
+    """
+
+    def __init__(self, owner: Any, argv: list[str], *, daemon: bool) -> None:
+        self.owner = owner
+        self.argv = argv
+        self.daemon = daemon
+        self.ready: Callable[[], bool] = lambda: True
+        self.until = math.inf
+        self.ended = False
+        #: Above zero while the run's own code works in this thread: its sleeps and locks are real.
+        self.outside = 0
+        self.turn = allocate_lock()
+        self.turn.acquire()
+
+
+class Turns:
+    """The threads of one run.
+
+    Parameters
+    ----------
+    advance
+        Lets one step of simulated time pass.
+    now
+        Simulated time [s].
+    over
+        Whether the run's time is up: every wait then ends.
+    failed
+        Called with what a thread raises.
+    """
+
+    def __init__(
+        self,
+        advance: Callable[[], None],
+        now: Callable[[], float],
+        over: Callable[[], bool],
+        failed: Callable[[BaseException], None],
+    ) -> None:
+        self._advance, self._now, self._over, self._failed = advance, now, over, failed
+        self._order: list[Seat] = []
+        self._seats: dict[int, Seat] = {}
+        self._current: Seat | None = None
+        self._broken = False
+
+    def seat(self) -> Seat | None:
+        """Return the seat of the thread that calls; None of a thread that is not the script's."""
+        return self._seats.get(threading.get_ident())
+
+    @property
+    def inside(self) -> bool:
+        """Whether the caller is the script, not the run's own code or another thread."""
+        seat = self.seat()
+        return seat is not None and not seat.outside
+
+    @property
+    def alone(self) -> bool:
+        """Whether the script has one thread."""
+        return len(self._order) == 1
+
+    @contextmanager
+    def main(self, owner: Any) -> Iterator[None]:
+        """Make the calling thread the script's first; at the end the others are waited for, daemons are ended."""
+        seat = Seat(owner, sys.argv, daemon=False)
+        self._order.append(seat)
+        self._current = seat
+        self._seats[threading.get_ident()] = seat
+        try:
+            yield
+            self.wait(lambda: all(other.daemon for other in self._order if other is not seat))
+        finally:
+            self._end_others(seat)
+            del self._seats[threading.get_ident()]
+
+    def wait(self, ready: Callable[[], bool], until: float = math.inf) -> bool:
+        """Give the turn away until `ready()` holds or simulated time reaches `until` [s]; returns `ready()`.
+
+        Raises
+        ------
+        RunOver
+            If the time is up and `ready()` does not hold.
+        """
+        me = self._seats[threading.get_ident()]
+        if me.ended:
+            raise ThreadEnded
+        me.ready, me.until = ready, until
+        while (chosen := self._next(self._order.index(me) + 1)) is None:
+            self._step(me)
+        if chosen is not me:
+            self._hand_to(chosen)
+            me.turn.acquire()
+            sys.argv = me.argv
+        if me.ended:
+            raise ThreadEnded
+        if ready():
+            return True
+        if self._now() >= until - 1e-9:
+            return False
+        raise RunOver
+
+    def start(self, thread: threading.Thread, start: Callable[[threading.Thread], None]) -> None:
+        """Start a thread of the script; it runs when its turn comes."""
+        mine = self._seats[threading.get_ident()]
+        # A node of a launch file has a context and a command line of its own.
+        owner, argv = getattr(thread, "limo_program", (mine.owner, mine.argv))
+        seat = Seat(owner, argv, daemon=thread.daemon)
+        run = thread.run
+
+        def run_in_turn() -> None:
+            self._seats[threading.get_ident()] = seat
+            seat.turn.acquire()
+            sys.argv = seat.argv
+            try:
+                if not seat.ended:
+                    run()
+            except (RunOver, ThreadEnded, ExternalShutdownException, SystemExit):
+                pass
+            except BaseException as error:  # whatever a thread raises ends the run
+                self._failed(error)
+                self._broken = True
+            finally:
+                self._leave(seat)
+
+        thread.run = run_in_turn  # type: ignore[method-assign]
+        # Python does not wait for it at exit: a thread in an endless loop would never let it end.
+        thread.daemon = True
+        thread.limo_seat = seat  # type: ignore[attr-defined]
+        self._order.append(seat)
+        with self.outside():
+            start(thread)
+
+    def alive(self, seat: Seat) -> bool:
+        """Whether a thread still runs."""
+        return seat in self._order
+
+    @contextmanager
+    def outside(self) -> Iterator[None]:
+        """Let the run's own code work in a thread of the script: what it waits for is real."""
+        seat = self.seat()
+        if seat is None:
+            yield
+            return
+        seat.outside += 1
+        try:
+            yield
+        finally:
+            seat.outside -= 1
+
+    def _step(self, seat: Seat) -> None:
+        seat.outside += 1
+        try:
+            self._advance()
+        finally:
+            seat.outside -= 1
+
+    def _step_or_break(self, seat: Seat) -> None:
+        try:
+            self._step(seat)
+        except BaseException as error:  # whatever a page raises ends the run
+            self._failed(error)
+            self._broken = True
+
+    def _due(self, seat: Seat) -> bool:
+        return seat.ended or self._broken or self._over() or seat.ready() or self._now() >= seat.until - 1e-9
+
+    def _next(self, at: int) -> Seat | None:
+        """Return the first thread from position `at` on, round to before it, that can go on; None where all wait."""
+        return next((seat for seat in (*self._order[at:], *self._order[:at]) if self._due(seat)), None)
+
+    def _hand_to(self, seat: Seat) -> None:
+        self._current = seat
+        seat.turn.release()
+
+    def _leave(self, me: Seat) -> None:
+        """Give the turn away for good."""
+        if me in self._order:
+            at = self._order.index(me)
+            self._order.remove(me)
+            while (chosen := self._next(at)) is None:
+                self._step_or_break(me)
+            self._hand_to(chosen)
+        del self._seats[threading.get_ident()]
+
+    def _end_others(self, me: Seat) -> None:
+        others = [seat for seat in self._order if seat is not me]
+        for seat in others:
+            seat.ended = True
+        if self._current is me:
+            for seat in others:
+                # Each ends in its turn, and hands the turn on: at last to this thread.
+                if seat in self._order:
+                    me.ready = lambda: len(self._order) == 1
+                    self._hand_to(seat)
+                    me.turn.acquire()
+            return
+        # A signal came while another thread had the turn: each goes to its end by itself.
+        self._order = [me]
+        for seat in others:
+            if seat.turn.locked():
+                seat.turn.release()

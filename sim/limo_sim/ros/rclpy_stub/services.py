@@ -1,0 +1,149 @@
+"""Services: a request of one node, answered by a callback of another or of the same script."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.future import Future
+from limo_sim.ros.rclpy_stub.groups import CallbackGroup
+from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.qos import QoSProfile
+
+#: A call without a time limit that has waited so long can never be answered [s]: an answer takes no simulated time
+#: where something spins. Chosen: long enough for a service that sleeps.
+NEVER_AFTER = 30.0
+
+
+class Service(Offered):
+    """Answers requests by a callback of the script."""
+
+    _not_offered = ("send_response", "configure_introspection", "handle", "logger_name")
+
+    def __init__(
+        self,
+        srv_type: Any,
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        callback_group: CallbackGroup,
+        qos_profile: QoSProfile,
+    ) -> None:
+        self.srv_type, self.srv_name, self.service_name = srv_type, srv_name, srv_name
+        self.callback, self.callback_group, self.qos_profile = callback, callback_group, qos_profile
+        self._requests: deque[tuple[Any, Client, Future]] = deque()
+
+    def request(self, request: Any, client: Client, future: Future) -> None:
+        """Queue a request."""
+        self._requests.append((request, client, future))
+
+    def is_ready(self) -> bool:
+        """Whether a request waits."""
+        return bool(self._requests)
+
+    def take(self) -> Callable[[], Any]:
+        """Return the work of answering the oldest request."""
+        request, client, future = self._requests.popleft()
+
+        def answer() -> Any:
+            response = self.callback(request, self.srv_type.Response())
+            if hasattr(response, "send"):
+                return self._awaited(response, client, future)
+            self._respond(response, client, future)
+            return None
+
+        return answer
+
+    async def _awaited(self, response: Any, client: Client, future: Future) -> None:
+        self._respond(await response, client, future)
+
+    def _respond(self, response: Any, client: Client, future: Future) -> None:
+        if not isinstance(response, self.srv_type.Response):
+            raise TypeError(
+                f"the callback of the service {self.srv_name!r} must return its response, a "
+                f"{self.srv_type.__name__}.Response; came {type(response).__name__}: end it with `return response`"
+            )
+        client.respond(copy.deepcopy(response), future)
+
+    def destroy(self) -> None:
+        """End the service."""
+        current().world.services.pop(self.srv_name, None)
+
+
+class Client(Offered):
+    """Sends requests."""
+
+    _not_offered = ("configure_introspection", "handle", "logger_name", "get_pending_request")
+
+    def __init__(self, srv_type: Any, srv_name: str, qos_profile: QoSProfile, callback_group: CallbackGroup) -> None:
+        self.srv_type, self.srv_name, self.service_name = srv_type, srv_name, srv_name
+        self.qos_profile, self.callback_group = qos_profile, callback_group
+        self._responses: deque[tuple[Any, Future]] = deque()
+
+    def service_is_ready(self) -> bool:
+        """Whether a node offers the service."""
+        return self.srv_name in current().world.services
+
+    def wait_for_service(self, timeout_sec: float | None = None) -> bool:
+        """Wait until a node offers the service; False when simulated time is up before."""
+        world = current().world
+        until = math.inf if timeout_sec is None else world.time + timeout_sec
+        return world.turns.wait(self.service_is_ready, until)
+
+    def call_async(self, request: Any) -> Future:
+        """Send a request; the future gets its answer while an executor spins the node."""
+        if not isinstance(request, self.srv_type.Request):
+            raise TypeError(
+                f"the service {self.srv_name!r} takes a {self.srv_type.__name__}.Request, came {type(request).__name__}"
+            )
+        future = Future()
+        server = current().world.services.get(self.srv_name)
+        if server is not None:
+            server.request(copy.deepcopy(request), self, future)
+        return future
+
+    def call(self, request: Any, timeout_sec: float | None = None) -> Any:
+        """Send a request and wait for its answer, None when `timeout_sec` is up.
+
+        Raises
+        ------
+        StubError
+            If the answer can never come, where ROS would wait for ever.
+        """
+        future = self.call_async(request)
+        world = current().world
+        limit = NEVER_AFTER if timeout_sec is None else timeout_sec
+        if world.turns.wait(future.done, world.time + limit):
+            return future.result()
+        if timeout_sec is None:
+            raise StubError(
+                f"call() of the service {self.srv_name!r} has waited for {NEVER_AFTER:g} s and can have no answer: "
+                "spin the node in another thread, or use call_async; in a callback, the client needs a "
+                "callback group of its own and a MultiThreadedExecutor"
+            )
+        return None
+
+    def remove_pending_request(self, future: Future) -> None:
+        """Want no answer any more."""
+        future.cancel()
+
+    def respond(self, response: Any, future: Future) -> None:
+        """Queue an answer."""
+        self._responses.append((response, future))
+
+    def is_ready(self) -> bool:
+        """Whether an answer waits."""
+        return bool(self._responses)
+
+    def take(self) -> Callable[[], Any]:
+        """Return the work of giving the oldest answer to its future."""
+        response, future = self._responses.popleft()
+        return lambda: None if future.cancelled() else future.set_result(response)
+
+    def destroy(self) -> None:
+        """End the client."""
+        self._responses.clear()

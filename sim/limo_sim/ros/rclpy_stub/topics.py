@@ -1,0 +1,135 @@
+"""Publishers and subscriptions."""
+
+from __future__ import annotations
+
+import copy
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from limo_hog.ros2 import names
+from limo_sim.ros.interfaces import Message
+from limo_sim.ros.lockstep.calls import PUBLISHED
+from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.groups import CallbackGroup
+from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+
+
+class Publisher(Offered):
+    """Sends messages of one type to one topic."""
+
+    _not_offered = ("assert_liveliness", "wait_for_all_acked", "handle", "event_handlers", "logger_name")
+
+    def __init__(self, msg_type: type[Message], topic: str, qos: QoSProfile) -> None:
+        self.msg_type = msg_type
+        self.topic_name = self.topic = topic
+        self.qos_profile = qos
+        self._kept: deque[Message] | None = None
+        world = current().world
+        if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+            self._kept = deque(maxlen=max(qos.depth, 1))
+            world.kept.append((topic, self._kept))
+        world.calls.writers.setdefault(topic, world.line())
+        world.writers.append(topic)
+
+    def publish(self, msg: Message) -> None:
+        """Send a message.
+
+        Raises
+        ------
+        TypeError
+            If it is of another type.
+        StubError
+            If it is a command that is not a number.
+        """
+        if not isinstance(msg, self.msg_type):
+            raise TypeError(
+                f"{self.topic} carries {self.msg_type.__name__}, came {type(msg).__name__}: "
+                f"publish a {self.msg_type.__name__}"
+            )
+        if self._kept is not None:
+            self._kept.append(copy.deepcopy(msg))
+        current().world.publish(self.topic, msg)
+
+    def get_subscription_count(self) -> int:
+        """Return the number of subscriptions; the robot is one to /cmd_vel."""
+        world = current().world
+        return sum(reader.topic == self.topic for reader in world.readers) + (self.topic == names.COMMAND)
+
+    def destroy(self) -> None:
+        """End the publisher."""
+        writers = current().world.writers
+        if self.topic in writers:
+            writers.remove(self.topic)
+
+
+class Subscription(Offered):
+    """Calls back with each message of a topic; the newest `depth` wait for a slow callback."""
+
+    _not_offered = ("handle", "event_handlers", "raw", "logger_name")
+
+    def __init__(
+        self,
+        msg_type: type[Message],
+        topic: str,
+        callback: Callable[[Any], Any],
+        qos: QoSProfile,
+        callback_group: CallbackGroup,
+    ) -> None:
+        self.msg_type = msg_type
+        self.topic_name = self.topic = topic
+        self.callback, self.callback_group = callback, callback_group
+        self.qos_profile = qos
+        keep_all = qos.history == HistoryPolicy.KEEP_ALL
+        self._queue: deque[Message] = deque(maxlen=None if keep_all else max(qos.depth, 1))
+        # As in ROS, a transient-local subscription gets no message from a volatile publisher.
+        volatile = topic in names.TYPES and topic != names.TF_STATIC
+        self.keeps = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        self._deaf = self.keeps and volatile
+
+    def offer(self, message: Message) -> None:
+        """Queue a message; the oldest gives way."""
+        if not self._deaf:
+            self._queue.append(message)
+
+    def is_ready(self) -> bool:
+        """Whether a message waits."""
+        return bool(self._queue)
+
+    def take(self) -> Callable[[], Any]:
+        """Return the work of giving the oldest message to the callback."""
+        if self.topic in (names.IMAGE, names.IMAGE_COMPRESSED):
+            current().world.calls.images += 1
+        message = self._queue.popleft()
+        return lambda: self.callback(message)
+
+    def get_publisher_count(self) -> int:
+        """Return how many publish on the topic, the arena being one."""
+        return publishers_of(self.topic)
+
+    def destroy(self) -> None:
+        """End the subscription."""
+        world = current().world
+        if self in world.readers:
+            world.readers.remove(self)
+
+
+def publishers_of(topic: str) -> int:
+    """Return how many publish on a topic, the arena being one."""
+    return current().world.writers.count(topic) + (topic in PUBLISHED)
+
+
+def check_type(msg_type: Any) -> None:
+    """Refuse what is no message type."""
+    if not (isinstance(msg_type, type) and issubclass(msg_type, Message)):
+        raise TypeError(f"want a message type such as geometry_msgs.msg.Twist, came {msg_type!r}")
+
+
+def check_topic(topic: str, msg_type: type[Message]) -> None:
+    """Refuse another type than that of the arena's topic; a command may have a stamp."""
+    wanted = names.TYPES.get(topic)
+    stamped = topic == names.COMMAND and msg_type._type_name == names.STAMPED_COMMAND_TYPE
+    if wanted is not None and wanted != msg_type._type_name and not stamped:
+        raise StubError(f"{topic} carries {wanted}, the script uses {msg_type._type_name}")

@@ -46,7 +46,7 @@ def searched(hog: _core.Hog, image: NDArray[np.uint8], group: float, guide: Guid
     times = []
     for _ in range(2):
         begin = time.perf_counter()
-        found = hog.detect_multi_scale(image, 0.0, (8, 8), (4, 4), 1.05, group, False, guide)
+        found = hog.detect_multi_scale(image, 0.0, (8, 8), (4, 4), 1.05, group, False, None, guide)
         times.append(time.perf_counter() - begin)
     return found, min(times)
 
@@ -74,7 +74,7 @@ def main() -> None:
             found, seconds[guide] = searched(hog, image, 2.0, guide)
             least[guide] += seconds[guide]
             if guide is not None:
-                boxes, _ = hog.detect_multi_scale(image, 0.0, (8, 8), (4, 4), 1.05, 0.0, False, guide)
+                boxes, _ = hog.detect_multi_scale(image, 0.0, (8, 8), (4, 4), 1.05, 0.0, False, None, guide)
                 same[guide] += np.array_equal(found[0], exact[0])
                 kept[guide] += len(every & {tuple(box) for box in boxes.tolist()})
     print(f"{count} pictures, {hits} hits")

@@ -3,7 +3,7 @@
 
 use arbitrary::Arbitrary;
 use hog_core::exact::{self, Svm, Tables};
-use hog_core::pyramid::Steps;
+use hog_core::pyramid::{Pyramid, Steps};
 use hog_core::{Backend, Grouping, Hog, HogParams, ImageView, Interrupt, Search};
 use libfuzzer_sys::fuzz_target;
 
@@ -127,7 +127,7 @@ fuzz_target!(|case: Case| {
         })
         .collect();
     let search = Search { hit_threshold, ..all };
-    let scale = 1.0 + f64::from(case.scale) / 128.0;
+    let pyramid = Pyramid { first: None, scale: 1.0 + f64::from(case.scale) / 128.0 };
     let grouping = if case.flags & 32 != 0 && hit_threshold > 0.0 && wanted.len() < 12 {
         Grouping::MeanShift(f64::from(case.group))
     } else {
@@ -139,7 +139,7 @@ fuzz_target!(|case: Case| {
         let hits = hog.detect(image, &search, None, &Interrupt::NEVER).expect("it fits the memory");
         let found: Vec<(i64, i64)> = hits.iter().map(|hit| (hit.x, hit.y)).collect();
         assert_eq!(found, wanted, "{}: {params:?}, {search:?}, {:?}, scores {scores:?}", backend.name(), image.size());
-        let found = hog.detect_multi_scale(image, &search, scale, grouping, 1, &Interrupt::NEVER);
+        let found = hog.detect_multi_scale(image, &search, &pyramid, grouping, None, 1, &Interrupt::NEVER);
         let rects: Vec<_> = found.expect("it fits the memory").into_iter().map(|(rect, _)| rect).collect();
         assert_eq!(*first.get_or_insert_with(|| rects.clone()), rects, "{}", backend.name());
     }

@@ -175,8 +175,7 @@ impl Hog {
         let Some(svm) = svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
             let level = memory::collect([Level { scale: 1.0, size: image.size() }])?;
-            let how =
-                How { search: *search, first: image.size(), exact_weights: false, guide: None, threads: 1 };
+            let how = How { search: *search, exact_weights: false, guide: None, threads: 1 };
             let mut hits = self.hits(image, &level, &steps, svm, &how, interrupt)?;
             return Ok(hits.pop().unwrap_or_default());
         };
@@ -216,7 +215,7 @@ impl Hog {
         let levels = levels(first, pyramid.scale, spec, interrupt)?;
         // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
         let exact_weights = matches!(grouping, Grouping::MeanShift(_));
-        let how = How { search: *search, first, exact_weights, guide, threads };
+        let how = How { search: *search, exact_weights, guide, threads };
         let hits = self.hits(image, &levels, &steps, svm, &how, interrupt)?;
         let mut candidates = memory::with_room(hits.iter().map(Vec::len).sum())?;
         for (level, hits) in levels.iter().zip(&hits) {
@@ -241,7 +240,8 @@ impl Hog {
         Candidate { rect, weight: hit.weight, scale: level.scale }
     }
 
-    /// The hits of each of `levels`: by the fast path, where the geometry has one.
+    /// The hits of each of `levels` of the image at the size of the first one: by the fast path, where the geometry has
+    /// one.
     fn hits(
         &self,
         image: ImageView,
@@ -251,8 +251,9 @@ impl Hog {
         how: &How,
         interrupt: &Interrupt,
     ) -> Result<Vec<Vec<Hit>>> {
-        let How { threads, exact_weights, first, .. } = *how;
+        let How { threads, exact_weights, .. } = *how;
         let hit_threshold = how.search.hit_threshold;
+        let first = levels.first().map_or(image.size(), |level| level.size);
         let grids =
             memory::collect(levels.iter().map(|level| (level.size, steps.grid(level.size, self.spec()))))?;
         let mut windows =
@@ -352,8 +353,6 @@ impl Hog {
 /// How hits are looked for.
 struct How {
     search: Search,
-    /// The size that the image is resized to before all else.
-    first: Size,
     /// Whether every hit's weight is to be the exact path's.
     exact_weights: bool,
     guide: Option<Guide>,

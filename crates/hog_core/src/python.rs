@@ -278,8 +278,8 @@ impl Hog {
     }
 
     #[allow(clippy::too_many_arguments, reason = "they are OpenCV's detectMultiScale arguments, and ours")]
-    #[pyo3(signature = (image, hit_threshold, win_stride, padding, scale, group_threshold, mean_shift, first_level = None,
-        guide = None, threads = None))]
+    #[pyo3(signature = (image, hit_threshold, win_stride, padding, scale, group_threshold, mean_shift,
+        first_level = None, guide = None, threads = None))]
     fn detect_multi_scale<'py>(
         &self,
         image: PyReadonlyArrayDyn<'py, u8>,

@@ -118,8 +118,7 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
         lines += [f"**{group}**: {members}", "", *table([one for one in by_group if one.scenario == group]), ""]
     lines += ["## Success by scenario", "", *successes(suite, each), "", "## Against `tracking`, run by run", ""]
     lines += [
-        "Bold: the interval leaves out 0.",
-        "",
+        *(["Bold: the interval leaves out 0.", ""] if args.seeds > 1 else []),
         *differences(compare(cards, "tracking", dict.fromkeys(groups, "all"))),
     ]
     lines += [

@@ -89,8 +89,9 @@ fuzz_target!(|case: Case| {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         state >> 16
     };
-    let coefficients: Vec<f32> =
-        (0..spec.descriptor_len() + usize::from(case.flags & 8 != 0)).map(|_| (noise() % 512) as f32 / 2048.0 - 0.125).collect();
+    let coefficients: Vec<f32> = (0..spec.descriptor_len() + usize::from(case.flags & 8 != 0))
+        .map(|_| (noise() % 512) as f32 / 2048.0 - 0.125)
+        .collect();
     let (width, height) = (usize::from(case.size.0 % 72) + 1, usize::from(case.size.1 % 72) + 1);
     let channels = if case.flags & 16 != 0 { 3 } else { 1 };
     let data: Vec<u8> = (0..width * height * channels)
@@ -114,7 +115,8 @@ fuzz_target!(|case: Case| {
     }
     let svm = Svm::new(&coefficients, &spec).expect("one coefficient an element");
     let tables = Tables::new(&spec).expect("it fits the memory");
-    let scores = exact::scores(image, &grid, &spec, &tables, &svm, &Interrupt::NEVER).expect("it fits the memory");
+    let scores =
+        exact::scores(image, &grid, &spec, &tables, &svm, &Interrupt::NEVER).expect("it fits the memory");
     let mut sorted: Vec<f64> = scores.iter().copied().filter(|score| score.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     // The score of a window, so that a close call is decided.
@@ -138,7 +140,13 @@ fuzz_target!(|case: Case| {
         let hog = Hog::with_backend(&params, Some(&coefficients), backend).expect("the geometry fits");
         let hits = hog.detect(image, &search, None, &Interrupt::NEVER).expect("it fits the memory");
         let found: Vec<(i64, i64)> = hits.iter().map(|hit| (hit.x, hit.y)).collect();
-        assert_eq!(found, wanted, "{}: {params:?}, {search:?}, {:?}, scores {scores:?}", backend.name(), image.size());
+        assert_eq!(
+            found,
+            wanted,
+            "{}: {params:?}, {search:?}, {:?}, scores {scores:?}",
+            backend.name(),
+            image.size()
+        );
         let found = hog.detect_multi_scale(image, &search, &pyramid, grouping, None, 1, &Interrupt::NEVER);
         let rects: Vec<_> = found.expect("it fits the memory").into_iter().map(|(rect, _)| rect).collect();
         assert_eq!(*first.get_or_insert_with(|| rects.clone()), rects, "{}", backend.name());

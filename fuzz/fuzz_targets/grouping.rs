@@ -29,7 +29,8 @@ fuzz_target!(|case: Case| {
     };
     let rects: Vec<Rect> = case.rects.iter().take(MOST).map(rect).collect();
     let threshold = if case.threshold > 100 { case.threshold } else { case.threshold % 5 };
-    let groups = group_rectangles(&rects, threshold, case.eps, &Interrupt::NEVER).expect("it fits the memory");
+    let groups =
+        group_rectangles(&rects, threshold, case.eps, &Interrupt::NEVER).expect("it fits the memory");
     let members: i64 = groups.iter().map(|&(_, count)| i64::from(count)).sum();
     assert!(members <= rects.len() as i64);
     if threshold <= 0 {
@@ -54,7 +55,10 @@ fuzz_target!(|case: Case| {
         assert!(rect.width <= 0 || rect.height <= 0 || inside(rect.y, rect.height, 480));
     }
     let few = &candidates[..candidates.len().min(6)];
-    if few.iter().all(|c| c.weight.abs() < 1e3 && c.rect.x.unsigned_abs() < 10_000 && c.rect.y.unsigned_abs() < 10_000) {
+    if few
+        .iter()
+        .all(|c| c.weight.abs() < 1e3 && c.rect.x.unsigned_abs() < 10_000 && c.rect.y.unsigned_abs() < 10_000)
+    {
         let modes = mean_shift(few, case.modes, (64, 128), &Interrupt::NEVER).expect("it fits the memory");
         assert!(modes.len() <= few.len());
         assert!(modes.iter().all(|&(_, weight)| weight > case.modes));

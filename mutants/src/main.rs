@@ -107,8 +107,13 @@ impl VisitMut for Mutator<'_> {
     fn visit_stmt_mut(&mut self, stmt: &mut Stmt) {
         let line = stmt.span().start().line;
         let lost = match &*stmt {
-            Stmt::Expr(Expr::Call(_) | Expr::MethodCall(_) | Expr::Continue(_) | Expr::Assign(_), Some(_)) => true,
-            Stmt::Expr(Expr::Try(tried), Some(_)) => matches!(&*tried.expr, Expr::MethodCall(_) | Expr::Call(_)),
+            Stmt::Expr(
+                Expr::Call(_) | Expr::MethodCall(_) | Expr::Continue(_) | Expr::Assign(_),
+                Some(_),
+            ) => true,
+            Stmt::Expr(Expr::Try(tried), Some(_)) => {
+                matches!(&*tried.expr, Expr::MethodCall(_) | Expr::Call(_))
+            }
             _ => false,
         };
         let told: String = stmt.to_token_stream().to_string().chars().take(40).collect();
@@ -150,7 +155,8 @@ impl VisitMut for Mutator<'_> {
             Expr::Binary(binary) => {
                 for op in swapped(&binary.op) {
                     let mut other = binary.clone();
-                    let told = format!("{} for {}: {before}", op.to_token_stream(), binary.op.to_token_stream());
+                    let told =
+                        format!("{} for {}: {before}", op.to_token_stream(), binary.op.to_token_stream());
                     other.op = op;
                     *expr = self.either(&expr.clone(), &Expr::Binary(other), line, &told);
                 }
@@ -161,17 +167,24 @@ impl VisitMut for Mutator<'_> {
             Expr::Lit(ExprLit { lit: Lit::Int(int), .. }) => {
                 let Ok(value) = int.base10_parse::<u64>() else { return };
                 let more = syn::LitInt::new(&format!("{}{}", value + 1, int.suffix()), int.span());
-                *expr = self.either(&original, &parse_quote!(#more), line, &format!("{} for {value}", value + 1));
+                *expr =
+                    self.either(&original, &parse_quote!(#more), line, &format!("{} for {value}", value + 1));
             }
             Expr::Lit(ExprLit { lit: Lit::Float(float), .. }) => {
                 let Ok(value) = float.base10_parse::<f64>() else { return };
                 let other = if value == 0.0 { 1.0 } else { value * 2.0 };
                 let other = syn::LitFloat::new(&format!("{other:?}{}", float.suffix()), float.span());
-                *expr = self.either(&original, &parse_quote!(#other), line, &format!("{other} for {value:?}"));
+                *expr =
+                    self.either(&original, &parse_quote!(#other), line, &format!("{other} for {value:?}"));
             }
             Expr::Lit(ExprLit { lit: Lit::Bool(flag), .. }) => {
                 let other = !flag.value;
-                *expr = self.either(&original, &parse_quote!(#other), line, &format!("{other} for {}", flag.value));
+                *expr = self.either(
+                    &original,
+                    &parse_quote!(#other),
+                    line,
+                    &format!("{other} for {}", flag.value),
+                );
             }
             Expr::MethodCall(call) => {
                 let found = SWAPPED.iter().find(|(name, _)| call.method == name);

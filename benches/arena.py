@@ -20,7 +20,7 @@ from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import CameraPose
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.world.person import Pose
-from limo_sim.world.scenario import Scenario
+from limo_sim.world.scenario import Furniture, Scenario
 
 REPEATS = 5
 KEPT_M, STOP_M = 1.0, 0.4
@@ -77,6 +77,30 @@ def around(distance: float, people: int) -> Iterator[float]:
             yield least_ms(lambda poses=poses: renderer.render(CameraPose(0, 0, 0), poses, np.random.default_rng(1)))
 
 
+def crowd(distance: float) -> Iterator[float]:
+    """Cost of a frame [ms] with six people in two staggered rows from a distance [m] on, turned 8 ways."""
+    person = Scenario.load("standing").people
+    renderer = Renderer(Scenario(people=6 * person), np.random.default_rng(0))
+    for turn in range(8):
+        poses = [
+            Pose(distance * (1 + 0.15 * (n % 3)), (n - 2.5) * distance * 0.22, turn * math.tau / 8 + n, turn + n, 1.0)
+            for n in range(6)
+        ]
+        yield least_ms(lambda poses=poses: renderer.render(CameraPose(0, 0, 0), poses, np.random.default_rng(1)))
+
+
+def pillars(count: int) -> Iterator[float]:
+    """Cost of a frame [ms] with pillars in sight, 1.2 to 4.6 m away, placed 8 ways."""
+    for seed in range(8):
+        random, placed = np.random.default_rng(seed), list[Furniture]()
+        while len(placed) < count:
+            x, y = random.uniform((1.2, -3.0), (4.6, 3.0)).tolist()
+            if abs(y) < 0.6 * x and all(math.hypot(x - other.x, y - other.y) > 0.4 for other in placed):
+                placed.append(Furniture("pillar", x, y))
+        renderer = Renderer(Scenario(furniture=tuple(placed)), np.random.default_rng(0))
+        yield least_ms(lambda renderer=renderer: renderer.render(CameraPose(0, 0, 0), [], np.random.default_rng(1)))
+
+
 def summary(times: list[float]) -> str:
     """Median, 95th percentile and maximum."""
     return " ".join(f"{value:8.2f}" for value in (np.median(times), np.percentile(times, 95), max(times)))
@@ -96,6 +120,9 @@ def main() -> None:
     for people, word in ((1, "person"), (2, "two")):
         for distance in (0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 3.0, 4.0, 6.0):
             print(f"{f'{word} at {distance} m':20}{summary(list(around(distance, people)))}", flush=True)
+    for distance in (1.2, 2.0, 3.0, 4.0):
+        print(f"{f'six from {distance} m on':20}{summary(list(crowd(distance)))}", flush=True)
+    print(f"{'twenty pillars':20}{summary(list(pillars(20)))}", flush=True)
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ __all__ = [
     "default_people_detector",
     "get_num_threads",
     "group_rectangles",
+    "resize",
     "set_num_threads",
 ]
 
@@ -172,6 +173,7 @@ class Hog:
         scale: float,
         group_threshold: float,
         mean_shift: bool,
+        first_level: _Pair | None = None,
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Hits on all levels of a pyramid, grouped, and clipped to the image.
 
@@ -190,6 +192,9 @@ class Hog:
             `mean_shift`: the least density of a mode.
         mean_shift
             Group by the modes of the hits' density over place and scale (Dalal's thesis, 2006, chapter 5).
+        first_level
+            Width and height [px]: the image is resized to this before all else, as `resize` does; boxes are in its
+            pixels.
 
         Returns
         -------
@@ -221,6 +226,26 @@ def group_rectangles(
     -------
     rects, counts
         int32 (m, 4) and int32 (m,) numbers of members.
+    """
+
+def resize(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """Resize with linear interpolation, bit for bit as OpenCV's INTER_LINEAR_EXACT: the resize of the pyramid's levels.
+
+    Parameters
+    ----------
+    image
+        uint8 (H, W), (H, W, 1) or (H, W, 3), not empty.
+    width, height
+        The new size [px], at least 1 × 1. Enlarging is smooth; shrinking takes single pixels, without a mean.
+
+    Returns
+    -------
+    uint8 (height, width) or (height, width, C).
+
+    Raises
+    ------
+    ImageError
+        No such image, or no size of an image.
     """
 
 def default_people_detector() -> NDArray[np.float32]:

@@ -188,17 +188,19 @@ class PeopleDetector:
 
             image = as_array(image)
         image = pixels(image)
-        seen = self._at_search_size(image)
+        first_level = self._first_level(image)
         threshold = self._model.threshold if self.threshold is None else self.threshold
         group_threshold = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
         grouping = group_threshold if self.nms == "group" else 0
         hits = [
-            hog.detect_multi_scale(seen, threshold, self.win_stride, self.padding, self.scale, grouping, False)
+            hog.detect_multi_scale(
+                image, threshold, self.win_stride, self.padding, self.scale, grouping, False, first_level
+            )
             for hog in self._hogs
         ]
         boxes, scores = (np.concatenate(parts) for parts in zip(*hits, strict=True))
         kept, scores = self._one_of_many(boxes, scores, threshold)
-        zoom = np.array(seen.shape[1::-1]) / image.shape[1::-1]
+        zoom = np.array(first_level) / image.shape[1::-1]
         found = boxes[kept] / np.tile(zoom, 2)
         if self.max_height is not None:
             # A level's window is rounded to whole pixels.
@@ -207,21 +209,16 @@ class PeopleDetector:
         boxes = np.rint(found).astype(np.int32)
         return Detections(boxes, scores, self._model.person_box, self._model.calibration, searched)
 
-    def _at_search_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the image at the size at which the smallest person fills the model's window."""
+    def _first_level(self, image: NDArray[np.uint8]) -> tuple[int, int]:
+        """Return the size (x, y) [px] at which the smallest person in the image fills the model's window."""
         zoom = self._zoom
         width, height = (max(1, round(side * zoom)) for side in image.shape[1::-1])
-        if (height, width) == image.shape[:2]:
-            return image
         if width * height > _MOST_PIXELS:
             raise ImageError(
                 f"the image, {image.shape[1]} x {image.shape[0]} px, would be {width} x {height} px to find people of "
                 f"{self.min_height:g} px; at most {_MOST_PIXELS} pixels are allowed: raise min_height"
             )
-        # Imported here: most programs that import this package need it later or never.
-        from limo_hog.imaging.resize import resize
-
-        return resize(image, width, height)
+        return width, height
 
     def _one_of_many(
         self, windows: NDArray[np.int32], scores: NDArray[np.float64], threshold: float

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from limo_hog.cli.main import main
+from limo_sim.run.suite import Suite
 
 KEYS = [
     "scenario",
@@ -64,7 +66,7 @@ def test_without_json_a_person_reads_the_card(capsys: pytest.CaptureFixture[str]
     ("arguments", "message"),
     [
         (["--scenario", "moon"], "unknown scenario moon"),
-        (["--detector", "yolo"], "want one of hog, hog-half, hog-iou, hog-soft, cv2, onnx:FILE"),
+        (["--detector", "yolo"], "want one of hog, hog-half, hog-iou, hog-soft, cv2, hog:MODEL, onnx:FILE"),
         (["--detector", "onnx:absent.onnx"], "absent.onnx: no such file"),
         (["--controller", "approach", "--target", "1"], "holds no distance"),
     ],
@@ -115,6 +117,64 @@ def test_score_writes_a_line_for_each_run_from_the_first_seed_on(tmp_path: Path)
     assert set(cards[0]) - set(rows[0]) == {"modes", "reasons"}
 
 
-@pytest.mark.parametrize("arguments", [["--csv", "score.txt"], ["--seed-start", "-1"], ["--seeds", "0"]])
-def test_wrong_arguments_of_score_are_refused(arguments: list[str]) -> None:
-    assert main(["score", *arguments]) == 2
+def test_score_compares_with_one_of_the_controllers_run_by_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "score.json"
+    command = ["score", "--scenario", "empty", "followable", "--controller", "approach", "pursuit", "ppo"]
+    command += ["--against", "approach", "--seeds", "2", "--seconds", "1.2", "--workers", "1", "--json", str(out)]
+    assert main(command) == 0
+    result = json.loads(out.read_text())
+    path = {(run["scenario"], run["controller"], run["seed"]): run["path_m"] for run in result["runs"]}
+    assert all(path["followable", name, seed] > 0 for name in ("approach", "pursuit") for seed in (0, 1))
+    assert [(one["scenario"], one["controller"], one["pairs"]) for one in result["comparison"]] == [
+        ("empty", "pursuit", 2),
+        ("empty", "ppo", 2),
+        ("followable", "pursuit", 2),
+        ("followable", "ppo", 2),
+        ("all", "pursuit", 4),
+        ("all", "ppo", 4),
+    ]
+    view = {(run["controller"], run["seed"]): run["pixel_error_mean"] for run in result["runs"] if run["in_view"]}
+    wanted = sum(view["pursuit", seed] - view["approach", seed] for seed in (0, 1)) / 2
+    assert result["comparison"][2]["differences"]["pixel_error_mean"]["mean"] == pytest.approx(wanted)
+    assert "minus approach" in capsys.readouterr().out
+
+
+def test_a_suite_is_summed_up_by_group(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    v1 = Suite.load("v1")
+    short = replace(v1, seconds=0.2, scenarios=(v1.scenarios[0], v1.scenarios[1], v1.scenarios[-1]))
+    monkeypatch.setattr(Suite, "load", staticmethod(lambda _: short))
+    out, picture = tmp_path / "score.json", tmp_path / "score.png"
+    command = ["score", "--suite", "v1", "--controller", "approach", "--seeds", "1", "--workers", "1"]
+    assert main([*command, "--json", str(out), "--plot", str(picture)]) == 0
+    result = json.loads(out.read_text())
+    assert [run["scenario"] for run in result["runs"]] == ["stroll", "patrol", "clutter"]
+    assert {run["seconds"] for run in result["runs"]} == {0.2}
+    assert [(one["scenario"], one["runs"]) for one in result["groups"]] == [("plain", 2), ("places", 1), ("all", 3)]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    shown = capsys.readouterr().out
+    assert "plain" in shown
+    assert "places" in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["--csv", "score.txt"], 2, "wanted is a name that ends in .csv"),
+        (["--seed-start", "-1"], 2, "no seed"),
+        (["--seeds", "0"], 2, "no count"),
+        (["--suite", "v1", "--scenario", "empty"], 2, "not allowed with"),
+        (["--suite", "v0"], 1, "unknown suite v0: want one of v1"),
+        (["--suite", "v1", "--seconds", "60"], 2, "a run of this suite takes 40 s"),
+        (["--controller", "policy:none.npz"], 1, "none.npz: cannot be read as a policy"),
+        (["--controller", "approach", "--against", "ppo"], 2, "--against ppo: is none of the controllers"),
+    ],
+)
+def test_wrong_arguments_of_score_are_refused(
+    arguments: list[str], code: int, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["score", *arguments]) == code
+    assert told in capsys.readouterr().err

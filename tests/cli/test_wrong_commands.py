@@ -50,7 +50,10 @@ WRONG_ARGUMENTS = [
     ("follow --json folder", "'folder' is a folder"),
     ("score --plot compared.txt", "'compared.txt': wanted is a name that ends in .png or .svg or .pdf"),
     ("score --seeds 0", "'0' is no count"),
-    ("score --controller zigzag", "invalid choice: 'zigzag' (choose from"),
+    (
+        "score --controller zigzag",
+        "'zigzag' is no controller; wanted is one of approach, proxemic, tracking, pursuit, ppo",
+    ),
     ("arena", "give --ros2, --view, --video or --record"),
     ("run", "the following arguments are required: NODE.py"),
     ("run node.py --real --json card.json", "a script on the network is not scored"),

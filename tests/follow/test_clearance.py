@@ -9,8 +9,18 @@ import pytest
 from tests.follow.views import flat, scan
 
 from limo_hog.follow.control.detour import Detour
-from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.clearance import DepthGrid, Margin, room_ahead, room_behind, scan_points, speed_within
+from limo_hog.follow.robot import LIMO, RobotGeometry
+from limo_hog.follow.sense.clearance import (
+    DepthGrid,
+    Margin,
+    from_odometry,
+    room_ahead,
+    room_behind,
+    scan_points,
+    speed_within,
+    to_odometry,
+)
+from limo_hog.follow.sense.observation import Odometry
 
 MARGIN = Margin(0.5, 0.2)
 
@@ -29,6 +39,18 @@ def test_an_obstacle_beside_the_way_is_passed_and_one_in_it_is_not() -> None:
 def test_towards_the_side_the_margin_is_an_ellipse() -> None:
     # Half the margin to the side: cos of 30 degrees of the margin ahead.
     assert room_ahead(np.array([[1.0, 0.11 + 0.1]]), MARGIN, LIMO) == pytest.approx(0.855 - 0.5 * math.sqrt(0.75))
+
+
+def test_a_door_of_80_cm_is_passed_and_one_of_60_cm_is_not() -> None:
+    posts = np.array([[1.0, 1.0], [1.0, -1.0]])
+    assert room_ahead(posts * (1.0, 0.4), Margin(), LIMO) == math.inf
+    assert room_ahead(posts * (1.0, 0.3), Margin(), LIMO) < 1.0 - 0.145
+
+
+def test_what_touches_the_ellipse_only_from_the_side_is_passed() -> None:
+    robot, margin = RobotGeometry(half_width=0.125), Margin(0.5, 0.25)
+    assert room_ahead(np.array([[1.0, 0.375]]), margin, robot) == math.inf
+    assert room_ahead(np.array([[1.0, 0.374]]), margin, robot) < math.inf
 
 
 def test_what_is_behind_is_not_in_the_way_ahead_nor_the_other_way_round() -> None:
@@ -65,6 +87,49 @@ def test_the_floor_is_no_obstacle() -> None:
     assert len(DepthGrid().points(np.broadcast_to(floor, (480, 640)), 448.6, 1.8, LIMO)) == 0
 
 
+@pytest.mark.parametrize(("height", "seen"), [(0.03, False), (0.08, True)])
+def test_what_is_higher_than_5_cm_is_an_obstacle(height: float, seen: bool) -> None:
+    # At 1 m, a pixel is 1 / 448.6 m high; the camera is 0.175 m above the floor.
+    row = round(239.5 + (0.175 - height) * 448.6)
+    depth = flat(np.nan)
+    depth[row] = 1.0
+    assert len(DepthGrid(step=1).points(depth, 448.6, 1.8, LIMO)) == (640 if seen else 0)
+
+
+def test_the_height_of_a_pixel_is_that_of_its_middle() -> None:
+    depth = flat(np.nan)
+    depth[300, 5] = 1.0
+    height = 0.175 - 60.5 / 448.6
+    assert len(DepthGrid(step=1, floor=height - 2e-4).points(depth, 448.6, 1.8, LIMO)) == 1
+    assert len(DepthGrid(step=1, floor=height + 2e-4).points(depth, 448.6, 1.8, LIMO)) == 0
+
+
+def test_the_pixels_looked_at_lie_8_apart_as_far_from_either_edge() -> None:
+    sideways = DepthGrid().points(flat(1.0), 448.6, 1.8, LIMO)[:, 1] * 448.6
+    columns = np.unique(np.round(sideways, 3))
+    assert np.diff(columns) == pytest.approx(8.0)
+    assert columns.max() == pytest.approx(-columns.min(), abs=1.01)
+    assert 320 - columns.max() < 8
+    # Rows too: the upper edge is as near to a row looked at as the left edge to a column.
+    edge = flat(np.nan)
+    edge[:5] = 1.0
+    assert len(DepthGrid().points(edge, 448.6, 1.8, LIMO)) == 80
+    assert len(DepthGrid().points(np.where(np.arange(480)[:, None] < 4, edge, np.nan), 448.6, 1.8, LIMO)) == 0
+
+
+def test_depth_of_exactly_the_reach_and_of_nothing_is_no_point() -> None:
+    assert len(DepthGrid().points(flat(1.5), 448.6, 1.5, LIMO)) == 0
+    assert len(DepthGrid().points(flat(0.0), 448.6, 1.5, LIMO)) == 0
+
+
+def test_points_go_to_the_odometry_frame_and_back() -> None:
+    pose = Odometry(x=1.0, y=2.0, yaw=math.radians(30))
+    ahead, left = to_odometry(np.array([[1.0, 0.0], [0.0, 1.0]]), pose)
+    assert ahead == pytest.approx([1 + math.cos(math.radians(30)), 2.5])
+    assert left == pytest.approx([0.5, 2 + math.cos(math.radians(30))])
+    assert from_odometry(np.stack([ahead, left]), pose) == pytest.approx(np.eye(2))
+
+
 def test_a_depth_pixel_becomes_a_point_of_the_base_frame() -> None:
     depth = flat(np.nan)
     depth[100, 500] = 1.2
@@ -78,6 +143,16 @@ def test_a_way_that_is_free_half_as_far_is_taken_and_a_shorter_one_is_not() -> N
     detour = Detour()
     assert detour.heading(wall(1.5), 0.0, 4.0, 0.0, LIMO) == 0.0
     assert detour.heading(wall(1.1), 0.0, 4.0, 0.0, LIMO) is None
+
+
+def test_the_way_to_the_person_is_looked_at_no_further_than_the_look_ahead_and_up_to_their_legs() -> None:
+    # 1.2 m of way, .145 m of robot and .65 m of margin: a wall at 2 m is as good as none, one at 1.98 m is not.
+    detour = Detour(steps=0)
+    assert detour.heading(wall(2.0), 0.0, 4.0, 0.0, LIMO) == 0.0
+    assert detour.free(wall(1.98), 0.0, 0.0, 1.2, LIMO) is None
+    # A person at 1.7 m: what is free up to .9 m before them is enough.
+    assert detour.heading(wall(1.6), 0.0, 1.7, 0.0, LIMO) == 0.0
+    assert detour.heading(wall(1.19), 0.0, 1.7, 0.0, LIMO) is None
 
 
 def test_of_two_ways_around_the_preferred_one_is_taken() -> None:

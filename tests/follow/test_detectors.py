@@ -121,7 +121,7 @@ def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) ->
         detector_named(f"onnx:{broken}")
     with pytest.raises(DetectorError, match="no such file"):
         detector_named("onnx:absent.onnx")
-    with pytest.raises(DetectorError, match="want one of hog, hog-half, hog-iou, hog-soft, cv2, onnx:FILE"):
+    with pytest.raises(DetectorError, match="want one of hog, hog-half, hog-iou, hog-soft, cv2, hog:MODEL, onnx:FILE"):
         detector_named("yolo")
 
 

@@ -93,11 +93,11 @@ def test_a_picture_on_a_wall_stands_out_from_nothing_whatever_side_it_is_seen_fr
 
 
 def test_a_person_before_a_wall_stands_out_by_the_distance_to_it() -> None:
-    assert stands_out(before_wall(2.0, tuple(BOX.tolist()), 2.6), BOX) == pytest.approx(0.6)  # type: ignore[arg-type]
+    assert stands_out(before_wall(2.0, tuple(BOX.tolist()), 2.6), BOX) == pytest.approx(0.6)
 
 
 def test_what_has_no_depth_beside_it_stands_out_and_without_any_nothing_is_known() -> None:
-    depth = before_wall(2.0, tuple(BOX.tolist()), np.nan)  # type: ignore[arg-type]
+    depth = before_wall(2.0, tuple(BOX.tolist()), np.nan)
     relief = stands_out(depth, BOX)
     assert relief is not None
     assert relief > 5

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Noise, bearing_range, initiate, innovation, predict, rates, update
@@ -82,3 +83,55 @@ def test_at_an_earlier_stamp_the_person_is_where_they_came_from() -> None:
     before = predict(track, 4.0, NOISE)
     assert before.mean == pytest.approx([3.0, 0.5, 0.0, 0.5])
     assert before.stamp == 4.0
+
+
+@pytest.mark.parametrize("pose", [HERE, Odometry(x=1.0, y=-2.0, yaw=0.7), Odometry(x=-1.5, y=3.0, yaw=-2.0)])
+def test_the_jacobian_is_the_slope_of_bearing_and_range(pose: Odometry) -> None:
+    track = replace(initiate(0.0, 0.3, 2.0, pose, NOISE), stamp=0.0)
+    found = innovation(track, 0.3, 2.0, pose, NOISE).jacobian
+    for axis in range(4):
+        ends = []
+        for side in (1e-6, -1e-6):
+            mean = track.mean.copy()
+            mean[axis] += side
+            ends.append(np.array(bearing_range(replace(track, mean=mean), pose)))
+        assert found[:, axis] == pytest.approx((ends[0] - ends[1]) / 2e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("pose", [Odometry(x=1.0, y=-2.0, yaw=0.7), Odometry(x=-1.5, y=3.0, yaw=-2.0)])
+def test_rates_are_how_bearing_and_range_change_with_the_persons_velocity(pose: Odometry) -> None:
+    track = replace(initiate(0.0, 0.3, 2.0, pose, NOISE), stamp=0.0)
+    track = replace(track, mean=track.mean + np.array([0.0, 0.0, 0.4, -0.9]))
+    ends = []
+    for dt in (1e-6, -1e-6):
+        moved = track.mean.copy()
+        moved[:2] += dt * moved[2:]
+        ends.append(np.array(bearing_range(replace(track, mean=moved), pose)))
+    assert rates(track, pose) == pytest.approx(tuple((ends[0] - ends[1]) / 2e-6), abs=1e-6)
+
+
+def test_a_prediction_is_the_integral_of_a_velocity_that_fades_and_of_white_acceleration() -> None:
+    track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.4, -0.8]))
+    for dt in (0.1, 0.7, 2.0):
+        later = predict(track, dt, NOISE)
+        times = np.linspace(0.0, dt, 20_001)
+        fading = np.exp(-times / NOISE.persistence)
+        assert later.mean[2:] == pytest.approx(track.mean[2:] * fading[-1])
+        assert later.mean[:2] == pytest.approx(track.mean[:2] + track.mean[2:] * trapezoid(fading, times), rel=1e-6)
+        # What was uncertain is carried along, and what accelerates meanwhile is added: dt³/3, dt²/2 and dt.
+        move = np.eye(4)
+        move[[0, 1], [2, 3]], move[[2, 3], [2, 3]] = trapezoid(fading, times), fading[-1]
+        added = later.covariance - move @ track.covariance @ move.T
+        left = dt - times
+        q = NOISE.acceleration**2
+        assert added[0, 0] == pytest.approx(q * trapezoid(left**2, times), rel=1e-4)
+        assert added[1, 3] == pytest.approx(q * trapezoid(left, times), rel=1e-4)
+        assert added[3, 3] == pytest.approx(q * dt)
+        assert added[0, 1] == added[0, 3] == pytest.approx(0.0)
+
+
+def test_a_predicted_track_of_the_same_stamp_is_the_track() -> None:
+    track = predict(initiate(0.0, 0.2, 3.0, HERE, NOISE), 1.0, NOISE)
+    same = predict(track, 1.0, NOISE)
+    assert same.mean == pytest.approx(track.mean)
+    assert same.covariance == pytest.approx(track.covariance)

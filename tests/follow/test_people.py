@@ -19,6 +19,7 @@ from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to, initiate, predict
 from limo_hog.follow.tracks.tracker import Tracker
+from limo_hog.follow.tracks.trust import Trust
 
 NOISE, POSE, TRACKER = Noise(), Odometry(), Tracker()
 APPEARANCE = TRACKER.association.appearance
@@ -191,3 +192,30 @@ def test_outside_the_region_searched_a_person_is_not_expected() -> None:
 def test_a_person_behind_something_is_not_expected() -> None:
     assert not expected(3.0, depth=flat(2.4))
     assert expected(3.0, depth=flat(2.6))
+
+
+@pytest.mark.parametrize(("turn", "range_"), [(0.0, 2.5), (0.4, 2.0), (-0.7, 3.1), (2.0, 1.0)])
+def test_the_distance_to_a_box_with_a_range_is_that_of_two_points_in_the_plane(turn: float, range_: float) -> None:
+    pose = Odometry(0.0, 1.0, -2.0, 0.8)
+    person = initiate(1, Measurement(0.2, 2.0, 120, 0.0, 1.0), 0.0, pose, NOISE, UnknownRange())
+    seen = Measurement(0.2 + turn, range_, 120, 0.0, 1.0)
+    there = [(r * math.cos(b), r * math.sin(b)) for b, r in ((0.2, 2.0), (0.2 + turn, range_))]
+    assert distance_to(person, seen, pose) == pytest.approx(math.dist(*there))
+
+
+def test_misses_are_counted_since_the_last_evidence() -> None:
+    person = initiate(1, Measurement(0.0, 2.0, 120, 0.0, 1.0), 0.0, POSE, NOISE, UnknownRange())
+    counted = []
+    for evidence in (0.5, 0.0, 0.0, 0.0, 1.0, 0.0):
+        person = Trust().update_trust(person, evidence)
+        counted.append((person.misses, person.age))
+    assert counted == [(0, 2), (1, 3), (2, 4), (3, 5), (0, 6), (1, 7)]
+
+
+def test_clothes_of_which_one_number_is_missing_are_unknown() -> None:
+    clothes = np.stack([IN_RED, IN_GREEN])
+    clothes[0, 1, 2] = np.nan
+    view = replace(look(boxes((300, 100, 60, 120), (100, 100, 60, 120))), depth=flat(2.0), clothes=clothes)
+    first, second = measure(view, LIMO)
+    assert first.clothes is None
+    np.testing.assert_array_equal(second.clothes, IN_GREEN)

@@ -142,6 +142,58 @@ def test_the_depth_image_limits_the_speed_as_far_as_its_reach(depth: float) -> N
     assert linear == pytest.approx(speed_within(room, guard.braking, guard.reaction_s), abs=1e-3)
 
 
+@pytest.mark.parametrize(("free", "speed"), [(0.0, 0.0), (0.09, 0.2), (0.375, 0.5), (0.84, 0.8)])
+def test_the_robot_stops_60_cm_before_an_obstacle_after_a_quarter_second_by_half_its_brakes(
+    free: float, speed: float
+) -> None:
+    # speed · 0.25 s + speed² / (2 · 0.5 m/s²) is the free way; the camera is .061 m behind the robot's front.
+    view = replace(look(), scan=scan(), depth=flat(free + 0.6 + 0.061))
+    assert ahead(2.0).step(view, ahead().start()).twist.linear == pytest.approx(speed, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("box", "faulty"),
+    [
+        ((-32, 100, 64, 128), False),
+        ((-33, 100, 64, 128), True),
+        ((607, 100, 64, 128), False),
+        ((608, 100, 64, 128), True),
+        ((100, -64, 64, 128), False),
+        ((100, -65, 64, 128), True),
+        ((100, 415, 64, 128), False),
+        ((100, 416, 64, 128), True),
+        ((100, 100, 1, 1), False),
+        ((100, 100, 64, 0), True),
+    ],
+)
+def test_a_box_whose_middle_is_no_pixel_of_the_image_is_a_fault(box: tuple[int, int, int, int], faulty: bool) -> None:
+    decision = ahead().step(look(boxes(box)), ahead().start())
+    assert (decision.mode is Mode.BLOCKED) is faulty
+
+
+def test_one_depth_pixel_and_one_beam_are_enough_to_go_by() -> None:
+    depth, ranges = flat(np.nan), np.full(292, np.nan, np.float32)
+    depth[3, 4], ranges[7] = 5.0, 5.0
+    decision = ahead().step(replace(look(), depth=depth, scan=scan(ranges)), ahead().start())
+    assert decision.twist.linear == 0.5
+
+
+def test_depth_beyond_its_reach_is_left_to_the_lidar() -> None:
+    # The robot's length, the margin and a metre: 1.89 m from the camera.
+    for depth, free in ((1.85, False), (1.93, True)):
+        view = replace(look(), scan=scan(), depth=flat(depth))
+        assert (ahead(2.0).step(view, ahead().start()).twist.linear == 2.0) is free
+
+
+def test_a_fault_of_the_same_instant_forgets_nothing() -> None:
+    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
+    there = replace(look(stamp=1.0), scan=scan_of([(0.6, 0.0)], 1.0), odometry=Odometry(1.0))
+    state = guard.step(there, guard.start()).state
+    faulty = guard.step(replace(look(stamp=1.0), fault="dark"), state).state
+    assert len(faulty.scan_points) == len(state.scan_points) > 0
+    assert faulty.inner == state.inner == 1
+
+
 def test_backwards_it_goes_slowly_for_it_does_not_look_there() -> None:
     guard = Guard(Headstrong(Twist(-0.7, 0.2)))
     decision = guard.step(replace(look(), scan=scan()), guard.start())

@@ -50,11 +50,11 @@ def test_the_robot_turns_before_it_drives_to_the_side() -> None:
     assert command(at(2.0, 2.5))[0].linear == 0
 
 
-def test_where_no_direction_is_free_it_backs_off() -> None:
+def test_where_no_direction_is_free_it_stands() -> None:
     twist, mode, reason = command(replace(at(3.0), heading=None))
-    assert twist.linear == -0.15
+    assert twist.linear == 0
     assert mode is Mode.BLOCKED
-    assert reason == "backing off: no free way to the person"
+    assert reason == "no free way to the person"
 
 
 def test_a_detour_is_driven_in_its_own_direction() -> None:

@@ -80,7 +80,7 @@ def test_it_coasts_over_missing_frames_and_says_where_it_looks() -> None:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_somebody_gone_is_lost_and_searched_for_the_way_they_went(side: float) -> None:
-    world = World(person=(3.0, side * -1.0), velocity=(0.0, side * 0.4))
+    world = World(person=(3.0, side * -1.0), velocity=(0.0, side * 0.4), lidar=False)
     state = run(world, 4.0).state
     decision = run(world, 1.5, state, visible=False)
     assert decision.mode is Mode.LOST
@@ -149,7 +149,7 @@ def lost(world: World) -> TrackingState:
         state = decision.state
         world.time += world.period
     assert decision.mode is Mode.LOST
-    assert decision.reason == "searching for the lost person"
+    assert "lost person" in decision.reason
     return state
 
 
@@ -197,7 +197,7 @@ def test_the_search_keeps_its_side_though_the_predicted_bearing_changes_sign() -
     for frame in range(75):
         noise = 0.02 if frame % 4 < 2 else -0.02
         odometry = Odometry(world.time, x, y, yaw + noise)
-        view = replace(world.observe(visible=False), odometry=odometry, depth=flat(1.2))
+        view = replace(world.observe(visible=False), odometry=odometry, depth=flat(1.2), scan=None)
         decision = CONTROLLER.step(view, state)
         state = decision.state
         world.time += world.period
@@ -219,7 +219,7 @@ def test_legs_alone_are_followed_for_four_seconds() -> None:
         world.time += world.period
     assert all(modes[frame] is Mode.HOLD for frame in range(1, 40))
     assert modes[51] is Mode.LOST
-    assert decision.reason == "searching for the lost person"
+    assert "lost person" in decision.reason
 
 
 def test_it_asks_for_the_part_of_the_image_where_the_person_will_be() -> None:
@@ -281,7 +281,7 @@ def test_it_goes_around_a_pillar_between() -> None:
     )
     decision = CONTROLLER.step(view, state)
     assert decision.reason == "driving around an obstacle"
-    assert abs(decision.twist.angular) > 0.3
+    assert abs(decision.twist.angular) > 0.2
 
 
 def test_nothing_depends_on_anything_but_what_is_handed_in() -> None:

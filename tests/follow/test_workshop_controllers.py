@@ -45,6 +45,12 @@ def test_proxemic_holds_its_distance_within_its_limits(depth: float, linear: flo
     assert ProxemicController().step(view, False).twist.linear == pytest.approx(linear, abs=1e-6)
 
 
+@pytest.mark.parametrize(("cx", "angular"), [(320, 0.0), (319, 0.005), (280, 0.2), (360, -0.2), (520, -0.8)])
+def test_proxemic_turns_by_gain_times_error(cx: int, angular: float) -> None:
+    view = replace(look(boxes((cx - 30, 100, 60, 120))), depth=flat(2.0))
+    assert ProxemicController().step(view, False).twist.angular == pytest.approx(angular)
+
+
 def test_proxemic_limits_its_turn() -> None:
     view = replace(look(boxes((0, 100, 60, 120))), depth=flat(2.0))
     assert ProxemicController().step(view, False).twist.angular == 0.8

@@ -76,6 +76,7 @@ class World:
     robot: tuple[float, float, float] = (0.0, 0.0, 0.0)
     time: float = 0.0
     period: float = 0.1
+    lidar: bool = True
 
     @property
     def bearing(self) -> float:
@@ -91,7 +92,12 @@ class World:
         x, y, yaw = self.robot
         depth = self.distance * math.cos(self.bearing) - 0.084
         odometry = Odometry(self.time, x, y, yaw)
-        seen = replace(look(stamp=self.time), depth=flat(8.0), scan=scan(stamp=self.time), odometry=odometry)
+        seen = replace(
+            look(stamp=self.time),
+            depth=flat(8.0),
+            scan=scan(stamp=self.time) if self.lidar else None,
+            odometry=odometry,
+        )
         if not visible or abs(self.bearing) > 0.55:
             return seen
         height = 0.9 * FOCAL / depth

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.learn.bollards import example
+from tests.learn import bollards as drawn
 
 from limo_hog.imaging.writing import write_image
 from limo_hog.learn.card import calibrate, calibration_error
@@ -24,7 +24,7 @@ SMALL = TrainingParameters(rounds=2, mining=MiningParameters(random_windows=400)
 @pytest.fixture(scope="module")
 def bollards(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bollards")
-    example().write(folder, pictures=20, seed=0)
+    drawn.write(folder, pictures=20, seed=0)
     return folder
 
 

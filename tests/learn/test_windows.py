@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from limo_hog.imaging.resize import resize
+from limo_hog._core import resize
 from limo_hog.learn.labels import Box, Picture
 from limo_hog.learn.windows import Jitter, WindowShape, cut, positive_crops, positive_regions, random_boxes, shape_for
 from limo_hog.models import PersonBox

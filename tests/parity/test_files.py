@@ -164,7 +164,7 @@ def test_a_file_that_is_no_model_is_refused_and_changes_nothing(
     path.write_text(text)
     hog = HOGDescriptor()
     hog.setSVMDetector(hog.getDefaultPeopleDetector())
-    before = HOGDescriptor(*hog._geometry)
+    before = HOGDescriptor(*hog._state.geometry)
     before.setSVMDetector(hog.svmDetector)
     with pytest.raises(error, match=told):
         hog.load(path)

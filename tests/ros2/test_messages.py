@@ -106,6 +106,47 @@ def test_odometry_keeps_its_yaw_through_the_quaternion(yaw: float) -> None:
     assert (back.stamp, back.x, back.y, back.linear, back.angular) == (3.25, 1.0, -2.0, 0.2, -0.4)
 
 
+def test_an_odometry_message_is_flat_on_the_floor_and_without_covariance() -> None:
+    message = messages.odometry(Odometry(3.25, 1.0, -2.0, 0.4, 0.2, -0.4))
+    pose, speed = message.pose.pose, message.twist.twist
+    assert (pose.position.x, pose.position.y, pose.position.z) == (1.0, -2.0, 0.0)
+    assert (pose.orientation.x, pose.orientation.y) == (0.0, 0.0)
+    assert (pose.orientation.z, pose.orientation.w) == pytest.approx((math.sin(0.2), math.cos(0.2)))
+    parts = (speed.linear, speed.angular)
+    assert [(part.x, part.y, part.z) for part in parts] == [(0.2, 0.0, 0.0), (0.0, 0.0, -0.4)]
+    assert not message.pose.covariance.any()
+    assert not message.twist.covariance.any()
+
+
+def test_camera_info_is_the_pinhole_of_rep_104() -> None:
+    info = messages.camera_info(1.0, 640, 480, 448.6)
+    pinhole = np.array([[448.6, 0, 319.5], [0, 448.6, 239.5], [0, 0, 1]])
+    np.testing.assert_array_equal(info.k.reshape(3, 3), pinhole)
+    np.testing.assert_array_equal(info.r.reshape(3, 3), np.eye(3))
+    np.testing.assert_array_equal(info.p.reshape(3, 4), np.column_stack([pinhole, np.zeros(3)]))
+    assert (info.width, info.height, info.distortion_model) == (640, 480, "plumb_bob")
+    assert not info.d.any()
+    region = info.roi
+    unused = (info.binning_x, info.binning_y, region.x_offset, region.y_offset, region.height, region.width)
+    assert unused == (0, 0, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "channels", "size"),
+    [
+        *(("mono8", 1, 1), ("8UC1", 1, 1), ("bgr8", 3, 1), ("rgb8", 3, 1), ("8UC3", 3, 1), ("bgra8", 4, 1)),
+        *(("rgba8", 4, 1), ("16UC1", 1, 2), ("32FC1", 1, 4)),
+    ],
+)
+def test_every_encoding_is_read_with_its_channels_and_size(encoding: str, channels: int, size: int) -> None:
+    message = messages.default_message("sensor_msgs/msg/Image")
+    message.height, message.width, message.encoding, message.step = 2, 3, encoding, 3 * channels * size
+    message.data = np.arange(2 * 3 * channels * size, dtype=np.uint8)
+    found = messages.pixels_of(message)
+    assert found.shape == ((2, 3) if channels == 1 else (2, 3, channels))
+    assert found.dtype.itemsize == size
+
+
 def test_a_jpeg_looks_like_its_picture() -> None:
     cv2 = pytest.importorskip("cv2")
     pixels = np.full((32, 48, 3), (200, 100, 50), np.uint8)

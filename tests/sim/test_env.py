@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import warnings
 from collections.abc import Callable
@@ -20,6 +21,9 @@ from limo_sim.sensing.camera import FOCAL_PX
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.world.scenario import Person, Robot, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
+
+# Whoever makes v0 by name is told of v1.
+pytestmark = pytest.mark.filterwarnings("ignore:.*LimoFollow-v0 is out of date")
 
 STRAIGHT = np.array([0.2, 0.0], np.float32)
 
@@ -60,6 +64,49 @@ def test_an_observation_is_finite_and_shows_the_arena() -> None:
     assert all(np.isfinite(part).all() for part in observation.values())
     assert 0.3 < np.median(observation["depth"][400:]) < 0.6
     assert observation["odometry"][3] > 0
+
+
+def test_the_spaces_hold_all_that_a_sensor_may_say() -> None:
+    observed = LimoFollow("empty").observation_space
+    assert isinstance(observed, gymnasium.spaces.Dict)
+    for name, top in (("image", 255), ("depth", Scenario().depth.far_m), ("scan", 8.0)):
+        space = observed[name]
+        assert isinstance(space, gymnasium.spaces.Box)
+        assert (space.low.min(), space.low.max()) == (0, 0)
+        assert space.high.max() == pytest.approx(top)
+
+
+def test_depth_that_is_unknown_or_out_of_range_is_0(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = LimoFollow("empty")
+    env.reset(seed=0)
+    frame = env._running().frame()
+    depth = frame.depth.copy()
+    depth[0, :3] = np.nan, np.inf, -np.inf
+    monkeypatch.setattr(type(env._running()), "frame", lambda _: dataclasses.replace(frame, depth=depth))
+    assert env._observe()["depth"][0, :3].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_the_distance_is_that_of_the_scenarios_first_person() -> None:
+    people = (Person(route=((3.0, 0.0, 3600.0),)), Person(route=((2.0, 1.0, 3600.0),)))
+    env = LimoFollow(Scenario(people=people))
+    env.reset(seed=0)
+    *_, info = env.step(np.zeros(2, np.float32))
+    assert info["distance"] == pytest.approx(3.0)
+
+
+def test_every_reset_of_random_makes_up_another_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+    numbers = []
+
+    def noted(number: int) -> Scenario:
+        numbers.append(number)
+        return Scenario()
+
+    monkeypatch.setattr("limo_sim.env.made_up", noted)
+    monkeypatch.setattr(LimoFollow, "_observe", lambda _: {})
+    env = LimoFollow("random")
+    for _ in range(300):
+        env.reset()
+    assert len(set(numbers)) == 300
 
 
 def run(seed: int) -> list[Any]:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from limo_hog.imaging.drawing import BLUE, GREEN, RED, annotate
+from limo_hog.imaging.drawing import BLUE, CHOSEN, OTHER, annotate
 
 BOXES = np.array([[100, 60, 64, 128], [300, 100, 96, 192]], np.int32)
 
 
 def test_the_target_is_red_with_a_blue_centre_and_the_others_are_green() -> None:
     picture = annotate(np.full((480, 640, 3), 128, np.uint8), BOXES, target=1)
-    assert tuple(picture[60 + 64, 100]) == GREEN
-    assert tuple(picture[100 + 96, 300]) == RED
+    assert tuple(picture[60 + 64, 100]) == OTHER
+    assert tuple(picture[100 + 96, 300]) == CHOSEN
     assert tuple(picture[100 + 96, 300 + 48]) == BLUE
     assert tuple(picture[60 + 64, 100 + 32]) == (128, 128, 128)
 

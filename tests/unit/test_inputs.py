@@ -69,6 +69,12 @@ def test_a_file_that_is_no_picture_is_named(tmp_path: Path) -> None:
         PeopleDetector().detect(tmp_path)
 
 
+@pytest.mark.parametrize("name", ["a\0b.jpg", "\ud800.jpg"])
+def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
+    with pytest.raises(ImageError, match="is no file's name"):
+        PeopleDetector().detect(name)
+
+
 def test_what_is_neither_is_refused_as_before() -> None:
     for image in ([[1, 2]], 7, None):
         with pytest.raises(ImageTypeError, match="an image is a uint8 numpy array"):

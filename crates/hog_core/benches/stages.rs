@@ -8,6 +8,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use hog_core::pyramid::Pyramid;
 use hog_core::{Backend, Grouping, Hog, HogParams, ImageView, Interrupt, Search, Size, model, pyramid};
 
 const WIDTH: usize = 640;
@@ -60,7 +61,14 @@ fn fast_path(criterion: &mut Criterion) {
             let grouping = Grouping::Similar(2);
             group.bench_function("pyramid", |b| {
                 b.iter(|| {
-                    hog.detect_multi_scale(black_box(image), &SEARCH, 1.05, grouping, 1, &Interrupt::NEVER)
+                    hog.detect_multi_scale(
+                        black_box(image),
+                        &SEARCH,
+                        &Pyramid { first: None, scale: 1.05 },
+                        grouping,
+                        1,
+                        &Interrupt::NEVER,
+                    )
                 });
             });
         }

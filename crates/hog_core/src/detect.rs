@@ -1,27 +1,35 @@
 //! Composes the stages: descriptors and hits of one image, and of a whole pyramid on several threads.
 
+use std::sync::Arc;
+
 use crate::error::{BackendError, ParameterError, Result};
 use crate::exact::{self, Gradient, Svm, Tables};
 use crate::fast::{self, Backend, Plan, Planes};
 use crate::geometry::{Padding, Rect, Size};
 use crate::group::{Candidate, clip, group_candidates, mean_shift};
-use crate::image::ImageView;
+use crate::image::{Image, ImageView};
 use crate::interrupt::Interrupt;
 use crate::memory::{self, Pool};
 use crate::params::{HogParams, HogSpec};
-use crate::pyramid::{Level, Steps, levels, to_image};
-use crate::rescore::{Fast, Hit, SCRATCH, Scorer};
+use crate::pyramid::{Grid, Level, Pyramid, Steps, check, levels, resize, to_image};
+use crate::rescore::{Hit, LevelWindows, Scorer};
 use crate::threads::in_order;
 
 /// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
 #[derive(Debug, Clone)]
 pub struct Hog {
+    exact: Arc<Exact>,
+    /// The fast path, where the geometry has one.
+    plan: Option<Arc<Plan>>,
+    backend: Backend,
+}
+
+/// What the exact path needs.
+#[derive(Debug)]
+struct Exact {
     spec: HogSpec,
     tables: Tables,
     svm: Option<Svm>,
-    /// The fast path, where the geometry has one.
-    plan: Option<Plan>,
-    backend: Backend,
 }
 
 /// The image in planes for the fast path, shared by all levels of a call.
@@ -64,12 +72,13 @@ impl Hog {
         let spec = HogSpec::new(params)?;
         let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
         let plan = svm.as_ref().and_then(|svm| fast::plan(backend, &spec, svm));
-        Ok(Self { tables: Tables::new(&spec)?, spec, svm, plan, backend })
+        let exact = Exact { tables: Tables::new(&spec)?, spec, svm };
+        Ok(Self { exact: Arc::new(exact), plan: plan.map(Arc::new), backend })
     }
 
     /// The checked geometry.
     pub fn spec(&self) -> &HogSpec {
-        &self.spec
+        &self.exact.spec
     }
 
     /// The gradient of the image with `left`, `top`, `right`, `bottom` columns and rows more (or fewer) around it.
@@ -94,7 +103,7 @@ impl Hog {
             return Err(ParameterError::PaddedArea { width: size.width, height: size.height }.into());
         }
         let padding = Padding { left, top, size };
-        Ok((exact::gradient(image, padding, &self.spec, &self.tables, interrupt)?, size))
+        Ok((exact::gradient(image, padding, self.spec(), &self.exact.tables, interrupt)?, size))
     }
 
     /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).
@@ -106,9 +115,9 @@ impl Hog {
         search: &Search,
         locations: Option<&[(i64, i64)]>,
     ) -> Result<usize> {
-        let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
+        let grid = self.steps(search, self.spec().cell)?.grid(image.size(), self.spec());
         let windows = locations.map_or(grid.len(), <[_]>::len);
-        let elements = self.spec.descriptor_len();
+        let elements = self.spec().descriptor_len();
         let all = windows.saturating_mul(elements);
         if all > i32::MAX as usize {
             return Err(ParameterError::Descriptors { windows, elements }.into());
@@ -127,14 +136,16 @@ impl Hog {
         interrupt: &Interrupt,
         out: &mut [f32],
     ) -> Result<()> {
-        let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
+        let grid = self.steps(search, self.spec().cell)?.grid(image.size(), self.spec());
         let Some(locations) = locations else {
-            return exact::descriptors(image, &grid, &self.spec, &self.tables, interrupt, out);
+            return exact::descriptors(image, &grid, self.spec(), &self.exact.tables, interrupt, out);
         };
-        let places = memory::collect(locations.iter().map(|&at| grid.to_padded(at, &self.spec)))?;
+        let places = memory::collect(locations.iter().map(|&at| grid.to_padded(at, self.spec())))?;
         let inside = memory::collect(places.iter().flatten().copied())?;
-        let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables, interrupt)?;
-        for (place, out) in places.into_iter().zip(out.chunks_exact_mut(self.spec.descriptor_len().max(1))) {
+        let mut windows =
+            exact::Windows::new(image, &grid, &inside, self.spec(), &self.exact.tables, interrupt)?;
+        for (place, out) in places.into_iter().zip(out.chunks_exact_mut(self.spec().descriptor_len().max(1)))
+        {
             interrupt.check()?;
             match place {
                 Some(at) => out.copy_from_slice(windows.descriptor(at)),
@@ -154,14 +165,16 @@ impl Hog {
         locations: Option<&[(i64, i64)]>,
         interrupt: &Interrupt,
     ) -> Result<Vec<Hit>> {
-        let grid = self.steps(search, self.spec.cell)?.grid(image.size(), &self.spec);
-        let Some(svm) = &self.svm else { return Ok(Vec::new()) };
+        let Exact { spec, tables, svm } = &*self.exact;
+        let grid = self.steps(search, spec.cell)?.grid(image.size(), spec);
+        let Some(svm) = svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
-            let find = |scorer: &Scorer| scorer.hits(image.size(), &grid, interrupt);
-            return self.with_scorer(image, svm, search, false, find);
+            let level = memory::collect([(image.size(), grid)])?;
+            let mut hits = self.hits(image, image.size(), level, svm, search, false, 1, interrupt)?;
+            return Ok(hits.pop().unwrap_or_default());
         };
-        let inside = memory::collect(locations.iter().filter_map(|&at| grid.to_padded(at, &self.spec)))?;
-        let mut windows = exact::Windows::new(image, &grid, &inside, &self.spec, &self.tables, interrupt)?;
+        let inside = memory::collect(locations.iter().filter_map(|&at| grid.to_padded(at, spec)))?;
+        let mut windows = exact::Windows::new(image, &grid, &inside, spec, tables, interrupt)?;
         let mut hits = Vec::new();
         for at in inside {
             interrupt.check()?;
@@ -173,88 +186,124 @@ impl Hog {
         Ok(hits)
     }
 
-    /// Rectangles of all hits of the pyramid whose levels shrink by `scale`, grouped and clipped to the image.
+    /// Rectangles of all hits of the pyramid, grouped and clipped to its first level, in whose pixels they are.
     ///
-    /// Levels are shared among `threads` threads; hits are in level order, whatever their number. The stride (0, 0)
+    /// The work is shared among `threads` threads; hits are in level order, whatever their number. The stride (0, 0)
     /// is the block stride.
     pub fn detect_multi_scale(
         &self,
         image: ImageView,
         search: &Search,
-        scale: f64,
+        pyramid: &Pyramid,
         grouping: Grouping,
         threads: usize,
         interrupt: &Interrupt,
     ) -> Result<Vec<(Rect, f64)>> {
-        let steps = self.steps(search, self.spec.stride)?;
-        let Some(svm) = &self.svm else { return Ok(Vec::new()) };
-        let levels = levels(image.size(), scale, &self.spec, interrupt)?;
+        let spec = self.spec();
+        let steps = self.steps(search, spec.stride)?;
+        let Some(svm) = &self.exact.svm else { return Ok(Vec::new()) };
+        let first = pyramid.first.unwrap_or(image.size());
+        check(first)?;
+        let levels = levels(first, pyramid.scale, spec, interrupt)?;
         // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
         let exact_weights = matches!(grouping, Grouping::MeanShift(_));
-        let search_levels = |scorer: &Scorer| -> Result<Vec<Candidate>> {
-            let of_level = |level: &Level, interrupt: &Interrupt| {
-                self.level_candidates(scorer, level, &steps, interrupt)
-            };
-            let mut candidates = Vec::new();
-            for found in in_order(&levels, threads, interrupt, of_level)? {
-                memory::reserve_some(&mut candidates, found.len())?;
-                candidates.extend(found);
-            }
-            Ok(candidates)
-        };
-        let candidates = self.with_scorer(image, svm, search, exact_weights, search_levels)?;
-        let win = self.spec.win;
+        let windows = memory::collect(levels.iter().map(|level| (level.size, steps.grid(level.size, spec))))?;
+        let hits = self.hits(image, first, windows, svm, search, exact_weights, threads, interrupt)?;
+        let mut candidates = memory::with_room(hits.iter().map(Vec::len).sum())?;
+        for (level, hits) in levels.iter().zip(&hits) {
+            candidates.extend(hits.iter().map(|hit| self.candidate(level, hit)));
+        }
+        let win = spec.win;
         let found = match grouping {
             Grouping::Similar(threshold) => group_candidates(&candidates, threshold, interrupt)?,
             Grouping::MeanShift(threshold) => {
                 mean_shift(&candidates, threshold, (win.width as i32, win.height as i32), interrupt)?
             }
         };
-        Ok(clip(found, image.width() as i32, image.height() as i32))
+        Ok(clip(found, first.width as i32, first.height as i32))
     }
 
     fn steps(&self, search: &Search, default_stride: Size) -> Result<Steps> {
-        Steps::new(search.win_stride, search.padding, default_stride, &self.spec)
+        Steps::new(search.win_stride, search.padding, default_stride, self.spec())
     }
 
-    /// Runs `work` with a scorer of the image: by the fast path, where the geometry has one.
-    fn with_scorer<R>(
+    fn candidate(&self, level: &Level, hit: &Hit) -> Candidate {
+        let rect = to_image(hit.x, hit.y, level.scale, self.spec());
+        Candidate { rect, weight: hit.weight, scale: level.scale }
+    }
+
+    /// The hits of each of `levels` of the image resized to `first`: by the fast path, where the geometry has one.
+    #[allow(clippy::too_many_arguments, reason = "a search is named by all of them")]
+    fn hits(
         &self,
         image: ImageView,
+        first: Size,
+        levels: Vec<(Size, Grid)>,
         svm: &Svm,
         search: &Search,
         exact_weights: bool,
-        work: impl FnOnce(&Scorer) -> Result<R>,
-    ) -> Result<R> {
-        let Self { spec, tables, plan, backend, .. } = self;
-        let hit_threshold = search.hit_threshold;
-        let exact = Scorer { image, spec, tables, svm, hit_threshold, fast: None };
-        let Some(plan) = plan else { return work(&exact) };
-        let error = plan.score_error_bound();
-        let rescore_margin = if exact_weights || error > SCORE_ERROR_MAX { f64::INFINITY } else { error };
-        let found = PLANES.with(|planes| {
-            fast::fill_planes(*backend, planes, image)?;
-            work(&Scorer { fast: Some(Fast { backend: *backend, plan, planes, rescore_margin }), ..exact })
-        });
-        // Not after each level: the levels of a large image use large workspaces again.
-        PLANES.trim();
-        SCRATCH.trim();
-        found
-    }
-
-    fn level_candidates(
-        &self,
-        scorer: &Scorer,
-        level: &Level,
-        steps: &Steps,
+        threads: usize,
         interrupt: &Interrupt,
-    ) -> Result<Vec<Candidate>> {
-        let hits = scorer.hits(level.size, &steps.grid(level.size, &self.spec), interrupt)?;
-        let candidate = |hit: &Hit| Candidate {
-            rect: to_image(hit.x, hit.y, level.scale, &self.spec),
-            weight: hit.weight,
-            scale: level.scale,
+    ) -> Result<Vec<Vec<Hit>>> {
+        let hit_threshold = search.hit_threshold;
+        let fast = self.plan.as_ref().filter(|_| levels.iter().all(|(_, grid)| fast::serves(grid)));
+        let mut windows =
+            memory::collect(levels.iter().map(|&(size, grid)| LevelWindows { size, grid, found: None }))?;
+        let mut margin = f64::INFINITY;
+        if let Some(plan) = fast {
+            let error = plan.score_error_bound();
+            if !exact_weights && error <= SCORE_ERROR_MAX {
+                margin = error;
+            }
+            let mut planes = PLANES.take();
+            fast::fill_planes(self.backend, &mut planes, image)?;
+            if first != image.size() {
+                let mut resized = PLANES.take();
+                fast::resize_planes(self.backend, &planes, &mut resized, first)?;
+                PLANES.give(std::mem::replace(&mut planes, resized));
+            }
+            let planes = Arc::new(planes);
+            let task = fast::Task {
+                backend: self.backend,
+                plan: Arc::clone(plan),
+                planes: Arc::clone(&planes),
+                levels,
+                threshold: hit_threshold,
+            };
+            let found = fast::search(task, threads, interrupt);
+            if let Ok(planes) = Arc::try_unwrap(planes) {
+                PLANES.give(planes);
+            }
+            PLANES.trim();
+            fast::trim();
+            for (level, found) in windows.iter_mut().zip(found?) {
+                level.found = Some(found);
+            }
+        }
+        let Exact { spec, tables, .. } = &*self.exact;
+        let scorer = Scorer { spec, tables, svm, hit_threshold, margin };
+        let is_needed = windows.iter().any(|level| scorer.is_needed(level));
+        let resized = if is_needed && first != image.size() {
+            Some(Image { data: resize(image, first)?, size: first, channels: image.channels() })
+        } else {
+            None
         };
-        memory::collect(hits.iter().map(candidate))
+        let image = resized.as_ref().map_or(Ok(image), Image::view)?;
+        if threads == 1 || !is_needed {
+            let mut hits = memory::with_room(windows.len())?;
+            for level in &windows {
+                interrupt.check()?;
+                hits.push(scorer.hits(image, level, interrupt)?);
+            }
+            return Ok(hits);
+        }
+        // Other threads may not borrow what is the caller's.
+        let (exact, image) = (Arc::clone(&self.exact), Image::new(image)?);
+        in_order(windows, threads, interrupt, move |level, interrupt| {
+            let Exact { spec, tables, svm } = &*exact;
+            let Some(svm) = svm else { return Ok(Vec::new()) };
+            let scorer = Scorer { spec, tables, svm, hit_threshold, margin };
+            scorer.hits(image.view()?, level, interrupt)
+        })
     }
 }

@@ -2,6 +2,10 @@
 
 use crate::error::{ImageError, Result};
 use crate::geometry::Size;
+use crate::memory;
+
+/// The longest side of an image [px]: with its padding it is an `i32`, as OpenCV's.
+pub(crate) const SIDE_MAX: usize = i32::MAX as usize / 4;
 
 /// A borrowed 8-bit image: rows of interleaved pixels, `row_stride` bytes apart.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +32,7 @@ impl<'a> ImageView<'a> {
         if width == 0 || height == 0 {
             return Err(ImageError::Empty { width, height }.into());
         }
-        if width > i32::MAX as usize / 4 || height > i32::MAX as usize / 4 {
+        if width > SIDE_MAX || height > SIDE_MAX {
             return Err(ImageError::TooLarge { width, height }.into());
         }
         let row = width * channels;
@@ -62,6 +66,31 @@ impl<'a> ImageView<'a> {
     /// The `width * channels` bytes of row `y`.
     pub fn row(&self, y: usize) -> &'a [u8] {
         &self.data[y * self.row_stride..][..self.width * self.channels]
+    }
+}
+
+/// An image of its own, without gaps between its rows.
+#[derive(Debug)]
+pub(crate) struct Image {
+    pub data: Vec<u8>,
+    pub size: Size,
+    pub channels: usize,
+}
+
+impl Image {
+    /// A copy of `view`.
+    pub(crate) fn new(view: ImageView) -> Result<Self> {
+        let row = view.width() * view.channels();
+        let mut data = memory::with_room(row * view.height())?;
+        for y in 0..view.height() {
+            data.extend_from_slice(&view.row(y)[..row]);
+        }
+        Ok(Self { data, size: view.size(), channels: view.channels() })
+    }
+
+    pub(crate) fn view(&self) -> Result<ImageView<'_>> {
+        let Size { width, height } = self.size;
+        ImageView::new(&self.data, width, height, self.channels, width * self.channels)
     }
 }
 

@@ -6,13 +6,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOverflowError};
 use pyo3::prelude::*;
 
 use crate::error::{ImageError, ParameterError};
-use crate::{Backend, Grouping, HogError, HogParams, ImageView, Interrupt, Rect, Search, memory};
+use crate::pyramid::Pyramid;
+use crate::{Backend, Grouping, HogError, HogParams, ImageView, Interrupt, Rect, Search, Size, memory};
 
 type Pair = (i64, i64);
 type Array1<'py, T> = Bound<'py, PyArray1<T>>;
@@ -243,6 +245,7 @@ impl Hog {
     }
 
     #[allow(clippy::too_many_arguments, reason = "they are OpenCV's detectMultiScale arguments")]
+    #[pyo3(signature = (image, hit_threshold, win_stride, padding, scale, group_threshold, mean_shift, first_level=None))]
     fn detect_multi_scale<'py>(
         &self,
         image: PyReadonlyArrayDyn<'py, u8>,
@@ -252,19 +255,26 @@ impl Hog {
         scale: f64,
         group_threshold: f64,
         mean_shift: bool,
+        first_level: Option<Pair>,
     ) -> PyResult<(Array2<'py, i32>, Array1<'py, f64>)> {
         let search = Search { hit_threshold, win_stride, padding };
+        let pyramid = Pyramid { first: first_level.map(size), scale };
         let grouping = if mean_shift {
             Grouping::MeanShift(group_threshold)
         } else {
             Grouping::Similar(group_threshold as i32)
         };
         let find = |hog: &crate::Hog, view: ImageView, interrupt: &Interrupt| {
-            hog.detect_multi_scale(view, &search, scale, grouping, threads(), interrupt)
+            hog.detect_multi_scale(view, &search, &pyramid, grouping, threads(), interrupt)
         };
         let (py, found) = (image.py(), self.on(&image, find)?);
         Ok((rect_array(py, &found)?, array1(py, found.iter().map(|&(_, weight)| weight))?))
     }
+}
+
+/// A negative side is 0, which is refused as such.
+fn size((width, height): Pair) -> Size {
+    Size::new(usize::try_from(width).unwrap_or(0), usize::try_from(height).unwrap_or(0))
 }
 
 fn rect_array<'py, T>(py: Python<'py>, found: &[(Rect, T)]) -> PyResult<Array2<'py, i32>> {
@@ -292,6 +302,21 @@ mod _core {
             crate::group::group_rectangles(&rects, threshold, eps, interrupt)
         })?;
         Ok((rect_array(py, &found)?, array1(py, found.iter().map(|&(_, count)| count))?))
+    }
+
+    #[pyfunction]
+    fn resize<'py>(
+        image: PyReadonlyArrayDyn<'py, u8>,
+        width: i64,
+        height: i64,
+    ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+        let py = image.py();
+        let pixels = Pixels::new(py, &image)?;
+        let new = size((width, height));
+        let resized = detached(py, |_| crate::pyramid::resize(pixels.view()?, new))?;
+        let mut shape = image.shape().to_vec();
+        shape[..2].copy_from_slice(&[new.height, new.width]);
+        PyArray1::from_vec(py, resized).reshape(shape)
     }
 
     #[pyfunction]

@@ -2,16 +2,13 @@
 
 use crate::error::Result;
 use crate::exact::{self, Svm, Tables};
-use crate::fast::{self, Backend, Plan, Planes};
+use crate::fast::Found;
 use crate::geometry::Size;
-use crate::image::ImageView;
+use crate::image::{Image, ImageView};
 use crate::interrupt::Interrupt;
-use crate::memory::{self, Pool};
+use crate::memory;
 use crate::params::HogSpec;
 use crate::pyramid::{Grid, resize};
-
-/// Scratch memory of the fast path, one per thread at work.
-pub(crate) static SCRATCH: Pool<fast::Scratch> = Pool::new();
 
 /// A window that scored at least the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,114 +28,114 @@ impl Hit {
     }
 }
 
-/// The fast path at work on one image.
-#[derive(Clone, Copy)]
-pub(crate) struct Fast<'a> {
-    pub backend: Backend,
-    pub plan: &'a Plan,
-    pub planes: &'a Planes,
-    /// Windows whose fast score is no further than this from the threshold are scored again by the exact path.
-    pub rescore_margin: f64,
-}
-
-/// A window of a level: padded x, padded y, score.
-type Found = (usize, usize, f64);
-
-/// One search of an image for windows that score at least `hit_threshold`, on any of its levels.
-#[derive(Clone, Copy)]
+/// What the exact path needs to score windows.
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Scorer<'a> {
-    pub image: ImageView<'a>,
     pub spec: &'a HogSpec,
     pub tables: &'a Tables,
     pub svm: &'a Svm,
-    /// The fast path, where the geometry has one.
-    pub fast: Option<Fast<'a>>,
+    /// A window whose score is at least this is a hit.
     pub hit_threshold: f64,
+    /// Windows whose fast score is no further than this from the threshold are scored again by the exact path.
+    pub margin: f64,
+}
+
+/// One level of an image.
+#[derive(Debug)]
+pub(crate) struct LevelWindows {
+    pub size: Size,
+    pub grid: Grid,
+    /// What the fast path found, row by row; none where the exact path is to score all windows.
+    pub found: Option<Vec<Found>>,
 }
 
 impl Scorer<'_> {
-    /// The hits among all windows of the image shrunk to `size`, row by row.
-    pub(crate) fn hits(&self, size: Size, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Hit>> {
-        match &self.fast {
-            Some(fast) if fast::serves(grid) => self.fast_hits(fast, size, grid, interrupt),
-            _ => self.exact_hits(size, grid, interrupt),
-        }
+    /// Whether the exact path has to look at this level.
+    pub(crate) fn is_needed(&self, level: &LevelWindows) -> bool {
+        level.found.as_ref().is_none_or(|found| found.iter().any(|found| self.is_close(found)))
     }
 
-    /// The hits by the exact path alone.
-    fn exact_hits(&self, size: Size, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Hit>> {
-        let level = LevelImage::new(self.image, size)?;
-        let scores = exact::scores(level.view()?, grid, self.spec, self.tables, self.svm, interrupt)?;
-        let place = |index: usize| {
-            let (column, row) = (index % grid.windows.width, index / grid.windows.width);
-            (column * grid.stride.width, row * grid.stride.height)
-        };
-        let hits = scores.into_iter().enumerate().filter(|&(_, score)| score >= self.hit_threshold);
-        memory::collect(hits.map(|(index, score)| Hit::new(grid, place(index), score)))
-    }
-
-    /// The hits by the fast path, each close call decided by the exact path.
-    fn fast_hits(&self, fast: &Fast, size: Size, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Hit>> {
-        SCRATCH.with(|scratch| {
-            let Fast { backend, plan, planes, rescore_margin } = *fast;
-            let threshold = self.hit_threshold;
-            let task = fast::Task { plan, source: planes, size, grid, threshold, interrupt };
-            fast::detect(backend, task, scratch)?;
-            self.rescore_close_calls(rescore_margin, size, grid, interrupt, &mut scratch.found)?;
-            let hits = scratch.found.iter().filter(|&&(_, _, score)| score >= self.hit_threshold);
-            memory::collect(hits.map(|&(x, y, score)| Hit::new(grid, (x, y), score)))
-        })
-    }
-
-    /// Gives the exact score to every window of `found` whose score is within `margin` of the threshold.
-    fn rescore_close_calls(
+    /// The hits of a level, row by row.
+    pub(crate) fn hits(
         &self,
-        margin: f64,
+        image: ImageView,
+        level: &LevelWindows,
+        interrupt: &Interrupt,
+    ) -> Result<Vec<Hit>> {
+        let LevelWindows { size, grid, found } = level;
+        let hit = |&(x, y, score): &Found| Hit::new(grid, (x, y), score);
+        let is_hit = |&&(_, _, score): &&Found| score >= self.hit_threshold;
+        let Some(found) = found else {
+            let level = LevelImage::new(image, *size)?;
+            let scores = exact::scores(level.view()?, grid, self.spec, self.tables, self.svm, interrupt)?;
+            let place = |index: usize, score: f64| {
+                let (column, row) = (index % grid.windows.width, index / grid.windows.width);
+                (column * grid.stride.width, row * grid.stride.height, score)
+            };
+            let all = scores.into_iter().enumerate().map(|(index, score)| place(index, score));
+            return memory::collect(all.filter(|found| is_hit(&found)).map(|found| hit(&found)));
+        };
+        if !found.iter().any(|found| self.is_close(found)) {
+            return memory::collect(found.iter().filter(is_hit).map(hit));
+        }
+        let rescored = self.rescored(image, *size, grid, found, interrupt)?;
+        memory::collect(rescored.iter().filter(is_hit).map(hit))
+    }
+
+    /// Whether the fast score is too near to the threshold; one that is not a number is never sure.
+    fn is_close(&self, &(_, _, score): &Found) -> bool {
+        let is_sure = (score - self.hit_threshold).abs() > self.margin;
+        !is_sure
+    }
+
+    /// `found` with the exact score of every close call.
+    fn rescored(
+        &self,
+        image: ImageView,
         size: Size,
         grid: &Grid,
+        found: &[Found],
         interrupt: &Interrupt,
-        found: &mut [Found],
-    ) -> Result<()> {
-        // A score that is not a number is never sure.
-        let is_sure = |score: f64| (score - self.hit_threshold).abs() > margin;
-        let close = found.iter().filter(|&&(_, _, score)| !is_sure(score)).count();
-        if close == 0 {
-            return Ok(());
-        }
-        let level = LevelImage::new(self.image, size)?;
+    ) -> Result<Vec<Found>> {
+        let close = found.iter().filter(|found| self.is_close(found)).count();
+        let level = LevelImage::new(image, size)?;
         let level = level.view()?;
-        let Self { spec, tables, svm, .. } = self;
+        let Self { spec, tables, svm, .. } = *self;
         // Neighbouring windows share pixels and blocks: scoring all at once is cheaper than scoring many one by one.
         let at_once = close * spec.win.area() > grid.padded.area();
         let all =
             if at_once { exact::scores(level, grid, spec, tables, svm, interrupt)? } else { Vec::new() };
-        for (x, y, score) in found.iter_mut().filter(|(_, _, score)| !is_sure(*score)) {
-            let index = *y / grid.stride.height * grid.windows.width + *x / grid.stride.width;
-            *score = match all.get(index) {
+        let mut rescored = memory::collect(found.iter().copied())?;
+        for found in rescored.iter_mut().filter(|found| self.is_close(found)) {
+            let (x, y, _) = *found;
+            let index = y / grid.stride.height * grid.windows.width + x / grid.stride.width;
+            found.2 = match all.get(index) {
                 Some(&score) => score,
-                None => exact::window_score(level, grid, (*x, *y), spec, tables, svm, interrupt)?,
+                None => exact::window_score(level, grid, (x, y), spec, tables, svm, interrupt)?,
             };
         }
-        Ok(())
+        Ok(rescored)
     }
 }
 
 /// The image at a level's size.
-struct LevelImage<'a> {
-    image: ImageView<'a>,
-    /// Its size and pixels, unless it is the image itself.
-    pixels: Option<(Size, Vec<u8>)>,
+enum LevelImage<'a> {
+    Same(ImageView<'a>),
+    Shrunk(Image),
 }
 
 impl<'a> LevelImage<'a> {
     fn new(image: ImageView<'a>, size: Size) -> Result<Self> {
-        let pixels = if size == image.size() { None } else { Some((size, resize(image, size)?)) };
-        Ok(Self { image, pixels })
+        if size == image.size() {
+            return Ok(Self::Same(image));
+        }
+        Ok(Self::Shrunk(Image { data: resize(image, size)?, size, channels: image.channels() }))
     }
 
     fn view(&self) -> Result<ImageView<'_>> {
-        let Some((size, pixels)) = &self.pixels else { return Ok(self.image) };
-        let channels = self.image.channels();
-        ImageView::new(pixels, size.width, size.height, channels, size.width * channels)
+        match self {
+            Self::Same(view) => Ok(*view),
+            Self::Shrunk(image) => image.view(),
+        }
     }
 }

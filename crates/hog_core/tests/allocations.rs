@@ -5,6 +5,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use hog_core::pyramid::Pyramid;
 use hog_core::{Grouping, Hog, HogParams, ImageView, Interrupt, Search, model};
 
 struct Counting;
@@ -39,8 +40,17 @@ fn scratch_memory_is_used_again() {
     let image = ImageView::new(&data, width, height, 3, 3 * width).unwrap();
     let hog = Hog::new(&HogParams::default(), Some(model::default_people())).unwrap();
     let search = Search { hit_threshold: 1e3, win_stride: (8, 8), padding: (4, 4) };
-    let call =
-        || hog.detect_multi_scale(image, &search, 1.05, Grouping::Similar(2), 1, &Interrupt::NEVER).unwrap();
+    let call = || {
+        hog.detect_multi_scale(
+            image,
+            &search,
+            &Pyramid { first: None, scale: 1.05 },
+            Grouping::Similar(2),
+            1,
+            &Interrupt::NEVER,
+        )
+        .unwrap()
+    };
     assert!(call().is_empty());
     let before = BYTES.load(Ordering::Relaxed);
     assert!(call().is_empty());

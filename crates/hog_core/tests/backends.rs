@@ -5,7 +5,7 @@ mod common;
 
 use common::{Detector, Picture, assert_same, available, reached_by};
 use hog_core::group::{Candidate, clip, group_candidates, mean_shift};
-use hog_core::pyramid::{levels, resize, to_image};
+use hog_core::pyramid::{Pyramid, levels, resize, to_image};
 use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size, model};
 use proptest::prelude::*;
 
@@ -132,6 +132,8 @@ fn candidates(detector: &Detector, image: ImageView, search: &Search, scale: f64
     found
 }
 
+const PYRAMID: Pyramid = Pyramid { first: None, scale: 1.1 };
+
 fn rects(found: &[(Rect, f64)]) -> Vec<Rect> {
     found.iter().map(|&(rect, _)| rect).collect()
 }
@@ -153,9 +155,10 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
         assert!(counts.iter().zip([50, 3, 3]).all(|(count, least)| *count >= least), "too few: {counts:?}");
         for backend in available() {
             let hog = hog(&detector, backend);
-            for threads in [1, 2, 5] {
+            for threads in [1, 2, 5, 64] {
                 let detect = |grouping| {
-                    hog.detect_multi_scale(image, &search, 1.1, grouping, threads, &Interrupt::NEVER).unwrap()
+                    hog.detect_multi_scale(image, &search, &PYRAMID, grouping, threads, &Interrupt::NEVER)
+                        .unwrap()
                 };
                 let found = detect(Grouping::Similar(0));
                 assert_eq!(rects(&found), rects(&every), "{}", backend.name());
@@ -165,9 +168,37 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
             }
             // Mean-shift is given exact weights: not a bit differs.
             let found = hog
-                .detect_multi_scale(image, &search, 1.1, Grouping::MeanShift(0.1), 2, &Interrupt::NEVER)
+                .detect_multi_scale(image, &search, &PYRAMID, Grouping::MeanShift(0.1), 2, &Interrupt::NEVER)
                 .unwrap();
             assert_eq!(found, modes, "{}", backend.name());
+        }
+    }
+}
+
+#[test]
+fn a_search_at_another_size_is_that_of_the_resized_image_on_every_backend() {
+    for (channels, size) in [(1, Size::new(313, 351)), (3, Size::new(400, 290)), (3, Size::new(150, 170))] {
+        let picture = Picture::new(257, 200, channels, 6);
+        let mut detector = Detector::people();
+        let resized = resize(picture.view(), size).unwrap();
+        let resized =
+            ImageView::new(&resized, size.width, size.height, channels, size.width * channels).unwrap();
+        detector.coefficients[3780] -= reached_by(&detector.every_window(resized, &STEPS), 0.03) as f32;
+        let wanted = candidates(&detector, resized, &STEPS, PYRAMID.scale);
+        let wanted = group_candidates(&wanted, 0, &Interrupt::NEVER).unwrap();
+        let wanted = clip(wanted, size.width as i32, size.height as i32);
+        assert!(wanted.len() > 5);
+        let pyramid = Pyramid { first: Some(size), ..PYRAMID };
+        // The grouping by mean-shift takes exact weights, which the exact path computes.
+        for backend in available() {
+            let hog = hog(&detector, backend);
+            let search = |image, pyramid, grouping| {
+                hog.detect_multi_scale(image, &STEPS, pyramid, grouping, 1, &Interrupt::NEVER).unwrap()
+            };
+            let found = search(picture.view(), &pyramid, Grouping::Similar(0));
+            assert_eq!(rects(&found), rects(&wanted), "{}", backend.name());
+            let modes = Grouping::MeanShift(0.1);
+            assert_eq!(search(picture.view(), &pyramid, modes), search(resized, &PYRAMID, modes));
         }
     }
 }
@@ -253,6 +284,16 @@ fn a_detector_with_a_weight_that_is_no_number_has_no_hits() {
                 .unwrap()
                 .is_empty()
         );
+    }
+}
+
+#[test]
+fn a_gaussian_too_narrow_or_too_wide_for_single_precision_is_scored_alike() {
+    for sigma in [1e-38, 1e-22, 2e-20, 1e-10, 1e-3, 1e18, 1e30] {
+        let mut detector = Detector::people();
+        detector.params.win_sigma = sigma;
+        let search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (0, 0) };
+        compare(&detector, (80, 144), 1, search, 5);
     }
 }
 

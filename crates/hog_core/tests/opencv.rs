@@ -6,6 +6,7 @@ mod common;
 use common::{Detector, Picture, available};
 use hog_core::exact::Svm;
 use hog_core::group::{Candidate, group_rectangles, mean_shift};
+use hog_core::pyramid::Pyramid;
 use hog_core::{Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, Search};
 
 fn rect([x, y, width, height]: [i32; 4]) -> Rect {
@@ -31,7 +32,15 @@ fn a_search_finds_what_opencv_finds_grouped_by_similarity_and_by_mean_shift() {
     for backend in available() {
         let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
         let search = |grouping| {
-            hog.detect_multi_scale(picture.view(), &STEPS, 1.1, grouping, 1, &Interrupt::NEVER).unwrap()
+            hog.detect_multi_scale(
+                picture.view(),
+                &STEPS,
+                &Pyramid { first: None, scale: 1.1 },
+                grouping,
+                1,
+                &Interrupt::NEVER,
+            )
+            .unwrap()
         };
         assert_eq!(search(Grouping::Similar(0)).len(), 51);
         assert_found(

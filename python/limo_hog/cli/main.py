@@ -42,6 +42,7 @@ ARENA = {
     "workshop": "learn it: a template node, a checker, and model solutions",
     "arena": "the arena alone, in real time, for ROS 2 nodes to drive",
     "score": "compare controllers over scenarios and seeds, on all cores",
+    "export": "write labelled pictures of the arena, to train and to measure detectors on",
 }
 
 

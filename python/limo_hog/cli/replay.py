@@ -33,7 +33,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="controller (%(default)s)")
-    parser.add_argument("--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="detector (hog)")
+    parser.add_argument(
+        "--detector", default="hog", metavar="|".join((*NAMES, "hog:MODEL", "onnx:FILE")), help="detector (hog)"
+    )
     parser.add_argument("--image", metavar="TOPIC", help="topic of the camera (/limo_camera/image)")
     parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="video of the detections (H.264)")
     parser.add_argument(

@@ -72,9 +72,10 @@ def coefficients(svm: ArrayLike | None) -> NDArray[np.float32] | None:
 
 def pair(name: str, value: Pair | None, default: tuple[int, int] = (0, 0)) -> tuple[int, int]:
     """Return two integers; None or nothing stands for `default`."""
-    if value is None or (hasattr(value, "__len__") and len(value) == 0):
-        return default
     try:
+        # (An array of no dimensions has a `__len__` that raises.)
+        if value is None or (hasattr(value, "__len__") and len(value) == 0):
+            return default
         x, y = value
         found = operator.index(x), operator.index(y)
     except (TypeError, ValueError):
@@ -107,12 +108,14 @@ def rectangles(name: str, value: Sequence[Sequence[int]] | NDArray[np.integer[An
         given = np.asarray(() if value is None else value)
     except ValueError:
         given = np.asarray(None)
-    if given.size and (given.dtype.kind not in "iu" or given.ndim != 2 or given.shape[1] != 4):
+    if given.ndim and not len(given):
+        return []
+    if given.dtype.kind not in "iu" or given.ndim != 2 or given.shape[1] != 4:
         raise ParameterTypeError(
             f"{name} has shape {given.shape} and type {given.dtype}; integers of shape (n, 4), each x, y, width, "
             "height, are wanted"
         )
-    if given.size and max(abs(int(given.min())), abs(int(given.max()))) > _INT_MAX:
+    if max(abs(int(given.min())), abs(int(given.max()))) > _INT_MAX:
         raise ParameterError(f"{name} has a coordinate beyond {_INT_MAX}")
     found: list[list[int]] = given.tolist()
     return found
@@ -143,6 +146,16 @@ def integer(name: str, value: SupportsIndex | None, default: int) -> int:
     if abs(found) > _INT_MAX:
         raise ParameterError(f"{name} is {shown(found)}; at most {_INT_MAX} is allowed")
     return found
+
+
+def flag(name: str, value: Any, default: bool) -> bool:
+    """Return a truth value; None stands for `default`."""
+    if value is None:
+        return default
+    try:
+        return bool(value)
+    except (TypeError, ValueError):  # an array of more than one
+        raise ParameterTypeError(f"{name} is {shown(value)}; True or False is wanted") from None
 
 
 def shown(value: object) -> str:

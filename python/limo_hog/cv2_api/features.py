@@ -7,88 +7,86 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog import _core
 from limo_hog.cv2_api.arguments import Nothing, Pair, Pairs, pair, pixels, places
 from limo_hog.cv2_api.geometry import Geometry
+from limo_hog.cv2_api.state import State
 
 
 class Features:
     """Histograms of oriented gradients of one geometry, which is checked at its first use."""
 
-    __slots__ = ("_bare", "_geometry")
+    __slots__ = ("_state",)
 
     def __init__(self, geometry: Geometry) -> None:
-        self._geometry = geometry
-        # The compiled geometry, made when first needed.
-        self._bare: _core.Hog | None = None
+        self._state = State(geometry)
 
     @property
     def winSize(self) -> tuple[int, int]:
         """Detection window (width, height) [px]."""
-        return self._geometry.winSize
+        return self._state.geometry.winSize
 
     @property
     def blockSize(self) -> tuple[int, int]:
         """Block (width, height) [px]."""
-        return self._geometry.blockSize
+        return self._state.geometry.blockSize
 
     @property
     def blockStride(self) -> tuple[int, int]:
         """Distance of neighbouring blocks (x, y) [px]."""
-        return self._geometry.blockStride
+        return self._state.geometry.blockStride
 
     @property
     def cellSize(self) -> tuple[int, int]:
         """Cell (width, height) [px]."""
-        return self._geometry.cellSize
+        return self._state.geometry.cellSize
 
     @property
     def nbins(self) -> int:
         """Orientation bins of a cell."""
-        return self._geometry.nbins
+        return self._state.geometry.nbins
 
     @property
     def derivAperture(self) -> int:
         """Kept and saved, never used, as in OpenCV."""
-        return self._geometry.derivAperture
+        return self._state.geometry.derivAperture
 
     @property
     def winSigma(self) -> float:
         """Gaussian window of a block [px]; -1 stands for the default, see `getWinSigma`."""
-        return self._geometry.winSigma
+        return self._state.geometry.winSigma
 
     @property
     def histogramNormType(self) -> int:
         """Kept and saved, never used, as in OpenCV: L2-Hys is the only one."""
-        return self._geometry.histogramNormType
+        return self._state.geometry.histogramNormType
 
     @property
     def L2HysThreshold(self) -> float:
         """Clipping value of the block normalisation."""
-        return self._geometry.L2HysThreshold
+        return self._state.geometry.L2HysThreshold
 
     @property
     def gammaCorrection(self) -> bool:
         """Whether the gradient is taken of the square root of the pixels."""
-        return self._geometry.gammaCorrection
+        return self._state.geometry.gammaCorrection
 
     @property
     def nlevels(self) -> int:
         """Most levels of a pyramid."""
-        return self._geometry.nlevels
+        return self._state.geometry.nlevels
 
     @property
     def signedGradient(self) -> bool:
         """Whether the bins cover 2π instead of π."""
-        return self._geometry.signedGradient
+        return self._state.geometry.signedGradient
 
     def getDescriptorSize(self) -> int:
         """Elements of one window's descriptor: bins × cells of a block × blocks of a window."""
-        return self._compiled.descriptor_len
+        return self._state.bare.descriptor_len
 
     def getWinSigma(self) -> float:
         """Gaussian window in force [px]: `winSigma`, or (block width + block height) / 8 where that is not positive."""
-        return self._geometry.sigma
+        return self._state.geometry.sigma
 
     def computeGradient(
         self,
@@ -118,7 +116,7 @@ class Features:
         (left, top), (right, bottom) = pair("paddingTL", paddingTL), pair("paddingBR", paddingBR)
         if 0 in (image.shape[0] + top + bottom, image.shape[1] + left + right):
             return (), ()
-        shares, bins = self._compiled.gradient(image, (left, top, right, bottom))
+        shares, bins = self._state.bare.gradient(image, (left, top, right, bottom))
         return _filled(grad, shares), _filled(angleOfs, bins)
 
     def compute(
@@ -147,19 +145,13 @@ class Features:
             float32 (windows × descriptor size,), blocks column by column; zeros for a location outside. `()` when
             no window fits.
         """
-        descriptors = self._compiled.compute(
+        descriptors = self._state.bare.compute(
             pixels(img),
             pair("winStride", winStride),
             pair("padding", padding),
             places("locations", locations),
         )
         return descriptors if len(descriptors) else ()
-
-    @property
-    def _compiled(self) -> _core.Hog:
-        if self._bare is None:
-            self._bare = self._geometry.compiled(None)
-        return self._bare
 
 
 def _filled(target: Any, result: Any) -> Any:

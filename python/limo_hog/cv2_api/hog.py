@@ -18,6 +18,7 @@ from limo_hog.cv2_api.arguments import (
     Pair,
     Pairs,
     coefficients,
+    flag,
     integer,
     pair,
     pixels,
@@ -27,6 +28,7 @@ from limo_hog.cv2_api.arguments import (
 )
 from limo_hog.cv2_api.features import Features
 from limo_hog.cv2_api.geometry import Geometry
+from limo_hog.cv2_api.state import State, replaced
 from limo_hog.exceptions import ParameterTypeError
 
 #: Rectangles or places and their weights.
@@ -40,9 +42,11 @@ class HOGDescriptor(Features):
     first five are mandatory and gamma correction is off unless asked for, as in OpenCV 4.14; None stands for a
     default. `HOGDescriptor(filename)` loads a file. Sizes are (width, height) [px]. The geometry is checked at its
     first use: what does not fit raises `GeometryError`.
+
+    Threads may share one: a search is of the geometry and coefficients that were in force together when it began.
     """
 
-    __slots__ = ("_armed", "_svm")
+    __slots__ = ()
 
     def __init__(
         self,
@@ -85,26 +89,25 @@ class HOGDescriptor(Features):
                 real("_winSigma", _winSigma, default.winSigma),
                 integer("_histogramNormType", _histogramNormType, default.histogramNormType),
                 real("_L2HysThreshold", _L2HysThreshold, default.L2HysThreshold),
-                bool(missing) if _gammaCorrection is None else bool(_gammaCorrection),
+                flag("_gammaCorrection", _gammaCorrection, bool(missing)),
                 integer("_nlevels", _nlevels, default.nlevels),
-                bool(_signedGradient),
+                flag("_signedGradient", _signedGradient, False),
             )
         )
-        self._svm: NDArray[np.float32] | None = None
-        # The compiled geometry with the SVM, made when first needed.
-        self._armed: _core.Hog | None = None
         if filename is not None:
             self.load(filename)
 
     @property
     def svmDetector(self) -> NDArray[np.float32] | Nothing:
         """float32 (n,): the coefficients in force, the bias last if there is one; `()` when unset."""
-        return () if self._svm is None else self._svm.copy()
+        svm = self._state.svm
+        return () if svm is None else svm.copy()
 
     def checkDetectorSize(self) -> bool:
         """Whether the detector, if any, fits the geometry; false only after `load` of a file without a detector."""
-        size = self.getDescriptorSize()
-        return self._svm is None or len(self._svm) in (size, size + 1)
+        state = self._state
+        size = state.bare.descriptor_len
+        return state.svm is None or len(state.svm) in (size, size + 1)
 
     def setSVMDetector(self, svmdetector: ArrayLike | None) -> None:
         """Set the coefficients of the SVM: one per descriptor element, and perhaps the bias after them.
@@ -120,8 +123,14 @@ class HOGDescriptor(Features):
             `n` is neither the descriptor's size nor one more; the detector in force stays.
         """
         svm = coefficients(svmdetector)
-        self._armed = None if svm is None else self._geometry.compiled(svm)
-        self._svm = svm
+        while True:
+            before = self._state
+            after = before.with_svm(svm)
+            if svm is not None:
+                # Compiled first: what does not fit raises here, and changes nothing.
+                _ = after.armed
+            if replaced(self, before, after):
+                return
 
     @staticmethod
     def getDefaultPeopleDetector() -> NDArray[np.float32]:
@@ -162,9 +171,10 @@ class HOGDescriptor(Features):
             int32 (n, 2) top left corners (negative inside the padding) and float64 (n,) scores, in search order;
             `((), ())` when there are none, or no detector is set.
         """
-        if self._svm is None:
+        state = self._state
+        if state.svm is None:
             return (), ()
-        found, weights = self._detector.detect(
+        found, weights = state.armed.detect(
             pixels(img),
             real("hitThreshold", hitThreshold, 0.0),
             pair("winStride", winStride),
@@ -213,16 +223,17 @@ class HOGDescriptor(Features):
             int32 (n, 4) x, y, width, height, clipped to the image, and float64 (n,) scores, in level order whatever
             the number of threads; `((), ())` when there are none, or no detector is set.
         """
-        if self._svm is None:
+        state = self._state
+        if state.svm is None:
             return (), ()
-        boxes, weights = self._detector.detect_multi_scale(
+        boxes, weights = state.armed.detect_multi_scale(
             pixels(img),
             real("hitThreshold", hitThreshold, 0.0),
             pair("winStride", winStride),
             pair("padding", padding),
             real("scale", scale, 1.05),
             real("groupThreshold", groupThreshold if finalThreshold is None else finalThreshold, 2.0),
-            bool(useMeanshiftGrouping),
+            flag("useMeanshiftGrouping", useMeanshiftGrouping, False),
         )
         return (boxes, weights) if len(boxes) else ((), ())
 
@@ -286,7 +297,8 @@ class HOGDescriptor(Features):
         # Imported here: what reads and writes files would double the time to import this package.
         from limo_hog.cv2_api import model_files
 
-        model_files.save(filename, self._geometry, self._svm, objname)
+        state = self._state
+        model_files.save(filename, state.geometry, state.svm, objname)
 
     def load(self, filename: str | os.PathLike[str], objname: str = "") -> bool:
         """Take geometry and detector from a file of OpenCV's or of `save`; true, or an error.
@@ -311,39 +323,39 @@ class HOGDescriptor(Features):
         """
         from limo_hog.cv2_api import model_files
 
-        geometry, svm = model_files.load(filename, objname)
+        geometry, numbers = model_files.load(filename, objname)
+        loaded = State(geometry, coefficients(numbers))
         # Compiled first: what does not fit raises here, and changes nothing.
-        hog = geometry.compiled(coefficients(svm))
-        self._geometry, self._bare, self._armed = geometry, None, None
-        if svm:
-            self._svm, self._armed = coefficients(svm), hog
-        return True
+        _ = loaded.bare if loaded.svm is None else loaded.armed
+        while True:
+            before = self._state
+            if replaced(self, before, loaded if numbers else loaded.with_svm(before.svm)):
+                return True
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, HOGDescriptor):
             return NotImplemented
-        return self._geometry == other._geometry and np.array_equal(self.svmDetector, other.svmDetector)
+        mine, theirs = self._state, other._state
+        if mine.svm is None or theirs.svm is None:
+            return mine.geometry == theirs.geometry and mine.svm is theirs.svm
+        return mine.geometry == theirs.geometry and np.array_equal(mine.svm, theirs.svm)
 
     def __hash__(self) -> int:
         # It may change while it is a key, so nothing it holds may go in.
         return hash(HOGDescriptor)
 
     def __repr__(self) -> str:
-        held = ", ".join(f"{name}={value}" for name, value in self._geometry._asdict().items())
-        svm = "no detector" if self._svm is None else f"a detector of {len(self._svm)} coefficients"
+        state = self._state
+        held = ", ".join(f"{name}={value}" for name, value in state.geometry._asdict().items())
+        svm = "no detector" if state.svm is None else f"a detector of {len(state.svm)} coefficients"
         return f"<{type(self).__name__} {held}; {svm}>"
 
     def __reduce__(self) -> tuple[Callable[..., HOGDescriptor], tuple[Any, ...]]:
-        return _restored, (type(self), tuple(self._geometry), self._svm)
-
-    @property
-    def _detector(self) -> _core.Hog:
-        if self._armed is None:
-            self._armed = self._geometry.compiled(self._svm)
-        return self._armed
+        state = self._state
+        return _restored, (type(self), tuple(state.geometry), state.svm)
 
 
 def _restored(kind: type[HOGDescriptor], geometry: tuple[Any, ...], svm: NDArray[np.float32] | None) -> HOGDescriptor:
     hog = kind(*geometry)
-    hog._svm = svm
+    hog._state = hog._state.with_svm(svm)
     return hog

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.cv2_api.arguments import shown
 from limo_hog.exceptions import ImageError, ImageTypeError
 from limo_hog.extras import MissingExtraError
 
@@ -36,7 +37,12 @@ def as_array(image: Any) -> Any:
         The file cannot be read.
     """
     if isinstance(image, (str, os.PathLike)):
-        return _read(Path(image))
+        try:
+            return _read(Path(image))
+        except ValueError as error:
+            if isinstance(error, ImageError):
+                raise
+            raise ImageError(f"{shown(image)} is no file's name: {error}") from error
     # Who has a PIL image has imported PIL.
     pil = sys.modules.get("PIL.Image")
     return _of_pil(image) if pil is not None and isinstance(image, pil.Image) else image

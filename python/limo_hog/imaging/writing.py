@@ -22,8 +22,8 @@ class WriteError(LimoHogError):
     """A picture could not be written."""
 
 
-def write_image(path: Path, image: NDArray[np.uint8]) -> None:
-    """Write uint8 BGR or gray in the format of the path's suffix; folders are made as needed.
+def write_image(path: Path, image: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
+    """Write uint8 BGR or gray (PNG also uint16) in the format of the path's suffix; folders are made as needed.
 
     Raises
     ------

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from limo_hog import _core
 from limo_hog.exceptions import ImageError
 from limo_hog.imaging.reading import ReadError
-from limo_hog.imaging.resize import resize
 from limo_hog.learn.labels import LabelWarning
 from limo_hog.learn.windows import (
     Jitter,
@@ -215,8 +214,7 @@ def hard_negatives(
             return _nothing(number, hog)
         boxes, margins = _search(detector, image, parameters)
         if np.random.default_rng([seed, 3, number]).random() < parameters.enlarged:
-            twice = resize(image, 2 * image.shape[1], 2 * image.shape[0])
-            more_boxes, more_margins = _search(detector, twice, parameters)
+            more_boxes, more_margins = _search(detector, image, parameters, enlarged=2)
             boxes, margins = np.concatenate([boxes, more_boxes / 2]), np.concatenate([margins, more_margins])
         surest = np.argsort(-margins, kind="stable")[: parameters.surest]
         boxes, margins = boxes[surest], margins[surest]
@@ -247,10 +245,13 @@ def cut_again(
 
 
 def _search(
-    detector: _core.Hog, image: NDArray[np.uint8], parameters: MiningParameters
+    detector: _core.Hog, image: NDArray[np.uint8], parameters: MiningParameters, enlarged: int = 1
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     # No padding: a window beyond the edge would learn what mirroring looks like.
-    boxes, margins = detector.detect_multi_scale(image, parameters.above, (8, 8), (0, 0), parameters.scale, 0, False)
+    height, width = image.shape
+    boxes, margins = detector.detect_multi_scale(
+        image, parameters.above, (8, 8), (0, 0), parameters.scale, 0, False, (enlarged * width, enlarged * height)
+    )
     return boxes.astype(np.float64), margins
 
 

@@ -214,15 +214,17 @@ def decompressed(message: Any) -> NDArray[np.uint8]:
     return pixels.astype(np.uint8, copy=False)
 
 
-def camera_info(stamp: float, width: int, height: int, focal_px: float) -> CameraInfo:
-    """Return the calibration of an undistorted pinhole camera whose principal point is the image centre."""
+def camera_info(
+    stamp: float, width: int, height: int, focal_px: float, distortion: tuple[float, float] = (0.0, 0.0)
+) -> CameraInfo:
+    """Return the calibration of a camera whose principal point is the image centre; `distortion`: k1 and k2."""
     cx, cy = (width - 1) / 2, (height - 1) / 2
     return CameraInfo(
         header=_header(stamp, CAMERA_FRAME),
         height=height,
         width=width,
         distortion_model="plumb_bob",
-        d=np.zeros(5),
+        d=np.array([*distortion, 0.0, 0.0, 0.0]),
         k=np.array([focal_px, 0, cx, 0, focal_px, cy, 0, 0, 1.0]),
         r=np.eye(3).reshape(-1),
         p=np.array([focal_px, 0, cx, 0, 0, focal_px, cy, 0, 0, 0, 1.0, 0]),

@@ -42,7 +42,18 @@ def picture(card: ScoreCard) -> Panel:
         ("best box wrong", _share(card.best_box_wrong, 0, 0.05), "path", _unit(card.path_m, "m")),
         ("pixel error", _pixels(card), "turn-rate change", _unit(card.mean_abs_domega, "rad/s", 3)),
         ("lost", _losses(card), "jerk", _unit(card.jerk_mean, "m/s³")),
-        ("target switches", "–" if card.identity_switches is None else str(card.identity_switches), "", ""),
+        (
+            "target switches",
+            _count(card.identity_switches),
+            "time to find again",
+            _unit(card.time_to_find_again_s, "s"),
+        ),
+        (
+            "near anybody",
+            f"intimate {_percent(card.intrusion_intimate)}",
+            "",
+            f"personal {_percent(card.intrusion_personal)}",
+        ),
     ):
         figures.add_row(*row)
     bars = Table.grid(padding=(0, 2))
@@ -96,6 +107,10 @@ def _unit(value: float | None, unit: str, digits: int = 1) -> str:
 
 def _success(card: ScoreCard) -> Text | str:
     return "–" if card.success is None else _good("yes" if card.success else "no", card.success)
+
+
+def _count(count: int | None) -> str:
+    return "–" if count is None else str(count)
 
 
 def _pixels(card: ScoreCard) -> str:

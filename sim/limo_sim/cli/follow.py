@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import add_follower, output_file
+from limo_hog.cli.support.arguments import add_follower
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
-from limo_sim.cli.options import add_scenario
+from limo_sim.cli.options import add_json, add_scenario
 from limo_sim.cli.watching import add_watching, watching
 
 if TYPE_CHECKING:
@@ -26,9 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_follower(parser)
     add_scenario(parser, 60.0, "simulated time (60)")
-    parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write the score card as JSON; - is standard output"
-    )
+    add_json(parser)
     parser.add_argument(
         "--ros2",
         action="store_true",
@@ -43,9 +41,8 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.run.episode import run_episode
     from limo_sim.run.score import score
     from limo_sim.view.tuning import Tunable
-    from limo_sim.world.variants import of_run
 
-    scenario = of_run(load(args.scenario), args.seed)
+    scenario = load(args.scenario)
     controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
     with watching(args, scenario, controller) as audience:

@@ -8,12 +8,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import output_file
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
-from limo_sim.cli.options import add_scenario
+from limo_sim.cli.options import add_json, add_scenario
 from limo_sim.cli.watching import add_watching, watching
 
 if TYPE_CHECKING:
@@ -28,16 +27,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add `run`."""
     parser = subparsers.add_parser(
         "run",
-        description="Run an rclpy script against the arena, in one process and in lock step: time passes only while "
-        "the node waits, so the same file, scenario and seed give the same run. Ends with the score card of `follow`.",
+        description="Run an rclpy script against the arena, in lock step: time passes only while the node "
+        "waits, so the same file, scenario and seed give the same run. Ends with the score card of `follow`.",
         epilog="What of ROS 2's Python API is offered: https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
     )
     parser.add_argument("node", metavar="NODE.py", type=Path, help="the script, or a launch file FILE.launch.py")
     parser.add_argument("words", metavar="NAME:=VALUE", nargs="*", help="arguments of a launch file")
     add_scenario(parser, 60.0, "simulated time (60)")
-    parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write the score card as JSON; - is standard output"
-    )
+    add_json(parser)
     parser.add_argument("--real", action="store_true", help="with this computer's own rclpy: in real time, no score")
     add_watching(parser)
     parser.add_argument(
@@ -60,7 +57,8 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.run.catalogue import load
 
     with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
-        from limo_sim.ros.script import run_script, score_of
+        from limo_sim.ros.apart import run_apart
+        from limo_sim.ros.script import score_of
     scenario = load(args.scenario)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
@@ -78,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
             line = f"[{level}] [{time:.9f}] [{name}]: {message}"
             bar.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
-        outcome = run_script(
+        ended = run_apart(
             args.node,
             scenario,
             args.seconds,
@@ -86,17 +84,20 @@ def run(args: argparse.Namespace) -> int:
             arguments=[*args.words, "--ros-args", *args.ros_args],
             log=log,
             watch=watch,
+            pictures=bool(audience),
         )
-        card = score_of(outcome)
+        card = score_of(ended)
         bar.stop()
-        audience.end(outcome.episode, card)
-    if outcome.failure:
-        sys.stderr.write(outcome.traceback)
-        raise ScriptError(outcome.failure)
+        audience.end(ended.episode, card)
     if args.json:
         write_json(args.json, card.to_json())
     if args.json != STDOUT:
         from limo_sim.cli.card import show
 
         show(card)
+    if ended.failure:
+        # What was printed before comes first, where both go to one terminal or file.
+        sys.stdout.flush()
+        sys.stderr.write(ended.traceback)
+        raise ScriptError(ended.failure)
     return 0

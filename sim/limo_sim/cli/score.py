@@ -9,34 +9,24 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich import box
-from rich.console import Console
-from rich.table import Table
-
 from limo_hog.atomic import about, whole_file
-from limo_hog.cli.support.arguments import count, file_ending, metres, output_file, seconds, seed
+from limo_hog.cli.support.arguments import add_target_and_detector, count, file_ending, seconds, seed
 from limo_hog.cli.support.environment import cores
-from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
-from limo_hog.follow.control.naming import CONTROLLERS, controller_named
-from limo_hog.follow.sense.detectors import NAMES, detector_named
+from limo_hog.follow.control.naming import CONTROLLERS
+from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.cli.options import add_json
 
 if TYPE_CHECKING:
     from limo_sim.run.score import ScoreCard
-    from limo_sim.run.sweep import Estimate, Summary
+    from limo_sim.run.suite import Suite
+    from limo_sim.run.sweep import Run
 
-#: Columns of the table: a figure of the score card, its heading, its unit, how it is written.
-_COLUMNS = (
-    ("success", "suc-\ncess", "%", ".0f"),
-    ("in_view", "in\nview", "%", ".1f"),
-    ("pixel_error_mean", "off\ncentre", "px", ".1f"),
-    ("distance_rms_error_m", "dist.\nerror", "m", ".2f"),
-    ("found_again", "found\nagain", "%", ".1f"),
-    ("follows_first", "same\nperson", "%", ".1f"),
-    ("clearance_min_m", "least\nclear", "m", ".2f"),
-    ("contacts_person", "con-\ntacts", "", ".2g"),
-    ("path_wrong_m", "path\nwrong", "m", ".2f"),
-)
+#: Those of `limo_sim.run.baselines`, which is not imported before it is needed.
+_BASELINES = ("pursuit", "ppo")
+#: Simulated time of a run that is not of a suite [s].
+_SECONDS = 60.0
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -45,20 +35,27 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "score",
         description="Play every scenario with every controller and several seeds, and compare: mean and 95 % "
         "interval of the score cards' figures.",
+        epilog="What the figures mean, and what other benchmarks call them: "
+        "https://github.com/limo-hog/limo-hog/blob/main/docs/metrics.md",
     )
-    parser.add_argument("--scenario", nargs="+", metavar="NAME|FILE.toml", help="only these (all that come along)")
-    parser.add_argument("--controller", nargs="+", choices=CONTROLLERS, default=CONTROLLERS, help="only these (all)")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--scenario", nargs="+", metavar="NAME|FILE.toml", help="only these (all that come along)")
+    which.add_argument("--suite", metavar="v1", help="the frozen scenarios of a benchmark, summed up by group")
+    parser.add_argument(
+        "--controller",
+        nargs="+",
+        type=_controller,
+        metavar="NAME",
+        default=CONTROLLERS,
+        help="only these, of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)",
+    )
+    parser.add_argument("--against", metavar="NAME", help="compare the others with this controller, run by run")
     parser.add_argument("--seeds", type=count, default=20, metavar="N", help="how many of each (%(default)s)")
     parser.add_argument("--seed-start", type=seed, default=0, metavar="N", help="the first of the seeds (%(default)s)")
-    parser.add_argument("--seconds", type=seconds, default=60.0, metavar="S", help="simulated time of a run (60)")
-    parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
-    parser.add_argument(
-        "--detector", default="hog", metavar="|".join((*NAMES, "onnx:FILE")), help="the people detector (%(default)s)"
-    )
+    parser.add_argument("--seconds", type=seconds, metavar="S", help=f"simulated time of a run ({_SECONDS:g})")
+    add_target_and_detector(parser)
     parser.add_argument("--workers", type=count, metavar="N", help="processes (one for each core)")
-    parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write every score card and the summary; - is standard output"
-    )
+    add_json(parser, "every score card and the summary")
     parser.add_argument(
         "--csv",
         type=file_ending(".csv"),
@@ -70,28 +67,23 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
 
 
+def _controller(text: str) -> str:
+    if text not in CONTROLLERS and text not in _BASELINES and not text.startswith("policy:"):
+        known = ", ".join((*CONTROLLERS, *_BASELINES))
+        raise argparse.ArgumentTypeError(f"{text!r} is no controller; wanted is one of {known}, policy:FILE.npz")
+    return text
+
+
 def run(args: argparse.Namespace) -> int:
     """Play all runs, show the table, and write what was asked for."""
-    from limo_sim.run.catalogue import load
-    from limo_sim.run.sweep import Run, play_all, summarise
-    from limo_sim.world.scenario import Scenario
+    from limo_sim.run.suite import Suite
+    from limo_sim.run.sweep import compare, play_all, summarise
 
     if args.plot:
         # A missing library is named before the work, not after.
         from limo_sim.view.sweep_plot import plot
-    scenarios = args.scenario or Scenario.names()
-    # What is wrong with a name is told before the work, too.
-    for name in scenarios:
-        load(name)
-    detector_named(args.detector)
-    for name in args.controller:
-        controller_named(name, args.target)
-    runs = [
-        Run(scenario, controller, args.detector, number, args.seconds, args.target)
-        for scenario in scenarios
-        for controller in args.controller
-        for number in range(args.seed_start, args.seed_start + args.seeds)
-    ]
+    suite = Suite.load(args.suite) if args.suite else None
+    runs = _runs(args, suite)
     card_of = {}
     with progress("runs") as bar:
         task = bar.add_task("playing", total=len(runs))
@@ -99,17 +91,61 @@ def run(args: argparse.Namespace) -> int:
             card_of[played] = card
             bar.advance(task)
     cards = [card_of[run] for run in runs]
+    groups = None if suite is None else suite.groups
     summaries = summarise(cards)
+    of_groups = [] if groups is None else [*summarise(cards, groups), *summarise(cards, dict.fromkeys(groups, "all"))]
+    comparisons = []
+    if args.against:
+        comparisons = compare(cards, args.against, groups)
+        comparisons += compare(cards, args.against, {card.scenario: "all" for card in cards})
     if args.json:
-        result = {"runs": [card.to_json() for card in cards], "summary": [asdict(one) for one in summaries]}
+        result = {
+            "runs": [card.to_json() for card in cards],
+            "summary": [asdict(one) for one in summaries],
+            "groups": [asdict(one) for one in of_groups],
+            "comparison": [asdict(one) for one in comparisons],
+        }
         write_json(args.json, result)
     if args.csv:
         _write_csv(args.csv, cards)
     if args.plot:
-        plot(summaries, args.plot)
+        plot(of_groups or summaries, args.plot)
     if args.json != STDOUT:
-        Console(highlight=False).print(_table(summaries, args.seconds))
+        from limo_sim.cli.tables import show
+
+        show(of_groups or summaries, comparisons, f"{args.seeds} seeds of {runs[0].seconds:g} s")
     return 0
+
+
+def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
+    """Return the runs that are asked for; what is wrong with a name is told here, before the work."""
+    from limo_sim.run.baselines import controller_of
+    from limo_sim.run.catalogue import load
+    from limo_sim.run.sweep import Run
+    from limo_sim.world.scenario import Scenario
+
+    if suite is not None and args.seconds is not None:
+        raise UsageError(f"--seconds and --suite {suite.name}: a run of this suite takes {suite.seconds:g} s")
+    if args.against and args.against not in args.controller:
+        raise UsageError(
+            f"--against {args.against}: is none of the controllers, want one of {', '.join(args.controller)}"
+        )
+    if suite is None:
+        scenarios = args.scenario or Scenario.names()
+    else:
+        scenarios = [str(suite.path(entry)) for entry in suite.scenarios]
+    for name in scenarios:
+        load(name)
+    detector_named(args.detector)
+    for name in args.controller:
+        controller_of(name, args.target)
+    duration = suite.seconds if suite is not None else args.seconds or _SECONDS
+    return [
+        Run(scenario, controller, args.detector, number, duration, args.target)
+        for scenario in scenarios
+        for controller in args.controller
+        for number in range(args.seed_start, args.seed_start + args.seeds)
+    ]
 
 
 def _write_csv(path: Path, cards: Sequence[ScoreCard]) -> None:
@@ -121,37 +157,3 @@ def _write_csv(path: Path, cards: Sequence[ScoreCard]) -> None:
         writer = csv.DictWriter(file, rows[0], lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-
-
-def _table(summaries: Sequence[Summary], duration: float) -> Table:
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        caption=f"mean and, below, half the 95 % interval over {summaries[0].runs} seeds of {duration:g} s",
-        caption_justify="left",
-    )
-    table.add_column("\n", no_wrap=True)
-    for _, heading, unit, _ in _COLUMNS:
-        table.add_column(f"{heading}\n[dim]{unit}[/]", justify="right", no_wrap=True)
-    before = ""
-    for one in summaries:
-        if one.scenario != before:
-            table.add_section()
-            table.add_row(f"[bold]{one.scenario}[/]")
-        cells = [_cell(one.measures[name], name, unit, style) for name, _, unit, style in _COLUMNS]
-        table.add_row(f"  {one.controller}", *cells)
-        before = one.scenario
-    return table
-
-
-def _cell(estimate: Estimate | None, name: str, unit: str, style: str) -> str:
-    if estimate is None:
-        return "[dim]–[/]"
-    factor = 100 if unit == "%" else 1
-    if name == "clearance_min_m":
-        # What counts is the worst run, which has no interval.
-        return format(estimate.least, style)
-    mean = format(factor * estimate.mean, style)
-    if estimate.interval is None:
-        return mean
-    return f"{mean}\n[dim]±{format(factor * estimate.interval, style)}[/]"

@@ -42,7 +42,13 @@ def run_live(
         Carries the topics; None for an arena without ROS.
     watch
         Called with every camera frame.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario asks for faults of the detector: those of the nodes are out of reach.
     """
+    scenario.check_detector_is_plain("the nodes on the network bring their own detectors")
     arena = Arena(scenario, seed)
     outlet: Outlet | None = None
     writers = {}

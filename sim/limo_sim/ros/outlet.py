@@ -43,9 +43,10 @@ class Outlet:
             out.append((names.SCAN, lambda: messages.laser_scan(scan, period)))
         if frame.stamp > self._camera:
             self._camera = stamp = frame.stamp
+            bent = arena.scenario.camera.k1, arena.scenario.camera.k2
             out += [
-                (names.CAMERA_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX)),
-                (names.DEPTH_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX)),
+                (names.CAMERA_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX, bent)),
+                (names.DEPTH_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX, bent)),
                 (names.DEPTH, lambda: messages.image(stamp, frame.depth)),
                 (names.DEPTH_LCAS, lambda: messages.image(stamp, frame.depth)),
                 (names.IMAGE, lambda: messages.image(stamp, frame.image)),

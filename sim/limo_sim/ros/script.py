@@ -12,7 +12,7 @@ from pathlib import Path
 from limo_hog.ros2 import names
 from limo_sim.ros.front import in_front
 from limo_sim.ros.launching.programs import SUFFIX, launch
-from limo_sim.ros.lockstep.patience import HungError
+from limo_sim.ros.lockstep.patience import DiedError, HungError
 from limo_sim.ros.lockstep.turns import ExternalShutdownException, RunOver
 from limo_sim.ros.lockstep.windows import watched_cv2
 from limo_sim.ros.lockstep.world import Log, StubError, World
@@ -27,26 +27,33 @@ _AFTERMATH = 2.0
 _HERE = Path(__file__).parent
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+@dataclass(frozen=True)
+class Ended:
     """How a run ended.
 
     Attributes
     ----------
-    world
-        The run, with its log, commands and windows.
     episode
         The log that is scored.
     failure
         One line that names the fault; "" without one.
     traceback
         The script's part of the traceback; "" without an exception.
+    asked
+        Whether the script used cv2's HOG detector.
     """
 
-    world: World
     episode: Episode
     failure: str
     traceback: str
+    asked: bool
+
+
+@dataclass(frozen=True)
+class Outcome(Ended):
+    """How a run in this process ended; `world` is the run, with its log, commands and windows."""
+
+    world: World
 
 
 def run_script(
@@ -84,6 +91,8 @@ def run_script(
     ------
     StubError
         If there is no such script.
+    ScenarioError
+        If the scenario asks for faults of the detector, which is the node's own here.
     """
     if not script.is_file():
         raise StubError(f"{script}: no such file")
@@ -93,7 +102,6 @@ def run_script(
     argv, path = sys.argv, list(sys.path)
     sys.argv = [str(script), *arguments]
     sys.path.insert(0, str(script.resolve().parent))
-    failed_at: float | None = None
     with in_front(world), watched_cv2(world):
         try:
             with world.patience.watching(), world.turns.main(Context(world)):
@@ -115,24 +123,29 @@ def run_script(
     if isinstance(world.fault, KeyboardInterrupt):
         # Ctrl-C in a callback ends the run, even if the script catches it.
         raise world.fault
+    return finished(world)
+
+
+def finished(world: World) -> Outcome:
+    """Let the arena go on after the script's end, and return how the run ended."""
+    failed_at = world.time
     if world.fault is not None:
-        failed_at = world.time
         world.seconds = failed_at + _AFTERMATH
     # After the script's end the arena goes on without commands until the time is up.
     while not world.over:
         world.advance()
     failure = _failure(world, failed_at)
     shown = "" if world.fault is None else _script_traceback(world.fault)
-    return Outcome(world, world.episode(), failure, shown)
+    return Outcome(world.episode(), failure, shown, bool(world.asked), world)
 
 
-def score_of(outcome: Outcome) -> ScoreCard:
+def score_of(outcome: Ended) -> ScoreCard:
     """Measure a run; where the script does not use cv2's HOG detector, figures of detections are None.
 
     Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
     """
     card = score(outcome.episode)
-    if outcome.world.asked:
+    if outcome.asked:
         return card
     twists = [step.decision.twist for step in outcome.episode.steps]
     driving = sum(bool(twist.linear or twist.angular) for twist in twists) / max(len(twists), 1)
@@ -145,6 +158,7 @@ def score_of(outcome: Outcome) -> ScoreCard:
         longest_gap_s=None,
         lost=0,
         found_again=None,
+        time_to_find_again_s=None,
         follows_first=None,
         identity_switches=None,
         detect_ms_p50=None,
@@ -153,9 +167,11 @@ def score_of(outcome: Outcome) -> ScoreCard:
     )
 
 
-def _failure(world: World, failed_at: float | None) -> str:
+def _failure(world: World, failed_at: float) -> str:
     if world.fault is not None:
-        kind = "hung" if isinstance(world.fault, HungError) else f"failed with {type(world.fault).__name__}"
+        kind = f"failed with {type(world.fault).__name__}"
+        if isinstance(world.fault, (HungError, DiedError)):
+            kind = "hung" if isinstance(world.fault, HungError) else "died"
         stopped = world.arena.odometry()
         stands = abs(stopped.linear) < 1e-6 and abs(stopped.angular) < 1e-6
         ending = "the watchdog stopped the robot" if stands else "the robot still moves"
@@ -170,7 +186,9 @@ def _failure(world: World, failed_at: float | None) -> str:
 
 
 def _script_traceback(error: BaseException) -> str:
-    """Return the traceback without the frames of limo-hog and of what runs the script."""
+    """Return the traceback without the frames of limo-hog and of what runs the script; "" without one."""
+    if error.__traceback__ is None:
+        return ""
     told = traceback.TracebackException.from_exception(error)
     link: traceback.TracebackException | None = told
     while link is not None:

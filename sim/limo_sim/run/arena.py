@@ -7,7 +7,9 @@ stream by the number of the reading, so that reading one sensor changes no other
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pymunk
@@ -18,15 +20,17 @@ from limo_hog.follow.twist import Twist
 from limo_sim.sensing import imu, lidar
 from limo_sim.sensing.camera import CameraPose, Frame
 from limo_sim.sensing.delivery import Channel, Exposure
-from limo_sim.sensing.renderer import Renderer, Seen
+from limo_sim.sensing.renderer import Past, Renderer, Seen
+from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
-from limo_sim.world.person import Pose, Walk, legs_at, trunk_radius
+from limo_sim.world.movers import Movers
+from limo_sim.world.person import Pose, earlier, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
-from limo_sim.world.scenario import Scenario
+from limo_sim.world.scenario import Furniture, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
+from limo_sim.world.variants import of_run
 
-STEPS_PER_SECOND = 50
-STEP_S = 1 / STEPS_PER_SECOND
+STEPS_PER_SECOND = round(1 / STEP_S)
 
 _ROBOT, _OBSTACLE, _PERSON = 1, 2, 3
 _WALL_HALF = 0.1  # half of the walls' thickness [m]
@@ -39,7 +43,7 @@ _CAMERA_STREAM, _LIDAR_STREAM, _IMU_STREAM, _DROP_STREAM, _SLIP_STREAM, _PATTERN
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """The robot at the end of a step: pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry, contacts."""
+    """The end of a step: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
 
     step: int
     x: float
@@ -49,14 +53,25 @@ class _State:
     turn_rate: float
     odometry: Odometry
     contacts: Contacts
+    people: tuple[Pose | None, ...]
+    people_before: tuple[Pose | None, ...]
 
     @property
     def time(self) -> float:
         return self.step / STEPS_PER_SECOND
 
 
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The arena from above at one instant [s]: the robot's x, y, yaw [m, m, rad], and where each person is."""
+
+    stamp: float
+    robot: tuple[float, float, float]
+    people: tuple[Pose | None, ...]
+
+
 class Arena:
-    """One run of a scenario.
+    """One run of a scenario, whose `vary` draws people from the seed: `scenario` holds those of this run.
 
     Raises
     ------
@@ -66,9 +81,9 @@ class Arena:
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         scenario.check(f"scenario {scenario.name!r}: ")
-        self.scenario = scenario
+        self.scenario = scenario = of_run(scenario, seed)
         self.seed = seed
-        self._walks = [Walk(person) for person in scenario.people]
+        self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario.movers)
         robot = scenario.robot
         self._drive = Drive(robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
         self._slip = self._stream(_SLIP_STREAM)
@@ -79,10 +94,22 @@ class Arena:
         self._robot = self._add_robot()
         self._add_obstacles()
         self._people: list[pymunk.Body | None] = [None] * len(scenario.people)
-        self._place_people(0.0)
+        self._place_people()
+        self._moving = [self._add_mover(piece) for piece in self._movers.at(0.0)]
         for other in (_OBSTACLE, _PERSON):
             self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
-        self._state = self._before = _State(0, robot.x, robot.y, robot.yaw, (0.0, 0.0), 0.0, Odometry(), Contacts())
+        self._state = self._before = _State(
+            0,
+            robot.x,
+            robot.y,
+            robot.yaw,
+            (0.0, 0.0),
+            0.0,
+            Odometry(),
+            Contacts(),
+            self._crowd.poses,
+            self._crowd.poses,
+        )
         camera = scenario.camera
         self._camera = Channel(
             camera.rate_hz,
@@ -96,12 +123,7 @@ class Arena:
         self._wheels = Channel(
             scenario.odometry.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.odometry.latency_s
         )
-        self._static_scanned = [
-            placed(shape, piece.x, piece.y, piece.yaw)
-            for piece in scenario.furniture
-            for shape in KINDS[piece.kind].scanned
-        ]
-        self._static_scanned += [wall.footprint for wall in scenario.walls]
+        self._static_scanned = _scanned(scenario.furniture) + [wall.footprint for wall in scenario.walls]
         self._renderer: Renderer | None = None
         self._frame: Frame | None = None
         self._scan: tuple[int, Scan] | None = None
@@ -135,7 +157,11 @@ class Arena:
         before = self._state
         self._drive.advance(before.time, STEP_S)
         step = before.step + 1
-        self._place_people(step / STEPS_PER_SECOND)
+        self._crowd.advance(step / STEPS_PER_SECOND, (before.x, before.y, before.yaw))
+        self._place_people()
+        for body, piece in zip(self._moving, self._movers.at(step / STEPS_PER_SECOND), strict=True):
+            body.velocity = (piece.x - body.position.x) / STEP_S, (piece.y - body.position.y) / STEP_S
+            body.angular_velocity = math.remainder(piece.yaw - body.angle, math.tau) / STEP_S
         self._space.step(STEP_S)
         robot = self._robot
         twist, wheels = self._drive.twist, before.odometry
@@ -152,6 +178,8 @@ class Arena:
             turn_rate=robot.angular_velocity,
             odometry=Odometry(step / STEPS_PER_SECOND, x, y, yaw, twist.linear, twist.angular),
             contacts=self.contacts,
+            people=self._crowd.poses,
+            people_before=before.people,
         )
         for channel in (self._camera, self._lidar, self._wheels):
             channel.advance(step, self._state)
@@ -162,8 +190,11 @@ class Arena:
         if self._frame is None or self._frame.stamp != exposure.state.time:
             image, depth, seen = self._render().render(
                 _camera_at(exposure.state),
-                self._poses(exposure.state.time),
+                exposure.state.people,
                 self._stream(_CAMERA_STREAM, exposure),
+                self._movers.at(exposure.state.time),
+                time=exposure.state.time,
+                past=Past(partial(self._earlier, exposure.state), exposure.state.turn_rate),
             )
             self._frame = Frame(exposure.state.time, image, depth, self._truth_at(exposure.state, seen))
         return self._frame
@@ -174,7 +205,8 @@ class Arena:
         if self._scan is None or self._scan[0] != exposure.index:
             state = exposure.state
             shapes: list[Disc | Rectangle] = list(self._static_scanned)
-            for person, pose in zip(self.scenario.people, self._poses(state.time), strict=True):
+            shapes += _scanned(self._movers.at(state.time))
+            for person, pose in zip(self.scenario.people, state.people, strict=True):
                 if pose is not None:
                     shapes += legs_at(person, pose, lidar.MOUNT_HEIGHT)
             x = state.x + lidar.MOUNT_AHEAD * math.cos(state.yaw)
@@ -208,24 +240,40 @@ class Arena:
         """Return the truth now (`Frame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
-        seen = self._render().look(_camera_at(self._state), self._poses(self.time))
+        seen = self._render().look(_camera_at(self._state), self._state.people, self._movers.at(self.time))
         return self._truth_at(self._state, seen)
+
+    def furniture_in_frame(self) -> list[Seen]:
+        """Return the visible share and the box [px] of each piece of furniture in the newest frame; movers last."""
+        state = self._camera.newest.state
+        return self._render().look_at_furniture(_camera_at(state), state.people, self._movers.at(state.time))
+
+    def plan(self, *, of_frame: bool = False) -> Plan:
+        """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
+        state = self._camera.newest.state if of_frame else self._state
+        return Plan(state.time, (state.x, state.y, state.yaw), state.people)
 
     def _render(self) -> Renderer:
         if self._renderer is None:
             self._renderer = Renderer(self.scenario, self._stream(_PATTERN_STREAM))
         return self._renderer
 
+    def _earlier(self, state: _State, age: float) -> tuple[CameraPose, list[Pose | None], tuple[Furniture, ...]]:
+        """Return what there was some seconds before a state, within a step or a few of it."""
+        (speed_x, speed_y), share = state.velocity, age / STEP_S
+        camera = CameraPose.on_robot(
+            state.x - age * speed_x, state.y - age * speed_y, state.yaw - age * state.turn_rate
+        )
+        people = [earlier(was, now, share) for was, now in zip(state.people_before, state.people, strict=True)]
+        return camera, people, self._movers.at(max(state.time - age, 0.0))
+
     def _stream(self, sensor: int, exposure: Exposure[_State] | None = None) -> np.random.Generator:
         return np.random.default_rng([self.seed, sensor, exposure.index if exposure else 0])
-
-    def _poses(self, time: float) -> list[Pose | None]:
-        return [walk.pose(time) for walk in self._walks]
 
     def _truth_at(self, state: _State, seen: list[Seen]) -> Truth:
         camera = _camera_at(state)
         people: list[PersonTruth | None] = []
-        for person, pose, (visible, box) in zip(self.scenario.people, self._poses(state.time), seen, strict=True):
+        for person, pose, (visible, box) in zip(self.scenario.people, state.people, seen, strict=True):
             if pose is None:
                 people.append(None)
                 continue
@@ -262,19 +310,17 @@ class Arena:
         for side in (middle, -middle):
             footprints += [Rectangle(side, 0, _WALL_HALF, half), Rectangle(0, side, half, _WALL_HALF)]
         for footprint in (*footprints, *self.scenario.footprints):
-            shape: pymunk.Shape
-            if isinstance(footprint, Disc):
-                shape = pymunk.Circle(ground, footprint.radius, (footprint.x, footprint.y))
-            else:
-                turned = pymunk.Transform.translation(footprint.x, footprint.y).rotated(footprint.yaw)
-                x, y = footprint.half_x, footprint.half_y
-                shape = pymunk.Poly(ground, [(-x, -y), (x, -y), (x, y), (-x, y)], turned)
-            shape.friction, shape.collision_type = _FRICTION, _OBSTACLE
-            self._space.add(shape)
+            self._space.add(_obstacle(ground, footprint))
 
-    def _place_people(self, time: float) -> None:
-        """Give each person the velocity that leads to their place at `time` [s]."""
-        for index, pose in enumerate(self._poses(time)):
+    def _add_mover(self, piece: Furniture) -> pymunk.Body:
+        body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        body.position, body.angle = (piece.x, piece.y), piece.yaw
+        self._space.add(body, _obstacle(body, KINDS[piece.kind].footprint))
+        return body
+
+    def _place_people(self) -> None:
+        """Give each person the velocity that leads to their place at the end of the step."""
+        for index, pose in enumerate(self._crowd.poses):
             person = self._people[index]
             if pose is None:
                 if person is not None:
@@ -295,6 +341,24 @@ class Arena:
         if step - self._touched[other] > _SAME_CONTACT:
             self._contacts[other] += 1
         self._touched[other] = step
+
+
+def _obstacle(body: pymunk.Body, footprint: Disc | Rectangle) -> pymunk.Shape:
+    """Return what the robot bumps into, in the body's frame."""
+    shape: pymunk.Shape
+    if isinstance(footprint, Disc):
+        shape = pymunk.Circle(body, footprint.radius, (footprint.x, footprint.y))
+    else:
+        turned = pymunk.Transform.translation(footprint.x, footprint.y).rotated(footprint.yaw)
+        x, y = footprint.half_x, footprint.half_y
+        shape = pymunk.Poly(body, [(-x, -y), (x, -y), (x, y), (-x, y)], turned)
+    shape.friction, shape.collision_type = _FRICTION, _OBSTACLE
+    return shape
+
+
+def _scanned(pieces: Iterable[Furniture]) -> list[Disc | Rectangle]:
+    """Return what the lidar sees of furniture."""
+    return [placed(shape, piece.x, piece.y, piece.yaw) for piece in pieces for shape in KINDS[piece.kind].scanned]
 
 
 def _camera_at(state: _State) -> CameraPose:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from statistics import NormalDist
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +51,98 @@ class FalseBoxes:
 FALSE_BOXES = FalseBoxes()
 
 
+#: What benches/fit_detector.py measured on photographs, for each model of people.
+FIT_FILE = Path(__file__).with_name("detector_fit.json")
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Recall by height: top · σ(slope · log2(height / middle)).
+
+    Attributes
+    ----------
+    top
+        Recall of tall people, whom pose, clothes and background still hide [0 … 1].
+    middle_px
+        Height at which half of it is reached [px].
+    slope
+        Of the logistic function, for each doubling of the height.
+    """
+
+    top: float
+    middle_px: float
+    slope: float
+
+    def at(self, height: float) -> float:
+        """Return the recall at a height [px]; a height of 0 stands for a person out of the image."""
+        return self.top / (1.0 + math.exp(-self.slope * math.log2(max(height, 1.0) / self.middle_px)))
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How a model of people does on photographs.
+
+    Attributes
+    ----------
+    photographs, arena
+        Recall of the detector on photographs, and its own in the arena.
+    memory_s
+        Time in which the correlation of a person's misses falls to 1/e [s].
+    false_rate
+        Mean number of false boxes in a frame.
+    """
+
+    photographs: Curve
+    arena: Curve
+    memory_s: float
+    false_rate: float
+
+    def kept(self, height: float) -> float:
+        """Return the share of what is found in the arena that is kept for people of a height [px], 0 … 1."""
+        return min(1.0, self.photographs.at(height) / self.arena.at(height))
+
+
+@cache
+def fit_of(model: str) -> Fit:
+    """Return the fit of "opencv" or "limo"."""
+    table = json.loads(FIT_FILE.read_text(encoding="utf-8"))["models"][model]
+    photographs, arena = (Curve(**table[place]) for place in ("photographs", "arena"))
+    return Fit(photographs, arena, table["memory_s"], table["false_rate"])
+
+
+class Missing(Protocol):
+    """When one person is missed."""
+
+    def at(self, period: int, height: float) -> bool:
+        """Return whether the person, so high in the image [px], is missed in a period of the camera.
+
+        No earlier period than the last one asked for.
+        """
+        ...
+
+
+class FittedMisses:
+    """When one person is missed, by a model's fit.
+
+    Missed while a standard normal process with correlation exp(-t / memory) is above the quantile of the share kept at
+    the person's height: that share is kept at every height, and misses come in bursts at all of them.
+    """
+
+    def __init__(self, fit: Fit, rate_hz: float, random: np.random.Generator) -> None:
+        self._fit, self._random = fit, random
+        self._correlation = math.exp(-1.0 / (rate_hz * fit.memory_s))
+        self._period = 0
+        self._value = float(random.standard_normal())
+
+    def at(self, period: int, height: float) -> bool:
+        """Return whether the person is missed, see `Missing.at`."""
+        for _ in range(period - self._period):
+            new = math.sqrt(1.0 - self._correlation**2) * self._random.standard_normal()
+            self._value = self._correlation * self._value + new
+        self._period = max(period, self._period)
+        return NormalDist().cdf(self._value) >= self._fit.kept(height)
+
+
 class Misses:
     """When one person is missed: a Markov chain of two states, one step for each period of the camera.
 
@@ -61,13 +159,22 @@ class Misses:
         self._period = 0
         self._missed = bool(random.random() >= faults.recall)
 
-    def at(self, period: int) -> bool:
-        """Return whether the person is missed in a period of the camera, no earlier than the last one asked for."""
+    def at(self, period: int, height: float) -> bool:
+        """Return whether the person is missed, see `Missing.at`; the height makes no difference."""
+        del height
         for _ in range(period - self._period):
             change = self._random.random() < (self._leaves if self._missed else self._begins)
             self._missed ^= bool(change)
         self._period = max(period, self._period)
         return self._missed
+
+
+def misses_of(faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> list[Missing]:
+    """Return when each person of a run is missed by a camera of `rate_hz` [Hz]."""
+    randoms = [np.random.default_rng([seed, _MISS_STREAM, person]) for person in range(people)]
+    if faults.model == "none":
+        return [Misses(faults, rate_hz, random) for random in randoms]
+    return [FittedMisses(fit_of(faults.model), rate_hz, random) for random in randoms]
 
 
 class FaultyDetector:
@@ -91,10 +198,9 @@ class FaultyDetector:
     """
 
     def __init__(self, detector: Detector, faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> None:
-        self._detector, self._faults, self._rate, self._seed = detector, faults, rate_hz, seed
-        self._misses = [
-            Misses(faults, rate_hz, np.random.default_rng([seed, _MISS_STREAM, person])) for person in range(people)
-        ]
+        self._detector, self._rate, self._seed = detector, rate_hz, seed
+        self._misses = misses_of(faults, rate_hz, people, seed)
+        self._false_rate = faults.false_rate if faults.model == "none" else fit_of(faults.model).false_rate
         self._truth: Truth | None = None
         self._region: Region | None = None
 
@@ -131,14 +237,15 @@ class FaultyDetector:
 
     def _kept(self, boxes: NDArray[np.int32], truth: Truth, period: int) -> list[int]:
         """Return the boxes (N, 4) [px of the camera's image] that are on nobody, or on people who are not missed."""
-        missed = [misses.at(period) for misses in self._misses]
+        heights = [person.box[3] if person and person.box else 0.0 for person in truth.people]
+        missed = [misses.at(period, height) for misses, height in zip(self._misses, heights, strict=True)]
         on: Sequence[int] = [person_of(box, truth.people) for box in boxes]
         return [index for index, person in enumerate(on) if person == NO_PERSON or not missed[person]]
 
     def _false(self, period: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return false boxes int64 (N, 4) in the camera's image [px] and their scores (N,)."""
         random = np.random.default_rng([self._seed, _FALSE_STREAM, period])
-        count = random.poisson(self._faults.false_rate)
+        count = random.poisson(self._false_rate)
         height = FALSE_BOXES.least_height * 2.0 ** random.exponential(FALSE_BOXES.octaves, count)
         height = np.minimum(height, HEIGHT)
         width = height / 2

@@ -189,7 +189,7 @@ def run_episode(
                 watch(Moment(step, frame if fresh else None, scan, odometry))
         arena.step()
     return Episode(
-        scenario,
+        arena.scenario,
         *names,
         seed,
         arena.time,

@@ -8,6 +8,7 @@ import json
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import limo_hog
 from limo_sim.world.scenario import Scenario
@@ -19,10 +20,29 @@ _LOOKS_ON = "view"
 
 
 def scenario_hash(scenario: Scenario) -> str:
-    """Return 16 hexadecimal digits of the SHA-256 of every value in a scenario, its name and summary left out."""
-    table = dataclasses.asdict(scenario)
-    del table["name"], table["summary"]
+    """Return 16 hexadecimal digits of the SHA-256 of what a scenario says, its name and summary left out.
+
+    Values that are the defaults are left out as well, so that a new option leaves the hashes of old scenarios alone.
+    """
+    table = _told(dataclasses.replace(scenario, name="", summary=""))
     return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()[:_DIGITS]
+
+
+def _told(value: Any) -> Any:
+    """Return a dataclass as nested lists and tables, without the fields that hold their default."""
+    if isinstance(value, tuple):
+        return [_told(item) for item in value]
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        return value
+    return {
+        field.name: _told(item)
+        for field in dataclasses.fields(value)
+        if (item := getattr(value, field.name)) != _default(field)
+    }
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    return field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
 
 
 @cache

@@ -69,11 +69,17 @@ class ScoreCard:
         Share of time in each of Hall's zones, by the distance from the robot's centre to the subject's axis.
     clearance_min_m
         Smallest gap between the robot's outline and the cylinder around any person [m].
+    intrusion_intimate, intrusion_personal, intrusion_social
+        Share of the whole run in which the nearest of all people is in this zone of Hall's, by the distance from the
+        robot's centre to the person's axis; None where no person ever was in the arena.
     contacts_person, contacts_wall
         How often the robot touched a person; a wall or furniture.
     lost, found_again
         How often the subject was not the target for more than 0.5 s; share of these in which the subject was the target
         again within 3 s, not counting the time hidden behind something.
+    time_to_find_again_s
+        Mean time from such a loss until the subject is the target again, counted alike; a search that the run's end cut
+        off counts as far as it got, if it took longer than 3 s [s].
     follows_first
         Share of frames with a target in which the target is the subject.
     identity_switches
@@ -119,10 +125,14 @@ class ScoreCard:
     zone_social: float | None
     zone_public: float | None
     clearance_min_m: float | None
+    intrusion_intimate: float | None
+    intrusion_personal: float | None
+    intrusion_social: float | None
     contacts_person: int
     contacts_wall: int
     lost: int
     found_again: float | None
+    time_to_find_again_s: float | None
     follows_first: float | None
     identity_switches: int | None
     path_wrong_m: float
@@ -169,6 +179,7 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
     stamps = [step.seen.stamp for step, ok in zip(frames, found, strict=True) if ok and step.seen]
     known = [person for person in targets if person is not None]
     zones = Counter(zone_of(distance) for distance in distances)
+    nearest = Counter(zone_of(distance) for step in steps if (distance := _nearest(step)) is not None)
     return ScoreCard(
         scenario=episode.scenario.name,
         controller=episode.controller,
@@ -191,15 +202,19 @@ def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
         distance_min_m=min(distances, default=None),
         distance_mean_m=_mean(distances),
         distance_rms_error_m=None if target is None else _rms(held - kept),
-        zone_intimate=_share(zones, Zone.INTIMATE),
-        zone_personal=_share(zones, Zone.PERSONAL),
-        zone_social=_share(zones, Zone.SOCIAL),
-        zone_public=_share(zones, Zone.PUBLIC),
+        zone_intimate=_share(zones, Zone.INTIMATE, zones.total()),
+        zone_personal=_share(zones, Zone.PERSONAL, zones.total()),
+        zone_social=_share(zones, Zone.SOCIAL, zones.total()),
+        zone_public=_share(zones, Zone.PUBLIC, zones.total()),
         clearance_min_m=_clearance(episode),
+        intrusion_intimate=_share(nearest, Zone.INTIMATE, len(steps)),
+        intrusion_personal=_share(nearest, Zone.PERSONAL, len(steps)),
+        intrusion_social=_share(nearest, Zone.SOCIAL, len(steps)),
         contacts_person=episode.contacts.person,
         contacts_wall=episode.contacts.wall,
         lost=len(gaps),
         found_again=_mean([gap <= criteria.found_within_s for gap in gaps]),
+        time_to_find_again_s=_mean(gaps),
         follows_first=_mean([person == subject for person in known]),
         identity_switches=sum(one != other for one, other in itertools.pairwise(chosen)),
         path_wrong_m=_path_wrong(steps, criteria),
@@ -348,8 +363,13 @@ def _rms(values: NDArray[np.float64]) -> float | None:
     return float(np.sqrt(np.mean(values**2))) if len(values) else None
 
 
-def _share(zones: Counter[Zone], zone: Zone) -> float | None:
-    return zones[zone] / zones.total() if zones else None
+def _nearest(step: Step) -> float | None:
+    """Return the distance from the robot's centre to the axis of the nearest person [m]."""
+    return min((person.distance for person in step.truth.people if person), default=None)
+
+
+def _share(zones: Counter[Zone], zone: Zone, total: int) -> float | None:
+    return zones[zone] / total if zones else None
 
 
 def _shares(values: Sequence[str], always: Sequence[str]) -> dict[str, float]:

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
 from statistics import NormalDist, fmean, stdev
 
 import limo_hog
-from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.run.baselines import controller_of
 from limo_sim.run.catalogue import load
 from limo_sim.run.episode import run_episode
 from limo_sim.run.score import ScoreCard, score
-from limo_sim.world.variants import of_run
 
 #: Figures of a score card that are summed up, in the order they are shown.
 MEASURES = (
@@ -27,9 +26,13 @@ MEASURES = (
     "distance_rms_error_m",
     "zone_social",
     "found_again",
+    "time_to_find_again_s",
     "follows_first",
     "identity_switches",
     "clearance_min_m",
+    "intrusion_intimate",
+    "intrusion_personal",
+    "intrusion_social",
     "contacts_person",
     "contacts_wall",
     "path_wrong_m",
@@ -64,12 +67,27 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The statistics of one scenario and controller over seeds; None where no run had anything to measure."""
+    """The statistics of one scenario, or group of them, and controller over seeds; None where nothing was measured."""
 
     scenario: str
     controller: str
     runs: int
     measures: dict[str, Estimate | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """How far a controller's figures lie above those of another in the same scenarios and seeds.
+
+    The differences are taken run by run, so that what a seed makes harder for both cancels. Where the interval of one
+    leaves out 0, the difference is more than the choice of seeds.
+    """
+
+    scenario: str
+    controller: str
+    against: str
+    pairs: int
+    differences: dict[str, Estimate | None]
 
 
 def play(run: Run) -> ScoreCard:
@@ -78,9 +96,9 @@ def play(run: Run) -> ScoreCard:
 
     limo_hog.set_num_threads(1)
     cv2.setNumThreads(1)
-    controller = controller_named(run.controller, run.target)
+    controller = controller_of(run.controller, run.target)
     names = (run.controller, run.detector)
-    scenario, detector = of_run(load(run.scenario), run.seed), detector_named(run.detector)
+    scenario, detector = load(run.scenario), detector_named(run.detector)
     return score(run_episode(scenario, controller, detector, run.seconds, run.seed, names=names))
 
 
@@ -97,15 +115,58 @@ def play_all(runs: Sequence[Run], workers: int) -> Iterator[tuple[Run, ScoreCard
             raise
 
 
-def summarise(cards: Sequence[ScoreCard]) -> list[Summary]:
-    """Sum up the cards of each scenario and controller, in the order these first occur."""
-    groups: dict[tuple[str, str], list[ScoreCard]] = {}
-    for card in cards:
-        groups.setdefault((card.scenario, card.controller), []).append(card)
+def summarise(cards: Sequence[ScoreCard], groups: Mapping[str, str] | None = None) -> list[Summary]:
+    """Sum up the cards of each scenario and controller, in the order these first occur.
+
+    Parameters
+    ----------
+    groups
+        The group of each scenario: each group is summed up instead, its scenarios counting alike. The mean over a group
+        is taken seed by seed, and the interval is that of the seeds.
+    """
     return [
-        Summary(scenario, controller, len(group), {name: _estimate(group, name) for name in MEASURES})
-        for (scenario, controller), group in groups.items()
+        Summary(label, controller, len(group), {name: _estimate(_by_seed(_values(group, name))) for name in MEASURES})
+        for (label, controller), group in _grouped(cards, groups).items()
     ]
+
+
+def compare(cards: Sequence[ScoreCard], against: str, groups: Mapping[str, str] | None = None) -> list[Comparison]:
+    """Compare every other controller with `against`, scenario by scenario or group by group, as `summarise` does."""
+    grouped = _grouped(cards, groups)
+    comparisons = []
+    for (label, controller), group in grouped.items():
+        if controller == against or (label, against) not in grouped:
+            continue
+        others = grouped[label, against]
+        differences: dict[str, Estimate | None] = {}
+        for name in MEASURES:
+            mine, theirs = _values(group, name), _values(others, name)
+            differences[name] = _estimate(_by_seed({run: mine[run] - theirs[run] for run in mine if run in theirs}))
+        pairs = len({(card.scenario, card.seed) for card in group} & {(card.scenario, card.seed) for card in others})
+        comparisons.append(Comparison(label, controller, against, pairs, differences))
+    return comparisons
+
+
+def _grouped(cards: Sequence[ScoreCard], groups: Mapping[str, str] | None) -> dict[tuple[str, str], list[ScoreCard]]:
+    """Return the cards by scenario, or by group, and controller."""
+    grouped: dict[tuple[str, str], list[ScoreCard]] = {}
+    for card in cards:
+        label = card.scenario if groups is None else groups[card.scenario]
+        grouped.setdefault((label, card.controller), []).append(card)
+    return grouped
+
+
+def _values(cards: Sequence[ScoreCard], name: str) -> dict[tuple[str, int], float]:
+    """Return a figure by scenario and seed, where there is one."""
+    return {(card.scenario, card.seed): float(value) for card in cards if (value := getattr(card, name)) is not None}
+
+
+def _by_seed(values: Mapping[tuple[str, int], float]) -> list[float]:
+    """Return the mean over the scenarios of each seed."""
+    seeds: dict[int, list[float]] = {}
+    for (_, seed), value in values.items():
+        seeds.setdefault(seed, []).append(value)
+    return [fmean(seeds[seed]) for seed in sorted(seeds)]
 
 
 def estimate(values: Sequence[float]) -> Estimate:
@@ -116,8 +177,7 @@ def estimate(values: Sequence[float]) -> Estimate:
     return Estimate(mean, _student(count - 1) * stdev(values) / math.sqrt(count), min(values), max(values))
 
 
-def _estimate(cards: Sequence[ScoreCard], name: str) -> Estimate | None:
-    values = [float(value) for card in cards if (value := getattr(card, name)) is not None]
+def _estimate(values: Sequence[float]) -> Estimate | None:
     return estimate(values) if values else None
 
 

@@ -43,6 +43,12 @@ class CameraPose:
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return np.array([[sin, -cos, 0.0], [0.0, 0.0, -1.0], [cos, sin, 0.0]])
 
+    def ahead_of(self, x: float, y: float) -> tuple[float, float]:
+        """Return how far a place is to the right of the camera and ahead of it [m]."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        dx, dy = x - self.x, y - self.y
+        return sin * dx - cos * dy, cos * dx + sin * dy
+
     def to_camera(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Take points (N, 3) from the arena's frame to the camera's [m]."""
         offset: NDArray[np.float64] = (points - np.array([self.x, self.y, MOUNT_HEIGHT])) @ self.rotation.T

@@ -7,16 +7,20 @@ frusta and boxes are cast in exact perspective. Camera frame and pixels as in `c
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, MOUNT_HEIGHT, CameraPose
 from limo_sim.world.furniture import Box, Frustum
 from limo_sim.world.person import BodyMesh
 from limo_sim.world.scenario import Light
+
+with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
 
 F32 = NDArray[np.float32]
 Bounds = tuple[float, float, float, float]
@@ -67,38 +71,59 @@ class Canvas:
     cover
         float32, how much of a pixel is covered: its depth [px] inside the silhouette.
     tone
-        float32, number of the solid x `TONES` + brightness.
+        float32, number of the solid x `TONES` + brightness; a single row where all rows are equal.
     """
 
-    def __init__(self, window: Window, sheet: F32) -> None:
-        """Begin on scratch memory, float32 (3, at least as many as there are pixels)."""
+    def __init__(self, window: Window, sheet: F32, *, solids: int) -> None:
+        """Begin on scratch memory, float32 (3, at least as many as there are pixels), for a number of solids."""
         left, top, right, bottom = window
         self.window = window
         self.xs: F32 = np.arange(left, right, dtype=np.float32)
         self.ys: F32 = np.arange(top, bottom, dtype=np.float32)[:, None]
         shape = bottom - top, right - left
+        self._shape, self._single = shape, solids == 1
         self.depth, self.cover, self.tone = sheet[:, : shape[0] * shape[1]].reshape(3, *shape)
+        self._is_blank = self._single
+        if not self._single:
+            self._clear()
+
+    def _clear(self) -> None:
         self.depth.fill(np.inf)
         self.cover.fill(0.0)
         self.tone.fill(0.0)
+        self._is_blank = False
 
-    def bands(self, left: float, top: float, right: float, bottom: float) -> Iterator[tuple[slice, slice]]:
+    def finish(self) -> None:
+        """Leave a canvas on which nothing was put empty."""
+        if self._is_blank:
+            self._clear()
+
+    def bands(self, left: float, top: float, right: float, bottom: float) -> list[tuple[slice, slice]]:
         """Rows and columns of the canvas that a box in image pixels touches, in bands that fit the cache."""
         x0, y0 = self.window[0], self.window[1]
-        rows, columns = self.depth.shape
+        rows, columns = self._shape
         c0, c1 = max(0, math.floor(left - x0)), min(columns, math.ceil(right - x0) + 1)
         r0, r1 = max(0, math.floor(top - y0)), min(rows, math.ceil(bottom - y0) + 1)
-        if c0 < c1:
-            step = max(1, BAND // (c1 - c0))
-            for row in range(r0, r1, step):
-                yield slice(row, min(row + step, r1)), slice(c0, c1)
+        if c0 >= c1 or r0 >= r1:
+            return []
+        if (r1 - r0) * (c1 - c0) <= BAND:
+            return [(slice(r0, r1), slice(c0, c1))]
+        step = max(1, BAND // (c1 - c0))
+        return [(slice(row, min(row + step, r1)), slice(c0, c1)) for row in range(r0, r1, step)]
 
     def put(self, at: tuple[slice, slice], depth: F32, cover: F32, tone: F32) -> None:
         """Draw one solid where it is nearest; its depth is NaN where it is not."""
-        wins = depth < self.depth[at]
-        np.copyto(self.depth[at], depth, where=wins)
-        np.copyto(self.tone[at], tone, where=wins)
-        covered = self.cover[at]
+        if self._is_blank and depth.shape == self._shape:
+            # The only solid, and it touches all of the canvas: nothing to compare with. Its depth is NaN for inf.
+            self.depth, self.cover, self.tone, self._is_blank = depth, cover, tone, False
+            return
+        if self._is_blank:
+            self._clear()
+        nearest, covered = self.depth[at], self.cover[at]
+        # OpenCV's masked copy is ten times as fast as numpy's.
+        wins = (depth < nearest).view(np.uint8)
+        cv2.copyTo(depth, wins, nearest)
+        cv2.copyTo(tone if tone.shape == wins.shape else np.repeat(tone, len(wins), axis=0), wins, self.tone[at])
         np.fmax(covered, cover, out=covered)
 
     @property
@@ -254,7 +279,7 @@ def covers(shape: Outline, x: F32, y: F32) -> NDArray[np.bool_]:
 
 def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, part: int) -> None:
     """Cast an upright cone or cylinder that stands in the arena's frame; `sun` in the camera's frame."""
-    [[x0, _, z0]] = camera.to_camera(np.array([[solid.x, solid.y, 0.0]])).tolist()
+    x0, z0 = camera.ahead_of(solid.x, solid.y)
     widest = max(solid.r0, solid.r1)
     bounds = upright_bounds(x0, z0, widest, solid.z0, solid.z1)
     if bounds is None:
@@ -267,7 +292,7 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
     for at in canvas.bands(*bounds):
         right, down = (canvas.xs[at[1]] - CENTRE_X) / FOCAL_PX, (canvas.ys[at[0]] - CENTRE_Y) / FOCAL_PX
         # a cylinder's rays differ by column only: `lift` is then a number, and most of this one row
-        lift = taper * down if taper else 0.0
+        lift: Any = taper * down if taper else 0.0
         a = right * right + (1.0 - lift * lift)
         b = right * x0 + (z0 - level * lift)
         with np.errstate(invalid="ignore"):
@@ -280,14 +305,14 @@ def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, p
             below_top, above_foot = FOCAL_PX * down + 0.5, 0.5 - FOCAL_PX * down
             cover = np.minimum(cover, (solid.z1 - MOUNT_HEIGHT) * pixels + below_top)
             np.minimum(cover, (MOUNT_HEIGHT - solid.z0) * pixels + above_foot, out=cover)
+            tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)
             depth = np.where((cover > 0) & (depth > NEAR), depth, np.float32(np.nan))
-        tone = (sun.gain / radii) * (x * (right * depth - x0) + z * (depth - z0)) + (TONES * part + sun.base)
-        canvas.put(at, depth, cover, tone)
+        canvas.put(at, depth, cover, tone if tone.ndim > 1 else tone[None])
 
 
 def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int) -> None:
     """Cast an upright box that stands in the arena's frame; `sun` in the arena's frame."""
-    [[x0, _, z0]] = camera.to_camera(np.array([[solid.x, solid.y, 0.0]])).tolist()
+    x0, z0 = camera.ahead_of(solid.x, solid.y)
     bounds = upright_bounds(x0, z0, math.hypot(solid.half_x, solid.half_y), solid.z0, solid.z1)
     if bounds is None:
         return

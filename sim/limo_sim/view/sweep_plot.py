@@ -17,13 +17,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _INK, _FAINT = "#1d2329", "#8a949e"
-_COLOURS = {"approach": "#b35900", "proxemic": "#7a4fd0", "tracking": "#1f6feb"}
-#: A figure of the score card and what it says.
+# Okabe and Ito's colours, which people who cannot tell red from green tell apart; markers for print in grey.
+_STYLES = {
+    "approach": ("#d55e00", "s"),
+    "proxemic": ("#cc79a7", "D"),
+    "pursuit": ("#e69f00", "v"),
+    "ppo": ("#009e73", "^"),
+    "tracking": ("#0072b2", "o"),
+}
+#: A figure of the score card, what it says, and whether it is a share.
 _PANELS = (
-    ("in_view", "in view [share of frames]"),
-    ("pixel_error_mean", "off centre [px]"),
-    ("distance_rms_error_m", "error to 1.5 m [m]"),
-    ("zone_social", "at 1.2–3.6 m [share of time]"),
+    ("success", "success [share of runs]", True),
+    ("in_view", "in view [share of frames]", True),
+    ("distance_rms_error_m", "error to the target distance [m]", False),
+    ("time_to_find_again_s", "time to find again [s]", False),
+    ("intrusion_personal", "in a personal zone [share of time]", True),
 )
 
 
@@ -31,16 +39,20 @@ def plot(summaries: Sequence[Summary], path: Path) -> None:
     """Draw summaries into a picture of the kind the path's suffix says."""
     scenarios = list(dict.fromkeys(one.scenario for one in summaries))
     controllers = list(dict.fromkeys(one.controller for one in summaries))
-    figure = Figure(figsize=(3.2 * len(_PANELS), 1.6 + 0.45 * len(scenarios)), layout="constrained", dpi=150)
+    figure = Figure(
+        figsize=(2.6 * len(_PANELS), 1.4 + (0.2 + 0.1 * len(controllers)) * len(scenarios)),
+        layout="constrained",
+        dpi=150,
+    )
     panels = figure.subplots(1, len(_PANELS), sharey=True, squeeze=False)[0]
-    for axes, (name, title) in zip(panels, _PANELS, strict=True):
+    for axes, (name, title, share) in zip(panels, _PANELS, strict=True):
         for place, controller in enumerate(controllers):
-            shift = 0.22 * (place - (len(controllers) - 1) / 2)
+            shift = 0.7 / len(controllers) * (place - (len(controllers) - 1) / 2)
             _dots(axes, [one for one in summaries if one.controller == controller], name, scenarios, shift)
         axes.set_title(title, loc="left", fontsize=10, color=_INK)
         axes.set_yticks(range(len(scenarios)), scenarios)
         axes.set_ylim(len(scenarios) - 0.5, -0.5)
-        axes.set_xlim(0, 1.02 if name in ("in_view", "zone_social") else None)
+        axes.set_xlim(0, 1.02 if share else None)
         axes.grid(axis="x", color=_FAINT, alpha=0.3, linewidth=0.6)
         axes.tick_params(length=0, labelsize=9, colors=_INK)
         axes.spines[["top", "right", "left"]].set_visible(False)
@@ -54,13 +66,14 @@ def plot(summaries: Sequence[Summary], path: Path) -> None:
 def _dots(axes: Axes, summaries: Sequence[Summary], name: str, scenarios: Sequence[str], shift: float) -> None:
     found = [(one.scenario, one.measures[name]) for one in summaries]
     dots = [(scenarios.index(where) + shift, estimate) for where, estimate in found if estimate is not None]
+    colour, marker = _STYLES.get(summaries[0].controller, (_INK, "x"))
     axes.errorbar(
         [estimate.mean for _, estimate in dots],
         [row for row, _ in dots],
         xerr=[estimate.interval or 0.0 for _, estimate in dots],
-        fmt="o",
-        markersize=5,
-        linewidth=1.5,
-        color=_COLOURS.get(summaries[0].controller, _INK),
+        fmt=marker,
+        markersize=4,
+        linewidth=1.2,
+        color=colour,
         label=summaries[0].controller,
     )

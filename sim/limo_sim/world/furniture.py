@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from limo_sim.world.schema import WIDEST, one_of, required, within
+
 Colour = tuple[float, float, float]
 
 
@@ -66,12 +68,24 @@ class Piece:
     footprint: Disc | Rectangle
     scanned: tuple[Disc | Rectangle, ...]
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Radius and height of the upright cylinder about the piece's middle that holds its solids [m]."""
+        reaches = (
+            math.hypot(solid.x, solid.y)
+            + (math.hypot(solid.half_x, solid.half_y) if isinstance(solid, Box) else max(solid.r0, solid.r1))
+            for solid in self.solids
+        )
+        return max(reaches), max(solid.z1 for solid in self.solids)
+
 
 _STONE: Colour = (176, 172, 164)
 _WOOD: Colour = (150, 108, 72)
 _STEEL: Colour = (92, 94, 98)
 _ORANGE: Colour = (214, 92, 34)
 _WHITE: Colour = (226, 226, 222)
+_CARDBOARD: Colour = (172, 134, 92)
+_POSTS = ((-0.235, -0.155), (-0.235, 0.155), (0.235, -0.155), (0.235, 0.155))
 _LEGS = ((-0.14, -0.13), (-0.14, 0.13), (0.14, -0.13), (0.14, 0.13))
 
 KINDS: dict[str, Piece] = {
@@ -120,7 +134,24 @@ KINDS: dict[str, Piece] = {
         footprint=Rectangle(0, 0, 0.17, 0.16),
         scanned=tuple(Disc(x, y, 0.015) for x, y in _LEGS),
     ),
+    "trolley": Piece(
+        solids=(
+            *(Box(x, y, 0.012, 0.012, 0.03, 0.75, _STEEL) for x, y in _POSTS),
+            Box(0, 0, 0.25, 0.17, 0.08, 0.13, _STEEL),
+            Box(0, 0, 0.25, 0.17, 0.48, 0.50, _STEEL),
+            Box(0.04, 0.02, 0.16, 0.12, 0.13, 0.38, _CARDBOARD),
+            Box(-0.08, 0, 0.12, 0.13, 0.50, 0.68, _CARDBOARD),
+        ),
+        footprint=Rectangle(0, 0, 0.25, 0.17),
+        scanned=(Rectangle(0, 0, 0.25, 0.17),),
+    ),
 }
+
+
+def reach(shape: Disc | Rectangle) -> float:
+    """Radius of the circle about the piece's middle that holds its footprint [m]."""
+    size = shape.radius if isinstance(shape, Disc) else math.hypot(shape.half_x, shape.half_y)
+    return math.hypot(shape.x, shape.y) + size
 
 
 def placed(shape: Disc | Rectangle, x: float, y: float, yaw: float) -> Disc | Rectangle:
@@ -141,3 +172,18 @@ def distance_to(shape: Disc | Rectangle, x: float, y: float) -> float:
     across_x = abs(cos * dx + sin * dy) - shape.half_x
     across_y = abs(cos * dy - sin * dx) - shape.half_y
     return math.hypot(max(across_x, 0.0), max(across_y, 0.0)) + min(max(across_x, across_y), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Furniture:
+    """A piece of one of the known kinds, standing at (x, y)."""
+
+    kind: str = one_of(tuple(KINDS))
+    x: float = required(-WIDEST, WIDEST)
+    y: float = required(-WIDEST, WIDEST)
+    yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
+
+    @property
+    def footprint(self) -> Disc | Rectangle:
+        """What the robot bumps into, in the arena's frame."""
+        return placed(KINDS[self.kind].footprint, self.x, self.y, self.yaw)

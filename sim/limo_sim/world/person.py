@@ -14,20 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_sim.world.furniture import Disc
-from limo_sim.world.scenario import Person
+from limo_sim.world.people import Person
 
 Point = tuple[float, float, float]
 Capsule = tuple[Point, Point, float, float, str]
 Ellipsoid = tuple[Point, Point, float, str]
 
-# Length of a gait cycle (two steps) in statures: 0.75 m for the workshop's person of 0.9 m.
-_STRIDE = 0.75 / 0.9
+STRIDE = 0.75 / 0.9
+"""Length of a gait cycle (two steps) in statures: 0.75 m for the workshop's person of 0.9 m."""
 # A turn at a corner takes this long, and the limbs start or stop swinging within the second [s]. Chosen by eye.
 _TURN_S, _EASE_S = 0.5, 0.25
 
 # Lengths of the limbs in statures; the whole body was chosen so that OpenCV's HOG model finds it from every side.
 _THIGH = _SHIN = 0.245
 _UPPER_ARM, _FOREARM = 0.165, 0.145
+# Height of a stool's seat, and how far it stands behind the middle of who sits on it, in statures. Chosen.
+_SEAT, _SEAT_BACK = 0.24, 0.13
 # Half axes of the ellipse that a trunk is to the depth camera. Measured: median depth at the middle of HOG's box, 8
 # directions, 6 phases of the gait, 1.5 … 3 m, statures 0.82 … 1 m. From the front .052, diagonally .077, from the side
 # .09 of the stature, standard deviation .02.
@@ -53,6 +55,19 @@ class Pose:
     yaw: float
     phase: float = 0.0
     swing: float = 0.0
+
+
+def earlier(before: Pose | None, now: Pose | None, steps: float) -> Pose | None:
+    """Return where a person was some steps before `now`, who walked on from `before` in the last of them."""
+    if before is None or now is None:
+        return now
+    return Pose(
+        x=now.x - steps * (now.x - before.x),
+        y=now.y - steps * (now.y - before.y),
+        yaw=now.yaw - steps * math.remainder(now.yaw - before.yaw, math.tau),
+        phase=now.phase - steps * math.remainder(now.phase - before.phase, math.tau),
+        swing=now.swing,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +137,7 @@ class Walk:
             x=x + walked * math.cos(leg.heading),
             y=y + walked * math.sin(leg.heading),
             yaw=self._yaw(index, clock, first=laps == 0 and index == 0),
-            phase=math.tau * metres / (_STRIDE * person.height) % math.tau,
+            phase=math.tau * metres / (STRIDE * person.height) % math.tau,
             swing=_swing(leg, clock),
         )
 
@@ -142,17 +157,18 @@ def _swing(leg: _RouteLeg, clock: float) -> float:
     """How much the limbs swing: eased in after a pause and out before one."""
     rise = clock / _EASE_S if leg.pause_before > 0 else 1.0
     fall = (leg.duration - clock) / _EASE_S if leg.pause_after > 0 else 1.0
-    return _smooth(min(rise, fall))
+    return smooth(min(rise, fall))
 
 
-def _smooth(share: float) -> float:
+def smooth(share: float) -> float:
+    """Rise from 0 to 1 with its share of the way, slowly at both ends."""
     share = min(max(share, 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)
 
 
 def _blend(start: float, end: float, share: float) -> float:
     turn = (end - start + math.pi) % math.tau - math.pi
-    return start + _smooth(share) * turn
+    return start + smooth(share) * turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,11 +232,42 @@ def _legs(pose: Pose) -> tuple[list[Capsule], float]:
     return [(_raise(a, hips), _raise(b, hips), r0, r1, name) for a, b, r0, r1, name in capsules], hips
 
 
-def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
+def _seated_legs() -> tuple[list[Capsule], float]:
+    """Capsules of the legs of a person on a stool, and of the stool's; the height of the hips, for stature 1."""
+    capsules: list[Capsule] = []
+    for side in (1, -1):
+        y = side * 0.05
+        knee, ankle = (_THIGH - _SEAT_BACK, y * 1.2, _SEAT + 0.045), (_THIGH - _SEAT_BACK + 0.02, y * 1.2, 0.038)
+        capsules += [
+            ((-_SEAT_BACK, y, _SEAT + 0.05), knee, 0.056, 0.040, "trousers"),
+            (knee, ankle, 0.040, 0.027, "trousers"),
+            ((ankle[0] - 0.025, ankle[1], 0.026), (ankle[0] + 0.095, ankle[1], 0.021), 0.026, 0.021, "shoes"),
+        ]
+    for x, y in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+        top, foot = (0.055 * x - _SEAT_BACK, 0.055 * y, _SEAT), (0.075 * x - _SEAT_BACK, 0.075 * y, 0.012)
+        capsules.append((top, foot, 0.012, 0.012, "stool"))
+    return capsules, _SEAT + 0.05
+
+
+def _skeleton(pose: Pose, *, sits: bool) -> tuple[list[Capsule], list[Ellipsoid]]:
     """Capsules (ends, radii, colour) and ellipsoids (centre, semi-axes, twist, colour) for stature 1."""
+    if not sits:
+        legs, hips = _legs(pose)
+        capsules, ellipsoids = _trunk(pose, hips, 0.0, 0.0)
+        return [*legs, *capsules], ellipsoids
+    legs, hips = _seated_legs()
+    capsules, ellipsoids = _trunk(pose, hips, 0.1, 0.75)
+    back = -_SEAT_BACK
+    moved = [((a[0] + back, *a[1:]), (b[0] + back, *b[1:]), r0, r1, name) for a, b, r0, r1, name in capsules]
+    seat: Ellipsoid = ((back, 0.0, _SEAT - 0.005), (0.085, 0.085, 0.022), 0.0, "stool")
+    return [*legs, *moved], [*(((c[0] + back, *c[1:]), a, t, name) for c, a, t, name in ellipsoids), seat]
+
+
+def _trunk(pose: Pose, hips: float, arms: float, bent: float) -> tuple[list[Capsule], list[Ellipsoid]]:
+    """All above the legs: hips at a height, upper arms and elbows bent forward by so much [rad], for stature 1."""
     phase, swing = pose.phase, pose.swing
     twist = swing * 0.12 * math.sin(phase)
-    capsules, hips = _legs(pose)
+    capsules: list[Capsule] = []
     cos, sin = math.cos(twist), math.sin(twist)
     shoulders = hips + 0.285
     capsules.append(
@@ -233,8 +280,8 @@ def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
         )
     )
     for side in (1, -1):
-        upper = 0.03 - side * swing * 0.38 * math.sin(phase)
-        fore = upper + 0.16 + 0.14 * swing
+        upper = arms + 0.03 - side * swing * 0.38 * math.sin(phase)
+        fore = upper + bent + 0.16 + 0.14 * swing
         shoulder = (-side * 0.112 * sin, side * 0.112 * cos, shoulders - 0.008)
         elbow = (
             shoulder[0] + _UPPER_ARM * math.sin(upper),
@@ -271,13 +318,14 @@ def _skeleton(pose: Pose) -> tuple[list[Capsule], list[Ellipsoid]]:
 
 def body(person: Person, pose: Pose) -> BodyMesh:
     """Build a person's body in a pose; the lower foot touches the floor."""
-    capsules, ellipsoids = _skeleton(pose)
+    capsules, ellipsoids = _skeleton(pose, sits=person.sits)
     palette = {
         "shirt": person.shirt,
         "trousers": person.trousers,
         "skin": person.skin,
         "hair": person.hair,
         "shoes": (34, 30, 30),
+        "stool": (150, 108, 72),
     }
     height, girth = person.height, person.girth
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
@@ -314,7 +362,9 @@ def trunk_radius(person: Person, pose: Pose, direction: float) -> float:
     """
     turn = direction - pose.yaw
     depth, breadth = _TRUNK_HALF_DEPTH * math.cos(turn), _TRUNK_HALF_BREADTH * math.sin(turn)
-    return person.height * person.girth * math.hypot(depth, breadth)
+    radius = person.height * person.girth * math.hypot(depth, breadth)
+    # Who sits has the trunk behind the axis, which goes through the thighs.
+    return radius + (person.height * _SEAT_BACK * math.cos(turn) if person.sits else 0.0)
 
 
 def legs_at(person: Person, pose: Pose, height: float) -> list[Disc]:
@@ -322,7 +372,7 @@ def legs_at(person: Person, pose: Pose, height: float) -> list[Disc]:
     cut = []
     cos, sin = person.height * math.cos(pose.yaw), person.height * math.sin(pose.yaw)
     level = height / person.height
-    for (x0, y0, z0), (x1, y1, z1), r0, r1, _ in _legs(pose)[0]:
+    for (x0, y0, z0), (x1, y1, z1), r0, r1, _ in (_seated_legs() if person.sits else _legs(pose))[0]:
         rise = z1 - z0
         share = min(max((level - z0) / rise if rise else 0.5, 0.0), 1.0)
         radius, above = person.girth * (r0 + share * (r1 - r0)), level - (z0 + share * rise)

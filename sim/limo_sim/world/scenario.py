@@ -11,130 +11,84 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from limo_sim.world.furniture import KINDS, Disc, Rectangle, distance_to, placed
-from limo_sim.world.schema import ScenarioError, build, check_fields, one_of, required, within
+from limo_sim.world.furniture import Disc, Furniture, Rectangle, distance_to
+from limo_sim.world.movers import Mover
+from limo_sim.world.people import ROBOT_RADIUS, Group, Person, Surroundings, Vary, check_person
+from limo_sim.world.schema import WIDEST, ScenarioError, build, check_fields, one_of, required, within
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib  # type: ignore[import-not-found]
 
+__all__ = [
+    "ROOM_HALF",
+    "WALL_HEIGHT",
+    "Camera",
+    "Depth",
+    "DetectorFaults",
+    "Furniture",
+    "Group",
+    "Imu",
+    "Lidar",
+    "Light",
+    "Mover",
+    "Person",
+    "Robot",
+    "Room",
+    "Scenario",
+    "Vary",
+    "Wall",
+    "WallsTexture",
+    "Wheels",
+]
+
 ROOM_HALF = 4.9
 """Without `room.half` the walls' inner faces stand at ± this [m]: 0.2 m thick, on ± 5 m, as in `hri_world.world`."""
 WALL_HEIGHT = 1.0
 """Of the walls [m], as in `hri_world.world`."""
-ROBOT_RADIUS = 0.19
-"""The circle about the base centre that holds the robot's 0.29 × 0.22 m body [m]."""
-# Corners of routes keep this distance from the walls [m]: the first, or a person's radius and the second, if that is
-# more. Chosen: the robot's diagonal is 0.364 m, so that a person does not press the robot against a wall.
-_WALL_DISTANCE, _WALL_GAP = 0.6, 0.37
 # The middle of a piece of furniture, and of the robot at the start, keep these distances from the outer walls [m].
 _FURNITURE_DISTANCE, _ROBOT_DISTANCE = 0.2, 0.3
-# Half of the widest room [m]. Chosen: 30 m, nearly twice as far as the depth camera sees in any direction.
-_WIDEST = 15.0
 # Inner walls are at least this long [m]: shorter than thick they would have no direction to speak of.
 _SHORTEST_WALL = 0.05
-# Routes keep this distance from furniture [m]. Chosen: arms swing beyond the cylinder that stands for the body.
-_CLEARANCE = 0.2
-# Distances from routes to furniture are taken at points this far apart [m]: right to within half of it.
-_ROUTE_STEP = 0.02
 _FOLDER = Path(__file__).parents[1] / "scenarios"
 
 
 @dataclass(frozen=True, slots=True)
-class Person:
-    """A person who walks a closed route again and again.
+class WallsTexture:
+    """What is on the walls.
 
     Attributes
     ----------
-    route
-        Corners (x, y, pause): walked in order, then from the last to the first again, with `pause` seconds at
-        each on arrival [m, m, s]. One corner: the person stands there.
-    speed
-        Walking speed [m/s].
-    speeds
-        Walking speed from each corner to the next, one for each corner [m/s]; without them, `speed` everywhere.
-    height
-        Stature [m]; the whole body scales with it.
-    girth
-        Breadth of limbs and trunk, relative to that of `person.body`.
-    arrives_s
-        The person is not in the arena before this time [s].
-    leaves_s
-        Nor from this time on [s].
-    facing
-        Direction in which a person whose route has a single corner faces [rad].
-    shirt, trousers, skin, hair
-        Colours, red, green, blue, 0 … 255.
+    kind
+        "plain", "bricks" or "boards" (upright).
+    contrast
+        By how much tiles and joints are darker than a plain wall, at most [1].
+    posters
+        Posters for each metre of wall [1/m].
+    seed
+        Of the tiles' shades and of what the posters show.
     """
 
-    route: tuple[tuple[float, float, float], ...] = required(-_WIDEST, 3600.0)
-    speed: float = within(0.75, 0.05, 2.0)
-    speeds: tuple[float, ...] = within((), 0.05, 2.0)
-    height: float = within(0.9, 0.6, 2.0)
-    girth: float = within(1.0, 0.7, 1.4)
-    arrives_s: float = within(0.0, 0.0, 3600.0)
-    leaves_s: float = within(math.inf, 0.0, math.inf)
-    facing: float = within(math.pi, -2 * math.pi, 2 * math.pi)
-    shirt: tuple[float, float, float] = within((34, 52, 128), 0, 255)
-    trousers: tuple[float, float, float] = within((38, 42, 56), 0, 255)
-    skin: tuple[float, float, float] = within((198, 154, 124), 0, 255)
-    hair: tuple[float, float, float] = within((56, 38, 28), 0, 255)
-
-    @property
-    def radius(self) -> float:
-        """Of the upright cylinder the robot can bump into [m]."""
-        return 0.17 * self.height
-
-
-@dataclass(frozen=True, slots=True)
-class Furniture:
-    """A piece of one of the known kinds, standing at (x, y)."""
-
-    kind: str = one_of(tuple(KINDS))
-    x: float = required(-_WIDEST, _WIDEST)
-    y: float = required(-_WIDEST, _WIDEST)
-    yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
-
-    @property
-    def footprint(self) -> Disc | Rectangle:
-        """What the robot bumps into, in the arena's frame."""
-        return placed(KINDS[self.kind].footprint, self.x, self.y, self.yaw)
-
-
-@dataclass(frozen=True, slots=True)
-class Vary:
-    """How much the people of a run differ from the scenario's, drawn from the run's seed.
-
-    Attributes
-    ----------
-    clothes
-        Whether colours and girth are drawn.
-    height, speed
-        By up to this share of the scenario's [1].
-    place
-        By how much each corner of a route is moved along x and y, at most [m].
-    """
-
-    clothes: bool = False
-    height: float = within(0.0, 0.0, 0.5)
-    speed: float = within(0.0, 0.0, 0.9)
-    place: float = within(0.0, 0.0, 2.0)
+    kind: str = one_of(("plain", "bricks", "boards"), "plain")
+    contrast: float = within(0.15, 0.0, 0.6)
+    posters: float = within(0.0, 0.0, 1.5)
+    seed: int = within(0, 0, 1_000_000)
 
 
 @dataclass(frozen=True, slots=True)
 class Room:
     """A square room around the origin; its outer walls' inner faces stand at ± `half` [m]."""
 
-    half: float = within(ROOM_HALF, 1.5, _WIDEST)
+    half: float = within(ROOM_HALF, 1.5, WIDEST)
 
 
 @dataclass(frozen=True, slots=True)
 class Wall:
     """A straight inner wall, as high as the outer ones, from the middle of one end (x, y) to that of the other [m]."""
 
-    start: tuple[float, float] = required(-_WIDEST, _WIDEST)
-    end: tuple[float, float] = required(-_WIDEST, _WIDEST)
+    start: tuple[float, float] = required(-WIDEST, WIDEST)
+    end: tuple[float, float] = required(-WIDEST, WIDEST)
     thickness: float = within(0.1, 0.02, 1.0)
 
     @property
@@ -154,8 +108,8 @@ class Wall:
 class Robot:
     """The Limo's start [m, m, rad], its wheels' limits [m/s, m/s²], and the watchdog's time [s]."""
 
-    x: float = within(0.0, -_WIDEST, _WIDEST)
-    y: float = within(0.0, -_WIDEST, _WIDEST)
+    x: float = within(0.0, -WIDEST, WIDEST)
+    y: float = within(0.0, -WIDEST, WIDEST)
     yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
     wheel_speed: float = within(1.0, 0.05, 3.0)
     wheel_acceleration: float = within(1.0, 0.1, 10.0)
@@ -164,12 +118,30 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """The colour camera: rate [Hz], age of a frame on arrival [s], share of frames lost, noise [of 255]."""
+    """The colour camera.
+
+    Attributes
+    ----------
+    rate_hz, latency_s, drop_probability
+        Rate [Hz], age of a frame on arrival [s], share of frames lost.
+    noise
+        Of brightness [of 255].
+    exposure_s
+        How long each row is exposed: what moves is blurred [s].
+    readout_s
+        Between the first row and the last, of a rolling shutter [s].
+    k1, k2
+        Radial distortion, as in OpenCV's camera model; the limits keep it one to one within the image.
+    """
 
     rate_hz: float = within(10.0, 0.5, 50.0)
     latency_s: float = within(0.0, 0.0, 5.0)
     drop_probability: float = within(0.0, 0.0, 1.0)
     noise: float = within(1.0, 0.0, 20.0)
+    exposure_s: float = within(0.0, 0.0, 0.1)
+    readout_s: float = within(0.0, 0.0, 0.1)
+    k1: float = within(0.0, -0.15, 0.3)
+    k2: float = within(0.0, -0.02, 0.1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +186,9 @@ class DetectorFaults:
 
     Attributes
     ----------
+    model
+        "opencv" or "limo": misses by the person's height in the image, bursts and false boxes as that model of people
+        has them on photographs (docs/detector-model.md); the other keys are then left out. "none": those count.
     recall
         Share of the camera's frames in which a person is not missed, in the long run, of those in which the detector
         itself finds the person [0 … 1].
@@ -223,12 +198,19 @@ class DetectorFaults:
         Mean number of false boxes in a frame that is searched as a whole.
     """
 
+    model: str = one_of(("none", "opencv", "limo"), "none")
     recall: float = within(1.0, 0.0, 1.0)
     burst_s: float = within(0.3, 0.02, 60.0)
     false_rate: float = within(0.0, 0.0, 20.0)
 
     def check(self, rate_hz: float, where: str) -> None:
-        """Raise `ScenarioError` unless a camera of `rate_hz` can show bursts of this length."""
+        """Raise `ScenarioError` unless these keys go together, and a camera of `rate_hz` can show such bursts."""
+        for name in ("recall", "burst_s", "false_rate") if self.model != "none" else ():
+            if getattr(self, name) != getattr(DetectorFaults(), name):
+                raise ScenarioError(
+                    f"{where}{name}: got {getattr(self, name):g} beside model {self.model!r}, which has its own; "
+                    f"give one of the two"
+                )
         if not 0.0 < self.recall < 1.0:
             return
         # At best every gap between two bursts is one frame long.
@@ -242,7 +224,10 @@ class DetectorFaults:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """The sun's direction and strengths, and the brightness of sky, floor and walls, 0 … 1."""
+    """The sun's direction and strengths, and the brightness of sky, floor and walls, 0 … 1.
+
+    All of it goes down by the share `swing` and up again, once in `swing_s` [s].
+    """
 
     sun: tuple[float, float, float] = within((-0.5, 0.1, -0.9), -1.0, 1.0)
     diffuse: float = within(0.8, 0.0, 1.2)
@@ -250,6 +235,12 @@ class Light:
     sky: float = within(0.70, 0.2, 1.0)
     floor: float = within(0.45, 0.1, 0.9)
     wall: float = within(0.95, 0.3, 1.0)
+    swing: float = within(0.0, 0.0, 0.9)
+    swing_s: float = within(20.0, 0.1, 3600.0)
+
+    def strength(self, time: float) -> float:
+        """Return the brightness at a time [s], relative to that at the start."""
+        return 1.0 - self.swing * (0.5 - 0.5 * math.cos(math.tau * time / self.swing_s))
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,6 +262,13 @@ class Scenario:
     room: Room = dataclasses.field(default_factory=Room)
     walls: tuple[Wall, ...] = ()
     vary: Vary = dataclasses.field(default_factory=Vary)
+    movers: tuple[Mover, ...] = ()
+    walls_texture: WallsTexture = dataclasses.field(default_factory=WallsTexture)
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What the people have to fit between."""
+        return Surroundings(self.room.half, (self.robot.x, self.robot.y), self._obstacles())
 
     @property
     def footprints(self) -> tuple[Disc | Rectangle, ...]:
@@ -305,9 +303,11 @@ class Scenario:
             raise ScenarioError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError(f"{path}: not TOML: {error}") from error
-        scenario = build(Scenario, {"name": path.stem, **table}, f"{path.name}: ")
-        scenario.check(f"{path.name}: ")
-        return scenario
+        where = f"{path.name}: "
+        groups = build(_Groups, {"groups": table.pop("groups", [])}, where).groups
+        scenario = build(Scenario, {"name": path.stem, **table}, where)
+        scenario.check(where)
+        return scenario._with_groups(groups, where) if groups else scenario
 
     def check(self, where: str = "") -> None:
         """Raise `ScenarioError`, its message beginning with `where`, unless this scenario can be run."""
@@ -328,9 +328,33 @@ class Scenario:
                     f"{where}walls[{index}]: is {wall.length:g} m long, want at least {_SHORTEST_WALL} m"
                 )
         for name, footprint in self._obstacles():
-            self._check_robot_free(distance_to(footprint, self.robot.x, self.robot.y), f"{where}{name.split(' ')[0]}")
+            distance = distance_to(footprint, self.robot.x, self.robot.y)
+            if distance < ROBOT_RADIUS:
+                raise ScenarioError(
+                    f"{where}{name.split(' ')[0]}: is {max(distance, 0.0):.2f} m from the robot's centre, "
+                    f"want at least {ROBOT_RADIUS} m"
+                )
+        around = self.surroundings
         for index, person in enumerate(self.people):
-            self._check_person(person, f"{where}people[{index}]")
+            check_person(person, around, f"{where}people[{index}]")
+        for index, mover in enumerate(self.movers):
+            check_person(mover.timetable, around, f"{where}movers[{index}]")
+
+    def _with_groups(self, groups: tuple[Group, ...], where: str) -> Scenario:
+        """Return this scenario with the members of groups among its people; refuse groups that do not fit."""
+        around = self.surroundings
+        for index, group in enumerate(groups):
+            check_fields(group, f"{where}groups[{index}].")
+            for member in group.members():
+                check_person(member, around, f"{where}groups[{index}], one of its people")
+        return dataclasses.replace(self, people=(*self.people, *(one for group in groups for one in group.members())))
+
+    def check_detector_is_plain(self, why: str) -> None:
+        """Raise `ScenarioError` if `[detector]` asks for faults where none can be added, which `why` explains."""
+        if self.detector != DetectorFaults():
+            raise ScenarioError(
+                f"scenario {self.name!r}: detector: {why}; leave the table out, or use `limo-hog follow` or `score`"
+            )
 
     def _obstacles(self) -> list[tuple[str, Disc | Rectangle]]:
         """Return what stands in the room, by the name that a message gives it."""
@@ -346,52 +370,9 @@ class Scenario:
             if abs(value) > half + 1e-9:
                 raise ScenarioError(f"{name}: got {value}, want a number in {-half:g} … {half:g}")
 
-    def _check_robot_free(self, distance: float, where: str) -> None:
-        if distance < ROBOT_RADIUS:
-            raise ScenarioError(
-                f"{where}: is {max(distance, 0.0):.2f} m from the robot's centre, want at least {ROBOT_RADIUS} m"
-            )
 
-    def _check_person(self, person: Person, where: str) -> None:
-        if not person.route:
-            raise ScenarioError(f"{where}.route: is empty, want at least one corner [x, y, pause]")
-        # In whole centimetres, as the message shows it.
-        half = math.floor(100 * (self.room.half - max(_WALL_DISTANCE, person.radius + _WALL_GAP))) / 100
-        for index, (x, y, pause) in enumerate(person.route):
-            if max(abs(x), abs(y)) > half:
-                raise ScenarioError(
-                    f"{where}.route[{index}]: ({x:g}, {y:g}) is in a wall or too near one, "
-                    f"want x and y in {-half:g} … {half:g}"
-                )
-            if pause < 0:
-                raise ScenarioError(f"{where}.route[{index}]: pause {pause:g} s, want 0 … 3600")
-        if person.speeds and len(person.speeds) != len(person.route):
-            raise ScenarioError(
-                f"{where}.speeds: got {len(person.speeds)} values, want one for each of {len(person.route)} corners"
-            )
-        if person.leaves_s <= person.arrives_s:
-            raise ScenarioError(
-                f"{where}.leaves_s: got {person.leaves_s:g}, want more than arrives_s, {person.arrives_s:g}"
-            )
-        x, y, _ = person.route[0]
-        if person.arrives_s == 0:
-            robot = math.hypot(x - self.robot.x, y - self.robot.y)
-            self._check_robot_free(robot - person.radius, f"{where}.route[0]")
-        for index, corner in enumerate(person.route):
-            after = person.route[(index + 1) % len(person.route)]
-            for name, footprint in self._obstacles():
-                gap = _gap(corner, after, footprint) - person.radius
-                if gap < _CLEARANCE:
-                    raise ScenarioError(
-                        f"{where}.route[{index}]: the way to the next corner passes {max(gap, 0.0):.2f} m "
-                        f"from {name}, want at least {_CLEARANCE} m"
-                    )
+@dataclass(frozen=True, slots=True)
+class _Groups:
+    """The groups of people in a file."""
 
-
-def _gap(start: tuple[float, float, float], end: tuple[float, float, float], shape: Disc | Rectangle) -> float:
-    """Smallest distance [m] from the straight way between two corners to a shape, to within a centimetre."""
-    steps = max(1, math.ceil(math.dist(start[:2], end[:2]) / _ROUTE_STEP))
-    ways = (index / steps for index in range(steps + 1))
-    return min(
-        distance_to(shape, start[0] + way * (end[0] - start[0]), start[1] + way * (end[1] - start[1])) for way in ways
-    )
+    groups: tuple[Group, ...] = ()

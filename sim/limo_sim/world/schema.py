@@ -12,6 +12,9 @@ from limo_hog.exceptions import LimoHogError
 
 T = TypeVar("T")
 
+WIDEST = 15.0
+"""Half of the widest room [m]. Chosen: 30 m, nearly twice as far as the depth camera sees in any direction."""
+
 
 class ScenarioError(LimoHogError):
     """A scenario that cannot be run; the message names the file, the key and what is allowed."""
@@ -47,9 +50,9 @@ def required(low: float, high: float) -> Any:
     return dataclasses.field(metadata={"limits": Limits(low, high)})
 
 
-def one_of(words: tuple[str, ...]) -> Any:
-    """Return a required dataclass field that holds one of `words`."""
-    return dataclasses.field(metadata={"limits": Limits(words=words)})
+def one_of(words: tuple[str, ...], default: Any = dataclasses.MISSING) -> Any:
+    """Return a dataclass field that holds one of `words`; without a default it is required."""
+    return dataclasses.field(default=default, metadata={"limits": Limits(words=words)})
 
 
 def check_fields(value: Any, where: str) -> None:

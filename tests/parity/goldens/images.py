@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import skimage.data
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
@@ -62,6 +61,8 @@ def view(seed: int) -> Image:
 
 def photograph(name: str) -> Image:
     """Read a photograph of scikit-image's wheel, colours in OpenCV's order."""
+    import skimage.data  # here, so that the drawn images need numpy alone
+
     shipped: Any = getattr(skimage.data, name)()
     return np.ascontiguousarray(shipped[:, :, ::-1]) if shipped.ndim == 3 else np.asarray(shipped)
 

@@ -13,7 +13,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from tests.parity.goldens.case import RETURNS, Case, ask
 from tests.parity.goldens.specified import specified
@@ -44,6 +43,8 @@ def summary(array: Any) -> dict[str, Any] | None:
 
 def recorded(case: Case) -> dict[str, Any]:
     """Put a case to OpenCV: places and weights in full, arrays in short."""
+    import cv2
+
     image = case.image()
     found = ask(case, image, cv2)
     answer: dict[str, Any] = {"image": digest(image)}
@@ -58,6 +59,8 @@ def recorded(case: Case) -> dict[str, Any]:
 
 def recorded_with(clip: float) -> dict[str, Any]:
     """Record the cases of one `L2HysThreshold`."""
+    import cv2
+
     cv2.setNumThreads(1)  # with more, rectangles come in another order each time
     return {case.name: recorded(case) for case in CASES if case.clip == clip}
 
@@ -77,6 +80,8 @@ def write(answers: dict[str, Any]) -> None:
 
 
 if __name__ == "__main__":
+    import cv2
+
     if not cv2.__version__.startswith("4.14."):
         sys.exit(f"OpenCV is {cv2.__version__}, but the answers are those of 4.14: install opencv-python-headless 4.14")
     write(opencv_answers())

@@ -165,7 +165,7 @@ def wander(seed: int, seconds: float) -> None:
             ranges = arena.scan().ranges
             assert not np.isnan(ranges).any()
             assert (ranges >= 0.12).all()
-            for pose in arena._poses(arena.time):
+            for pose in arena._state.people:
                 assert pose is None or max(abs(pose.x), abs(pose.y)) < 4.4
 
 

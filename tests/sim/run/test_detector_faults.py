@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import groupby
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from limo_hog.follow import TrackingController
 from limo_hog.follow.sense.detectors import HalfSize, detect_in, detector_named
 from limo_hog.follow.sense.region import Region
 from limo_sim.run.catalogue import load
-from limo_sim.run.detector_faults import FaultyDetector
+from limo_sim.run.detector_faults import FaultyDetector, fit_of
 from limo_sim.run.episode import run_episode
 from limo_sim.run.score import score
 from limo_sim.run.sweep import Run, play_all
@@ -131,6 +132,63 @@ def test_the_half_size_detector_keeps_its_own_boxes() -> None:
     detector = FaultyDetector(HalfSize(SeesBoth()), DetectorFaults(false_rate=0.001), 10.0, 2, 0)
     detector.face(truth(0), None)
     np.testing.assert_array_equal(detector.detect(IMAGE).boxes[:2], WINDOWS * 2)
+
+
+def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np.bool_]:
+    """Return in which frames a person of a height in the image [px] is found, with a model on."""
+    x, y = 300, 470 - height
+    person = PersonTruth(2.0, 0.0, 0.0, 2.0, 0.0, 1.8, 1.0, (x, y, height // 3, height))
+    window = np.array([[x + height // 6 - height // 3, y - height // 6, 2 * height // 3, 4 * height // 3]], np.int32)
+
+    class SeesOne:
+        def detect(self, _image: NDArray[np.uint8]) -> Detections:
+            return Detections(window, np.array([1.0]))
+
+    detector = FaultyDetector(SeesOne(), DetectorFaults(model=model), 10.0, 1, seed)
+    found = []
+    for frame in range(frames):
+        detector.face(Truth(frame / 10, (0.0, 0.0, 0.0), (person,), Contacts()), None)
+        found.append((detector.detect(IMAGE).boxes == window).all(axis=1).any())
+    return np.array(found)
+
+
+@pytest.mark.parametrize("model", ["opencv", "limo"])
+@pytest.mark.parametrize("height", [90, 130, 200])
+def test_a_model_keeps_the_share_of_its_fit_at_every_height(model: str, height: int) -> None:
+    found = at_height(height, model, 10_000)
+    # Frames of a process with a correlation of exp(-0.1 s / memory) count for fewer.
+    assert abs(found.mean() - fit_of(model).kept(height)) < 0.03
+
+
+def test_a_model_misses_in_bursts_as_long_as_its_memory() -> None:
+    found = at_height(130, "opencv", 10_000)
+    share, fit = found.mean(), fit_of("opencv")
+    # P(missed twice) of two standard normals with this correlation: the bivariate normal integral, by quadrature.
+    rho, limit = math.exp(-0.1 / fit.memory_s), NormalDist().inv_cdf(fit.kept(130))
+    z = np.linspace(limit, 8.0, 4001)
+    above = [1 - NormalDist().cdf((limit - rho * value) / math.sqrt(1 - rho**2)) for value in z]
+    both = np.trapezoid(np.exp(-(z**2) / 2) / math.sqrt(2 * math.pi) * above, z)
+    assert abs((~found[1:] & ~found[:-1]).mean() - both) < 0.02
+    assert both > 1.3 * (1 - share) ** 2
+
+
+def test_a_models_misses_and_false_boxes_are_those_of_the_seed() -> None:
+    np.testing.assert_array_equal(at_height(130, "limo", 100, 3), at_height(130, "limo", 100, 3))
+    assert (at_height(130, "limo", 100, 3) != at_height(130, "limo", 100, 4)).any()
+    frames = seen(DetectorFaults(model="opencv"), 10_000)
+    extra = [len(found) - found_of([found], 0)[0] - found_of([found], 1)[0] for found in frames]
+    rate = fit_of("opencv").false_rate
+    assert abs(np.mean(extra) - rate) < 4 * math.sqrt(rate / 10_000)
+
+
+def test_the_fits_are_probabilities_that_grow_with_the_height() -> None:
+    for model in ("opencv", "limo"):
+        fit = fit_of(model)
+        heights = np.geomspace(64, 250, 30)
+        shares = [fit.photographs.at(height) for height in heights]
+        assert all(np.diff(shares) > 0)
+        assert all(0.0 < fit.kept(height) <= 1.0 for height in (0.0, *heights, 480.0))
+        assert fit.memory_s > 0
 
 
 @pytest.fixture

@@ -25,5 +25,16 @@ def test_any_value_changes_the_hash(camera: Camera) -> None:
     assert scenario_hash(dataclasses.replace(workshop, camera=camera)) != scenario_hash(workshop)
 
 
+def test_a_scenario_that_says_what_it_would_have_left_out_has_the_same_hash() -> None:
+    workshop = load("workshop")
+    told = dataclasses.replace(workshop, people=(dataclasses.replace(workshop.people[0], speed=0.75),), camera=Camera())
+    assert scenario_hash(told) == scenario_hash(workshop)
+
+
+def test_new_options_leave_the_hashes_of_old_scenarios_alone() -> None:
+    assert scenario_hash(load("empty")) == "44136fa355b3678a"
+    assert scenario_hash(load("workshop")) == "f6353cf7e6222da5"
+
+
 def test_the_code_is_told_by_versions_and_a_hash() -> None:
     assert re.fullmatch(r"limo-hog \d+\.\d+\S*, limo-sim \d+\.\d+\S*, [0-9a-f]{16}", code_version())

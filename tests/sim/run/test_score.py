@@ -16,7 +16,7 @@ from limo_hog.follow.twist import Twist
 from limo_sim.run.episode import Episode, FrameRecord, Step
 from limo_sim.run.matching import on_person
 from limo_sim.run.score import ScoreCard, score
-from limo_sim.run.sweep import estimate, summarise
+from limo_sim.run.sweep import compare, estimate, summarise
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
@@ -254,6 +254,29 @@ def test_the_pixel_error_reached_in_95_of_100_frames() -> None:
     assert result.pixel_error_p95 == 95.0
 
 
+def test_the_pixel_error_is_of_the_frames_with_the_subject_in_view() -> None:
+    behind = step(1, person(visible=0.4, box=(0, 100, 60, 120)))
+    result = card(step(0, person(box=(300, 100, 60, 120))), behind, step(2, person(box=(250, 100, 60, 120))))
+    assert result.pixel_error_mean == 25.0
+
+
+def test_the_shares_of_modes_and_reasons_add_up_to_one_however_short_the_log() -> None:
+    for count in (1, 2, 5):
+        result = card(*(step(k, person()) for k in range(count)))
+        assert sum(result.modes.values()) == sum(result.reasons.values()) == 1.0
+        assert result.modes["follow"] == result.reasons["because"] == 1.0
+
+
+@pytest.mark.parametrize(("searched", "found_again"), [(3.0, 1.0), (3.25, 0.0)])
+def test_a_search_of_up_to_three_seconds_counts_as_found_again(searched: float, found_again: float) -> None:
+    # Times whose sums are exact.
+    times = [0.0, *np.arange(0.25, searched, 0.25), searched]
+    steps = [replace(step(0, person(), boxes=[ON], target=0), time=time) for time in times]
+    empty = [replace(one, decision=replace(one.decision, target=None)) for one in steps[1:-1]]
+    result = card(steps[0], *empty, steps[-1])
+    assert (result.lost, result.found_again) == (1, found_again)
+
+
 def test_the_longest_gap_is_between_two_detections_of_the_subject() -> None:
     seen = {0, 1, 5, 7}
     steps = [step(k, person(), boxes=[ON] if k in seen else [OFF], target=0 if k in seen else None) for k in range(9)]
@@ -284,6 +307,27 @@ def test_a_loss_is_counted_without_the_time_behind_a_pillar() -> None:
     assert result.found_again == 1.0
     away = [step(k, person(visible=0.0, box=None)) for k in range(3, 50)]
     assert card(*followed, *away, *again).found_again == 0.0
+
+
+def test_the_time_to_find_the_subject_again_is_the_mean_over_the_losses() -> None:
+    steps, number = [], 0
+    for gone in (10, 20):
+        steps += [step(number + k, person(), boxes=[ON], target=0) for k in range(3)]
+        steps += [step(number + 3 + k, person()) for k in range(gone - 1)]
+        number += 2 + gone
+    steps += [step(number + k, person(), boxes=[ON], target=0) for k in range(3)]
+    assert card(*steps).time_to_find_again_s == pytest.approx((1.0 + 2.0) / 2)
+    never = [step(k, person(), boxes=[ON], target=0) for k in range(3)]
+    assert card(*never).time_to_find_again_s is None
+    assert card(*never, *(step(k, person()) for k in range(3, 53))).time_to_find_again_s == pytest.approx(5.0)
+
+
+def test_intrusions_are_those_of_the_nearest_of_all_people() -> None:
+    far, near, absent = person(4.0), replace(other_person(), distance=0.9), None
+    result = card(step(0, far, near), step(1, far, absent), step(2, person(0.3), near), step(3, absent, absent))
+    assert (result.intrusion_intimate, result.intrusion_personal, result.intrusion_social) == (0.25, 0.25, 0.0)
+    empty = card(step(0, None, None))
+    assert empty.intrusion_intimate is empty.intrusion_personal is empty.intrusion_social is None
 
 
 def test_driving_after_a_decoy_is_measured() -> None:
@@ -355,3 +399,31 @@ def test_cards_are_summed_up_by_scenario_and_controller() -> None:
     summaries = summarise([one, replace(one, seed=1), replace(one, controller="other")])
     assert [(s.controller, s.runs) for s in summaries] == [("c", 2), ("other", 1)]
     assert summaries[0].measures["found_again"] is None
+
+
+def several(controller: str, figures: dict[tuple[str, int], float]) -> list[ScoreCard]:
+    """Return cards by scenario and seed that differ in one figure."""
+    plain = replace(card(step(0, person())), controller=controller)
+    return [replace(plain, scenario=name, seed=seed, path_wrong_m=value) for (name, seed), value in figures.items()]
+
+
+def test_a_group_is_averaged_seed_by_seed_and_its_interval_is_that_of_the_seeds() -> None:
+    cards = several("c", {("one", 0): 1.0, ("two", 0): 3.0, ("one", 1): 5.0, ("two", 1): 7.0})
+    (summary,) = summarise(cards, {"one": "both", "two": "both"})
+    assert (summary.scenario, summary.runs) == ("both", 4)
+    assert summary.measures["path_wrong_m"] == estimate([2.0, 6.0])
+
+
+def test_two_controllers_are_compared_run_by_run() -> None:
+    # A seed that is hard for both moves both figures, not their difference.
+    mine = several("mine", {("one", 0): 1.5, ("one", 1): 10.5, ("one", 2): 5.5})
+    theirs = several("theirs", {("one", 0): 1.0, ("one", 1): 10.0, ("one", 2): 5.0, ("one", 3): 50.0})
+    (comparison,) = compare([*mine, *theirs], "theirs")
+    assert (comparison.controller, comparison.against, comparison.pairs) == ("mine", "theirs", 3)
+    difference = comparison.differences["path_wrong_m"]
+    assert difference is not None
+    assert difference.mean == pytest.approx(0.5)
+    assert difference.interval == pytest.approx(0.0)
+    assert comparison.differences["found_again"] is None
+    overall = compare([*mine, *theirs], "theirs", {"one": "all"})[0]
+    assert (overall.scenario, overall.differences) == ("all", comparison.differences)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from limo_sim.world.person import BodyMesh, Pose, Walk, body
+from limo_sim.world.person import BodyMesh, Pose, Walk, body, legs_at
 from limo_sim.world.scenario import Person, Scenario
 
 PATROL = Scenario.load("workshop").people[0]
@@ -147,3 +147,15 @@ def test_a_turned_body_is_the_same_body_turned() -> None:
     straight, turned = body(person, Pose(0, 0, 0, 1.0, 1.0)), body(person, Pose(1, 2, math.pi / 2, 1.0, 1.0))
     expected = np.stack([1 - straight.start[:, 1], 2 + straight.start[:, 0], straight.start[:, 2]], axis=1)
     np.testing.assert_allclose(turned.start, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("height", [0.9, 1.8])
+def test_who_sits_is_on_a_stool_with_feet_on_the_floor_and_three_quarters_as_tall(height: float) -> None:
+    person = Person(route=((2, 0, 0),), height=height, sits=True)
+    figure = body(person, Pose(2, 0, 0.4))
+    assert lowest(figure) == pytest.approx(0.0, abs=0.01 * height)
+    assert 0.7 * height < highest(figure) < 0.85 * height
+    reach = np.hypot(figure.start[:, 0] - 2, figure.start[:, 1]).max()
+    assert reach < person.radius
+    # The lidar's plane meets two shins and four legs of the stool.
+    assert len(legs_at(person, Pose(2, 0, 0.4), 0.111)) == 6

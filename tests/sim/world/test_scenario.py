@@ -10,10 +10,13 @@ import pytest
 
 from limo_hog.exceptions import LimoHogError
 from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import Camera, Furniture, Person, Scenario, Wall
+from limo_sim.world.scenario import Camera, Furniture, Group, Mover, Person, Scenario, Wall
 from limo_sim.world.schema import ScenarioError
 
 NAMES = ("crossing", "empty", "followable", "furniture", "late", "occlusion", "two_people", "workshop", "zigzag")
+
+
+EXAMPLES = Path(__file__).parents[3] / "examples" / "arena"
 
 
 def written(folder: Path, text: str) -> Path:
@@ -34,6 +37,17 @@ def test_every_scenario_loads_and_runs(name: str) -> None:
     arena = Arena(scenario, 0)
     arena.step()
     assert arena.frame().image.shape == (480, 640, 3)
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_example_loads_and_shows_a_person(path: Path) -> None:
+    arena, seen = Arena(Scenario.load(path), 0), False
+    assert arena.scenario.summary
+    while arena.time < 3.0 and not seen:
+        for _ in range(25):
+            arena.step()
+        seen = any(person is not None and person.visible > 0.5 for person in arena.frame().truth.people)
+    assert seen
 
 
 def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
@@ -132,6 +146,11 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
             "[detector]\nrecall = 0.5\nburst_s = 0.05",
             "mine.toml: detector.burst_s: got 0.05, want at least 0.1 s",
         ),
+        ('[detector]\nmodel = "hog"', "mine.toml: detector.model: got 'hog', want one of none, opencv, limo"),
+        (
+            '[detector]\nmodel = "limo"\nrecall = 0.9',
+            "mine.toml: detector.recall: got 0.9 beside model 'limo', which has its own; give one of the two",
+        ),
         ("[detector]\nrecall = 0.1", "mine.toml: detector.burst_s: got 0.3, want at least 0.9 s"),
         ("[camera", "mine.toml: not TOML"),
     ],
@@ -171,7 +190,7 @@ def test_the_page_about_the_arena_tells_the_truth(tmp_path: Path) -> None:
     assert scenario.camera.drop_probability == 0.3
     for name in Scenario.names():
         assert f"| `{name}` |" in page
-    known = {"people[]": Person, "furniture[]": Furniture, "walls[]": Wall} | {
+    known = {"people[]": Person, "groups[]": Group, "furniture[]": Furniture, "walls[]": Wall, "movers[]": Mover} | {
         field.name: type(getattr(scenario, field.name)) for field in dataclasses.fields(scenario)
     }
     told = set()

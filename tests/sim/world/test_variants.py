@@ -23,6 +23,7 @@ def test_without_vary_every_seed_has_the_same_people() -> None:
 def test_a_seed_draws_clothes_stature_speed_and_places_within_what_is_asked_for() -> None:
     runs = [of_run(DRAWN, seed) for seed in range(200)]
     assert runs[3] == of_run(DRAWN, 3)
+    assert of_run(runs[3], 4) is runs[3]
     assert len({run.people for run in runs}) == 200
     for run in runs:
         run.check()

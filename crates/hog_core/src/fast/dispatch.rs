@@ -1,20 +1,19 @@
-//! Which kernels serve a call: every entry to the fast path, and the functions that enable an instruction set.
+//! Which kernels serve a call: every entry to the fast path.
 
 use crate::error::Result;
 use crate::exact::Svm;
+use crate::geometry::Size;
 use crate::image::ImageView;
 use crate::params::HogSpec;
 use crate::pyramid::Grid;
 
 use super::backend::Backend;
-#[cfg(target_arch = "x86_64")]
 use super::lane::Lane;
 #[cfg(target_arch = "aarch64")]
 use super::lane::neon::Neon;
 use super::lane::portable::Portable;
 #[cfg(target_arch = "x86_64")]
-use super::lane::{avx2::Avx2, avx512::Avx512};
-use super::level::{Scratch, Task, level};
+use super::lane::{Kernel, avx2::Avx2, avx512::Avx512};
 use super::plan::Plan;
 use super::rows::Planes;
 
@@ -27,36 +26,31 @@ pub(crate) fn plan(backend: Backend, spec: &HogSpec, svm: &Svm) -> Option<Plan> 
 fn sqrt_of_byte_is_exact(backend: Backend) -> bool {
     match backend {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => unsafe { avx512_sqrt_of_byte_is_exact() },
+        // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2, which a level's last strip is.
+        Backend::Avx512 => unsafe {
+            Avx512::new().compiled(SqrtIsExact) && Avx2::new().compiled(SqrtIsExact)
+        },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => unsafe { avx2_sqrt_of_byte_is_exact() },
+        Backend::Avx2 => unsafe { Avx2::new() }.compiled(SqrtIsExact),
         _ => false,
     }
 }
 
+/// Whether `sqrt_of_byte` is right for every pixel value.
 #[cfg(target_arch = "x86_64")]
-#[inline(always)]
-fn is_exact<L: Lane>(l: L) -> bool {
-    (0..=255u8).all(|value| {
-        let value = f32::from(value);
-        l.first(l.sqrt_of_byte(l.splat(value))) == value.sqrt()
-    })
-}
+struct SqrtIsExact;
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
-fn avx512_sqrt_of_byte_is_exact() -> bool {
-    // SAFETY: this function's features are the tokens'; a level's last strip is AVX2's.
-    unsafe { is_exact(Avx512::new()) && is_exact(Avx2::new()) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2_sqrt_of_byte_is_exact() -> bool {
-    // SAFETY: this function's features are the token's.
-    unsafe { is_exact(Avx2::new()) }
+impl Kernel for SqrtIsExact {
+    type Output = bool;
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) -> bool {
+        (0..=255u8).all(|value| {
+            let value = f32::from(value);
+            l.first(l.sqrt_of_byte(l.splat(value))) == value.sqrt()
+        })
+    }
 }
 
 /// Whether the kernels can serve windows of this stride.
@@ -64,26 +58,26 @@ pub(crate) fn serves(grid: &Grid) -> bool {
     grid.stride.width.is_multiple_of(4) && grid.stride.height.is_multiple_of(4)
 }
 
-/// Puts into `scratch.found` every window whose exact score may be at least the task's threshold, row by row: x, y in
-/// padded pixels.
-pub(crate) fn detect(backend: Backend, task: Task, scratch: &mut Scratch) -> Result<()> {
-    scratch.found.clear();
-    if task.grid.is_empty() {
-        return Ok(());
-    }
+/// Work that is the same on every instruction set but for the lane that it hands to the kernels.
+pub(super) trait OnLane {
+    type Output;
+    fn run<L: Lane>(self, l: L) -> Self::Output;
+}
+
+/// Runs `work` with the lane of `backend`.
+pub(super) fn on_lane<W: OnLane>(backend: Backend, work: W) -> W::Output {
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => unsafe { avx512(task, scratch) }?,
+        Backend::Avx512 => work.run(unsafe { Avx512::new() }),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => unsafe { avx2(task, scratch) }?,
+        Backend::Avx2 => work.run(unsafe { Avx2::new() }),
         #[cfg(target_arch = "aarch64")]
-        Backend::Neon => neon(task, scratch)?,
-        _ => level(Portable, Portable, task, scratch)?,
+        // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
+        Backend::Neon => work.run(unsafe { Neon::new() }),
+        _ => work.run(Portable),
     }
-    scratch.found.sort_unstable_by_key(|&(x, y, _)| (y, x));
-    Ok(())
 }
 
 /// Fills `planes` with the pixels of `image`.
@@ -91,39 +85,27 @@ pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageVie
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2.
-        Backend::Avx512 | Backend::Avx2 => unsafe { avx2_fill_planes(planes, image) },
+        Backend::Avx512 | Backend::Avx2 => planes.fill(unsafe { Avx2::new() }, image),
         #[cfg(target_arch = "aarch64")]
-        // SAFETY: as in `neon`.
+        // SAFETY: as in `on_lane`.
         Backend::Neon => planes.fill(unsafe { Neon::new() }, image),
         _ => planes.fill(Portable, image),
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2_fill_planes(planes: &mut Planes, image: ImageView) -> Result<()> {
-    // SAFETY: this function's features are the token's.
-    planes.fill(unsafe { Avx2::new() }, image)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni")]
-fn avx512(task: Task, scratch: &mut Scratch) -> Result<()> {
-    // SAFETY: this function's features are the tokens'.
-    unsafe { level(Avx512::new(), Avx2::new(), task, scratch) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2(task: Task, scratch: &mut Scratch) -> Result<()> {
-    // SAFETY: this function's features are the token's.
-    let l = unsafe { Avx2::new() };
-    level(l, l, task, scratch)
-}
-
-#[cfg(target_arch = "aarch64")]
-fn neon(task: Task, scratch: &mut Scratch) -> Result<()> {
-    // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
-    let l = unsafe { Neon::new() };
-    level(l, l, task, scratch)
+/// Fills `resized` with the pixels of `source`, resized to `size`.
+pub(crate) fn resize_planes(
+    backend: Backend,
+    source: &Planes,
+    resized: &mut Planes,
+    size: Size,
+) -> Result<()> {
+    struct Resize<'a>(&'a Planes, &'a mut Planes, Size);
+    impl OnLane for Resize<'_> {
+        type Output = Result<()>;
+        fn run<L: Lane>(self, l: L) -> Result<()> {
+            self.1.resize(l, self.0, self.2)
+        }
+    }
+    on_lane(backend, Resize(source, resized, size))
 }

@@ -91,7 +91,8 @@ impl Plan {
             && spec.blocks.width > 0
             && spec.blocks.height > 0
             && spec.blocks.width * spec.blocks.height <= BLOCKS_MAX
-            && spec.sigma.is_normal()
+            // What the exact path divides by in single precision; the weights of a narrower Gaussian are no numbers.
+            && (spec.sigma * spec.sigma).is_normal()
             && svm.bias().is_finite()
             && svm.weights().iter().all(|w| w.is_finite() && w.abs() < 1e6);
         if !served {

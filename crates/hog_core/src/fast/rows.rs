@@ -1,12 +1,14 @@
 //! Pixels for the kernels: the image as planes, shrunk to a level, each row mirrored outwards.
 
+use std::ops::Range;
+
 use crate::error::Result;
 use crate::geometry::Size;
 use crate::image::{ImageView, reflect_101};
 use crate::memory::{self, Workspace};
 use crate::pyramid::{Tap, taps};
 
-use super::lane::{Columns, Lane, RowPointers};
+use super::lane::{Columns, Kernel, Lane, RowPointers};
 use super::layout::{OVERREAD, SLACK, STEP};
 
 /// The image as one plane per channel, rows without gaps, every byte flipped by 0x80 (signed, for the resize).
@@ -19,7 +21,6 @@ pub(crate) struct Planes {
 
 impl Planes {
     /// Copies the pixels of `image`.
-    #[inline(always)]
     pub(super) fn fill<L: Lane>(&mut self, l: L, image: ImageView) -> Result<()> {
         let (width, height, channels) = (image.width(), image.height(), image.channels());
         let plane = width * height;
@@ -36,8 +37,27 @@ impl Planes {
                 let (first, rest) = self.data.split_at_mut(plane);
                 let (second, third) = rest.split_at_mut(plane);
                 let to = [first, second, third].map(|plane| plane[y * width..][..width].as_mut_ptr());
-                // SAFETY: a row of the image and of each plane has `width` pixels.
-                unsafe { l.deinterleave(row.as_ptr(), to, width) };
+                l.compiled(Deinterleave { row, to });
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the pixels of `source`, resized to `size`.
+    pub(super) fn resize<L: Lane>(&mut self, l: L, source: &Self, size: Size) -> Result<()> {
+        let mut band = Band::default();
+        self.channels = source.channels;
+        self.size = size;
+        memory::resize(&mut self.data, size.area() * source.channels + SLACK, 0)?;
+        band.begin(source, size, 0..size.width as i64, L::GROUP, L::REACH)?;
+        for y in 0..size.height {
+            band.fill(l, source, y as i64, 1)?;
+            for channel in 0..source.channels {
+                let from = &band.data[channel * band.plane + band.left..][..size.width];
+                let to = &mut self.data[(channel * size.height + y) * size.width..][..size.width];
+                for (to, from) in to.iter_mut().zip(from) {
+                    *to = from ^ 0x80;
+                }
             }
         }
         Ok(())
@@ -52,52 +72,88 @@ impl Planes {
     }
 }
 
+/// Splits a row of three channels into planes.
+struct Deinterleave<'a> {
+    row: &'a [u8],
+    /// Each with room for a third of the row.
+    to: [*mut u8; 3],
+}
+
+impl Kernel for Deinterleave<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) {
+        // SAFETY: there is room in each plane.
+        unsafe { l.deinterleave(self.row.as_ptr(), self.to, self.row.len() / 3) }
+    }
+}
+
 impl Workspace for Planes {
     fn bytes(&self) -> usize {
         self.data.capacity()
     }
 }
 
-/// Rows of one level, each mirrored outwards by the padding and one pixel more: as many at a time as stay in the
+/// Rows of some columns of a level, mirrored outwards where the level ends: as many at a time as stay in the
 /// second-level cache.
 #[derive(Debug, Default)]
 pub(super) struct Band {
     data: Vec<u8>,
     size: Size,
-    pad: usize,
+    /// The columns [px of the level]; negative, or beyond the level, where they are mirrored.
+    wanted: Range<i64>,
+    /// Those of them that are made, not mirrored, and others that are mirrored.
+    made: Range<usize>,
     /// Bytes from row to row; the channels of a row lie one after the other.
     pub stride: usize,
     /// Bytes from channel to channel.
     pub plane: usize,
-    /// Bytes before the first pixel of a row.
-    pub left: usize,
+    /// Bytes before the first pixel that is made.
+    left: usize,
     columns: Columns,
     /// Which two rows of the image make a row of the level; none if the level is the image.
     down: Vec<Tap>,
 }
 
 impl Band {
-    pub(super) fn pixels(&self) -> &[u8] {
-        &self.data
+    /// For every channel, the second of the wanted columns in the first row; the first one is its neighbour.
+    pub(super) fn origin(&self) -> [*const u8; 3] {
+        let channels = self.stride / self.plane;
+        std::array::from_fn(|channel| {
+            self.data[channel.min(channels - 1) * self.plane + self.first() + 1..].as_ptr()
+        })
     }
 
-    /// Prepares for rows of the level of `size` pixels, with room for `pad` pixels of border.
+    /// Bytes before the first of the wanted columns.
+    fn first(&self) -> usize {
+        (self.left as i64 + self.wanted.start - self.made.start as i64) as usize
+    }
+
+    /// Prepares for the columns `wanted` of the level of `size` pixels.
     pub(super) fn begin(
         &mut self,
         source: &Planes,
         size: Size,
-        pad: usize,
+        wanted: Range<i64>,
         group: usize,
         reach: usize,
     ) -> Result<()> {
+        let width = size.width as i64;
+        let (before, after) = ((-wanted.start).max(0), (wanted.end - width).max(0));
+        // The pixels that are mirrored lie within as many of the border as there are mirrored ones, and a chunk more.
+        let chunk = MIRRORED as i64;
+        let start = if after > 0 { wanted.start.min(width - after - 2 * chunk) } else { wanted.start }.max(0);
+        let end = if before > 0 { wanted.end.max(before + 2 * chunk) } else { wanted.end }.min(width);
+        self.made = start as usize..end as usize;
+        self.left = ((start - wanted.start).max(0) as usize + 16 + MIRRORED).next_multiple_of(64);
+        self.plane = (self.left + self.made.len() + after as usize + OVERREAD + STEP).next_multiple_of(64);
+        self.wanted = wanted;
         self.size = size;
-        self.pad = pad;
-        self.left = (pad + 17).next_multiple_of(64);
-        self.plane = (self.left + size.width + pad + OVERREAD + STEP).next_multiple_of(64);
         self.stride = self.plane * source.channels;
         self.down.clear();
         if size != source.size {
-            self.columns.fill(source.size.width, size.width, group, reach)?;
+            let widths = (source.size.width, size.width);
+            self.columns.fill(widths, self.made.clone(), group, reach)?;
             memory::extend(&mut self.down, taps(source.size.height, size.height))?;
         }
         Ok(())
@@ -109,61 +165,82 @@ impl Band {
     }
 
     /// Makes the rows `from..from + count` of the level, mirrored where there are none.
-    #[inline(always)]
-    pub(super) fn fill<L: Lane, const C: usize>(
-        &mut self,
-        l: L,
-        source: &Planes,
-        from: i64,
-        count: usize,
-    ) -> Result<()> {
+    pub(super) fn fill<L: Lane>(&mut self, l: L, source: &Planes, from: i64, count: usize) -> Result<()> {
         if self.data.len() < count * self.stride {
             memory::resize(&mut self.data, count * self.stride, 0)?;
         }
-        let Size { width, height } = self.size;
-        for (i, all) in self.data.chunks_exact_mut(self.stride).take(count).enumerate() {
-            let y = reflect_101(from + i as i64, height);
-            if let Some(tap) = self.down.get(y) {
-                let rows = std::array::from_fn(|channel| RowPointers {
-                    upper: source.row(channel, tap.first).as_ptr(),
-                    lower: source.row(channel, tap.second).as_ptr(),
-                    to: all[channel * self.plane + self.left..][..width.next_multiple_of(STEP)].as_mut_ptr(),
-                });
-                // SAFETY: every tap lies in its row, behind which are SLACK bytes; there is room for all groups.
-                unsafe { l.resize_row::<C>(rows, tap.weight as i16, &self.columns) };
-            } else {
-                for channel in 0..C {
-                    let to = &mut all[channel * self.plane + self.left..][..width];
-                    for (to, from) in to.iter_mut().zip(source.row(channel, y)) {
-                        *to = from ^ 0x80;
-                    }
-                }
-            }
-            for row in all.chunks_exact_mut(self.plane) {
-                mirror(row, self.left, width, self.pad + 1);
-            }
+        match source.channels {
+            1 => l.compiled(FillBand::<1> { band: self, source, from, count }),
+            _ => l.compiled(FillBand::<3> { band: self, source, from, count }),
         }
         Ok(())
     }
 }
 
-/// Continues the `width` pixels at `left` by `count` mirrored ones (or some more) on both sides.
+/// The work of [`Band::fill`]: there is room for the rows.
+struct FillBand<'a, const C: usize> {
+    band: &'a mut Band,
+    source: &'a Planes,
+    from: i64,
+    count: usize,
+}
+
+impl<const C: usize> Kernel for FillBand<'_, C> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) {
+        let Self { band, source, from, count } = self;
+        let (width, height) = (band.made.len(), band.size.height);
+        let before = (band.made.start as i64 - band.wanted.start).max(0) as usize;
+        let after = (band.wanted.end - band.made.end as i64).max(0) as usize;
+        for (i, all) in band.data.chunks_exact_mut(band.stride).take(count).enumerate() {
+            let y = reflect_101(from + i as i64, height);
+            if let Some(tap) = band.down.get(y) {
+                let rows = std::array::from_fn(|channel| RowPointers {
+                    upper: source.row(channel, tap.first).as_ptr(),
+                    lower: source.row(channel, tap.second).as_ptr(),
+                    to: all[channel * band.plane + band.left..][..width.next_multiple_of(STEP)].as_mut_ptr(),
+                });
+                // SAFETY: every tap lies in its row, behind which are SLACK bytes; there is room for all groups.
+                unsafe { l.resize_row::<C>(rows, tap.weight as i16, &band.columns) };
+            } else {
+                for channel in 0..C {
+                    let to = &mut all[channel * band.plane + band.left..][..width];
+                    for (to, from) in to.iter_mut().zip(&source.row(channel, y)[band.made.start..]) {
+                        *to = from ^ 0x80;
+                    }
+                }
+            }
+            for row in all.chunks_exact_mut(band.plane) {
+                mirror(row, band.left, width, [before, after]);
+            }
+        }
+    }
+}
+
+/// Pixels that are mirrored at a time.
+const MIRRORED: usize = 16;
+
+/// Continues the `width` pixels at `left` by `before` and `after` mirrored ones (or some more).
 #[inline(always)]
-fn mirror(row: &mut [u8], left: usize, width: usize, count: usize) {
-    const AT_ONCE: usize = 16;
-    if width <= count.next_multiple_of(AT_ONCE) {
-        for i in 0..count {
+fn mirror(row: &mut [u8], left: usize, width: usize, [before, after]: [usize; 2]) {
+    if width <= before.max(after).next_multiple_of(MIRRORED) {
+        for i in 0..before {
             row[left - 1 - i] = row[left + reflect_101(-1 - i as i64, width)];
+        }
+        for i in 0..after {
             row[left + width + i] = row[left + reflect_101((width + i) as i64, width)];
         }
         return;
     }
-    for i in (0..count).step_by(AT_ONCE) {
-        let (before, from) = row.split_at_mut(left);
-        let (inner, after) = from.split_at_mut(width);
-        let chunk = |at: usize| -> [u8; AT_ONCE] { std::array::from_fn(|k| inner[at + AT_ONCE - 1 - k]) };
-        before[left - i - AT_ONCE..][..AT_ONCE].copy_from_slice(&chunk(1 + i));
-        after[i..][..AT_ONCE].copy_from_slice(&chunk(width - 1 - i - AT_ONCE));
+    let (outer, from) = row.split_at_mut(left);
+    let (inner, behind) = from.split_at_mut(width);
+    let chunk = |at: usize| -> [u8; MIRRORED] { std::array::from_fn(|k| inner[at + MIRRORED - 1 - k]) };
+    for i in (0..before).step_by(MIRRORED) {
+        outer[left - i - MIRRORED..][..MIRRORED].copy_from_slice(&chunk(1 + i));
+    }
+    for i in (0..after).step_by(MIRRORED) {
+        behind[i..][..MIRRORED].copy_from_slice(&chunk(width - 1 - i - MIRRORED));
     }
 }
 
@@ -182,15 +259,16 @@ mod tests {
         let mut planes = Planes::default();
         planes.fill(l, image).unwrap();
         let mut band = Band::default();
-        band.begin(&planes, to, pad, L::GROUP, L::REACH).unwrap();
+        let columns = -(pad as i64)..(to.width + pad) as i64;
+        band.begin(&planes, to, columns, L::GROUP, L::REACH).unwrap();
         let count = to.height + 2 * pad;
-        band.fill::<L, C>(l, &planes, -(pad as i64), count).unwrap();
+        band.fill(l, &planes, -(pad as i64), count).unwrap();
         for y in 0..count {
             let wanted_y = reflect_101(y as i64 - pad as i64, to.height);
             for x in 0..to.width + 2 * pad {
                 let wanted_x = reflect_101(x as i64 - pad as i64, to.width);
                 for channel in 0..C {
-                    let found = band.pixels()[y * band.stride + channel * band.plane + band.left + x - pad];
+                    let found = band.data[y * band.stride + channel * band.plane + band.first() + x];
                     let wanted = wanted[(wanted_y * to.width + wanted_x) * C + channel];
                     assert_eq!(found, wanted, "{from:?} to {to:?}, {C} channels, ({x}, {y})");
                 }

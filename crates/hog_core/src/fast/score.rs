@@ -6,18 +6,21 @@ use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::memory;
 
-use super::lane::Lane;
+use super::lane::{Kernel, Lane};
 use super::layout::{ACROSS, BLOCK, WORDS};
 use super::plan::Plan;
 
 /// Rows of windows that the prefilter scores at a time.
 const ROWS: usize = 8;
 
-/// The windows of a level's lattice and the blocks they are made of.
+/// The windows of a band and the blocks they are made of.
 pub(super) struct WindowGrid<'a> {
     pub plan: &'a Plan,
-    pub blocks: *const f32,
-    pub bytes: *const u32,
+    /// Of the first rows of blocks, and of those after them.
+    pub blocks: [*const f32; 2],
+    pub bytes: [*const u32; 2],
+    /// How many rows the first ones are.
+    pub rows: usize,
     /// Lanes of a row of blocks.
     pub lanes: usize,
     /// Windows along x and y.
@@ -25,18 +28,27 @@ pub(super) struct WindowGrid<'a> {
     pub height: usize,
 }
 
+impl WindowGrid<'_> {
+    /// Row `y` of one of `blocks` and `bytes`, whose rows have `elements` of each lane.
+    ///
+    /// # Safety
+    /// There is such a row.
+    #[inline(always)]
+    unsafe fn row<T>(&self, parts: [*const T; 2], y: usize, elements: usize) -> *const T {
+        let (part, y) = if y < self.rows { (parts[0], y) } else { (parts[1], y - self.rows) };
+        // SAFETY: the caller's promise.
+        unsafe { part.add(y * elements * self.lanes) }
+    }
+}
+
 /// Adds (x, y, score) to `found` for every window whose exact score may be at least `threshold`, row by row, and for
 /// some others.
-///
-/// `narrow` has at most [`ACROSS`] lanes.
 ///
 /// # Safety
 /// `blocks` and `bytes` hold the blocks of all windows, and `lanes` is at least `width` rounded up to 32 plus the
 /// blocks of a window along x plus 16.
-#[inline(always)]
-pub(super) unsafe fn score<L: Lane, T: Lane>(
+pub(super) unsafe fn score<L: Lane>(
     l: L,
-    narrow: T,
     windows: &WindowGrid,
     threshold: f64,
     interrupt: &Interrupt,
@@ -49,13 +61,46 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
     memory::resize(masks, groups * windows.height, u32::MAX)?;
     let least = (threshold - plan.bias - plan.score_error_bound - plan.prefilter.bound) / plan.prefilter.unit;
     let least = least.floor().clamp(f64::from(i32::MIN), f64::from(i32::MAX)) as i32;
-    let mut top = 0;
-    while L::PREFILTER_VECTORS > 0 && top < windows.height {
+    if L::PREFILTER_VECTORS > 0 {
+        for top in (0..windows.height).step_by(ROWS) {
+            interrupt.check()?;
+            let rows = (windows.height - top).min(ROWS);
+            l.compiled(Prefilter { windows, least, top, rows, masks });
+        }
+    }
+    for (y, masks) in masks.chunks_exact(groups).enumerate() {
         interrupt.check()?;
-        let rows = (windows.height - top).min(ROWS);
+        for (group, &mask) in masks.iter().enumerate() {
+            let x = group * L::LANES;
+            let inside = (windows.width - x).min(L::LANES);
+            let mask = mask & (((1u64 << inside) - 1) as u32);
+            if mask != 0 {
+                memory::reserve_some(found, mask.count_ones() as usize)?;
+                l.narrow().compiled(ScoreWindows { windows, x, y, mask, found });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Prefilters `rows` rows of windows. Made by [`score`] alone, which has its caller's promise.
+struct Prefilter<'a> {
+    windows: &'a WindowGrid<'a>,
+    least: i32,
+    top: usize,
+    rows: usize,
+    masks: &'a mut [u32],
+}
+
+impl Kernel for Prefilter<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) {
+        let Self { windows, least, top, rows, masks } = self;
+        let groups = windows.width.div_ceil(L::LANES);
         let mut group = 0;
         while group < groups {
-            // SAFETY: the windows of these rows and lanes are the caller's promise.
+            // SAFETY: the windows of these rows and lanes are the promise to `score`.
             unsafe {
                 if L::PREFILTER_VECTORS == 2 && group + 1 < groups {
                     prefilter::<L, 2>(l, windows, least, top, rows, group, groups, masks);
@@ -66,25 +111,30 @@ pub(super) unsafe fn score<L: Lane, T: Lane>(
                 }
             }
         }
-        top += rows;
     }
-    for (index, &mask) in masks.iter().enumerate() {
-        let (y, x) = (index / groups, index % groups * L::LANES);
-        let inside = (windows.width - x).min(L::LANES);
-        let mut mask = mask & (((1u64 << inside) - 1) as u32);
-        if mask == 0 {
-            continue;
-        }
-        interrupt.check()?;
-        memory::reserve_some(found, mask.count_ones() as usize)?;
+}
+
+/// Scores those of the windows `x..x + 32` of row `y` that `mask` names. Made by [`score`] alone.
+struct ScoreWindows<'a> {
+    windows: &'a WindowGrid<'a>,
+    x: usize,
+    y: usize,
+    mask: u32,
+    found: &'a mut Vec<(usize, usize, f64)>,
+}
+
+impl Kernel for ScoreWindows<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) {
+        let mut mask = self.mask;
         while mask != 0 {
-            let x = x + mask.trailing_zeros() as usize;
+            let x = self.x + mask.trailing_zeros() as usize;
             mask &= mask - 1;
-            // SAFETY: as above.
-            found.push((x, y, unsafe { score_window(narrow, windows, x, y) }));
+            // SAFETY: the promise to `score`.
+            self.found.push((x, self.y, unsafe { score_window(l, self.windows, x, self.y) }));
         }
     }
-    Ok(())
 }
 
 /// The score of one window in single precision. Lanes are neighbouring blocks of the window.
@@ -95,7 +145,7 @@ unsafe fn score_window<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) 
     let mut score = plan.bias;
     for (block_y, weights) in plan.weights.chunks_exact(BLOCK * padded).enumerate() {
         // SAFETY: promised by the caller of `score`; lanes beyond the window's have the weight 0.
-        let blocks = unsafe { windows.blocks.add((y + block_y) * BLOCK * windows.lanes + x) };
+        let blocks = unsafe { windows.row(windows.blocks, y + block_y, BLOCK).add(x) };
         for part in (0..plan.blocks.width).step_by(L::LANES) {
             let mut sums = [l.splat(0.0); 4];
             for (i, weights) in weights.chunks_exact(padded).enumerate() {
@@ -136,7 +186,7 @@ unsafe fn prefilter<L: Lane, const V: usize>(
         // Row y of blocks takes part in window rows from..to, as their block row y - window row.
         let (from, to) = ((y + 1).saturating_sub(height), (y + 1).min(rows));
         // SAFETY: promised by the caller of `score`.
-        let bytes = unsafe { windows.bytes.add((top + y) * WORDS * windows.lanes + group * L::LANES) };
+        let bytes = unsafe { windows.row(windows.bytes, top + y, WORDS).add(group * L::LANES) };
         macro_rules! step {
             ($($from:literal $to:literal),*) => {
                 match (from, to) {

@@ -13,7 +13,7 @@
 use std::hint::black_box;
 use std::ops::Range;
 
-use super::lane::{Lane, ODD};
+use super::lane::{Kernel, Lane, ODD};
 use super::layout::{BINS, BLOCK, CARRY, CELL, Gamma};
 use super::plan::Plan;
 
@@ -24,10 +24,16 @@ pub(super) struct Job<'a> {
     pub origin: [*const u8; 3],
     /// Bytes from one row of pixels to the next.
     pub stride: usize,
-    /// Rows of cells to be added to the blocks; those above them have been.
+    /// Rows of cells to be added to the blocks.
     pub cells: Range<usize>,
+    /// The row of blocks that `blocks` begins with.
+    pub top: usize,
+    /// Whether the row of cells above them has been added.
+    pub carried: bool,
     /// Sums of the cells above, for the blocks that begin there: [`CARRY`] numbers for each lane.
     pub carry: *mut f32,
+    /// Room for one strip: [`ROOM`] numbers for each of its lanes.
+    pub room: *mut f32,
     /// Normalised blocks: `[block row][element][lane]`, and the same as bytes (1 stands for 255).
     pub blocks: *mut f32,
     pub bytes: *mut u32,
@@ -36,6 +42,17 @@ pub(super) struct Job<'a> {
     /// For each row of blocks, the sums that the first cells of the strip to the right add to the blocks left of them.
     pub edge: &'a mut [[f32; BLOCK]],
 }
+
+/// What a strip keeps of the row of cells it is at.
+struct Room<L: Lane, const CHANNELS: usize> {
+    rows: [[[L::F; CELL + 2]; CHANNELS]; CELL + 2],
+    /// In colour.
+    gradients: [[[L::F; 2]; CELL]; CELL],
+    sums: [[L::F; CELL]; 2 * BINS],
+}
+
+/// Words per lane that a strip needs as room.
+pub(super) const ROOM: usize = (CELL + 2) * 3 * (CELL + 2) + 2 * CELL * CELL + 2 * BINS * CELL;
 
 /// A gradient's two votes. Of two neighbouring bins one is even and one is odd, so each vote is kept by parity and a
 /// bin has to look at one of them only. Bins 8 and 0 are neighbours too: there the odd vote belongs to the other one.
@@ -53,19 +70,42 @@ pub(super) struct LaneVotes<L: Lane> {
 /// # Safety
 /// For every channel and row of `job`, the bytes from 8 before to 8 behind the strip's cells are readable; `blocks`
 /// and `bytes` have `cells_y - 1` rows of `lanes` lanes, the strip's among them.
+pub(super) unsafe fn strip<L: Lane>(l: L, job: &mut Job, first: usize, channels: usize) {
+    match channels {
+        1 => l.compiled(Strip::<1> { job, first }),
+        _ => l.compiled(Strip::<3> { job, first }),
+    }
+}
+
+/// The work of [`strip`], which alone makes it.
+struct Strip<'a, 'b, const CHANNELS: usize> {
+    job: &'a mut Job<'b>,
+    first: usize,
+}
+
+impl<const CHANNELS: usize> Kernel for Strip<'_, '_, CHANNELS> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lane>(self, l: L) {
+        // SAFETY: promised to `strip`.
+        unsafe { blocks_of_strip::<L, CHANNELS>(l, self.job, self.first) }
+    }
+}
+
 #[inline(always)]
-pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, first: usize) {
+unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, first: usize) {
     let zero = l.splat(0.0);
     // Two rows from the cell above, eight of the cell, each with one neighbour on both sides. In colour only the last
     // three are kept, in turn in three places: all would not leave room for the rest in the first-level cache.
-    let mut rows = [[[zero; CELL + 2]; CHANNELS]; CELL + 2];
-    let mut gradients = [[[zero; 2]; CELL]; CELL];
+    // In scratch memory, as zeroing them would take a fiftieth of the time.
+    // SAFETY: aligned room for one strip is the caller's promise; any bits are numbers, and all are written before they
+    // are read.
+    let Room { rows, gradients, sums } = unsafe { &mut *job.room.cast::<Room<L, CHANNELS>>() };
     // SAFETY: aligned room for the strip's lanes is the caller's promise; any bits are numbers.
     let carry = unsafe { &mut *job.carry.add(CARRY * first).cast::<[[[L::F; 2]; BINS]; CELL]>() };
-    if job.cells.start == 0 {
+    if !job.carried {
         *carry = [[[zero; 2]; BINS]; CELL];
     }
-    let mut sums = [[zero; CELL]; 2 * BINS];
     let mut votes = [vote(l, [zero; 2]); CELL];
     // SAFETY: promised by the caller.
     unsafe {
@@ -93,14 +133,14 @@ pub(super) unsafe fn strip<L: Lane, const CHANNELS: usize>(l: L, job: &mut Job, 
                 };
                 *votes = vote(l, gradient);
             }
-            spread_all(l, &job.plan.down, &votes, &mut carry[phase], &mut sums, phase);
+            spread_all(l, &job.plan.down, &votes, &mut carry[phase], sums, phase);
         }
         if CHANNELS == 1 {
             rows.copy_within(CELL.., 0);
         }
-        if cell_y > 0 {
+        if job.carried || i > 0 {
             // SAFETY: the strip's lanes of this row of blocks are the caller's promise.
-            unsafe { finish(l, job, &sums, cell_y - 1, first) };
+            unsafe { finish(l, job, sums, cell_y - 1 - job.top, first) };
         }
     }
 }

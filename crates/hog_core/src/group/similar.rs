@@ -141,10 +141,10 @@ fn surviving(
             let end = |start: i32, length: i32| i64::from(start) + i64::from(length);
             j != i
                 && outer_count > threshold
-                && i64::from(inner.x) >= i64::from(outer.x) - dx
-                && i64::from(inner.y) >= i64::from(outer.y) - dy
-                && end(inner.x, inner.width) <= end(outer.x, outer.width) + dx
-                && end(inner.y, inner.height) <= end(outer.y, outer.height) + dy
+                && i64::from(inner.x) >= i64::from(outer.x).saturating_sub(dx)
+                && i64::from(inner.y) >= i64::from(outer.y).saturating_sub(dy)
+                && end(inner.x, inner.width) <= end(outer.x, outer.width).saturating_add(dx)
+                && end(inner.y, inner.height) <= end(outer.y, outer.height).saturating_add(dy)
                 && (outer_count > count.max(3) || count < 3)
         })
     };
@@ -213,5 +213,16 @@ mod tests {
         let far =
             [rect(i32::MAX, i32::MIN, i32::MAX, i32::MAX), rect(i32::MIN, i32::MAX, i32::MAX, i32::MIN)];
         assert!(group_rectangles(&far, 1, 0.2, &Interrupt::NEVER).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_tolerance_beyond_all_integers_does_not_overflow() {
+        // Each three are alike; of the two kinds, neither lies within the other by any tolerance.
+        let (flat, slim) = (rect(0, 0, 100, -90), rect(0, 0, -90, 100));
+        let rects = [[flat; 3], [slim; 3]].concat();
+        for eps in [1e300, f64::MAX] {
+            let found = group_rectangles(&rects, 2, eps, &Interrupt::NEVER).unwrap();
+            assert_eq!(found, [(flat, 3), (slim, 3)]);
+        }
     }
 }

@@ -32,9 +32,19 @@ impl<T: Workspace> Pool<T> {
 
     /// Runs `work` with a spare workspace, or with a new one if there is none.
     pub(crate) fn with<R>(&self, work: impl FnOnce(&mut T) -> R) -> R {
-        let spare = self.0.iter().find_map(|slot| slot.try_lock().ok()?.take());
-        let mut workspace = spare.unwrap_or_default();
+        let mut workspace = self.take();
         let result = work(&mut workspace);
+        self.give(workspace);
+        result
+    }
+
+    /// A spare workspace, or a new one if there is none.
+    pub(crate) fn take(&self) -> T {
+        self.0.iter().find_map(|slot| slot.try_lock().ok()?.take()).unwrap_or_default()
+    }
+
+    /// Keeps `workspace` as a spare one.
+    pub(crate) fn give(&self, workspace: T) {
         for slot in &self.0 {
             if let Ok(mut slot) = slot.try_lock()
                 && slot.is_none()
@@ -43,7 +53,6 @@ impl<T: Workspace> Pool<T> {
                 break;
             }
         }
-        result
     }
 
     /// Frees the spare workspaces that are too large to be kept.

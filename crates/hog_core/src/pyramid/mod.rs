@@ -5,5 +5,6 @@ mod levels;
 mod resize;
 
 pub use grid::{Grid, Steps};
-pub use levels::{Level, levels, to_image};
+pub use levels::{Level, Pyramid, levels, to_image};
+pub(crate) use resize::check;
 pub use resize::{Tap, resize, taps};

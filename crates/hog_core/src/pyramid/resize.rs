@@ -2,7 +2,7 @@
 
 use crate::error::{ImageError, Result};
 use crate::geometry::Size;
-use crate::image::ImageView;
+use crate::image::{ImageView, SIDE_MAX};
 use crate::memory;
 
 /// Where one output pixel reads along one axis: two neighbours and the weight of the second, in 1/256.
@@ -34,12 +34,22 @@ pub fn taps(from: usize, to: usize) -> impl ExactSizeIterator<Item = Tap> + Clon
     (0..to).map(tap)
 }
 
+/// Refuses sizes that no image can have.
+pub(crate) fn check(size: Size) -> Result<()> {
+    let Size { width, height } = size;
+    if width == 0 || height == 0 {
+        return Err(ImageError::Resize { width, height }.into());
+    }
+    if width > SIDE_MAX || height > SIDE_MAX {
+        return Err(ImageError::TooLarge { width, height }.into());
+    }
+    Ok(())
+}
+
 /// `image` at `size`, bit for bit as OpenCV's INTER_LINEAR_EXACT; rows without gaps, channels interleaved.
 pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
     let channels = image.channels();
-    if size.width == 0 || size.height == 0 {
-        return Err(ImageError::Resize { width: size.width, height: size.height }.into());
-    }
+    check(size)?;
     let across = memory::collect(taps(image.width(), size.width))?;
     let down = taps(image.height(), size.height);
     let shrink_row = |y: usize, out: &mut Vec<u32>| {

@@ -91,13 +91,20 @@ def file_ending(*suffixes: str) -> Callable[[str], Path]:
 def add_follower(parser: ArgumentParser) -> None:
     """Add the options that choose a controller and a detector."""
     from limo_hog.follow.control.naming import CONTROLLERS
-    from limo_hog.follow.sense.detectors import NAMES
 
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="the controller (%(default)s)")
+    add_target_and_detector(parser)
+
+
+def add_target_and_detector(parser: ArgumentParser) -> None:
+    """Add --target and --detector."""
+    from limo_hog.follow.sense.detectors import NAMES
+
     parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
     parser.add_argument(
         "--detector",
         default="hog",
-        metavar="|".join((*NAMES, "onnx:FILE")),
-        help="the people detector: ours, ours on the half image, OpenCV's, or a network (%(default)s)",
+        metavar="|".join((*NAMES, "hog:MODEL", "onnx:FILE")),
+        help="the people detector: ours, ours on the half image, OpenCV's, one that `train` wrote, or a network "
+        "(%(default)s)",
     )

@@ -18,8 +18,14 @@ class UsageError(LimoHogError):
 
 
 def write_json(target: str, value: object) -> None:
-    """Write one JSON value, indented, to a file, or to standard output where the target is "-"."""
-    text = json.dumps(value, indent=2) + "\n"
+    """Write one JSON value, indented, to a file, or to standard output where the target is "-".
+
+    Raises
+    ------
+    ValueError
+        A number in it is not finite, which JSON does not know.
+    """
+    text = json.dumps(value, indent=2, allow_nan=False) + "\n"
     if target == STDOUT:
         sys.stdout.write(text)
         return

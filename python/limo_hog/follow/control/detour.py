@@ -29,6 +29,9 @@ class Detour:
         So much of the way must be free [m]. Chosen: two seconds at 0.6 m/s.
     lean_s
         The preferred detour is on the side the person walks to, their bearing rate times this [s]. Chosen.
+    steps_near, creep
+        Along a planned way, directions tried to either side [1], and how far one must be free [m]. Chosen: 1.2 rad, as
+        the corner of a corridor of 1 m needs; almost the robot's length.
     person_radius
         Returns nearer than this to the person are the person's own [m]. Chosen: legs in mid-stride and an arm.
     occluder_half_width
@@ -41,6 +44,8 @@ class Detour:
     preference: float = 0.5
     look_ahead: float = 1.2
     lean_s: float = 2.0
+    steps_near: int = 15
+    creep: float = 0.25
     person_radius: float = 0.45
     occluder_half_width: float = 0.12
 
@@ -72,14 +77,29 @@ class Detour:
             The detour liked best, from `bearing` [rad]: the one already begun, or the side the person walks to.
         """
         reach = min(distance - 2 * self.person_radius, self.look_ahead)
-        heading = self._free(obstacles, bearing, preferred, reach, robot)
-        return heading if heading is not None else self._free(obstacles, bearing, preferred, reach / 2, robot)
+        heading = self.free(obstacles, bearing, preferred, reach, robot)
+        return heading if heading is not None else self.free(obstacles, bearing, preferred, reach / 2, robot)
 
-    def _free(
-        self, obstacles: Points, bearing: float, preferred: float, reach: float, robot: RobotGeometry
+    def near(self, obstacles: Points, bearing: float, robot: RobotGeometry) -> float | None:
+        """Return the direction nearest to a bearing [rad] in which the robot can drive a little; None for none."""
+        for reach in (self.creep, self.creep / 3):
+            heading = self.free(obstacles, bearing, 0.0, reach, robot, self.steps_near)
+            if heading is not None:
+                return heading
+        return None
+
+    def free(
+        self,
+        obstacles: Points,
+        bearing: float,
+        preferred: float,
+        reach: float,
+        robot: RobotGeometry,
+        steps: int | None = None,
     ) -> float | None:
         """Return the best direction in which the robot can drive at least `reach` [m]."""
-        detours = [self.step * index for index in range(-self.steps, self.steps + 1)]
+        most = self.steps if steps is None else steps
+        detours = [self.step * index for index in range(-most, most + 1)]
         for detour in sorted(detours, key=lambda detour: abs(detour) + self.preference * abs(detour - preferred)):
             cos, sin = math.cos(bearing + detour), math.sin(bearing + detour)
             if room_ahead(obstacles @ np.array([[cos, -sin], [sin, cos]]), self.margin, robot) >= reach:

@@ -55,8 +55,6 @@ class Steering:
         How long to drive by the prediction alone [s]. Chosen: .5 m at .6 m/s, within the margin of an obstacle.
     doubt_speed
         Share of `max_linear` at which to drive to a person who is not confirmed [1]. Chosen.
-    back_off
-        Speed backwards where no direction is free [m/s]. Chosen: a fifth of the full speed.
     """
 
     linear_gain: float = bounded(0.8, 0, 5)
@@ -69,7 +67,6 @@ class Steering:
     steady_range_rate: float = bounded(0.1, 0, 1)
     coast_s: float = bounded(0.8, 0, 5)
     doubt_speed: float = bounded(0.5, 0, 1)
-    back_off: float = bounded(0.15, 0, 0.5)
 
     def command(
         self,
@@ -100,14 +97,16 @@ class Steering:
             Time since the person was measured, by camera or lidar [s].
         """
         heading = aim.bearing if aim.heading is None else aim.heading
-        angular = self.angular_gain * heading + aim.bearing_rate
-        angular = min(max(angular, -self.max_angular), self.max_angular)
+        facing, angular = (
+            min(max(self.angular_gain * off + aim.bearing_rate, -self.max_angular), self.max_angular)
+            for off in (aim.bearing, heading)
+        )
         error = aim.distance - robot.camera_x - target_distance
         # Driving sideways to the person would lose sight of them: turn first, then drive.
         linear = (self.linear_gain * error + aim.range_rate) * max(math.cos(heading), 0.0) ** 2
         linear = min(max(linear, -self.max_linear), self.max_linear)
         if lost_s > self.coast_s:
-            return Twist(0.0, angular), Mode.LOST, "turning to the predicted position"
+            return Twist(0.0, facing), Mode.LOST, "turning to the predicted position"
         if not confirmed and linear > 0:
             if not worth_nearing:
                 return Twist(0.0, angular), Mode.FOLLOW, "turning to a possible person"
@@ -116,9 +115,9 @@ class Steering:
         if abs(error) < self.distance_tolerance and abs(aim.range_rate) < self.steady_range_rate:
             if abs(aim.bearing) < self.bearing_tolerance and abs(aim.bearing_rate) < self.steady_bearing_rate:
                 return Twist(), Mode.HOLD, "at the target distance"
-            return Twist(0.0, angular), Mode.HOLD, "turning with the person"
+            return Twist(0.0, facing), Mode.HOLD, "turning with the person"
         if aim.heading is None:
-            return Twist(-self.back_off, angular), Mode.BLOCKED, "backing off: no free way to the person"
+            return Twist(0.0, facing), Mode.BLOCKED, "no free way to the person"
         twist = Twist(linear, angular)
         if aim.heading != aim.bearing:
             return twist, Mode.FOLLOW, "driving around an obstacle"

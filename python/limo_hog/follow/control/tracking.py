@@ -5,20 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from limo_hog.follow.control.detour import Detour
+from limo_hog.follow.control.lookout import Hunt, Lookout
 from limo_hog.follow.control.search import Search
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.control.steer import Aim, Steering
 from limo_hog.follow.decision import Belief, Believed, Decision, Mode
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.sense.clearance import scan_points
-from limo_hog.follow.sense.observation import Observation
+from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, Points, scan_points, to_odometry
+from limo_hog.follow.sense.observation import Observation, Odometry, Scan
 from limo_hog.follow.sense.region import Region, RegionSize
-from limo_hog.follow.tracks.kalman import bearing_range, predict, rates
+from limo_hog.follow.space.grid import Grid, Ground
+from limo_hog.follow.space.routes import point_ahead
+from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates, wrap
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.poses import pose_at
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
+from limo_hog.follow.twist import Twist
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +43,14 @@ class TrackingState:
         How far off the direct way to the person the robot drives [rad].
     since_full
         Frames since the whole image was searched [1].
+    ground
+        What stands where; None before the first scan.
+    known
+        The followed person's track when last measured; None before anyone was followed.
+    hunt
+        What is remembered while looking for that person; None while they are measured.
+    way, way_at
+        float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
     """
 
     tracks: Tracks = field(default_factory=Tracks)
@@ -44,6 +58,11 @@ class TrackingState:
     side: float = 1.0
     detour: float = 0.0
     since_full: int = 0
+    ground: Ground | None = None
+    known: Track | None = None
+    hunt: Hunt | None = None
+    way: Points = field(default_factory=lambda: NO_POINTS)
+    way_at: float = -math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +75,9 @@ class TrackingController:
         Distance to hold, as the depth image measures it [m].
     full_every
         Every so many frames the whole image is searched [1]. Chosen: another person is noticed within 1.5 s.
+    near_hiding, foresight_s
+        Distance to hold to a person who will be out of sight after so long [m, s]. Chosen: the edge of Hall's personal
+        zone; the time in which the robot comes up by that much.
     steering
         From the followed person's position to a command.
     search
@@ -68,18 +90,25 @@ class TrackingController:
         How much of the image to search.
     tracker
         Where all people are.
+    lookout, grid, depth_grid
+        How to look for a lost person, how the ground is mapped, and which depth pixels are looked at for it.
     robot
         Where camera and lidar sit.
     """
 
     target_distance: float = bounded(1.5, 0.1, 8)
     full_every: int = bounded(15, 1, 1000)
+    near_hiding: float = bounded(1.2, 0.5, 8)
+    foresight_s: float = bounded(1.0, 0, 5)
     steering: Steering = field(default_factory=Steering)
     search: Search = field(default_factory=Search)
     selection: Selection = field(default_factory=Selection)
     detour: Detour = field(default_factory=Detour)
     region: RegionSize = field(default_factory=RegionSize)
     tracker: Tracker = field(default_factory=Tracker)
+    lookout: Lookout = field(default_factory=Lookout)
+    grid: Grid = field(default_factory=Grid)
+    depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))
     robot: RobotGeometry = LIMO
 
     def start(self) -> TrackingState:
@@ -91,20 +120,24 @@ class TrackingController:
         appearance = self.tracker.association.appearance
         tracks, boxes = self.tracker.update(observation, state.tracks)
         choice = self.selection.choose(tracks, state.choice, self.search.after_s, appearance)
-        state = replace(state, tracks=tracks, choice=choice)
+        state = self._map(replace(state, tracks=tracks, choice=choice), observation)
         person = tracks.person(choice.number)
         if person is None:
             return self._search(state, observation)
         unseen_s = observation.stamp - person.seen
-        person, tracks = self.tracker.follow_legs(person, tracks)
+        person, tracks = self.tracker.follow_legs(person, tracks, self.grid, state.ground)
         state = replace(state, tracks=tracks)
-        keeps = self._keeps(person, observation)
+        state = self._planned(state, person, observation)
+        keeps = self._keeps(person, state, observation)
         aim = self._aim(person, keeps, state, observation)
         lost_s = min(unseen_s, observation.now - person.felt)
         if lost_s <= self.tracker.scan_period_s:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
-            state = replace(state, side=self.steering.side_of(aim))
-        if lost_s > (self.tracker.forget_s if aim.hidden else self.search.after_s):
+            known = person.track if person.confirmed else state.known
+            state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None)
+        can_look = state.ground is not None and state.known is not None and person.confirmed
+        patience = self.lookout.after_s if can_look else self.tracker.forget_s if aim.hidden else self.search.after_s
+        if lost_s > patience:
             return self._search(state, observation)
         twist, mode, reason = self.steering.command(
             aim,
@@ -128,12 +161,43 @@ class TrackingController:
         belief = Belief(keeps, self._believed(state, observation), followed=person.number)
         return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief)
 
+    def _map(self, state: TrackingState, observation: Observation) -> TrackingState:
+        """Enter a new scan, and the depth image, into the map of the ground."""
+        scan, tracks = observation.scan, state.tracks
+        if scan is None or observation.odometry is None:
+            return state
+        if state.ground is not None and scan.stamp <= state.ground.stamp:
+            return state
+        pose = pose_at(tracks.poses, scan.stamp)
+        people = np.array([one.track.mean[:2] for one in tracks.people if one.confirmed]).reshape(-1, 2)
+        depth_points = NO_POINTS
+        if observation.depth is not None:
+            near = self.depth_grid.points(observation.depth, observation.focal_px, self.lookout.view, self.robot)
+            depth_points = to_odometry(near, pose_at(tracks.poses, observation.stamp))
+        return replace(state, ground=self.grid.update(state.ground, scan, pose, people, depth_points, self.robot))
+
     def _search(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
         tracks, choice, appearance = state.tracks, state.choice, self.tracker.association.appearance
         other = any(self.selection.is_stranger(one, tracks, choice, appearance) for one in tracks.in_view)
         lost = choice.measured is not None
+        if lost and not other and state.ground is not None and state.known is not None and observation.scan is not None:
+            now = observation.now
+            if now - state.known.stamp < self.lookout.give_up_s:
+                return self._look_round(state, state.known, state.ground, observation.scan, now)
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
         return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
+
+    def _look_round(
+        self, state: TrackingState, known: Track, ground: Ground, scan: Scan, now: float
+    ) -> Decision[TrackingState]:
+        pose = pose_at(state.tracks.poses, now)
+        hunt = state.hunt or self.lookout.begin(known, state.choice.number or 0, self.grid, ground)
+        hunt = self.lookout.step(hunt, scan, now, pose, self.grid, ground)
+        points, turn = scan_points(scan, self.robot), Twist(0.0, state.side * self.search.rate)
+        twist, reason = self.lookout.command(hunt, pose, points, self.detour, self.robot, turn)
+        places, way = self.lookout.ways(hunt, pose)
+        belief = Belief(None, (), places, way)
+        return Decision(twist, replace(state, hunt=hunt), Mode.LOST, reason, belief=belief)
 
     def _aim(self, person: Person, keeps: float, state: TrackingState, observation: Observation) -> Aim:
         """Return where the person is at the newest stamp, and which way leads there."""
@@ -146,15 +210,24 @@ class TrackingController:
         obstacles = self.detour.obstacles(scan_points(observation.scan, self.robot), bearing, distance)
         if distance - self.robot.camera_x > keeps - self.steering.distance_tolerance:
             preferred = state.detour or self.detour.lean_s * aim.bearing_rate
-            aim = replace(aim, heading=self.detour.heading(obstacles, bearing, distance, preferred, self.robot))
+            heading = self.detour.heading(obstacles, bearing, distance, preferred, self.robot)
+            aim = replace(aim, heading=heading)
+            if heading != bearing and len(state.way):
+                aim = replace(aim, heading=self._along(state.way, obstacles, pose))
         return replace(aim, hidden=self.detour.hides(obstacles, bearing, distance))
 
-    def _keeps(self, person: Person, observation: Observation) -> float:
+    def _keeps(self, person: Person, state: TrackingState, observation: Observation) -> float:
         """Return the distance to hold from the camera [m]: the target, but none from which a person is cut off."""
         if not person.confirmed:
             return self.target_distance
         least = self.tracker.visibility.least_distance(person.window, person.centre, observation.height)
-        return max(self.target_distance, least - self.robot.camera_x)
+        keeps = max(self.target_distance, least - self.robot.camera_x)
+        if keeps > self.near_hiding and state.ground is not None:
+            pose = pose_at(state.tracks.poses, observation.now)
+            soon = predict(person.track, observation.now + self.foresight_s, self.tracker.noise).mean[:2]
+            if not self.grid.sees(state.ground, np.array([[pose.x, pose.y]]), soon[None])[0, 0]:
+                return self.near_hiding
+        return keeps
 
     def _believed(self, state: TrackingState, observation: Observation) -> tuple[Believed, ...]:
         """Return everyone tracked, in the base frame, as of the newest stamp."""
@@ -177,6 +250,28 @@ class TrackingController:
                 )
             )
         return tuple(people)
+
+    def _along(self, way: Points, obstacles: Points, pose: Odometry) -> float | None:
+        """Return the direction along a way [rad]; None where none is free."""
+        x, y = point_ahead(way, pose, self.lookout.ahead)
+        off = wrap(math.atan2(y - pose.y, x - pose.x) - pose.yaw)
+        return off if abs(off) > self.lookout.aside else self.detour.near(obstacles, off, self.robot)
+
+    def _planned(self, state: TrackingState, person: Person, observation: Observation) -> TrackingState:
+        """Return the state with a way to the person where the direct one is not free; a way is kept for a while."""
+        now, ground, scan = observation.now, state.ground, observation.scan
+        if ground is None or scan is None or not person.confirmed:
+            return state
+        pose, track = pose_at(state.tracks.poses, now), predict(person.track, now, self.tracker.noise)
+        bearing, distance = bearing_range(track, pose)
+        obstacles = self.detour.obstacles(scan_points(scan, self.robot), bearing, distance)
+        reach = min(distance - 2 * self.detour.person_radius, self.detour.look_ahead)
+        if self.detour.free(obstacles, bearing, 0.0, reach, self.robot, 0) is not None:
+            return replace(state, way=NO_POINTS, way_at=-math.inf)
+        if now - state.way_at < self.lookout.replan_s:
+            return state
+        way = self.lookout.router.way_towards(self.grid, ground, pose, track.mean[:2])
+        return replace(state, way=way if len(way) > 1 else NO_POINTS, way_at=now)
 
     def _is_worth_nearing(self, person: Person, aim: Aim) -> bool:
         """Whether a track is too far away for HOG to confirm it, and likely enough to be one to drive there."""

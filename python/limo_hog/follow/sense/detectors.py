@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Image = NDArray[np.uint8]
 
-#: Names `detector_named` knows; `onnx:FILE` is the fourth kind.
+#: Names `detector_named` knows, besides those with a file: `hog:MODEL` and `onnx:FILE`.
 NAMES = ("hog", "hog-half", "hog-iou", "hog-soft", "cv2")
 
 
@@ -39,21 +39,25 @@ class Detector(Protocol):
 
 
 def detector_named(name: str) -> Detector:
-    """Return a detector: one of `NAMES`, or `onnx:FILE`.
+    """Return a detector: one of `NAMES`, `hog:MODEL` (a model of `PeopleDetector`, as a file), or `onnx:FILE`.
 
     Raises
     ------
     DetectorError
         There is no such detector, OpenCV has no HOG, or the file is no network.
+    ParameterError, ModelFormatError
+        The file holds no model.
     """
     if name == "cv2":
         return Cv2Detector()
     if name.startswith("onnx:"):
         return OnnxDetector(Path(name.removeprefix("onnx:")))
-    if name not in NAMES:
-        raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}, onnx:FILE")
     from limo_hog.detector import PeopleDetector
 
+    if name.startswith("hog:"):
+        return PeopleDetector(model=name.removeprefix("hog:"), min_height=None)
+    if name not in NAMES:
+        raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}, hog:MODEL, onnx:FILE")
     kinds: dict[str, Literal["group", "iou", "soft"]] = {"hog-iou": "iou", "hog-soft": "soft"}
     # Without enlarging, grouped: the rectangles of `cv2.HOGDescriptor`.
     hog = PeopleDetector(min_height=None, nms=kinds.get(name, "group"))

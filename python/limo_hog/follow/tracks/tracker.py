@@ -11,6 +11,7 @@ from limo_hog.follow.sense.appearance import Clothes
 from limo_hog.follow.sense.measurement import Measurement, measure
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_hog.follow.sense.visibility import Visibility
+from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Association
 from limo_hog.follow.tracks.existence import Existence, Recall
@@ -180,8 +181,10 @@ class Tracker:
             clothes=clothes,
         )
 
-    def follow_legs(self, person: Person, tracks: Tracks) -> tuple[Person, Tracks]:
+    def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
         """Bring a person up to the newest scan, if their legs are in it.
+
+        `ground` is what stands around, where that is known: its returns are not legs.
 
         Returns the person at the newest scan's stamp, and the tracks. There, a person found in the last frame stays at
         the frame's stamp, since the next frame may be older than the scans.
@@ -198,6 +201,10 @@ class Tracker:
         for returns in tracks.scans:
             # The track of an unseen person already contains the scans up to `felt`: each may count only once.
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
+                if ground is not None:
+                    # Walls and furniture that are known already are nobody's legs.
+                    known = grid.is_near_blocked(ground, returns.points)
+                    returns = replace(returns, points=returns.points[~known])
                 track = self.legs.update(now.track, returns, self.noise)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
         kept = now if unseen > 0 else replace(person, felt=now.felt)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog import _core
 from limo_hog.imaging.drawing import annotate
-from limo_hog.imaging.resize import resize
 from limo_hog.learn.evaluation.run import Evaluation
 from limo_hog.learn.labels import Picture
 
@@ -88,4 +88,4 @@ def _tile(mistake: Mistake) -> NDArray[np.uint8]:
     box = np.rint(np.array([[(x - left) * scale, (y - top) * scale, w * scale, h * scale]])).astype(np.int32)
     found = mistake.score is not None
     caption = f"false alarm {mistake.score:.2f}" if found else f"missed, {h:.0f} px"
-    return annotate(resize(view, width, height), box, target=0 if found else None, caption=caption)
+    return annotate(_core.resize(view, width, height), box, target=0 if found else None, caption=caption)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -12,15 +12,25 @@ class HungError(BaseException):
     """The script hangs; not an Exception, so that `except Exception` in a script does not hide it."""
 
 
+class DiedError(BaseException):
+    """The script's process has ended before the run was over."""
+
+
 class Patience:
     """A timer that starts again whenever simulated time passes.
 
-    It needs the main thread and a system with interval timers; elsewhere (Windows) a hanging script must be stopped
-    with Ctrl-C.
+    It needs the main thread and a system with interval timers; elsewhere (Windows), and where the script takes no
+    interrupt, `limo_sim.ros.apart` stops its process.
+
+    Attributes
+    ----------
+    passing
+        Called whenever simulated time passes.
     """
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
+        self.passing: Callable[[], None] = lambda: None
         self._running = False
 
     @contextmanager
@@ -49,6 +59,7 @@ class Patience:
 
     def progress(self) -> None:
         """Start the timer again: simulated time has passed."""
+        self.passing()
         if self._running:
             signal.setitimer(signal.ITIMER_REAL, self.seconds)
 

@@ -11,7 +11,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol
@@ -95,6 +95,24 @@ class Callback:
     worked: float
 
 
+@dataclass
+class Past:
+    """What is known of a run that another process began: enough to go on with it.
+
+    Attributes
+    ----------
+    steps, commands
+        Every control period, and every command.
+    asked, target_distance
+        As `World` has them.
+    """
+
+    steps: list[Step] = field(default_factory=list)
+    commands: list[Command] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+    target_distance: float | None = None
+
+
 class World:
     """One run: the arena, the subscriptions, and the log that is scored.
 
@@ -140,7 +158,9 @@ class World:
         log: Log,
         watch: Callable[[Moment], None] | None = None,
         patience: float = 20.0,
+        began: float | None = None,
     ) -> None:
+        scenario.check_detector_is_plain("a node brings its own detector")
         self.arena = Arena(scenario, seed)
         self.seconds = seconds
         self.log = log
@@ -169,7 +189,7 @@ class World:
         self._render_ms = 0.0
         self._logged = self._logged_frame = -math.inf
         self._seen_before = False
-        self._began = time.perf_counter()
+        self._began = time.perf_counter() if began is None else began
         self._collected = False
         self.advances = 0
         self.turns = Turns(self.advance, lambda: self.time, lambda: self.over, self._fail)
@@ -292,6 +312,22 @@ class World:
             if reader.topic == topic:
                 reader.offer(copy.deepcopy(message))
 
+    def take_over(self, past: Past, until: float) -> None:
+        """Bring a new world to the time `until` [s] at which another process left its own, by the same commands."""
+        arena = self.arena
+        for command in past.commands:
+            while arena.time < command.time - 1e-9:
+                arena.step()
+            arena.command(command.twist)
+        while arena.time < until - 1e-9:
+            arena.step()
+        self._steps, self.commands = list(past.steps), list(past.commands)
+        self.asked, self.parameters = list(past.asked), {"target_distance": past.target_distance}
+        self._logged = max((step.time for step in past.steps), default=-math.inf)
+        frames = (step.frame.truth.stamp for step in past.steps if step.frame is not None)
+        self._logged_frame = max(frames, default=-math.inf)
+        self._seen_before = any(step.decision.target is not None for step in past.steps)
+
     def episode(self) -> Episode:
         """Return the log."""
         return Episode(
@@ -303,11 +339,12 @@ class World:
             steps=tuple(self._steps),
             contacts=self.arena.contacts,
             wall_seconds=time.perf_counter() - self._began,
-            target_distance=self._target_distance(),
+            target_distance=self.target_distance,
         )
 
-    def _target_distance(self) -> float | None:
-        """Return the node's parameter `target_distance` [m], None where no node has one that is a distance."""
+    @property
+    def target_distance(self) -> float | None:
+        """The node's parameter `target_distance` [m], None where no node has one that is a distance."""
         value = self.parameters.get("target_distance")
         return value if isinstance(value, float) and math.isfinite(value) and value > 0 else None
 

@@ -20,6 +20,14 @@ impl Lane for Avx2 {
     /// The integer below the position, and the nearest one.
     type Slots = [__m256; 2];
 
+    type Narrow = Self;
+
+    #[inline(always)]
+    fn narrow(self) -> Self {
+        self
+    }
+    compiled!("avx2,fma");
+
     instructions! {
         splat(x: f32) -> __m256 = _mm256_set1_ps;
         add(a: __m256, b: __m256) -> __m256 = _mm256_add_ps;

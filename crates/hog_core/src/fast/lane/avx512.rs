@@ -2,6 +2,7 @@
 
 use std::arch::x86_64::*;
 
+use super::avx2::Avx2;
 use super::{Columns, Lane, ODD, RowPointers};
 
 token!(Avx512, "AVX-512 F, BW, VL, DQ, VBMI and VNNI");
@@ -19,6 +20,14 @@ impl Lane for Avx512 {
     type Masked = (__m512, __mmask16);
     /// The integer below the position, and the nearest one.
     type Slots = [__m512; 2];
+
+    type Narrow = Avx2;
+
+    #[inline(always)]
+    fn narrow(self) -> Avx2 {
+        isa!(Avx2::new()) // AVX-512 implies AVX2
+    }
+    compiled!("avx2,fma,avx512f,avx512bw,avx512vl,avx512dq,avx512vbmi,avx512vnni");
 
     instructions! {
         splat(x: f32) -> __m512 = _mm512_set1_ps;

@@ -1,5 +1,7 @@
 //! The rows that [`resize_row`](super::Lane::resize_row) reads and writes, and which pixels it mixes.
 
+use std::ops::Range;
+
 use crate::error::Result;
 use crate::fast::layout::STEP;
 use crate::memory;
@@ -25,10 +27,18 @@ pub(in crate::fast) struct Columns {
 }
 
 impl Columns {
-    /// Prepares to shrink rows of `from` pixels to `to`, in groups of `group` whose parts span at most `reach`.
-    pub(in crate::fast) fn fill(&mut self, from: usize, to: usize, group: usize, reach: usize) -> Result<()> {
+    /// Prepares to shrink rows of `from` pixels to `to`, of which the pixels `wanted` are, in groups of `group` whose
+    /// parts span at most `reach`.
+    pub(in crate::fast) fn fill(
+        &mut self,
+        (from, to): (usize, usize),
+        wanted: Range<usize>,
+        group: usize,
+        reach: usize,
+    ) -> Result<()> {
+        let count = wanted.len();
         self.taps.clear();
-        memory::extend(&mut self.taps, taps(from, to))?;
+        memory::extend(&mut self.taps, taps(from, to).skip(wanted.start).take(count))?;
         let spanned = |taps: &[Tap]| match taps {
             [first, .., last] => last.second + 1 - first.first,
             _ => 2,
@@ -41,7 +51,7 @@ impl Columns {
             }
             self.parts *= 2;
         }
-        let all = to.div_ceil(STEP) * (STEP / group) * self.parts;
+        let all = count.div_ceil(STEP) * (STEP / group) * self.parts;
         for list in [&mut self.index, &mut self.weight] {
             list.clear();
             memory::resize(list, 2 * group * all, 0)?;

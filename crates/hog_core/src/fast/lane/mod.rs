@@ -35,6 +35,25 @@ macro_rules! instructions {
     )*};
 }
 
+/// Gives a [`Lane`] its `compiled`: a function of its own that enables `$features`.
+macro_rules! compiled {
+    ($features:literal) => {
+        #[inline(always)]
+        fn compiled<K: $crate::fast::lane::Kernel>(self, kernel: K) -> K::Output {
+            #[target_feature(enable = $features)]
+            #[inline(never)]
+            fn enabled<L: $crate::fast::lane::Lane, K: $crate::fast::lane::Kernel>(
+                l: L,
+                kernel: K,
+            ) -> K::Output {
+                kernel.run(l)
+            }
+            // SAFETY: the token proves that the CPU has these features.
+            unsafe { enabled(self, kernel) }
+        }
+    };
+}
+
 #[cfg(target_arch = "x86_64")]
 pub(super) mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -49,11 +68,21 @@ pub(super) use columns::{Columns, RowPointers};
 /// The first of the slots for odd bins.
 pub(super) const ODD: usize = 8;
 
+/// A stage of the fast path, to be compiled once for each instruction set by [`Lane::compiled`].
+///
+/// Each is a function of its own: together in one, a change to one stage moves the registers of the others, which cost
+/// up to a tenth of the time.
+pub(super) trait Kernel {
+    type Output;
+    /// Must be `#[inline(always)]`.
+    fn run<L: Lane>(self, l: L) -> Self::Output;
+}
+
 /// The operations of one instruction set on vectors of [`LANES`](Self::LANES) single precision numbers.
 ///
 /// A value of an implementing type is the proof that the CPU has the instruction set: it can only be made (unsafely)
-/// after detection. Methods are `#[inline(always)]`, so that a kernel generic over `Lane` is compiled whole inside the
-/// one function that enables the instruction set; called elsewhere they are right, but slow.
+/// after detection. Methods are `#[inline(always)]`, so that a [`Kernel`] is compiled whole inside the one function that
+/// enables the instruction set; called elsewhere they are right, but slow.
 pub(super) trait Lane: Copy {
     /// Numbers in a vector.
     const LANES: usize;
@@ -79,6 +108,13 @@ pub(super) trait Lane: Copy {
     /// Vectors of windows that the quantised prefilter takes at a time; 0: no prefilter, all windows are scored in
     /// single precision.
     const PREFILTER_VECTORS: usize;
+
+    /// A vector of at most [`ACROSS`](super::layout::ACROSS) lanes that this CPU has too: for single windows, and for a
+    /// level's last strip where its lanes are enough.
+    type Narrow: Lane;
+    fn narrow(self) -> Self::Narrow;
+    /// Runs `kernel` in a function that enables the instruction set.
+    fn compiled<K: Kernel>(self, kernel: K) -> K::Output;
 
     fn splat(self, x: f32) -> Self::F;
     /// # Safety

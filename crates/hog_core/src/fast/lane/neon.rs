@@ -22,6 +22,14 @@ impl Lane for Neon {
     /// The integer below the position, and the nearest one.
     type Slots = [float32x4_t; 2];
 
+    type Narrow = Self;
+
+    #[inline(always)]
+    fn narrow(self) -> Self {
+        self
+    }
+    compiled!("neon");
+
     instructions! {
         splat(x: f32) -> float32x4_t = vdupq_n_f32;
         add(a: float32x4_t, b: float32x4_t) -> float32x4_t = vaddq_f32;

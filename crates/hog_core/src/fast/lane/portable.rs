@@ -1,6 +1,6 @@
 //! Four lanes in plain Rust, which the compiler vectorises for the architecture's baseline (SSE2 on x86-64).
 
-use super::{Columns, Lane, ODD, RowPointers};
+use super::{Columns, Kernel, Lane, ODD, RowPointers};
 
 /// No instruction set beyond the architecture's baseline.
 #[derive(Clone, Copy)]
@@ -48,6 +48,16 @@ impl Lane for Portable {
     type Masked = Four<f32>;
     /// The integer below the position, and the nearest one.
     type Slots = [Four<f32>; 2];
+    type Narrow = Self;
+
+    #[inline(always)]
+    fn narrow(self) -> Self {
+        self
+    }
+    #[inline(never)]
+    fn compiled<K: Kernel>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
 
     #[inline(always)]
     fn splat(self, x: f32) -> Four<f32> {

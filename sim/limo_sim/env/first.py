@@ -1,7 +1,4 @@
-"""`LimoFollow-v0`: the arena as a Gymnasium environment; ten actions a second, one for each camera frame.
-
-`gymnasium.make("limo_sim.env:LimoFollow-v0")` imports this module, which registers it.
-"""
+"""`LimoFollow-v0`: the arena as a Gymnasium environment; ten actions a second, one for each camera frame."""
 
 from __future__ import annotations
 
@@ -72,6 +69,11 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         A `Scenario`, a name or a file that `catalogue.load` knows, or "random": a new one at every reset.
     render_mode
         "rgb_array": `render` returns the image of the last observation.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such scenario, or it asks for faults of a detector: this environment has none.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": ACTIONS_PER_SECOND}  # noqa: RUF012 (Gymnasium's own way)
@@ -81,6 +83,7 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._scenario: Scenario | None = None
         if scenario != "random":
             self._scenario = scenario if isinstance(scenario, Scenario) else load(scenario)
+            self._scenario.check_detector_is_plain("LimoFollow-v0 gives images, and has no detector")
         known = self._scenario or Scenario()
         speed = known.robot.wheel_speed
         limits = np.array([speed, 2 * speed / LIMO.wheel_separation], np.float32)
@@ -177,6 +180,3 @@ def reward_parts(
 def _distance(truth: Truth) -> float | None:
     person = truth.people[0] if truth.people else None
     return person.distance if person else None
-
-
-gymnasium.register("LimoFollow-v0", entry_point="limo_sim.env:LimoFollow", max_episode_steps=600)

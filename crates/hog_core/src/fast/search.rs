@@ -1,0 +1,271 @@
+//! A search of many levels at once, shared among threads: tiles, cut into bands, of which any thread may take the rest.
+//!
+//! A thread makes the bands of a tile one after the other, from the top. One that has nothing to do takes the lower half of
+//! the bands that another one has before it. Where the two meet, the windows of the upper one's last band end in the lower
+//! one's first: whichever is there last has the blocks of both, and scores them (a [`Seam`]). So nothing waits.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::error::Result;
+use crate::geometry::Size;
+use crate::interrupt::Interrupt;
+use crate::memory::{self, Pool};
+use crate::pyramid::Grid;
+use crate::threads::{Shared, together};
+
+use super::backend::Backend;
+use super::dispatch::{OnLane, on_lane};
+use super::lane::Lane;
+use super::plan::Plan;
+use super::rows::Planes;
+use super::tile::{self, Blocks, COLUMNS_MAX, Context, Found, Scratch, Tile};
+
+/// Scratch memory, one per thread at work.
+static SCRATCH: Pool<Scratch> = Pool::new();
+
+/// Blocks, two per thread at work and one per seam.
+static BLOCKS: Pool<Blocks> = Pool::new();
+
+/// Frees scratch memory that is too large to be kept.
+pub(crate) fn trim() {
+    SCRATCH.trim();
+    BLOCKS.trim();
+}
+
+/// What to search.
+#[derive(Debug)]
+pub(crate) struct Task {
+    pub backend: Backend,
+    pub plan: Arc<Plan>,
+    pub planes: Arc<Planes>,
+    /// The size and the windows of each level.
+    pub levels: Vec<(Size, Grid)>,
+    pub threshold: f64,
+}
+
+/// For each level of `task`, every window whose exact score may be at least the threshold, row by row.
+pub(crate) fn search(task: Task, threads: usize, interrupt: &Interrupt) -> Result<Vec<Vec<Found>>> {
+    let mut tiles = Vec::new();
+    for (level, (_, grid)) in task.levels.iter().enumerate() {
+        tiles_of(level, grid, &task.plan, &mut tiles)?;
+    }
+    run(task, tiles, threads, interrupt)
+}
+
+/// The search of `tiles`.
+fn run(task: Task, tiles: Vec<Tile>, threads: usize, interrupt: &Interrupt) -> Result<Vec<Vec<Found>>> {
+    let bands = tiles.iter().map(|tile| tile.bands(&task.plan)).sum();
+    let found = memory::filled(task.levels.len(), Vec::new())?;
+    let search = Arc::new(Search {
+        task,
+        tiles,
+        progress: Mutex::new(Progress {
+            next_tile: 0,
+            runs: memory::with_room(threads.min(bands))?,
+            numbers: 0,
+        }),
+        found: Mutex::new(found),
+    });
+    together(&search, threads.min(bands), interrupt)?;
+    let mut found = std::mem::take(&mut *lock(&search.found));
+    for level in &mut found {
+        level.sort_unstable_by_key(|&(x, y, _)| (y, x));
+    }
+    Ok(found)
+}
+
+/// Adds the tiles of all windows of `grid` to `tiles`.
+fn tiles_of(level: usize, grid: &Grid, plan: &Plan, tiles: &mut Vec<Tile>) -> Result<()> {
+    if grid.is_empty() {
+        return Ok(());
+    }
+    // Windows whose distance is no multiple of 8 lie on several lattices of blocks.
+    let origins = |stride: usize| if stride.is_multiple_of(8) { 0..1 } else { 0..2 };
+    let along = |padded: usize, blocks: usize, origin: usize| {
+        (padded - origin).checked_sub(8 * (blocks + 1)).map_or(0, |room| room / 8 + 1)
+    };
+    for y in origins(grid.stride.height) {
+        for x in origins(grid.stride.width) {
+            let origin = (4 * x, 4 * y);
+            let width = along(grid.padded.width, plan.blocks.width, origin.0);
+            let height = along(grid.padded.height, plan.blocks.height, origin.1);
+            if width == 0 || height == 0 {
+                continue;
+            }
+            let parts = width.div_ceil(COLUMNS_MAX);
+            for part in 0..parts {
+                let columns = part * width / parts..(part + 1) * width / parts;
+                memory::push(tiles, Tile { level, origin, columns, rows: 0..height })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A search at work.
+struct Search {
+    task: Task,
+    tiles: Vec<Tile>,
+    progress: Mutex<Progress>,
+    /// What was found on each level.
+    found: Mutex<Vec<Vec<Found>>>,
+}
+
+/// Which bands are taken.
+struct Progress {
+    /// Tiles before this one are taken by a thread.
+    next_tile: usize,
+    runs: Vec<Run>,
+    /// How many runs there have been.
+    numbers: usize,
+}
+
+/// Bands of one tile, which one thread makes from the top.
+#[derive(Clone)]
+struct Run {
+    number: usize,
+    tile: usize,
+    /// The first band, the next one to be made, and the end of those that are this thread's.
+    begin: usize,
+    next: usize,
+    end: usize,
+    /// Where another thread's bands lie above or below.
+    above: Option<Arc<Seam>>,
+    below: Option<Arc<Seam>>,
+}
+
+impl Run {
+    /// Where another thread may take over: it leaves half, and the first band, which the seam above waits for.
+    fn cut(&self) -> usize {
+        (self.next + (self.end - self.next) / 2).max(self.begin + 1)
+    }
+}
+
+/// The blocks of the bands on both sides of a cut, from the thread that was there first.
+struct Seam(Mutex<Option<Arc<Blocks>>>);
+
+impl Seam {
+    /// The blocks of the other side, if they are there; else leaves `own` for the other side.
+    fn meet(&self, own: &Arc<Blocks>) -> Option<Arc<Blocks>> {
+        let mut first = lock(&self.0);
+        let other = first.take();
+        if other.is_none() {
+            *first = Some(Arc::clone(own));
+        }
+        other
+    }
+}
+
+impl Shared for Search {
+    fn work(&self, interrupt: &Interrupt) -> Result<()> {
+        SCRATCH.with(|scratch| {
+            while let Some(run) = self.take()? {
+                on_lane(self.task.backend, Bands { search: self, run, scratch, interrupt })?;
+            }
+            Ok(())
+        })
+    }
+}
+
+impl Search {
+    /// A run for a thread that has nothing to do: a tile of its own, or half of what another thread has before it.
+    fn take(&self) -> Result<Option<Run>> {
+        let mut progress = lock(&self.progress);
+        let number = progress.numbers;
+        let plan = &self.task.plan;
+        let run = if let Some(tile) = self.tiles.get(progress.next_tile) {
+            let (tile, end) = (progress.next_tile, tile.bands(plan));
+            progress.next_tile += 1;
+            Run { number, tile, begin: 0, next: 0, end, above: None, below: None }
+        } else {
+            let cost = |run: &&mut Run| (run.end - run.cut()) * self.tiles[run.tile].band_cost(plan);
+            let others = progress.runs.iter_mut().filter(|run| run.cut() < run.end);
+            let Some(other) = others.max_by_key(cost) else { return Ok(None) };
+            let (tile, begin, end) = (other.tile, other.cut(), other.end);
+            let seam = Arc::new(Seam(Mutex::new(None)));
+            let below = other.below.replace(Arc::clone(&seam));
+            other.end = begin;
+            Run { number, tile, begin, next: begin, end, above: Some(seam), below }
+        };
+        progress.numbers += 1;
+        memory::push(&mut progress.runs, run.clone())?;
+        Ok(Some(run))
+    }
+
+    /// The next band of the run `number`; where it has ended, what lies below it.
+    fn next(&self, number: usize) -> std::result::Result<usize, Option<Arc<Seam>>> {
+        let mut progress = lock(&self.progress);
+        let Some(at) = progress.runs.iter().position(|run| run.number == number) else { return Err(None) };
+        let run = &mut progress.runs[at];
+        if run.next < run.end {
+            run.next += 1;
+            return Ok(run.next - 1);
+        }
+        Err(progress.runs.swap_remove(at).below)
+    }
+}
+
+/// The work of one run.
+struct Bands<'a> {
+    search: &'a Search,
+    run: Run,
+    scratch: &'a mut Scratch,
+    interrupt: &'a Interrupt<'a>,
+}
+
+impl OnLane for Bands<'_> {
+    type Output = Result<()>;
+
+    fn run<L: Lane>(self, l: L) -> Result<()> {
+        let Self { search, run, scratch, interrupt } = self;
+        let Task { plan, planes, levels, threshold, .. } = &search.task;
+        let tile = &search.tiles[run.tile];
+        let (size, grid) = &levels[tile.level];
+        let context = Context { plan, source: planes, size: *size, grid, threshold: *threshold };
+        scratch.found.clear();
+        tile::begin(l, &context, tile, scratch)?;
+        let mut last: Option<(usize, Arc<Blocks>)> = None;
+        let below = loop {
+            let band = match search.next(run.number) {
+                Ok(band) => band,
+                Err(below) => break below,
+            };
+            let mut blocks = BLOCKS.take();
+            tile::make(l, &context, tile, (band, last.is_none()), scratch, &mut blocks, interrupt)?;
+            let blocks = Arc::new(blocks);
+            let above = match last.take() {
+                Some((_, above)) => Some(above),
+                None => run.above.as_ref().and_then(|seam| seam.meet(&blocks)),
+            };
+            if let Some(above) = above {
+                let both = (&*above, Some(&*blocks));
+                tile::score_band(l, &context, tile, band - 1, both, scratch, interrupt)?;
+                give(above);
+            }
+            last = Some((band, blocks));
+        };
+        if let Some((band, own)) = last {
+            let next = below.as_ref().map(|seam| seam.meet(&own));
+            if !matches!(next, Some(None)) {
+                let next = next.flatten();
+                tile::score_band(l, &context, tile, band, (&own, next.as_deref()), scratch, interrupt)?;
+                next.into_iter().for_each(give);
+            }
+            give(own);
+        }
+        let mut found = lock(&search.found);
+        memory::extend(&mut found[tile.level], scratch.found.iter().copied())
+    }
+}
+
+/// Keeps blocks that nothing else needs for another band.
+fn give(blocks: Arc<Blocks>) {
+    if let Ok(blocks) = Arc::try_unwrap(blocks) {
+        BLOCKS.give(blocks);
+    }
+}
+
+/// The lock, which another thread of this call holds for a moment.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

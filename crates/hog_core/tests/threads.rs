@@ -1,0 +1,41 @@
+//! One detector that many threads search with, each with helpers of its own: for ThreadSanitizer, see `.ci/hardening`.
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+mod common;
+
+use common::{Detector, Picture};
+use hog_core::pyramid::Pyramid;
+use hog_core::{Grouping, Hog, Interrupt, Search};
+
+const SEARCH: Search = Search { hit_threshold: -0.5, win_stride: (8, 8), padding: (8, 8) };
+
+#[test]
+fn threads_that_share_a_detector_find_what_one_alone_finds() {
+    let detector = Detector::people();
+    let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
+    let pictures: Vec<Picture> = (0..4).map(|i| Picture::new(120 + 9 * i, 170, 1 + 2 * (i % 2), 7)).collect();
+    let find = |picture: &Picture, threads: usize| {
+        hog.detect_multi_scale(
+            picture.view(),
+            &SEARCH,
+            &Pyramid { first: None, scale: 1.1 },
+            Grouping::Similar(0),
+            threads,
+            &Interrupt::NEVER,
+        )
+        .unwrap()
+    };
+    let wanted: Vec<_> = pictures.iter().map(|picture| find(picture, 1)).collect();
+    assert!(wanted.iter().all(|found| !found.is_empty()));
+    std::thread::scope(|scope| {
+        for start in 0..4 {
+            let (find, pictures, wanted) = (&find, &pictures, &wanted);
+            scope.spawn(move || {
+                for round in 0..6 {
+                    let i = (start + round) % pictures.len();
+                    assert_eq!(find(&pictures[i], 1 + round % 3), wanted[i]);
+                }
+            });
+        }
+    });
+}

@@ -1,0 +1,201 @@
+"""Looking for a lost person: where to drive and turn so that hidden ground comes into view, and when to give up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from limo_hog.follow.control.detour import Detour
+from limo_hog.follow.parameters import bounded
+from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.sense.clearance import Points, from_odometry
+from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.space.grid import Grid, Ground
+from limo_hog.follow.space.places import Places, Wandering
+from limo_hog.follow.space.routes import Router, point_ahead
+from limo_hog.follow.tracks.kalman import Track, wrap
+from limo_hog.follow.twist import Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Hunt:
+    """What is remembered while looking for one person.
+
+    Attributes
+    ----------
+    track
+        The person when last measured.
+    places
+        Where the person may be.
+    way
+        float64 (N, 2) [m], odometry frame: still to be driven; empty to turn in place.
+    facing
+        A point to turn to where there is no way [m], odometry frame; None to turn on and on.
+    planned
+        When the way was chosen [s].
+    """
+
+    track: Track
+    places: Places
+    way: Points = field(default_factory=lambda: np.empty((0, 2)))
+    facing: tuple[float, float] | None = None
+    planned: float = -math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Lookout:
+    """Chooses the place from which most of the hidden ground is seen soonest, and drives there.
+
+    Attributes
+    ----------
+    after_s
+        A person who is not measured for so long is looked for [s]. Chosen: as long as `Steering` drives by the
+        prediction.
+    speed
+        At most, on the way [m/s]. Chosen: a little less than when following.
+    turn_gain, max_turn
+        Turn rate for each radian off the way [1/s], and its limit [rad/s]. Chosen: the search's rate, and half more.
+    ahead
+        The point of the way that is driven to is so far off [m]. Chosen: half of the tightest corridor's width.
+    aside
+        A point of the way further aside than this is turned to before driving [rad]. Chosen: half a right angle.
+    arrived
+        A way ends so near to its last point [m]. Chosen: two cells.
+    replan_s
+        A way is chosen anew after so long [s]. Chosen: what the lidar has shown since changes it.
+    candidates
+        Places to look from that are compared [1]. Chosen: 2 ms.
+    view
+        From so far away a person is seen [m]. Chosen: HOG finds .9 m people up to 4.
+    half_view
+        So far to either side of straight ahead the camera shows a whole person [rad]. Chosen: the Limo's .62, less half
+        a person at 2.5 m.
+    settle_s
+        Time that looking from a place takes, however near it is [s]. Chosen: a turn by half a right angle and a few
+        frames.
+    least
+        A place that shows a smaller share of where the person may be is not worth driving to [1].
+    give_up_s
+        Then looking round ends, and the robot turns in place [s]. Chosen: a person is a room further by then.
+    """
+
+    after_s: float = bounded(0.8, 0, 30)
+    speed: float = bounded(0.6, 0, 1)
+    turn_gain: float = bounded(2.0, 0, 10)
+    max_turn: float = bounded(1.2, 0, 3)
+    ahead: float = 0.5
+    aside: float = 0.8
+    arrived: float = 0.2
+    replan_s: float = 0.8
+    candidates: int = 40
+    view: float = 3.5
+    half_view: float = 0.5
+    settle_s: float = 1.5
+    least: float = 0.05
+    give_up_s: float = bounded(60.0, 0, 3600)
+    wandering: Wandering = field(default_factory=Wandering)
+    router: Router = field(default_factory=Router)
+
+    def begin(self, track: Track, number: int, grid: Grid, ground: Ground) -> Hunt:
+        """Begin with the person as last measured."""
+        places = self.wandering.start(track.stamp, track.mean, track.covariance, number)
+        here = track.mean[None, :2]
+        # Nobody is on the other side of a wall who was measured on this one.
+        behind = ~grid.sees(ground, here, places.points)[0]
+        places.points[behind] = here
+        return Hunt(track, places)
+
+    def step(self, hunt: Hunt, scan: Scan, now: float, pose: Odometry, grid: Grid, ground: Ground) -> Hunt:
+        """Let the person walk on in mind, remove what is seen to be empty, and choose a way where one is due."""
+        places = hunt.places
+        while now - places.stamp > 1e-6:
+            places = self.wandering.walk_on(places, min(places.stamp + 0.2, now), grid, ground)
+        here = np.array([[pose.x, pose.y]])
+        ahead = from_odometry(places.points, pose)
+        off, far = np.arctan2(ahead[:, 1], ahead[:, 0]), np.hypot(*ahead.T)
+        shown = (np.abs(off) < self.half_view) & (far < self.view) & grid.sees(ground, here, places.points)[0]
+        places_left = self.wandering.look(places, scan, shown, pose)
+        if places_left is None:
+            places_left = self._anywhere(hunt, now, grid, ground)
+        if places_left is None:
+            return replace(hunt, places=places, way=np.empty((0, 2)), facing=None, planned=now)
+        hunt = replace(hunt, places=places_left)
+        if now - hunt.planned < self.replan_s:
+            return hunt
+        return self._plan(hunt, now, pose, grid, ground)
+
+    def command(
+        self,
+        hunt: Hunt,
+        pose: Odometry,
+        points: Points,
+        detour: Detour,
+        robot: RobotGeometry,
+        turn: Twist,
+    ) -> tuple[Twist, str]:
+        """Return the command and the reason.
+
+        Parameters
+        ----------
+        hunt, pose
+            The way and where the robot is.
+        points, detour, robot
+            float64 (N, 2) [m], base frame: what the lidar sees, and how to drive around it.
+        turn
+            The turn in place where nothing else is to be done.
+        """
+        if len(hunt.way) and math.dist(hunt.way[-1], (pose.x, pose.y)) > self.arrived:
+            off = self._off(point_ahead(hunt.way, pose, self.ahead), pose)
+            heading = detour.near(points, off, robot) if abs(off) < self.aside else None
+            speed = 0.0 if heading is None else self.speed * max(math.cos(heading), 0.0) ** 2
+            angular = self.turn_gain * (off if heading is None else heading)
+            angular = min(max(angular, -self.max_turn), self.max_turn)
+            return Twist(speed, angular), "looking round for the lost person"
+        if hunt.facing is not None:
+            off = self._off(np.array(hunt.facing), pose)
+            angular = min(max(self.turn_gain * off, -self.max_turn), self.max_turn)
+            return Twist(0.0, angular), "turning to where the lost person may be"
+        return turn, "searching for the lost person"
+
+    def ways(self, hunt: Hunt, pose: Odometry) -> tuple[tuple[tuple[float, float], ...], ...]:
+        """Return the places and the way in the base frame [m], for those who watch."""
+        moved = (from_odometry(points, pose) for points in (hunt.places.points, hunt.way))
+        return tuple(tuple((float(x), float(y)) for x, y in points) for points in moved)
+
+    def _plan(self, hunt: Hunt, now: float, pose: Odometry, grid: Grid, ground: Ground) -> Hunt:
+        routes = self.router.field(grid, ground, pose)
+        cells = np.argwhere(np.isfinite(routes.distance))
+        here = np.array([[pose.x, pose.y]])
+        step = max(len(cells) // self.candidates, 1)
+        cells = cells[step // 2 :: step]
+        origins = np.concatenate([here, grid.middle_of(ground, cells)])
+        far = np.concatenate([[0.0], routes.distance[cells[:, 0], cells[:, 1]]])
+        points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
+        near = np.hypot(*(origins[:, None] - points[None, :]).transpose(2, 0, 1)) < self.view
+        shown = near & grid.sees(ground, origins, points)
+        share = shown.mean(axis=1)
+        worth = share / (self.settle_s + far / self.speed)
+        best = int(np.argmax(worth))
+        if share[best] < self.least:
+            return replace(hunt, way=np.empty((0, 2)), facing=None, planned=now)
+        middle = points[shown[best]].mean(axis=0)
+        facing = float(middle[0]), float(middle[1])
+        way = np.empty((0, 2)) if best == 0 else self.router.way(grid, ground, routes, tuple(cells[best - 1]))
+        return replace(hunt, way=way, facing=facing, planned=now)
+
+    def _anywhere(self, hunt: Hunt, now: float, grid: Grid, ground: Ground) -> Places | None:
+        """Return places spread over the ground that was not seen lately, as far as the person can have walked."""
+        reach = 1.0 + self.wandering.walk * (now - hunt.track.stamp)
+        cells = np.argwhere((ground.occupied <= 0) & (ground.seen < now - 2.0) & np.isfinite(ground.seen))
+        points = grid.middle_of(ground, cells)
+        points = points[np.hypot(*(points - hunt.track.mean[:2]).T) < reach]
+        if len(points) == 0:
+            return None
+        count, random = self.wandering.count, np.random.default_rng([hunt.places.seed, 3])
+        chosen = points[random.integers(len(points), size=count)]
+        return Places(now, chosen, np.zeros((count, 2)), hunt.places.seed + 1)
+
+    def _off(self, goal: Points, pose: Odometry) -> float:
+        return wrap(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.yaw)

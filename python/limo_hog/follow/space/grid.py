@@ -1,0 +1,199 @@
+"""An occupancy grid of the ground around the robot, from the lidar and the depth image, in the odometry frame.
+
+Cells hold the log-odds of being occupied (Moravec and Elfes 1985) and when they were last looked at. The grid is a
+square that moves along with the robot in whole cells.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.robot import LIMO, RobotGeometry
+from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.observation import Odometry, Scan
+
+Cells = NDArray[np.int64]
+"""(N, 2): row (x) and column (y) of cells."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What is known about the ground.
+
+    Attributes
+    ----------
+    corner
+        Lower corner of cell (0, 0), x and y in the odometry frame [cells].
+    occupied
+        float32 (N, N): log-odds of each cell's being occupied; rows along x, columns along y.
+    seen
+        float32 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never.
+    stamp
+        Of the last scan [s].
+    """
+
+    corner: tuple[int, int]
+    occupied: NDArray[np.float32]
+    seen: NDArray[np.float32]
+    stamp: float = -math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """How the ground is mapped.
+
+    Attributes
+    ----------
+    cell
+        Side of a cell [m]. Chosen: a corridor of 1 m, less the robot's width on either side, is four cells wide.
+    cells
+        Along each side of the square [1]: 10 m, as far as HOG finds an adult to either side.
+    shift_after
+        The square moves along when the robot is so far from its middle [m]. Chosen: moving costs a copy.
+    reach
+        Of a beam's free part and of its end, no more is used [m]. Chosen: at 5 m two beams are .07 m apart.
+    every
+        One in so many beams clears cells [1]; all of them fill cells. Chosen: at 3.5 m two are a cell apart.
+    free, hit
+        What a beam takes and adds [log-odds]. Chosen: two hits make a free cell occupied, three misses free it again.
+    lowest, highest
+        Limits of the log-odds. Chosen: what has moved away is forgotten after seven scans, about a second.
+    person_radius
+        Returns nearer than this to a tracked person are the person's and fill no cell [m]. Chosen: as `Detour`'s.
+    own_radius
+        The ground under the robot is free [m]: the circle around its outline.
+    """
+
+    cell: float = 0.1
+    cells: int = 100
+    shift_after: float = 1.0
+    reach: float = 5.0
+    every: int = 2
+    free: float = 0.4
+    hit: float = 0.9
+    lowest: float = -1.2
+    highest: float = 2.5
+    person_radius: float = 0.45
+    own_radius: float = 0.2
+
+    def start(self, pose: Odometry) -> Ground:
+        """Return ground of which nothing is known, around the robot."""
+        shape = self.cells, self.cells
+        return Ground(self._corner(pose), np.zeros(shape, np.float32), np.full(shape, -np.inf, np.float32))
+
+    def update(
+        self,
+        ground: Ground | None,
+        scan: Scan,
+        pose: Odometry,
+        people: Points,
+        depth_points: Points,
+        robot: RobotGeometry = LIMO,
+    ) -> Ground:
+        """Enter a scan.
+
+        Parameters
+        ----------
+        ground
+            What was known; None before the first scan.
+        scan, pose
+            The scan, and where the robot was at its stamp.
+        people
+            float64 (N, 2) [m], odometry frame: tracked people, who are not part of the ground.
+        depth_points
+            float64 (N, 2) [m], odometry frame: what the depth image shows above the floor; it fills cells only.
+        robot
+            Where the lidar sits.
+        """
+        ground = self._moved(ground or self.start(pose), pose)
+        occupied, seen = ground.occupied.copy(), ground.seen.copy()
+        ranges = scan.ranges.astype(np.float64)
+        angles = pose.yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
+        at = np.array([pose.x + robot.lidar_x * math.cos(pose.yaw), pose.y + robot.lidar_x * math.sin(pose.yaw)])
+        returned = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
+        # A beam that hits nothing is free as far as it reaches; one that is no number says nothing.
+        clear = np.where(np.isnan(ranges) | (ranges < scan.range_min), 0.0, np.minimum(ranges, scan.range_max))
+        steps = np.arange(0.5, self.reach / self.cell) * self.cell
+        beams = slice(None, None, self.every)
+        free = steps[None, :] < clear[beams, None] - self.cell
+        directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        points = (at + steps[None, :, None] * directions[beams, None, :])[free]
+        ends = at + ranges[returned & (ranges < self.reach), None] * directions[returned & (ranges < self.reach)]
+        ends = np.concatenate([ends, depth_points])
+        if len(people) and len(ends):
+            gaps = np.hypot(ends[:, None, 0] - people[None, :, 0], ends[:, None, 1] - people[None, :, 1])
+            ends = ends[gaps.min(axis=1) > self.person_radius]
+        own = np.arange(-self.own_radius, self.own_radius + 1e-9, self.cell)
+        under = np.array([pose.x, pose.y]) + np.stack(np.meshgrid(own, own), axis=-1).reshape(-1, 2)
+        cleared, filled = self.flat(ground, np.concatenate([points, under])), self.flat(ground, ends)
+        occupied.flat[cleared] = np.maximum(occupied.flat[cleared] - self.free, self.lowest)
+        occupied.flat[filled] = np.minimum(ground.occupied.flat[filled] + self.hit, self.highest)
+        seen.flat[cleared] = scan.stamp
+        seen.flat[filled] = scan.stamp
+        return Ground(ground.corner, occupied, seen, scan.stamp)
+
+    def index(self, ground: Ground, points: Points) -> tuple[Cells, NDArray[np.bool_]]:
+        """Return the cell of each point, int64 (N, 2), and whether it is in the square, bool (N,)."""
+        cells: Cells = np.floor(points / self.cell).astype(np.int64) - ground.corner
+        inside: NDArray[np.bool_] = np.all((cells >= 0) & (cells < self.cells), axis=1)
+        return cells, inside
+
+    def flat(self, ground: Ground, points: Points) -> NDArray[np.int64]:
+        """Return the flat indices of the cells of those points that are in the square."""
+        cells, inside = self.index(ground, points)
+        flat: NDArray[np.int64] = cells[inside, 0] * self.cells + cells[inside, 1]
+        return flat
+
+    def middle_of(self, ground: Ground, cells: Cells) -> Points:
+        """Return the middle of each cell [m], float64 (N, 2)."""
+        return np.asarray((cells + ground.corner + 0.5) * self.cell, np.float64)
+
+    def is_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
+        """Return whether each point is in an occupied cell, bool (N,); outside of the square none is."""
+        cells, inside = self.index(ground, points)
+        blocked = np.zeros(len(points), bool)
+        blocked[inside] = ground.occupied[cells[inside, 0], cells[inside, 1]] > 0
+        return blocked
+
+    def is_near_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
+        """Return whether an occupied cell is within half a cell of each point, bool (N,)."""
+        half = self.cell / 2
+        corners = np.array([(-half, -half), (-half, half), (half, -half), (half, half)])
+        around = (points[:, None] + corners).reshape(-1, 2)
+        return np.asarray(self.is_blocked(ground, around).reshape(-1, 4).any(axis=1))
+
+    def sees(self, ground: Ground, origins: Points, places: Points, samples: int = 24) -> NDArray[np.bool_]:
+        """Return whether nothing occupied is between each of (K, 2) origins and each of (N, 2) places, bool (K, N).
+
+        `samples` points on each line are looked at [1]; chosen: at 3 m one in every cell.
+        """
+        shares = (np.arange(samples) + 0.5) / samples
+        way = origins[:, None, None, :] + shares[None, None, :, None] * (places[None, :] - origins[:, None])[:, :, None]
+        blocked = self.is_blocked(ground, way.reshape(-1, 2)).reshape(len(origins), len(places), samples)
+        return np.asarray(~blocked.any(axis=2))
+
+    def _corner(self, pose: Odometry) -> tuple[int, int]:
+        half = self.cells // 2
+        return math.floor(pose.x / self.cell) - half, math.floor(pose.y / self.cell) - half
+
+    def _moved(self, ground: Ground, pose: Odometry) -> Ground:
+        """Return the ground with the robot near the square's middle; what comes in at the edges is unknown."""
+        corner = self._corner(pose)
+        by = corner[0] - ground.corner[0], corner[1] - ground.corner[1]
+        if max(abs(by[0]), abs(by[1])) * self.cell <= self.shift_after:
+            return ground
+        fresh = self.start(pose)
+        (to_x, from_x), (to_y, from_y) = (_overlap(step, self.cells) for step in by)
+        fresh.occupied[to_x, to_y] = ground.occupied[from_x, from_y]
+        fresh.seen[to_x, to_y] = ground.seen[from_x, from_y]
+        return replace(ground, corner=corner, occupied=fresh.occupied, seen=fresh.seen)
+
+
+def _overlap(step: int, cells: int) -> tuple[slice, slice]:
+    """Return where old cells go, and where they come from, along one axis of a square moved by `step` cells."""
+    low, high = max(-step, 0), min(cells - step, cells)
+    return slice(low, max(high, low)), slice(low + step, max(high, low) + step)

@@ -1,0 +1,158 @@
+"""Where a lost person may be by now: particles that walk on as people do, and end where the lidar looks through them.
+
+A bootstrap filter (Gordon, Salmond and Smith 1993) of the person's position and velocity. What it measures is mostly
+that nobody is there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.robot import LIMO, RobotGeometry
+from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.space.grid import Grid, Ground
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where the person may be.
+
+    Attributes
+    ----------
+    stamp
+        Time of the estimate [s].
+    points, velocities
+        float64 (N, 2) [m, m/s], odometry frame: each as likely as the others.
+    seed
+        Of the next step's random numbers.
+    """
+
+    stamp: float
+    points: Points
+    velocities: NDArray[np.float64]
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Wandering:
+    """How people walk on unseen.
+
+    Attributes
+    ----------
+    count
+        Of particles [1]. Chosen: looking from one place for all of them takes .1 ms.
+    walk
+        Speed of a person who sets out again [m/s]. Chosen: a stroll; the workshop's person walks at .75.
+    stays
+        Share of the particles that stand at the beginning [1]. Chosen.
+    turn
+        Square root of the spectral density of the heading [rad/√s]. Chosen: after 4 s a right angle off.
+    change_s
+        Mean time after which a person stands still or sets out [s]. Chosen.
+    body
+        A beam that reaches further than a particle by this has looked through it [m]. Chosen: legs in
+        mid-stride are hit up to .17 m from the body's axis.
+    width
+        A person is looked through if all beams in this width pass [m]. Chosen: a leg and a gap.
+    far
+        Beams do not tell further away [m]. Chosen: at 4 m two beams are .055 m apart, a shin's width.
+    found
+        Chance that the camera finds a person in one frame who is not hidden [1]. Chosen low: neighbouring frames show
+        the same, and half a person beside a wall is often missed.
+    """
+
+    count: int = 150
+    walk: float = 0.5
+    stays: float = 0.2
+    turn: float = 0.8
+    change_s: float = 6.0
+    body: float = 0.2
+    width: float = 0.3
+    far: float = 4.0
+    found: float = 0.15
+
+    def start(self, stamp: float, mean: NDArray[np.float64], covariance: NDArray[np.float64], seed: int) -> Places:
+        """Begin with a track: `mean` (4,) is x, y, vx, vy in the odometry frame, `covariance` (4, 4) its."""
+        random = np.random.default_rng([seed, 0])
+        drawn = random.multivariate_normal(mean, covariance, self.count, method="cholesky")
+        velocities = drawn[:, 2:]
+        velocities[: round(self.stays * self.count)] = 0.0
+        return Places(stamp, drawn[:, :2], velocities, 1)
+
+    def walk_on(self, places: Places, stamp: float, grid: Grid, ground: Ground) -> Places:
+        """Let time pass until `stamp` [s]; nobody walks through what is occupied."""
+        dt = stamp - places.stamp
+        if dt <= 0:
+            return places
+        random = np.random.default_rng([places.seed, 1])
+        count = len(places.points)
+        velocities = places.velocities.copy()
+        change = random.random(count) < dt / self.change_s
+        stands = np.hypot(*velocities.T) < 0.05
+        heading = random.uniform(-math.pi, math.pi, count)
+        fresh = self.walk * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        velocities[change & stands] = fresh[change & stands]
+        velocities[change & ~stands] = 0.0
+        turn = self.turn * math.sqrt(dt) * random.standard_normal(count)
+        cos, sin = np.cos(turn), np.sin(turn)
+        velocities = np.stack(
+            [cos * velocities[:, 0] - sin * velocities[:, 1], sin * velocities[:, 0] + cos * velocities[:, 1]], axis=1
+        )
+        points = places.points + dt * velocities
+        # Not through a wall: the middle of the way counts too, since a step may be longer than the wall is thick.
+        blocked = grid.is_blocked(ground, points) | grid.is_blocked(ground, (points + places.points) / 2)
+        points[blocked] = places.points[blocked]
+        speed = np.hypot(*velocities[blocked].T)[:, None]
+        velocities[blocked] = speed / self.walk * fresh[blocked]
+        return Places(stamp, points, velocities, places.seed + 1)
+
+    def look(
+        self, places: Places, scan: Scan, shown: NDArray[np.bool_], pose: Odometry, robot: RobotGeometry = LIMO
+    ) -> Places | None:
+        """Remove places where the person was not found, in favour of the others; None where no place is left.
+
+        Parameters
+        ----------
+        places
+            Where the person may be.
+        scan, pose
+            The newest scan; where the robot was. Nobody is where its beams pass.
+        shown
+            bool (N,): the places that the camera shows, without a person in them.
+        robot
+            Where the lidar sits.
+        """
+        random = np.random.default_rng([places.seed, 2])
+        kept = ~self.looked_through(places.points, scan, pose, robot)
+        kept &= ~shown | (random.random(len(shown)) > self.found)
+        if kept.all():
+            return places
+        left = np.flatnonzero(kept)
+        if len(left) == 0:
+            return None
+        chosen = np.concatenate([left, left[random.integers(len(left), size=(~kept).sum())]])
+        return Places(places.stamp, places.points[chosen], places.velocities[chosen], places.seed)
+
+    def looked_through(
+        self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry = LIMO
+    ) -> NDArray[np.bool_]:
+        """Return for each point, bool (N,), whether all beams near it pass."""
+        x, y = pose.x + robot.lidar_x * math.cos(pose.yaw), pose.y + robot.lidar_x * math.sin(pose.yaw)
+        dx, dy = points[:, 0] - x, points[:, 1] - y
+        distance = np.maximum(np.hypot(dx, dy), 0.05)
+        angle = np.remainder(np.arctan2(dy, dx) - pose.yaw + math.pi, math.tau) - math.pi
+        step = (scan.angle_max - scan.angle_min) / max(len(scan.ranges) - 1, 1)
+        beam = np.rint((angle - scan.angle_min) / step).astype(np.int64)
+        half = np.minimum(np.ceil(np.arctan(self.width / 2 / distance) / step), 20).astype(np.int64)
+        passes = (beam - half >= 0) & (beam + half < len(scan.ranges)) & (distance < self.far)
+        ranges = np.where(np.isnan(scan.ranges), 0.0, scan.ranges).astype(np.float64)
+        offsets = np.arange(-20, 21)
+        near = np.abs(offsets)[None, :] <= half[:, None]
+        around = ranges[np.clip(beam[:, None] + offsets[None, :], 0, len(ranges) - 1)]
+        least = np.where(near, around, np.inf).min(axis=1)
+        return np.asarray(passes & (least > distance + self.body))

@@ -1,0 +1,130 @@
+"""Ways over known free ground: distances from the robot, and the shortest way to a place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.space.grid import Grid, Ground
+
+_NEIGHBOURS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """How far it is to drive to each cell.
+
+    Attributes
+    ----------
+    distance
+        float32 (N, N) [m]: inf where no way leads.
+    """
+
+    distance: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Router:
+    """Plans ways.
+
+    Attributes
+    ----------
+    keep_off
+        Distance that a way keeps from the middles of occupied cells [m]. Chosen: half the robot's width and what
+        `Guard` wants beside it, .31, and a cell's half.
+    keep_off_far, detour
+        Nearer than this to something, a way counts as longer by this share [m, 1]. Chosen: along the middle of a
+        corridor of 1 m.
+    farthest
+        Longer ways are not looked for [m]. Chosen: the square's half.
+    """
+
+    keep_off: float = 0.36
+    keep_off_far: float = 0.5
+    detour: float = 1.0
+    farthest: float = 6.0
+
+    def field(self, grid: Grid, ground: Ground, pose: Odometry) -> Field:
+        """Return the driving distance to every cell that is known to be free."""
+        blocked = ground.occupied > 0
+        wide, wider = _dilated(blocked, self.keep_off / grid.cell), _dilated(blocked, self.keep_off_far / grid.cell)
+        reach = int(self.keep_off / grid.cell)
+        free = np.isfinite(ground.seen) & ~wide
+        cells, inside = grid.index(ground, np.array([[pose.x, pose.y]]))
+        distance = np.full(free.shape, np.inf, np.float32)
+        if not inside[0]:
+            return Field(distance)
+        x, y = cells[0]
+        # The robot may stand nearer to something than a way should lead.
+        free[max(x - reach, 0) : x + reach + 1, max(y - reach, 0) : y + reach + 1] |= ~blocked[
+            max(x - reach, 0) : x + reach + 1, max(y - reach, 0) : y + reach + 1
+        ]
+        distance[x, y] = 0.0
+        closed = np.where(free, np.float32(self.detour * grid.cell) * wider, np.float32(np.inf)).astype(np.float32)
+        for _ in range(int(self.farthest / grid.cell)):
+            nearer = np.full_like(distance, np.inf)
+            for dx, dy, cost in _NEIGHBOURS:
+                there = nearer[_at(dx), _at(dy)]
+                np.minimum(there, distance[_at(-dx), _at(-dy)] + np.float32(cost * grid.cell), out=there)
+            nearer += closed
+            np.minimum(nearer, distance, out=nearer)
+            if np.array_equal(nearer, distance):
+                break
+            distance = nearer
+        return Field(distance)
+
+    def way_towards(self, grid: Grid, ground: Ground, pose: Odometry, place: Points) -> Points:
+        """Return the shortest way to the cell nearest to a place (2,) [m] of those that a way leads to."""
+        field = self.field(grid, ground, pose)
+        cells = np.argwhere(np.isfinite(field.distance))
+        if len(cells) == 0:
+            return np.empty((0, 2))
+        x, y = cells[np.argmin(np.hypot(*(grid.middle_of(ground, cells) - place).T))].tolist()
+        return self.way(grid, ground, field, (x, y))
+
+    def way(self, grid: Grid, ground: Ground, field: Field, goal: tuple[int, int]) -> Points:
+        """Return the shortest way from the robot to a cell, float64 (N, 2) [m]; empty where none leads there."""
+        distance = field.distance
+        if not math.isfinite(distance[goal]):
+            return np.empty((0, 2))
+        cells, here = [goal], goal
+        while distance[here] > 0:
+            x, y = here
+            around = [
+                (float(distance[x + dx, y + dy]) + cost * grid.cell, (x + dx, y + dy))
+                for dx, dy, cost in _NEIGHBOURS
+                if 0 <= x + dx < len(distance) and 0 <= y + dy < len(distance)
+            ]
+            here = min(around)[1]
+            cells.append(here)
+        return grid.middle_of(ground, np.array(cells[::-1]))
+
+
+def point_ahead(way: Points, pose: Odometry, ahead: float) -> Points:
+    """Return the first point (2,) of a way (N, 2) that is `ahead` [m] of the robot, or its last."""
+    gaps = np.hypot(way[:, 0] - pose.x, way[:, 1] - pose.y)
+    nearest = int(np.argmin(gaps))
+    beyond = np.flatnonzero(gaps[nearest:] >= ahead)
+    point: Points = way[nearest + beyond[0]] if len(beyond) else way[-1]
+    return point
+
+
+def _dilated(cells: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
+    """Return the cells within a radius [cells] of those that are true."""
+    wide, reach = cells.copy(), int(radius)
+    for dx in range(-reach, reach + 1):
+        for dy in range(-reach, reach + 1):
+            if (dx or dy) and math.hypot(dx, dy) <= radius:
+                wide[_at(dx), _at(dy)] |= cells[_at(-dx), _at(-dy)]
+    widened: NDArray[np.bool_] = wide
+    return widened
+
+
+def _at(step: int) -> slice:
+    """Return the part of an axis that has a neighbour `step` cells before it."""
+    return slice(max(step, 0), step if step < 0 else None)

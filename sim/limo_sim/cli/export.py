@@ -1,0 +1,108 @@
+"""`limo-hog export`: labelled frames of the arena, for training and for measuring."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from limo_hog.cli.support.arguments import count, seconds, seed
+from limo_hog.cli.support.output import UsageError
+from limo_hog.cli.support.progress import progress
+
+if TYPE_CHECKING:
+    from limo_sim.run.export import Thing
+    from limo_sim.sensing.camera import Frame
+
+# Less visible things are marked `iscrowd`: evaluators neither want them found nor count them as false. The share is
+# that of the "reasonable" set in Dollár et al., "Pedestrian Detection: An Evaluation of the State of the Art", 2012.
+_LEAST_VISIBLE = 0.65
+_MILLIMETRES, _FARTHEST = 1000, 65535  # depth pictures hold millimetres in 16 bits, as depth cameras' do (REP 118)
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `export`."""
+    parser = subparsers.add_parser(
+        "export",
+        description="Let the robot wander through the arena and write what its camera sees, with the boxes of people "
+        "and furniture: DIR/coco.json and DIR/images, for `limo-hog train` and `limo-hog evaluate`.",
+    )
+    parser.add_argument(
+        "--scenario", default="workshop", metavar="NAME|FILE.toml", help="the scenario to look at (%(default)s)"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="a new or empty folder")
+    parser.add_argument("--format", choices=("coco",), default="coco", help="of the labels (%(default)s)")
+    parser.add_argument("--frames", type=count, default=150, metavar="N", help="how many pictures (%(default)s)")
+    parser.add_argument(
+        "--every", type=seconds, default=1.0, metavar="S", help="simulated time between two (%(default)s)"
+    )
+    parser.add_argument("--depth", action="store_true", help="write depth pictures too: PNG, 16 bits, millimetres")
+    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the pictures, then the labels: of those written, if it is stopped."""
+    from limo_hog.atomic import about, whole_file
+    from limo_sim.run.catalogue import load
+    from limo_sim.run.export import labelled_frames, labels_of
+    from limo_sim.run.provenance import code_version, scenario_hash
+
+    folder: Path = args.out
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} is there already, and not empty; wanted is a new folder")
+    scenario = load(args.scenario)
+    labels = sorted({"person", *labels_of(scenario)})
+    images: list[dict[str, Any]] = []
+    annotations: list[dict[str, Any]] = []
+    with about(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with progress("frames") as bar:
+            task = bar.add_task(scenario.name, total=args.frames)
+            for frame, things in labelled_frames(scenario, args.seed, args.frames, args.every):
+                number = len(images) + 1
+                images.append(_write_pictures(folder, number, frame, depth=args.depth))
+                annotations += [
+                    {"id": len(annotations) + i, "image_id": number, **_annotation(thing, labels)}
+                    for i, thing in enumerate(things, 1)
+                ]
+                bar.advance(task)
+    finally:
+        if images:
+            about_all = {"scenario": scenario.name, "scenario_hash": scenario_hash(scenario), "seed": args.seed}
+            categories = [{"id": i, "name": label} for i, label in enumerate(labels, 1)]
+            data = {"info": {**about_all, "code_version": code_version()}, "categories": categories}
+            path = folder / "coco.json"
+            with whole_file(path) as part, about(path):
+                part.write_text(json.dumps({**data, "images": images, "annotations": annotations}) + "\n", "utf-8")
+    return 0
+
+
+def _write_pictures(folder: Path, number: int, frame: Frame, *, depth: bool) -> dict[str, Any]:
+    """Write a frame, and return its entry in COCO's `images`."""
+    import numpy as np
+
+    from limo_hog.imaging.writing import write_image
+
+    name = f"{number:06d}.png"
+    height, width = frame.depth.shape
+    entry = {"id": number, "file_name": f"images/{name}", "width": width, "height": height, "stamp": frame.stamp}
+    write_image(folder / "images" / name, frame.image)
+    if depth:
+        # 0 where the depth is unknown, too near or too far.
+        known = np.where(np.isfinite(frame.depth), frame.depth * _MILLIMETRES, 0)
+        write_image(folder / "depth" / name, np.rint(known).clip(0, _FARTHEST).astype(np.uint16))
+        entry["depth_file_name"] = f"depth/{name}"
+    return entry
+
+
+def _annotation(thing: Thing, labels: list[str]) -> dict[str, Any]:
+    return {
+        "category_id": labels.index(thing.label) + 1,
+        "bbox": thing.box,
+        "area": thing.box[2] * thing.box[3],
+        "iscrowd": int(thing.visible < _LEAST_VISIBLE),
+        "track_id": thing.identity,
+        "visible": round(thing.visible, 4),
+    }

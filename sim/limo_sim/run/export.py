@@ -1,0 +1,118 @@
+"""Labelled frames of the arena: what stands in each, where, how much of it is seen, and which one it is.
+
+The robot wanders through the room and takes pictures; what it meets depends on the scenario and the seed alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from limo_hog.follow.pipeline import CONTROL_PERIOD
+from limo_hog.follow.sense.observation import Scan
+from limo_hog.follow.twist import Twist
+from limo_sim.run.arena import STEPS_PER_SECOND, Arena
+from limo_sim.sensing.camera import Frame
+from limo_sim.world.scenario import Scenario
+
+_STREAM = 9  # of the run's generator; 0 … 8 are the sensors', the detector's and the people's
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """A person or a piece of furniture in a frame.
+
+    Attributes
+    ----------
+    label
+        "person", or the kind of furniture.
+    identity
+        Its number in the scenario, people before furniture, movers last: the same in all frames.
+    box
+        x, y, w, h [px] around all that lies within the image, as if nothing stood in front of it.
+    visible
+        Share of the whole silhouette that is seen: 0 (hidden) … 1.
+    """
+
+    label: str
+    identity: int
+    box: tuple[int, int, int, int]
+    visible: float
+
+
+@dataclass(frozen=True, slots=True)
+class Wandering:
+    """How the robot looks around.
+
+    Attributes
+    ----------
+    speed
+        [m/s]; half of what it can, so that pictures differ and little is missed.
+    turn
+        Largest turn rate while it drives [rad/s]; drawn anew for every leg.
+    leg_s
+        Length of a leg [s].
+    turn_away
+        Turn rate where the way is blocked [rad/s].
+    keep
+        Nearest obstacle ahead that it drives towards [m]: it stops within less.
+    clear
+        What must be free ahead before it drives again [m].
+    ahead
+        Half of the sector that counts as ahead [rad].
+    """
+
+    speed: float = 0.5
+    turn: float = 0.5
+    leg_s: float = 3.0
+    turn_away: float = 0.9
+    keep: float = 0.7
+    clear: float = 1.0
+    ahead: float = 0.6
+
+
+def labelled_frames(
+    scenario: Scenario, seed: int, count: int, every_s: float, wandering: Wandering | None = None
+) -> Iterator[tuple[Frame, tuple[Thing, ...]]]:
+    """Take `count` pictures, one every `every_s` seconds of the arena, while the robot wanders.
+
+    Yields
+    ------
+    frame, things
+        A frame, and all of which a part lies within the image, hidden or not.
+    """
+    wandering = wandering or Wandering()
+    arena = Arena(scenario, seed)
+    random = np.random.default_rng([seed, _STREAM])
+    labels = labels_of(scenario)
+    steps = round(CONTROL_PERIOD * STEPS_PER_SECOND)
+    turn, turning, leg_ends, next_s = 0.0, False, 0.0, 0.0
+    while count > 0:
+        if arena.time >= leg_ends:
+            turn, leg_ends = float(random.uniform(-wandering.turn, wandering.turn)), arena.time + wandering.leg_s
+        free = _free_ahead(arena.scan(), wandering.ahead)
+        turning = free < (wandering.clear if turning else wandering.keep)
+        away = wandering.turn_away if turn >= 0 else -wandering.turn_away
+        arena.command(Twist(0.0, away) if turning else Twist(wandering.speed, turn))
+        for _ in range(steps):
+            arena.step()
+        if arena.time >= next_s:
+            frame = arena.frame()
+            seen = [(0.0, None) if person is None else (person.visible, person.box) for person in frame.truth.people]
+            everything = enumerate(zip(labels, [*seen, *arena.furniture_in_frame()], strict=True))
+            yield frame, tuple(Thing(label, i, box, visible) for i, (label, (visible, box)) in everything if box)
+            next_s, count = next_s + every_s, count - 1
+
+
+def labels_of(scenario: Scenario) -> list[str]:
+    """Return the label of every person and piece: people, then furniture, then movers."""
+    kinds = [piece.kind for piece in scenario.furniture] + [piece.kind for piece in scenario.movers]
+    return ["person"] * len(scenario.people) + kinds
+
+
+def _free_ahead(scan: Scan, half_sector: float) -> float:
+    """Return the least distance within the sector ahead [m]; inf where there is nothing."""
+    angles = np.linspace(scan.angle_min, scan.angle_max, len(scan.ranges))
+    return float(np.min(scan.ranges[np.abs(angles) <= half_sector], initial=np.inf))

@@ -1,0 +1,124 @@
+"""What the camera sees of the bare room: sky, floor and walls, column by column."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.extras import needed
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, MOUNT_HEIGHT, WIDTH, CameraPose
+from limo_sim.sensing.paint import Paint, sides_of
+from limo_sim.sensing.solids import F32, Sun, slab
+from limo_sim.world.furniture import Rectangle
+from limo_sim.world.scenario import WALL_HEIGHT, Scenario
+
+with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+    import cv2
+
+U8 = NDArray[np.uint8]
+Columns = tuple[F32, NDArray[np.int64]]
+"""For every column of the image the depth of the wall [m] and the number of the wall's side."""
+
+COLUMNS = ((np.arange(WIDTH) - CENTRE_X) / FOCAL_PX).astype(np.float32)
+_ROWS = ((np.arange(HEIGHT) - CENTRE_Y) / FOCAL_PX).astype(np.float32)[:, None]
+with np.errstate(divide="ignore"):
+    FLOOR_DEPTH = np.where(_ROWS > 0, MOUNT_HEIGHT / _ROWS, np.inf).astype(np.float32)
+
+
+class Room:
+    """The room of one scenario."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._backdrop = self._make_backdrop()
+        self._walls = [wall.footprint for wall in scenario.walls]
+        greys = self._make_wall_greys()
+        self._paint = Paint(scenario, sides_of(scenario.room.half, self._walls, greys))
+        self._wall_greys = [grey * self._paint.mean_shade for grey in greys]
+
+    def cast(self, camera: CameraPose) -> tuple[F32, Columns]:
+        """Return the depth of sky, floor and walls, float32 (480, 640) [m], and what each column shows of the walls."""
+        look = math.cos(camera.yaw), math.sin(camera.yaw)
+        ahead_x, ahead_y = look[0] + look[1] * COLUMNS, look[1] - look[0] * COLUMNS
+        half = np.float32(self._scenario.room.half)
+        with np.errstate(divide="ignore"):
+            to_x = (np.copysign(half, ahead_x) - camera.x) / ahead_x
+            to_y = (np.copysign(half, ahead_y) - camera.y) / ahead_y
+        wall = np.minimum(to_x, to_y).astype(np.float32)
+        faces = np.where(to_x < to_y, 2 * (ahead_x < 0), 1 + 2 * (ahead_y < 0))
+        # All walls are equally high and higher than the camera: of a column's walls, the nearest hides the others.
+        for number, shape in enumerate(self._walls, start=1):
+            enters, face = _nearest_face(shape, camera, ahead_x, ahead_y)
+            nearer = enters < wall
+            wall, faces = np.where(nearer, enters, wall), np.where(nearer, 4 * number + face, faces)
+        depth: F32 = np.minimum(FLOOR_DEPTH, wall)
+        top = CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) / wall
+        sky, end = (max(0, math.ceil(float(edge))) for edge in (top.min(), top.max()))
+        depth[:sky] = np.inf
+        depth[sky:end][np.arange(sky, end, dtype=np.float32)[:, None] < top] = np.inf
+        return depth, (wall, faces)
+
+    def paint(self, columns: Columns) -> U8:
+        """Return the room in its plain greys: uint8 (480, 640)."""
+        room: U8 = self._backdrop.copy()
+        wall, faces = columns
+        edges = [0, *(np.flatnonzero(np.diff(faces)) + 1).tolist(), WIDTH]
+        for start, stop in pairwise(edges):
+            z = wall[[start, stop - 1]]
+            # a flat wall is a straight line in 1/z: carry it on to the pixels' outer edges
+            inverse = 1.0 / z
+            step = (inverse[1] - inverse[0]) / max(stop - 1 - start, 1)
+            left, right = inverse[0] - step / 2, inverse[1] + step / 2
+            corners = [
+                (start - 0.5, CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) * left),
+                (stop - 0.5, CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) * right),
+                (stop - 0.5, CENTRE_Y + FOCAL_PX * MOUNT_HEIGHT * right),
+                (start - 0.5, CENTRE_Y + FOCAL_PX * MOUNT_HEIGHT * left),
+            ]
+            quad = np.clip(np.rint(np.array(corners) * 16), -(2**20), 2**20).astype(np.int32)
+            grey = self._wall_greys[int(faces[start])]
+            cv2.fillConvexPoly(room, quad, grey, cv2.LINE_AA, shift=4)
+        return room
+
+    def decorate(self, image: U8, columns: Columns, camera: CameraPose) -> None:
+        """Draw what is on the walls over the room's greys in an image: uint8 (480, 640, 4)."""
+        if not self._paint.is_bare:
+            self._paint.draw(image, columns[1], columns[0], camera)
+
+    def _make_backdrop(self) -> U8:
+        """Sky above, floor below, each a little brighter towards the horizon."""
+        light = self._scenario.light
+        toward = np.linspace(0.0, 1.0, HEIGHT // 2, dtype=np.float32)
+        sky = 255 * light.sky * (0.985 + 0.03 * toward)
+        floor = 255 * light.floor * (0.97 + 0.05 * toward[::-1])
+        rows = np.rint(np.minimum(np.concatenate([sky, floor]), 255)).astype(np.uint8)
+        return np.repeat(rows[:, None], WIDTH, axis=1)
+
+    def _make_wall_greys(self) -> list[float]:
+        """Brightness of the outer walls at +x, +y, -x, -y, then of each inner wall's sides, as they face the sun."""
+        x, y, _ = Sun.above(self._scenario.light).towards
+        facings = [-x, -y, x, y]
+        for shape in self._walls:
+            cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
+            facings += [cos * x + sin * y, cos * y - sin * x, -cos * x - sin * y, sin * x - cos * y]
+        wall = 255 * self._scenario.light.wall
+        return [min(wall * (0.895 + 0.095 * facing), 255.0) for facing in facings]
+
+
+def _nearest_face(shape: Rectangle, camera: CameraPose, ahead_x: F32, ahead_y: F32) -> tuple[F32, NDArray[np.int64]]:
+    """Where each column's ray meets an upright block: depth float32 (W,) [m], inf where it does not, and on which side.
+
+    The sides are numbered 0 … 3: +x, +y, -x, -y of the block's own frame.
+    """
+    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
+    from_x, from_y = camera.x - shape.x, camera.y - shape.y
+    along_x, along_y = cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
+    in_x, out_x = slab(cos * from_x + sin * from_y, along_x, shape.half_x)
+    in_y, out_y = slab(cos * from_y - sin * from_x, along_y, shape.half_y)
+    enters = np.maximum(in_x, in_y)
+    hit = (enters < np.minimum(out_x, out_y)) & (enters > 0)
+    face = np.where(in_x > in_y, 2 * (along_x > 0), 1 + 2 * (along_y > 0))
+    return np.where(hit, enters, np.inf).astype(np.float32), face

@@ -1,0 +1,49 @@
+"""Furniture that moves: pieces on timetables of their own."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from limo_sim.world.furniture import KINDS, Furniture, reach
+from limo_sim.world.people import Person
+from limo_sim.world.person import Walk
+from limo_sim.world.schema import WIDEST, one_of, required, within
+
+
+@dataclass(frozen=True, slots=True)
+class Mover:
+    """A piece of furniture that moves along a closed route, as a person with a timetable walks.
+
+    Attributes
+    ----------
+    kind
+        As of `Furniture`.
+    route
+        Corners (x, y, pause) [m, m, s].
+    speed
+        On the way [m/s].
+    """
+
+    kind: str = one_of(tuple(KINDS))
+    route: tuple[tuple[float, float, float], ...] = required(-WIDEST, 3600.0)
+    speed: float = within(0.3, 0.05, 2.0)
+
+    @property
+    def timetable(self) -> Person:
+        """A person as broad as the piece, who walks its route."""
+        person = Person(route=self.route, speed=self.speed, facing=0.0)
+        return dataclasses.replace(person, height=person.height * reach(KINDS[self.kind].footprint) / person.radius)
+
+
+class Movers:
+    """The moving pieces of a run, in the scenario's order."""
+
+    def __init__(self, movers: Iterable[Mover]) -> None:
+        self._walks = [(mover.kind, Walk(mover.timetable)) for mover in movers]
+
+    def at(self, time: float) -> tuple[Furniture, ...]:
+        """Return the pieces where they are at a time [s]."""
+        poses = ((kind, walk.pose(time)) for kind, walk in self._walks)
+        return tuple(Furniture(kind, pose.x, pose.y, pose.yaw) for kind, pose in poses if pose is not None)

@@ -1,0 +1,158 @@
+"""The map of the ground, where a lost person may be, and ways there; compared with geometry."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.clearance import NO_POINTS
+from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.space.grid import Grid, Ground
+from limo_hog.follow.space.places import Places, Wandering
+from limo_hog.follow.space.routes import Router, point_ahead
+
+GRID, ROUTER, WANDERING = Grid(), Router(), Wandering()
+HERE = Odometry()
+ANGLES = np.linspace(-2.0, 2.0, 292)
+#: A wall 2 m ahead of the robot's centre, from the far left to y = -0.5.
+WALL_X, WALL_END = 2.04, -0.5
+
+
+def wall_scan(pose: Odometry = HERE, stamp: float = 0.0) -> Scan:
+    """What the lidar measures of that wall, by geometry."""
+    x, y = pose.x + LIMO.lidar_x * math.cos(pose.yaw), pose.y + LIMO.lidar_x * math.sin(pose.yaw)
+    ranges = np.full(len(ANGLES), np.inf)
+    cos, sin = np.cos(ANGLES + pose.yaw), np.sin(ANGLES + pose.yaw)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (WALL_X - x) / cos
+        met = (far > 0) & (y + far * sin > WALL_END)
+    ranges[met] = far[met]
+    return Scan(stamp, ranges.astype(np.float32), -2.0, 2.0, 0.12, 8.0)
+
+
+def mapped(scans: int = 3, pose: Odometry = HERE) -> Ground:
+    ground = None
+    for scan in range(scans):
+        ground = GRID.update(ground, wall_scan(pose, scan / 8), pose, NO_POINTS, NO_POINTS)
+    assert ground is not None
+    return ground
+
+
+def at(*points: tuple[float, float]) -> NDArray[np.float64]:
+    return np.array(points, np.float64)
+
+
+def test_walls_are_occupied_what_is_before_them_free_and_what_is_behind_unknown() -> None:
+    ground = mapped()
+    assert GRID.is_blocked(ground, at((WALL_X, 0.5), (WALL_X, 1.0))).all()
+    assert not GRID.is_blocked(ground, at((1.5, 0.5), (2.6, 0.5), (2.6, -1.5))).any()
+    cells, _ = GRID.index(ground, at((1.5, 0.5), (2.6, 0.5), (3.0, -2.0)))
+    assert np.isfinite(ground.seen[tuple(cells.T)]).tolist() == [True, False, True]
+
+
+def test_a_wall_hides_what_is_behind_it() -> None:
+    places = at((3.0, 0.5), (3.0, -2.0), (1.5, 0.5))
+    assert GRID.sees(mapped(), at((0.0, 0.0)), places).tolist() == [[False, True, True]]
+
+
+def test_the_map_moves_along_without_moving_what_stands() -> None:
+    ground = mapped()
+    pose = Odometry(x=1.63, y=-1.21)
+    for scan in range(3):
+        ground = GRID.update(ground, wall_scan(pose, 1 + scan / 8), pose, NO_POINTS, NO_POINTS)
+    assert ground.corner != mapped().corner
+    assert GRID.is_blocked(ground, at((WALL_X, 0.5))).all()
+
+
+def test_a_person_is_no_part_of_the_ground_and_what_moved_away_is_forgotten() -> None:
+    free = Scan(0.0, np.full(292, np.inf, np.float32), -2.0, 2.0, 0.12, 8.0)
+    person = at((WALL_X, 0.5))
+    ground = GRID.update(None, wall_scan(), HERE, person, NO_POINTS)
+    ground = GRID.update(ground, wall_scan(), HERE, person, NO_POINTS)
+    assert GRID.is_blocked(ground, at((WALL_X, 0.5), (WALL_X, 1.5))).tolist() == [False, True]
+    for _ in range(8):
+        ground = GRID.update(ground, free, HERE, NO_POINTS, NO_POINTS)
+    assert not GRID.is_blocked(ground, at((WALL_X, 1.5)))[0]
+
+
+def test_depth_fills_what_is_above_or_below_the_lidar() -> None:
+    table = at((1.0, 0.0), (1.0, 0.05))
+    ground = None
+    for _ in range(3):
+        ground = GRID.update(ground, wall_scan(), HERE, NO_POINTS, table)
+    assert ground is not None
+    assert GRID.is_blocked(ground, at((1.0, 0.0)))[0]
+
+
+def test_a_way_round_a_wall_is_as_long_as_geometry_says_and_keeps_off_it() -> None:
+    ground = mapped()
+    # What is behind the wall is seen from beside it.
+    beside = Odometry(x=2.6, y=-2.4, yaw=math.pi / 2)
+    for scan in range(3):
+        ground = GRID.update(ground, wall_scan(beside, 1 + scan / 8), beside, NO_POINTS, NO_POINTS)
+    way = ROUTER.way_towards(GRID, ground, HERE, at((2.9, 0.4))[0])
+    assert np.hypot(*(way[-1] - (2.9, 0.4))) < 0.15
+    wall = np.stack([np.full(60, WALL_X), np.linspace(WALL_END, 2.5, 60)], axis=1)
+    gaps = np.hypot(*(way[:, None] - wall[None]).transpose(2, 0, 1))
+    assert gaps.min() > 0.3
+    length = np.hypot(*np.diff(way, axis=0).T).sum()
+    shortest = math.dist((0, 0), (WALL_X, WALL_END)) + math.dist((WALL_X, WALL_END), (2.9, 0.4))
+    assert shortest < length < 1.35 * shortest
+
+
+def test_no_way_leads_through_a_door_narrower_than_the_robot_needs() -> None:
+    ranges = np.full(292, np.inf)
+    far = (1.0 - LIMO.lidar_x) / np.cos(ANGLES)
+    met = (np.cos(ANGLES) > 0.2) & (np.abs(far * np.sin(ANGLES)) > 0.2)
+    ranges[met] = far[met]
+    scan, ground = Scan(0.0, ranges.astype(np.float32), -2.0, 2.0, 0.12, 8.0), None
+    for _ in range(3):
+        ground = GRID.update(ground, scan, HERE, NO_POINTS, NO_POINTS)
+    assert ground is not None
+    assert ROUTER.way_towards(GRID, ground, HERE, at((2.5, 0.0))[0])[:, 0].max() < 1.0
+
+
+def test_the_point_ahead_is_on_the_way_at_the_distance_asked_for() -> None:
+    way = np.stack([np.arange(0, 2, 0.1), np.zeros(20)], axis=1)
+    assert point_ahead(way, Odometry(x=0.5), 0.5) == pytest.approx([1.0, 0.0])
+    assert point_ahead(way, Odometry(x=1.7), 0.5) == pytest.approx([1.9, 0.0])
+
+
+def lost_at(x: float, y: float, velocity: tuple[float, float]) -> Places:
+    mean = np.array([x, y, *velocity])
+    return WANDERING.start(0.0, mean, np.diag([0.01, 0.01, 0.02, 0.02]), 1)
+
+
+def test_a_person_walks_on_where_they_went_and_not_through_walls() -> None:
+    ground, places = mapped(), lost_at(1.2, 0.5, (0.6, 0.0))
+    for step in range(1, 31):
+        places = WANDERING.walk_on(places, 0.1 * step, GRID, ground)
+    assert (places.points[:, 0] > WALL_X + 0.1).mean() < 0.05
+    free = lost_at(-3.0, 0.0, (0.6, 0.0))
+    for step in range(1, 11):
+        free = WANDERING.walk_on(free, 0.1 * step, GRID, ground)
+    moving = np.hypot(*free.velocities.T) > 0.2
+    assert free.points[moving, 0].mean() == pytest.approx(-2.4, abs=0.25)
+
+
+def test_nobody_is_where_beams_pass() -> None:
+    points = at((1.0, 0.5), (1.75, 0.5), (1.9, 0.5), (2.5, 0.5), (3.0, -2.0), (-1.0, 0.0))
+    passed = WANDERING.looked_through(points, wall_scan(), HERE)
+    assert passed.tolist() == [True, True, False, False, True, False]
+
+
+def test_what_is_seen_to_be_empty_leaves_the_other_places() -> None:
+    both = Places(0.0, at((1.0, 0.5), (3.0, 0.5)), np.zeros((2, 2)))
+    left = WANDERING.look(both, wall_scan(), np.zeros(2, bool), HERE)
+    assert left is not None
+    assert left.points.tolist() == [[3.0, 0.5], [3.0, 0.5]]
+    assert WANDERING.look(Places(0.0, at((1.0, 0.5)), np.zeros((1, 2))), wall_scan(), np.zeros(1, bool), HERE) is None
+
+
+def test_the_same_is_drawn_from_the_same() -> None:
+    one, other = (WANDERING.walk_on(lost_at(1.0, 0.0, (0.3, 0.0)), 1.0, GRID, mapped()) for _ in range(2))
+    assert np.array_equal(one.points, other.points)

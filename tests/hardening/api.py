@@ -1,0 +1,485 @@
+"""Random calls of the public Python API, each made of its number alone: an answer or a named error is wanted.
+
+`python -m tests.hardening.api --calls 10000000 --state FILE` makes the calls in processes of 20,000 each and writes
+what it found to FILE; started again, it goes on where it stopped. `--only N` makes call N alone, here.
+
+A share of the calls with ordinary arguments is also put to OpenCV 4.14 (`opencv.py`), in a process of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import faulthandler
+import json
+import math
+import mmap
+import pickle
+import random
+import resource
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+from tests.hardening.opencv import Asked, Opencv, disagreement
+
+import limo_hog
+from limo_hog import HOGDescriptor, PeopleDetector
+from limo_hog.detections import Detections
+from limo_hog.suppression import nms, soft_nms
+
+#: Calls of one process.
+BATCH = 20_000
+#: A call that computes longer is a finding [s of this process's time].
+LATEST = 30
+#: Memory that a process may have [bytes]: larger wishes must end in a MemoryError.
+MEMORY = 3_000_000_000
+
+#: What no argument of the API means; none of them runs code of its own.
+UGLY: list[Any] = [
+    *(None, (), [], "", "8", b"8", 1.5, math.nan, math.inf, -math.inf, 10**400, -(10**400), -1, 0, 1, 2**31 - 1, 2**31),
+    *(-(2**31), 2**63, True, object(), (1,), (1, 2, 3), (1.5, 2), ("a", "b"), (None, 8), (8, -8), (0, 0), (2**31, 8)),
+    *(
+        np.array([8, 8]),
+        np.array([8.0, 8.0]),
+        np.int64(8),
+        np.uint8(8),
+        np.float32("nan"),
+        np.array(5),
+        {},
+        {1, 2},
+        1 + 2j,
+    ),
+    *(
+        [[]],
+        range(2),
+        np.zeros((0, 4), int),
+        np.zeros((2, 2, 2)),
+        np.array(["a"]),
+        np.array([None]),
+        "\ud800",
+        -0.0,
+        1e-320,
+    ),
+    *((50_000, 50_000), (-(2**31), 3), 1e308, [1, [2]], np.datetime64("NaT"), type, np.zeros(3, "i4,f4")),
+]
+
+
+def detectors() -> list[Any]:
+    """A descriptor of each kind: the kernels' geometries, others, with and without an SVM."""
+    geometries: list[tuple[Any, ...]] = [
+        (),
+        ((48, 96), (16, 16), (8, 8), (8, 8), 9),
+        ((16, 24), (8, 8), (8, 8), (8, 8), 7),
+        ((24, 24), (12, 12), (6, 6), (6, 6), 9, 1, 2.0, 0, 0.2, True, 64, True),
+        ((16, 16), (16, 16), (8, 8), (4, 8), 1),
+        ((8, 8), (16, 16), (8, 8), (8, 8), 9),
+    ]
+    found: list[Any] = []
+    for number, geometry in enumerate(geometries):
+        hog: Any = HOGDescriptor(*geometry)
+        found.append(copy.copy(hog))
+        size = hog.getDescriptorSize()
+        svm = np.random.default_rng(number).normal(0, 0.1, size + 1).astype(np.float32)
+        hog.setSVMDetector({0: hog.getDefaultPeopleDetector(), 1: hog.getDaimlerPeopleDetector()}.get(number, svm))
+        found.append(hog)
+    return found
+
+
+DETECTORS = detectors()
+FINDERS = [
+    PeopleDetector(**wanted)
+    for wanted in (
+        *({}, {"min_height": None}, {"nms": "group"}, {"nms": "soft", "threshold": -1.0}, {"model": "daimler"}),
+        {"model": "limo", "min_height": 40, "nms": "iou", "padding": (0, 0)},
+    )
+]
+
+
+class Arguments:
+    """The random arguments of one call."""
+
+    def __init__(self, number: int) -> None:
+        self.draw = random.Random(number)
+        #: How many of a hundred arguments are ugly.
+        self.ugliness = self.draw.choice((0, 0, 3, 15))
+
+    def some(self, *values: Any) -> Any:
+        """One of the values, or something ugly."""
+        if self.ugliness and self.draw.randrange(100) < self.ugliness:
+            return self.draw.choice(UGLY)
+        return self.draw.choice(values)
+
+    def options(self, **values: Any) -> dict[str, Any]:
+        """Some of the named arguments."""
+        return {name: value() for name, value in values.items() if self.draw.random() < 0.5}
+
+    def image(self) -> Any:
+        draw = self.draw
+        if self.ugliness and draw.randrange(100) < self.ugliness:
+            odd = np.zeros((3, 3, draw.choice((0, 2, 4))), np.uint8)
+            return draw.choice(
+                (*UGLY, odd, np.zeros((40, 30), np.float32), np.zeros((5, 0), np.uint8), np.ones(9, np.uint8))
+            )
+        low, high = draw.choice(((1, 20), (1, 40), (20, 50), (10, 70), (60, 140)))
+        width, height = draw.randint(low, min(high, 100)), draw.randint(low, high)
+        channels = draw.choice((0, 1, 3, 3))
+        shape = (height, width, channels) if channels else (height, width)
+        values = (
+            draw.randbytes(math.prod(shape)) if draw.random() < 0.9 else bytes([draw.randrange(256)]) * math.prod(shape)
+        )
+        image = np.frombuffer(values, np.uint8).reshape(shape)
+        kind = draw.randrange(10)
+        if kind == 0:
+            return image[::-1, ::-1]
+        if kind == 1:
+            return np.asfortranarray(image)
+        if kind == 2:
+            return np.lib.stride_tricks.as_strided(image, image.shape, image.strides, writeable=False)
+        if kind == 3:
+            return np.repeat(image, 2, axis=1)[:, ::2]
+        return image
+
+    def number(self) -> Any:
+        return self.some(0.0, -1.0, 0.5, -1e9, 1e9, 1.0, 2, self.draw.gauss(0, 1))
+
+    def stride(self) -> Any:
+        return self.some((8, 8), (4, 4), (16, 16), (8, 16), (5, 3), (1, 100), None, (), [8, 8])
+
+    def padding(self) -> Any:
+        return self.some((0, 0), (4, 4), (8, 8), (32, 16), (3, 5), (-4, 8), None, ())
+
+    def scale(self) -> Any:
+        return self.some(1.05, 1.3, 1.1, 1.02, 1.0, 0.5, 2, 1.000001)
+
+    def places(self) -> Any:
+        count = self.draw.choice((0, 1, 5))
+        return self.some([(self.draw.randint(-20, 100), self.draw.randint(-20, 100)) for _ in range(count)], None)
+
+    def rectangles(self) -> Any:
+        draw = self.draw
+        width = draw.choice((20, 20, 200, 2**31 - 1))
+        found = [[draw.randint(-width, width) for _ in range(4)] for _ in range(draw.choice((0, 1, 4, 30)))]
+        return self.some(found, found, np.array(found, np.int64).reshape(-1, 4))
+
+    def svm(self, hog: Any) -> Any:
+        size = max(hog.getDescriptorSize() + self.draw.choice((0, 1, 1, -1, 2)), 0)
+        kinds = [
+            np.full(size, 0.01, np.float32),
+            [1] * min(size, 50),
+            np.full((size, 1), np.nan),
+            np.ones((1, size)),
+            None,
+        ]
+        return self.some(*kinds)
+
+
+def boxes_and_weights(found: Any, columns: int) -> tuple[Any, Any]:
+    """The two arrays of an answer, after a look at their types."""
+    assert isinstance(found, tuple) and len(found) == 2, found
+    places, weights = found
+    if isinstance(places, tuple) or isinstance(weights, tuple):
+        assert places == () and weights == (), found
+        return np.empty((0, columns), np.int32), np.empty(0)
+    assert places.dtype == np.int32 and places.shape == (len(weights), columns) and len(weights), places
+    return places, weights
+
+
+def search(a: Arguments) -> None:
+    hog, image = a.draw.choice(DETECTORS), a.image()
+    options = a.options(
+        hitThreshold=a.number,
+        winStride=a.stride,
+        padding=a.padding,
+        scale=a.scale,
+        groupThreshold=lambda: a.some(0, 1, 2, 2.7, -1, 0.1, 40),
+        useMeanshiftGrouping=lambda: a.some(False, False, True),
+        finalThreshold=lambda: a.some(0, 2, None),
+    )
+    if options.get("useMeanshiftGrouping") is True:
+        # Its time grows with the square of the hits.
+        options["hitThreshold"] = 1.0
+    boxes, weights = boxes_and_weights(hog.detectMultiScale(image, **options), 4)
+    assert weights.dtype == np.float64
+    if not len(boxes):
+        return
+    height, width = (*image.shape, 1)[:2]
+    assert (boxes[:, :2] >= 0).all() and (boxes[:, 2:] >= 0).all(), boxes
+    assert (boxes[:, 0] + boxes[:, 2] <= width).all() and (boxes[:, 1] + boxes[:, 3] <= height).all(), (
+        boxes,
+        image.shape,
+    )
+    if options.get("useMeanshiftGrouping", False) is False:
+        assert_reached(weights, options.get("hitThreshold"))
+
+
+def assert_reached(weights: Any, threshold: Any) -> None:
+    assert (weights >= float(0.0 if threshold is None else threshold)).all(), weights
+
+
+def windows(a: Arguments) -> None:
+    hog = a.draw.choice(DETECTORS)
+    image = a.image()
+    options = a.options(hitThreshold=a.number, winStride=a.stride, padding=a.padding, searchLocations=a.places)
+    _, weights = boxes_and_weights(hog.detect(image, **options), 2)
+    if len(weights):
+        assert_reached(weights, options.get("hitThreshold"))
+
+
+def descriptors(a: Arguments) -> None:
+    hog = a.draw.choice(DETECTORS[:10])
+    found = hog.compute(a.image(), **a.options(winStride=a.stride, padding=a.padding, locations=a.places))
+    if isinstance(found, tuple):
+        assert found == ()
+    else:
+        assert found.dtype == np.float32 and found.ndim == 1 and len(found) % hog.getDescriptorSize() == 0
+        assert np.isfinite(found).all() and (found >= 0).all() and (found <= 1).all()
+
+
+def gradients(a: Arguments) -> None:
+    hog, image = a.draw.choice(DETECTORS), a.image()
+    around = a.options(paddingTL=a.padding, paddingBR=a.padding)
+    target = a.some(None, None, np.zeros((9, 9, 2), np.float32), np.zeros((4, 4, 2), np.uint8))
+    shares, bins = hog.computeGradient(image, target, None, **around)
+    if not isinstance(shares, tuple):
+        assert shares.dtype == np.float32 and bins.dtype == np.uint8 and shares.shape == bins.shape, (shares, bins)
+        assert shares.shape[2] == 2 and (shares >= 0).all() and (bins < hog.nbins).all()
+
+
+def regions(a: Arguments) -> None:
+    hog = a.draw.choice(DETECTORS)
+    options = a.options(winStride=a.stride, padding=a.padding, scale=a.scale)
+    boxes_and_weights(hog.detectROI(a.image(), a.rectangles(), a.number(), **options), 4)
+
+
+def grouping(a: Arguments) -> None:
+    rects, threshold = a.rectangles(), a.some(0, 1, 2, 3, -1, 100)
+    eps = a.options(eps=lambda: a.some(0.2, 0.0, -1.0, 5.0, 0.05))
+    _, counts = boxes_and_weights(limo_hog.groupRectangles(rects, threshold, **eps), 4)
+    assert int(counts.sum()) <= (0 if rects is None else len(rects))
+    if isinstance(threshold, int) and threshold > 0:
+        assert (counts > threshold).all(), counts
+
+
+def construction(a: Arguments) -> None:
+    size: Callable[[], Any] = lambda: a.some((8, 8), (16, 16), (16, 8), (32, 16), (64, 128), (33, 8), [24, 24])  # noqa: E731
+    arguments = [size(), size(), size(), size(), a.some(9, 1, 18, 64, 256)]
+    more = [
+        a.some(1, 3),
+        a.some(-1.0, 4, 0.1),
+        a.some(0, 1),
+        a.some(0.2, 0, 5.0),
+        a.some(True, False),
+        a.some(64, 1, 2),
+        a.some(False, True),
+    ]
+    hog: Any = HOGDescriptor(*arguments, *more[: a.draw.randrange(8)])
+    repr(hog), hash(hog), hog.getWinSigma()
+    hog.setSVMDetector(a.svm(hog))
+    assert hog.checkDetectorSize() is True
+    again: Any = pickle.loads(pickle.dumps(copy.deepcopy(hog)))
+    # (What is no number equals nothing.)
+    assert again == hog or np.isnan(hog.svmDetector).any() or "nan" in repr(hog)
+
+
+def svms(a: Arguments) -> None:
+    hog = copy.copy(a.draw.choice(DETECTORS[4:]))
+    before = np.array(hog.svmDetector)
+    try:
+        hog.setSVMDetector(a.svm(hog))
+    except limo_hog.HogError:
+        np.testing.assert_array_equal(np.array(hog.svmDetector), before)
+        raise
+
+
+def finding(a: Arguments) -> None:
+    image = a.image()
+    found = a.draw.choice(FINDERS).detect(image)
+    assert isinstance(found, Detections) and found.boxes.dtype == np.int32 and found.boxes.shape == (len(found), 4)
+    assert (np.diff(found.scores) <= 0).all(), found.scores
+    assert found.person_boxes.shape == (len(found), 4)
+
+
+def finders(a: Arguments) -> None:
+    options = a.options(
+        model=lambda: a.some("opencv", "daimler", "limo", "/nowhere"),
+        min_height=lambda: a.some(64, 100.0, None, 8, 7),
+        max_height=lambda: a.some(None, 500, 64, 1),
+        threshold=a.number,
+        nms=lambda: a.some("overlap", "iou", "soft", "group"),
+        overlap=lambda: a.some(None, 0.5, 0, 1, 7),
+        group_threshold=lambda: a.some(None, 0, 2, -2),
+        win_stride=a.stride,
+        padding=a.padding,
+        scale=a.scale,
+    )
+    repr(PeopleDetector(**options))
+
+
+def detections(a: Arguments) -> None:
+    count = a.draw.choice((0, 1, 7))
+    boxes = np.array([[a.draw.randint(-5, 90) for _ in range(4)] for _ in range(count)], np.int32).reshape(-1, 4)
+    scores = -np.sort(-np.array([a.draw.gauss(0, 1) for _ in range(count)]))
+    found = Detections(boxes, scores)
+    kept = nms(boxes, scores, a.draw.random())
+    assert len(kept) == len(set(kept.tolist())) <= count
+    soft, lowered = soft_nms(boxes, scores, a.draw.uniform(0.01, 1), a.draw.gauss(0, 1))
+    assert len(soft) == len(lowered) <= count
+    drawn = found.draw(a.image())
+    assert drawn.dtype == np.uint8 and drawn.ndim == 3
+    assert len(pickle.loads(pickle.dumps(found[kept]))) == len(kept)
+
+
+def threads(a: Arguments) -> None:
+    limo_hog.set_num_threads(a.some(1, 2, 3))
+    assert 1 <= limo_hog.get_num_threads() <= 1024
+    search(a)
+
+
+#: Each kind of call, and how often of 96 it is made: what takes long is rare.
+WEIGHTS: dict[Callable[[Arguments], None], int] = {
+    search: 8,
+    windows: 16,
+    descriptors: 12,
+    gradients: 14,
+    grouping: 24,
+    construction: 6,
+    svms: 6,
+    regions: 6,
+    threads: 1,
+    finding: 1,
+    finders: 1,
+    detections: 1,
+}
+KINDS = [kind for kind, weight in WEIGHTS.items() for _ in range(weight)]
+
+
+def call(number: int) -> str:
+    """Make call `number`; return how it ended, "" or the error's class, or raise what is a finding."""
+    limo_hog.set_num_threads(1)
+    arguments = Arguments(number)
+    kind = arguments.draw.choice(KINDS)
+    try:
+        kind(arguments)
+    except (limo_hog.LimoHogError, MemoryError) as error:
+        assert str(error), f"a {type(error).__name__} without a message"
+        return type(error).__name__
+    except OSError as error:
+        # A model's file that is not there.
+        assert kind in (finders, finding), kind
+        return type(error).__name__
+    return ""
+
+
+def batch(first: int, count: int, here: mmap.mmap | None, asked: int) -> dict[str, Any]:
+    """Make calls `first` to `first + count - 1`; every `asked`th number is put to OpenCV instead."""
+
+    def late(_signal: int, _frame: FrameType | None) -> None:
+        raise RuntimeError(f"longer than {LATEST} s")
+
+    signal.signal(signal.SIGPROF, late)
+    ends: Counter[str] = Counter()
+    findings: list[str] = []
+    opencv = Opencv() if asked else None
+    for number in range(first, first + count):
+        if here is not None:
+            here[:8] = struct.pack("<q", number)
+        signal.setitimer(signal.ITIMER_PROF, LATEST)
+        try:
+            if opencv is not None and number % asked == 0:
+                ends["compared with OpenCV"] += 1
+                difference = disagreement(Asked.of(number), opencv)
+                if difference:
+                    findings.append(f"call {number}: {difference}")
+            else:
+                ends[call(number)] += 1
+        except Exception as error:
+            told = " ".join(str(error).split())[:300]
+            findings.append(f"call {number}: {type(error).__name__}: {told}")
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0)
+    if opencv is not None:
+        opencv.close()
+    return {"ends": ends, "findings": findings}
+
+
+def in_a_process(first: int, count: int, asked: int) -> dict[str, Any]:
+    """Make a batch in a process of its own; where it dies, the call is a finding and the rest follows."""
+    with tempfile.TemporaryFile() as marks:
+        marks.truncate(8)
+        command = [sys.executable, "-m", "tests.hardening.api", "--batch", str(first), str(count), str(asked)]
+        done = subprocess.run(
+            [*command, "--marks", str(marks.fileno())],
+            capture_output=True,
+            text=True,
+            pass_fds=[marks.fileno()],
+            timeout=7200,
+            check=False,
+        )
+        if done.returncode == 0:
+            answer: dict[str, Any] = json.loads(done.stdout)
+            return answer
+        marks.seek(0)
+        (last,) = struct.unpack("<q", marks.read(8))
+    told = " ".join(done.stderr.split())[-300:]
+    findings = [f"call {last}: the process ended with status {done.returncode}: {told}"]
+    before = in_a_process(first, last - first, asked) if last > first else {"ends": {}, "findings": []}
+    left = first + count - last - 1
+    after = in_a_process(last + 1, left, asked) if left else {"ends": {}, "findings": []}
+    ends = Counter(before["ends"]) + Counter(after["ends"])
+    return {"ends": ends, "findings": [*before["findings"], *findings, *after["findings"]]}
+
+
+def main() -> int:
+    """Run from the command line; 1 where something was found."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--calls", type=lambda text: int(float(text)), default=200_000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first call")
+    parser.add_argument("--asked", type=int, default=500, help="every how manieth call is put to OpenCV; 0: none")
+    parser.add_argument("--state", type=Path, help="where counts and findings are kept")
+    parser.add_argument("--only", type=int, help="make this call alone, in this process")
+    parser.add_argument("--batch", type=int, nargs=3, help=argparse.SUPPRESS)
+    parser.add_argument("--marks", type=int, help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.only is not None:
+        if args.asked and args.only % args.asked == 0:
+            print(disagreement(Asked.of(args.only), Opencv()) or "as OpenCV")
+        else:
+            print(call(args.only) or "answered")
+        return 0
+    if args.batch:
+        faulthandler.enable()
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        here = mmap.mmap(args.marks, 8)
+        json.dump(batch(args.batch[0], args.batch[1], here, args.batch[2]), sys.stdout)
+        return 0
+    state: dict[str, Any] = {"next": args.first, "ends": {}, "findings": [], "seconds": 0.0}
+    if args.state and args.state.exists():
+        state = json.loads(args.state.read_text())
+    last = args.first + args.calls
+    while state["next"] < last:
+        began, count = time.monotonic(), min(BATCH, last - state["next"])
+        found = in_a_process(state["next"], count, args.asked)
+        state["next"] += count
+        state["ends"] = Counter(state["ends"]) + Counter(found["ends"])
+        state["findings"] += found["findings"]
+        state["seconds"] += time.monotonic() - began
+        if args.state:
+            args.state.write_text(json.dumps(state, indent=1))
+    made = state["next"] - args.first
+    print(f"{made} calls in {state['seconds']:.0f} s: {dict(state['ends'])}; {len(state['findings'])} findings")
+    print(*state["findings"][:20], sep="\n")
+    return 1 if state["findings"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,132 @@
+"""One descriptor in many threads, some of which change it: every search is of one state, never a part of two."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from limo_hog import HOGDescriptor
+
+
+@pytest.fixture(autouse=True)
+def threads_take_turns_often() -> Iterator[None]:
+    """Let Python change threads as often as it can, so that few tries show what free threading would."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+IMAGE = np.random.default_rng(3).integers(0, 256, (48, 48, 3), dtype=np.uint8)
+#: Two geometries with descriptors of the same length, so that coefficients of one would fit the other.
+GEOMETRIES: list[Any] = [((16, 32), (16, 16), (8, 8), (8, 8), 9), ((32, 16), (16, 16), (8, 8), (8, 8), 9)]
+
+
+def detector(geometry: Any, seed: int) -> HOGDescriptor:
+    hog = HOGDescriptor(*geometry)
+    hog.setSVMDetector(np.random.default_rng(seed).normal(0, 1, hog.getDescriptorSize() + 1).astype(np.float32))
+    return hog
+
+
+def answer(hog: HOGDescriptor) -> tuple[Any, ...]:
+    """The windows' places and weights, and so which geometry and which coefficients were in force."""
+    places, weights = hog.detect(IMAGE, -1e9)
+    return tuple(map(tuple, np.asarray(places).tolist())), tuple(np.asarray(weights).tolist())
+
+
+def crowd(workers: list[Any], seconds: float) -> list[BaseException]:
+    """Run the workers again and again, each in a thread of its own; return what they raised."""
+    stop, raised = threading.Event(), []
+
+    def loop(work: Any) -> None:
+        try:
+            while not stop.is_set():
+                work()
+        except BaseException as error:
+            raised.append(error)
+            stop.set()
+
+    threads = [threading.Thread(target=loop, args=(work,)) for work in workers]
+    for thread in threads:
+        thread.start()
+    stop.wait(seconds)
+    stop.set()
+    for thread in threads:
+        thread.join()
+    return raised
+
+
+def test_a_search_during_load_is_of_the_old_detector_or_of_the_new_one(tmp_path: Path) -> None:
+    files, answers = [], set()
+    for number, geometry in enumerate(GEOMETRIES):
+        hog = detector(geometry, number)
+        files.append(tmp_path / f"{number}.yml")
+        hog.save(files[-1])
+        answers.add(answer(hog))
+    shared = detector(GEOMETRIES[0], 0)
+    mixed = []
+
+    def look() -> None:
+        found = answer(shared)
+        if found not in answers:
+            mixed.append(found)
+            raise AssertionError("a mix of two detectors")
+
+    raised = crowd([look] * 4 + [lambda: shared.load(files[0]), lambda: shared.load(files[1])], 4.0)
+    assert not raised
+    assert not mixed
+
+
+def test_coefficients_set_during_load_never_meet_the_geometry_that_was_replaced(tmp_path: Path) -> None:
+    old, new = HOGDescriptor(*GEOMETRIES[0]), detector(GEOMETRIES[1], 1)
+    new.save(tmp_path / "new.yml")
+    weights = np.random.default_rng(2).normal(0, 1, old.getDescriptorSize() + 1).astype(np.float32)
+    wanted = set()
+    for svm in (weights, new.svmDetector):
+        last = HOGDescriptor(*GEOMETRIES[1])
+        last.setSVMDetector(svm)
+        wanted.add(answer(last))
+    for _ in range(300):
+        shared = HOGDescriptor(*GEOMETRIES[0])
+        barrier = threading.Barrier(2)
+
+        def set_weights(shared: HOGDescriptor = shared, barrier: threading.Barrier = barrier) -> None:
+            barrier.wait()
+            shared.setSVMDetector(weights)
+
+        def load(shared: HOGDescriptor = shared, barrier: threading.Barrier = barrier) -> None:
+            barrier.wait()
+            shared.load(tmp_path / "new.yml")
+
+        threads = [threading.Thread(target=set_weights), threading.Thread(target=load)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        # Whichever came last, the geometry is the file's; the coefficients are of one of the two.
+        assert shared.winSize == GEOMETRIES[1][0]
+        assert answer(shared) in wanted
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_one_detector_answers_many_threads_alike(threads: int) -> None:
+    import limo_hog
+
+    before = limo_hog.get_num_threads()
+    limo_hog.set_num_threads(threads)
+    try:
+        shared = detector(GEOMETRIES[0], 5)
+        wanted = answer(shared)
+
+        def look() -> None:
+            assert answer(shared) == wanted
+
+        assert not crowd([look] * 8, 1.0)
+    finally:
+        limo_hog.set_num_threads(before)

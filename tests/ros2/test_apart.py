@@ -1,0 +1,173 @@
+"""A node in a process of its own: however it ends, there are a score card and one line of why."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from limo_hog.cli.main import main
+from limo_sim.ros import apart
+from limo_sim.ros.apart import run_apart
+from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.script import Ended, run_script
+from limo_sim.run.episode import Moment
+from limo_sim.world.scenario import Scenario
+
+from .conftest import HEAD, STANDING, node
+from .test_run import DRIVE, FOLLOW
+
+#: Drives for ten images, then does something else.
+THEN = f"self.n = getattr(self, 'n', 0) + 1\nif self.n < 10:\n    {DRIVE}\n    return\n"
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Callable[[str], Path]:
+    def write(text: str) -> Path:
+        path = tmp_path / "node.py"
+        path.write_text(HEAD + textwrap.dedent(text), encoding="utf-8")
+        return path
+
+    return write
+
+
+def log(ended: Ended) -> list[tuple[object, ...]]:
+    return [
+        (step.time, step.truth, step.decision, step.seen, step.detections.boxes.tolist())
+        for step in ended.episode.steps
+    ]
+
+
+def test_a_run_apart_is_the_run_in_this_process(script: Callable[[str], Path]) -> None:
+    path = script(node(FOLLOW, "self.declare_parameter('target_distance', 1.8)"))
+    here, there = run_script(path, STANDING, 1.5, 3), run_apart(path, STANDING, 1.5, 3)
+    assert log(here) == log(there)
+    assert len(log(there)) > 10
+    assert (here.failure, here.asked) == (there.failure, there.asked) == ("", True)
+    for name in ("scenario", "controller", "detector", "seed", "seconds", "contacts", "target_distance"):
+        assert getattr(here.episode, name) == getattr(there.episode, name), name
+
+
+def test_who_watches_is_given_the_same_pictures(script: Callable[[str], Path]) -> None:
+    path = script(node(FOLLOW))
+    here: list[Moment] = []
+    there: list[Moment] = []
+    run_script(path, STANDING, 0.3, watch=here.append)
+    run_apart(path, STANDING, 0.3, watch=there.append)
+    assert len(here) == len(there)
+    for ours, theirs in zip(here, there, strict=True):
+        assert (ours.frame is None) == (theirs.frame is None)
+        assert ours.odometry == theirs.odometry
+        assert ours.windows.keys() == theirs.windows.keys()
+        if ours.frame is not None and theirs.frame is not None:
+            assert (ours.frame.image == theirs.frame.image).all()
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("import os; os._exit(3)", "died at 0.90 s: its process ended with status 3 before the run was over"),
+        ("import os; os._exit(0)", "died at 0.90 s: its process ended with status 0"),
+        ("import ctypes; ctypes.string_at(0)", "died at 0.90 s: its process was ended by SIGSEGV"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "its process was ended by SIGKILL"),
+        (
+            "import os, signal\nif os.fork() == 0:\n    signal.signal(signal.SIGALRM, signal.SIG_DFL)\n"
+            "    signal.alarm(20); signal.pause()\nos._exit(1)",
+            "its process ended with status 1",
+        ),
+        ("1 / 0", "failed with ZeroDivisionError at 0.90 s"),
+    ],
+)
+def test_a_node_that_dies_leaves_its_log_and_a_robot_that_stands(
+    script: Callable[[str], Path], body: str, said: str
+) -> None:
+    ended = run_apart(script(node(THEN + body)), STANDING, 20.0)
+    assert ended.failure.startswith("node.py ")
+    assert said in ended.failure
+    assert ended.failure.endswith("; the watchdog stopped the robot")
+    assert "\n" not in ended.failure
+    # What followed is what follows where a node raises at the same time: the arena is the same one.
+    raised = run_script(script(node(THEN + "raise RuntimeError")), STANDING, 20.0)
+    assert [(step.time, step.truth) for step in ended.episode.steps] == [
+        (step.time, step.truth) for step in raised.episode.steps
+    ]
+    assert ended.episode.contacts == raised.episode.contacts
+    assert ended.episode.steps[-1].time == pytest.approx(2.9, abs=0.11)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "import signal; signal.signal(signal.SIGALRM, signal.SIG_IGN)\nwhile True: pass",
+        "while True:\n    try:\n        while True: sum(range(99))\n    except BaseException: pass",
+    ],
+)
+def test_a_node_that_takes_no_interrupt_is_stopped(
+    script: Callable[[str], Path], body: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(apart, "GRACE_S", 1.0)
+    began = time.monotonic()
+    ended = run_apart(script(node(THEN + body)), STANDING, 20.0, patience=1.0)
+    assert "hung at 0.90 s: no simulated time has passed for 1 s, and it took no interrupt" in ended.failure
+    assert time.monotonic() - began < 60
+
+
+def test_a_node_that_prints_for_ever_is_interrupted(script: Callable[[str], Path]) -> None:
+    ended = run_apart(script(node("while True: print(end='')")), STANDING, 2.0, patience=1.0)
+    assert "hung at 0.00 s" in ended.failure
+    assert "print(end='')" in ended.traceback
+
+
+def test_what_a_node_prints_comes_out_here_even_right_before_its_death(
+    script: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    body = "import os, sys\nprint('hello'); print('wrong', file=sys.stderr); os._exit(1)"
+    run_apart(script(node(body)), STANDING, 2.0)
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("hello\n", "wrong\n")
+
+
+def test_a_watcher_that_fails_ends_the_node(script: Callable[[str], Path]) -> None:
+    def full(_: Moment) -> None:
+        raise OSError("no space left on device")
+
+    with pytest.raises(OSError, match="no space left"):
+        run_apart(script(node(DRIVE)), STANDING, 2.0, watch=full)
+
+
+def test_a_script_that_is_not_there_and_a_scenario_that_cannot_be_are_named(tmp_path: Path) -> None:
+    with pytest.raises(StubError, match="no such file"):
+        run_apart(tmp_path / "none.py", Scenario(name="nobody"), 1.0)
+
+
+def test_the_command_line_writes_a_card_and_ends_with_one_line(
+    script: Callable[[str], Path], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path, card = script(node(THEN + "import os; os._exit(3)")), tmp_path / "card.json"
+    assert main(["run", str(path), "--seconds", "5", "--json", str(card), "--scenario", "followable"]) == 1
+    said = capfd.readouterr()
+    assert json.loads(card.read_text())["controller"] == "node.py"
+    assert "followable" in said.out
+    assert said.err.splitlines()[-1].startswith("limo-hog: node.py died at 0.90 s: its process ended with status 3")
+
+
+def test_ctrl_c_ends_run_and_node_and_leaves_no_process(script: Callable[[str], Path]) -> None:
+    path = script(node("import os; print('pid', os.getpid(), flush=True); " + DRIVE))
+    command = [sys.executable, "-m", "limo_hog.cli.main", "run", str(path), "--seconds", "3600", "--view", "0"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as run:
+        assert run.stdout
+        pid = int(run.stdout.readline().split()[1])
+        run.terminate()
+        began = time.monotonic()
+        run.communicate(timeout=60)
+        assert run.returncode == 128 + 15
+        assert time.monotonic() - began < 20
+    assert not Path(f"/proc/{pid}").exists()

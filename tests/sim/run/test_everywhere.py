@@ -1,0 +1,97 @@
+"""`[vary]` and `[detector]` count wherever a scenario runs, or are refused by name."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from limo_hog.follow import ApproachController
+from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.cli.real import run_real
+from limo_sim.env import LimoFollow
+from limo_sim.ros.live import run_live
+from limo_sim.ros.script import run_script
+from limo_sim.run.arena import Arena
+from limo_sim.run.episode import run_episode
+from limo_sim.run.sweep import Run, play
+from limo_sim.world.scenario import DetectorFaults, Person, Scenario, Vary
+from limo_sim.world.schema import ScenarioError
+from limo_sim.world.variants import of_run
+
+DRAWN = Scenario(
+    name="drawn", people=(Person(route=((2.5, 0.0, 0.0), (3.0, 1.5, 0.0))),), vary=Vary(clothes=True, place=0.4)
+)
+UNKIND = Scenario(name="unkind", detector=DetectorFaults(recall=0.5))
+UNKIND_TOML = "[detector]\nrecall = 0.5\n"
+NODE = "import rclpy\nrclpy.init()\nnode = rclpy.create_node('idle')\nrclpy.spin(node)\n"
+
+
+@pytest.fixture
+def node(tmp_path: Path) -> Path:
+    path = tmp_path / "node.py"
+    path.write_text(NODE, encoding="utf-8")
+    return path
+
+
+def test_an_arena_has_the_people_of_its_seed() -> None:
+    assert Arena(DRAWN, 3).scenario == of_run(DRAWN, 3)
+    assert Arena(DRAWN, 3).scenario != Arena(DRAWN, 4).scenario
+
+
+def test_the_closed_loop_and_a_sweep_run_with_the_people_of_the_seed(tmp_path: Path) -> None:
+    episode = run_episode(DRAWN, ApproachController(), detector_named("hog"), 0.2, 3)
+    assert episode.scenario == of_run(DRAWN, 3)
+    file = tmp_path / "drawn.toml"
+    file.write_text("[vary]\nplace = 0.4\n[[people]]\nroute = [[2.5, 0.0, 0.0], [3.0, 1.5, 0.0]]\n", encoding="utf-8")
+    cards = [play(Run(str(file), "approach", "hog", seed, 0.2)) for seed in (3, 4, 3)]
+    assert cards[0].scenario_hash == cards[2].scenario_hash != cards[1].scenario_hash
+
+
+def test_a_node_meets_the_people_of_the_seed(node: Path) -> None:
+    assert run_script(node, DRAWN, 0.5, 3).episode.scenario == of_run(DRAWN, 3)
+
+
+def test_an_arena_on_the_network_has_the_people_of_the_seed() -> None:
+    assert run_live(DRAWN, 3, 0.04, None).scenario == of_run(DRAWN, 3)
+
+
+def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
+    env = LimoFollow(DRAWN)
+    places = []
+    for seed in (0, 1, 0):
+        env.reset(seed=seed)
+        places.append(env.step(env.action_space.sample() * 0)[4]["distance"])
+    assert places[0] == places[2] != places[1]
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        lambda node: run_script(node, UNKIND, 0.5),
+        lambda _: run_live(UNKIND, 0, 0.04, None),
+        lambda _: LimoFollow(UNKIND),
+    ],
+    ids=["run", "arena", "LimoFollow-v0"],
+)
+def test_faults_of_a_detector_are_refused_where_the_detector_is_another_s(
+    start: Callable[[Path], object], node: Path
+) -> None:
+    with pytest.raises(ScenarioError, match=r"scenario 'unkind': detector: .*; leave the table out"):
+        start(node)
+    start_plain = replace(UNKIND, detector=DetectorFaults())
+    assert Arena(start_plain).scenario == start_plain
+
+
+def test_a_node_on_the_network_is_refused_before_it_starts(
+    tmp_path: Path, node: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "unkind.toml"
+    file.write_text(UNKIND_TOML, encoding="utf-8")
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: object())
+    args = argparse.Namespace(node=node, json=None, scenario=str(file), seconds=1.0, seed=0, ros_args=[])
+    with pytest.raises(ScenarioError, match="detector: a node brings its own"):
+        run_real(args)

@@ -1,0 +1,101 @@
+"""Labelled frames: boxes lie around what is seen, the same seed gives the same pictures."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from limo_hog.cli.main import main
+from limo_hog.learn.formats import read_labels
+from limo_sim.run.arena import Arena
+from limo_sim.run.export import labelled_frames
+from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD, MOUNT_HEIGHT
+from limo_sim.world.scenario import Furniture, Person, Scenario
+
+PILLAR = Furniture("pillar", 2.0, 0.3)
+
+
+def arena_after_a_frame(*furniture: Furniture) -> Arena:
+    arena = Arena(Scenario("bare", furniture=furniture))
+    for _ in range(10):
+        arena.step()
+    arena.frame()
+    return arena
+
+
+def test_a_pillars_box_is_the_projection_of_its_cylinder() -> None:
+    [(visible, box)] = arena_after_a_frame(PILLAR).furniture_in_frame()
+    assert visible == pytest.approx(1.0, abs=0.02)
+    assert box is not None
+    ahead = PILLAR.x - MOUNT_AHEAD
+    distance = math.hypot(ahead, PILLAR.y)
+    half = math.asin(0.15 / distance)
+    left, right = (319.5 - FOCAL_PX * math.tan(math.atan2(PILLAR.y, ahead) + side) for side in (half, -half))
+    top = 239.5 - FOCAL_PX * (1.1 - MOUNT_HEIGHT) / (distance - 0.15)  # of the edge nearest to the camera
+    assert box[0] == pytest.approx(left, abs=2)
+    assert box[0] + box[2] == pytest.approx(right, abs=2)
+    assert box[1] == pytest.approx(top, abs=3)
+
+
+def test_what_stands_behind_another_piece_is_not_visible() -> None:
+    hidden = Furniture("cone", 3.5, 0.585)
+    (near, _), (far, box) = arena_after_a_frame(PILLAR, hidden).furniture_in_frame()
+    assert near > 0.98
+    assert far < 0.05
+    assert box is not None
+
+
+def test_what_the_edge_cuts_off_counts_as_unseen() -> None:
+    [(visible, box)] = arena_after_a_frame(Furniture("pillar", 2.0, 1.3)).furniture_in_frame()
+    assert box is not None
+    assert box[0] == 0
+    assert 0 < visible < 0.9
+
+
+def test_pieces_behind_the_robot_have_no_box() -> None:
+    assert arena_after_a_frame(Furniture("pillar", -2.0, 0.0)).furniture_in_frame() == [(0.0, None)]
+
+
+def test_the_robot_wanders_and_the_same_seed_gives_the_same_pictures() -> None:
+    scenario = Scenario("one", people=(Person(route=((2.0, 0.0, 1.0),)),), furniture=(Furniture("cone", 2.5, -0.6),))
+    runs = [list(labelled_frames(scenario, seed, 12, 1.0)) for seed in (3, 3, 4)]
+    for (one, things), (other, same) in zip(runs[0], runs[1], strict=True):
+        np.testing.assert_array_equal(one.image, other.image)
+        assert things == same
+    assert any(one.truth.robot != other.truth.robot for (one, _), (other, _) in zip(runs[0], runs[2], strict=True))
+    x, y = np.array([frame.truth.robot[:2] for frame, _ in runs[0]]).T
+    assert np.hypot(np.ptp(x), np.ptp(y)) > 1
+    assert {thing.label for run in runs for _, things in run for thing in things} == {"person", "cone"}
+    assert all(frame.truth.contacts.wall == 0 for run in runs for frame, _ in run)
+
+
+def test_what_is_written_is_coco_with_depth_and_identities(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert main(["export", "--scenario", "two_people", "--out", str(out), "--frames", "8", "--depth"]) == 0
+    data = json.loads((out / "coco.json").read_text())
+    assert [image["stamp"] for image in data["images"]] == sorted({image["stamp"] for image in data["images"]})
+    assert {note["track_id"] for note in data["annotations"]} <= {0, 1}
+    assert all(note["iscrowd"] == (note["visible"] < 0.65) for note in data["annotations"])
+    pictures = read_labels(out / "coco.json")
+    assert len(pictures) == 8
+    assert sum(len(picture.boxes) for picture in pictures) == len(data["annotations"]) > 0
+    note = next(note for note in data["annotations"] if note["visible"] > 0.95)
+    image = data["images"][note["image_id"] - 1]
+    depth = cv2.imread(str(out / image["depth_file_name"]), cv2.IMREAD_UNCHANGED)
+    assert depth is not None
+    assert depth.dtype == np.uint16
+    x, y, w, h = note["bbox"]
+    there, beside = (depth[y + h // 3 : y + h // 2, x + w // 2 + shift] for shift in (0, w))
+    assert np.median(there[there > 0]) < np.median(beside) or np.median(beside) == 0
+
+
+def test_a_folder_with_files_is_not_written_into(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.txt").write_text("")
+    assert main(["export", "--out", str(tmp_path)]) == 2
+    assert "not empty" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]

@@ -1,0 +1,62 @@
+"""Suites are frozen: their files are those that were hashed, and every one of them can be run."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from limo_sim.run import suite as suites
+from limo_sim.run.arena import Arena
+from limo_sim.run.catalogue import load
+from limo_sim.run.suite import Suite, file_hash
+from limo_sim.world.schema import ScenarioError
+
+V1 = Suite.load("v1")
+
+
+def test_the_first_suite_has_twenty_scenarios_in_four_groups() -> None:
+    assert Counter(V1.groups.values()) == {"plain": 5, "senses": 5, "people": 5, "places": 5}
+    assert len({entry.sha256 for entry in V1.scenarios}) == 20
+    assert {path.stem for path in V1.path(V1.scenarios[0]).parent.glob("*.toml")} == set(V1.groups)
+
+
+@pytest.mark.parametrize("entry", V1.scenarios, ids=lambda entry: entry.name)
+def test_every_scenario_can_be_run_with_ten_seeds_and_its_people_differ(entry: suites.Entry) -> None:
+    scenario = load(V1.path(entry))
+    assert scenario.summary
+    assert len({Arena(scenario, seed).scenario.people for seed in range(10)}) == 10
+
+
+def test_a_file_that_was_changed_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(suites._FOLDER, tmp_path, dirs_exist_ok=True)
+    monkeypatch.setattr(suites, "_FOLDER", tmp_path)
+    assert Suite.load("v1") == V1
+    file = tmp_path / "v1" / "door.toml"
+    file.write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
+    assert Suite.load("v1") == V1
+    file.write_text(file.read_text(encoding="utf-8") + "# easier\n", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"suite v1: door.toml has the SHA-256 .*those of another suite"):
+        Suite.load("v1")
+
+
+def test_an_unknown_suite_is_refused_by_name() -> None:
+    with pytest.raises(ScenarioError, match="unknown suite v0: want one of v1"):
+        Suite.load("v0")
+
+
+def test_a_hash_is_that_of_the_text_whatever_its_line_ends(tmp_path: Path) -> None:
+    unix, windows = tmp_path / "unix", tmp_path / "windows"
+    unix.write_bytes(b"a = 1\nb = 2\n")
+    windows.write_bytes(b"a = 1\r\nb = 2\r\n")
+    assert file_hash(unix) == file_hash(windows)
+    unix.write_bytes(b"a = 1\nb = 3\n")
+    assert file_hash(unix) != file_hash(windows)
+
+
+def test_the_page_of_the_benchmark_is_about_these_files() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    for entry in V1.scenarios:
+        assert f"| `{entry.name}` | {load(V1.path(entry)).summary} | `{entry.sha256[:16]}` |" in page

@@ -1,0 +1,220 @@
+"""`LimoFollow-v1` keeps Gymnasium's rules, its reward has a slope everywhere, and its state is what HOG would tell."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from limo_hog.follow.sense.observation import Odometry
+from limo_sim.env import LimoFollowV1
+from limo_sim.env.glimpse import Glimpse, glimpse, hiding
+from limo_sim.env.second import SHAPING, _reward
+from limo_sim.run.arena import Arena, Plan
+from limo_sim.run.sighting import sighted, state_of
+from limo_sim.sensing.renderer import Renderer
+from limo_sim.world.person import Pose
+from limo_sim.world.scenario import DetectorFaults, Furniture, Person, Robot, Scenario, Wall
+from limo_sim.world.schema import ScenarioError
+
+STILL, AHEAD = np.zeros(2, np.float32), np.array([0.3, 0.0], np.float32)
+STANDING = Scenario(people=(Person(route=((2.5, 0.0, 0.0),)),))
+
+
+@pytest.mark.parametrize("observe", ["state", "gray", "camera"])
+def test_gymnasiums_checker_accepts_it_without_a_warning(observe: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made = gymnasium.make("limo_sim.env:LimoFollow-v1", observe=observe, render_mode="rgb_array")
+        check_env(made.unwrapped)
+
+
+@pytest.mark.parametrize("observe", ["state", "gray", "camera"])
+def test_it_is_made_by_name_and_its_observations_are_in_its_space(observe: str) -> None:
+    env = gymnasium.make("limo_sim.env:LimoFollow-v1", scenario="followable", observe=observe)
+    observation, _ = env.reset(seed=0)
+    for action in (AHEAD, -AHEAD, env.action_space.sample()):
+        assert env.observation_space.contains(observation)
+        observation, reward, terminated, truncated, info = env.step(action)
+        assert reward == pytest.approx(sum(info["reward"].values()))
+        assert not terminated
+        assert not truncated
+    assert info["time"] == pytest.approx(0.3)
+
+
+def test_an_action_is_in_units_of_the_tracking_controllers_limits() -> None:
+    env = LimoFollowV1(Scenario(people=(Person(route=((-2.5, 0.0, 0.0),)),)))
+    env.reset(seed=0)
+    for _ in range(10):
+        state = env.step(np.array([0.5, 0.0], np.float32))[0]
+    assert state[7] == pytest.approx(0.5, abs=1e-6)
+    assert env._running().odometry().linear == pytest.approx(0.35)
+
+
+@pytest.mark.parametrize("action", [[math.nan, 0.0], [0.0, 1.01], [-2.0, 0.0], [0.1], [0.1, 0.0, 0.0], 0.3])
+def test_an_action_out_of_its_range_is_refused_by_name(action: Any) -> None:
+    env = LimoFollowV1()
+    env.reset(seed=0)
+    with pytest.raises(gymnasium.error.InvalidAction, match=r"action: got .*, want two numbers in -1 … 1"):
+        env.step(np.array(action, np.float32))
+
+
+def test_wrong_words_and_faults_beside_images_are_refused_by_name() -> None:
+    with pytest.raises(ScenarioError, match="observe: got 'depth', want one of camera, gray, state"):
+        LimoFollowV1(observe="depth")
+    unkind = replace(STANDING, name="unkind", detector=DetectorFaults(recall=0.5))
+    with pytest.raises(ScenarioError, match=r"'unkind': detector: .*observe the state"):
+        LimoFollowV1(unkind, "gray")
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        LimoFollowV1().step(STILL)
+
+
+def follow(bearing: float, surface: float, visible: float = 0.0) -> float:
+    return sum(_reward(Glimpse(bearing, surface + 0.2, surface, visible, 100.0, False), 0, 0).values())
+
+
+@pytest.mark.parametrize("surface", [0.2, 1.0, 1.5, 2.5, 4.0, 8.0])
+def test_turning_towards_the_person_earns_more_from_every_bearing(surface: float) -> None:
+    rewards = [follow(bearing, surface) for bearing in np.linspace(0.0, math.pi, 181)]
+    assert (np.diff(rewards) < -1e-7).all()
+
+
+@pytest.mark.parametrize("bearing", [-3.0, -1.0, 0.0, 0.5, 2.0])
+def test_a_step_towards_the_distance_earns_more_from_everywhere(bearing: float) -> None:
+    beyond = [follow(bearing, surface) for surface in np.linspace(1.5, 12.0, 200)]
+    before = [follow(bearing, surface) for surface in np.linspace(0.0, 1.5, 50)]
+    assert (np.diff(beyond) < -1e-7).all()
+    assert (np.diff(before) > 1e-7).all()
+
+
+def test_the_best_reward_is_one_and_contacts_and_changes_of_the_action_cost() -> None:
+    assert follow(0.0, 1.5, 1.0) == pytest.approx(1.0)
+    assert sum(_reward(None, 1, 2).values()) == pytest.approx(-SHAPING.person_contact - 2 * SHAPING.wall_contact)
+    env = LimoFollowV1(STANDING)
+    env.reset(seed=0)
+    first, second = (env.step(AHEAD)[4]["reward"]["effort"] for _ in range(2))
+    assert first == pytest.approx(-0.3 * (SHAPING.effort + SHAPING.jerk))
+    assert second == pytest.approx(-0.3 * SHAPING.effort)
+
+
+def test_touching_the_person_ends_the_episode() -> None:
+    env = LimoFollowV1(Scenario(people=(Person(route=((1.2, 0.0, 0.0),)),)))
+    env.reset(seed=0)
+    for _ in range(30):
+        _, reward, terminated, _, _ = env.step(np.array([1.0, 0.0], np.float32))
+        if terminated:
+            break
+    assert terminated
+    assert reward < -SHAPING.person_contact + 1
+
+
+def run(seed: int, observe: str = "state") -> list[Any]:
+    env = LimoFollowV1(("random", "followable", "zigzag"), observe)
+    env.reset(seed=seed)
+    return [env.step(AHEAD) for _ in range(20)]
+
+
+def test_the_same_seed_gives_the_same_episode_whatever_is_observed() -> None:
+    for one, other, gray in zip(run(5), run(5), run(5, "gray"), strict=True):
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1:] == other[1:] == gray[1:]
+    assert any(one[1] != other[1] for one, other in zip(run(5), run(6), strict=True))
+
+
+def test_vectorised_runs_in_two_processes_equal_runs_in_one() -> None:
+    results = []
+    for mode in ("async", "sync"):
+        env = gymnasium.make_vec("limo_sim.env:LimoFollow-v1", 2, vectorization_mode=mode, scenario="zigzag")
+        env.reset(seed=1)
+        for _ in range(5):
+            states, rewards, *_ = env.step(np.stack([AHEAD, -AHEAD]))
+        results.append((states.copy(), rewards.copy()))
+        env.close()
+    for one, other in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_no_image_is_drawn_for_the_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = LimoFollowV1("workshop")
+    env.reset(seed=0)
+    monkeypatch.setattr(Renderer, "_draw", lambda *_: pytest.fail("an image was drawn"))
+    for _ in range(10):
+        env.step(AHEAD)
+
+
+def test_a_detector_that_finds_nobody_leaves_the_state_without_a_sighting() -> None:
+    states = {}
+    for recall in (1.0, 0.0):
+        env = LimoFollowV1(replace(STANDING, detector=DetectorFaults(recall=recall)))
+        states[recall] = env.reset(seed=0)[0]
+    assert states[0.0].tolist() == [0, 0, 0, 1, 1, 0, 0, 0, 0]
+    np.testing.assert_allclose(states[1.0][:5], [1, 1, 0, 2.5 / 8, 0], atol=0.03)
+
+
+def test_a_state_carries_the_last_sighting_along_with_the_robot() -> None:
+    seen = sighted(0.0, 2.0, 1.0, Odometry(1.0), None)
+    turned = Odometry(3.0, x=1.0, y=0.0, yaw=math.pi / 2, linear=0.35, angular=-0.75)
+    np.testing.assert_allclose(state_of(seen, False, 3.0, turned), [0, 0, -1, 1 / 8, 2 / 5, 0, 0, 0.5, -0.5], atol=1e-6)
+
+
+def test_a_persons_velocity_is_that_of_many_sightings() -> None:
+    seen = None
+    for frame in range(60):
+        time = frame / 10
+        x, y = 2.0 + 0.3 * time, 0.6 * time
+        seen = sighted(math.atan2(y, x), math.hypot(x, y), time, Odometry(time), seen)
+    state = state_of(seen, True, 5.9, Odometry(5.9))
+    np.testing.assert_allclose(state[5:7], [0.3 / 1.5, 0.6 / 1.5], atol=1e-3)
+
+
+def test_a_glimpse_is_what_the_camera_shows() -> None:
+    # The truth of the rendered image is the judge, over places before, beside and behind the robot.
+    random = np.random.default_rng(1)
+    errors = []
+    for _ in range(40):
+        bearing, distance = random.uniform(-1.0, 1.0), random.uniform(0.8, 4.2)
+        place = (distance * math.cos(bearing), distance * math.sin(bearing))
+        arena = Arena(Scenario(people=(Person(route=((*place, 0.0),)),)))
+        truth = arena.truth().people[0]
+        seen = glimpse(arena.plan(), arena.scenario, 0, [])
+        assert truth is not None
+        assert seen is not None
+        assert (seen.distance, seen.bearing) == pytest.approx((truth.distance, truth.bearing))
+        assert seen.surface == pytest.approx(truth.surface_distance)
+        errors.append(abs(seen.visible - truth.visible))
+    assert np.mean(errors) < 0.06
+    assert max(errors) < 0.35
+
+
+@pytest.mark.parametrize(
+    ("stands", "hidden"),
+    [
+        ({"walls": (Wall((1.2, -0.5), (1.2, 0.5)),)}, True),
+        ({"walls": (Wall((1.2, 0.2), (1.2, 1.0)),)}, False),
+        ({"walls": (Wall((1.0, -0.5), (1.8, 0.3)),)}, True),
+        ({"walls": (Wall((3.2, -0.5), (3.2, 0.5)),)}, False),
+        ({"furniture": (Furniture("pillar", 1.5, 0.0),)}, True),
+        ({"furniture": (Furniture("pillar", 1.5, 0.6),)}, False),
+        ({"furniture": (Furniture("chair", 1.5, 0.0),)}, False),
+    ],
+)
+def test_a_person_behind_a_wall_or_a_pillar_is_not_seen(stands: dict[str, Any], hidden: bool) -> None:
+    scenario = replace(STANDING, **stands)
+    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(2.5, 0.0, math.pi),)), scenario, 0, hiding(scenario))
+    assert seen is not None
+    assert (seen.visible == 0.0) == hidden
+    assert seen.found != hidden
+
+
+@pytest.mark.parametrize(("place", "found"), [((2.5, 0.0), True), ((1.2, 0.0), False), ((4.6, 0.0), False)])
+def test_what_hog_cannot_find_is_not_found(place: tuple[float, float], found: bool) -> None:
+    scenario = Scenario(people=(Person(route=((*place, 0.0),)),), robot=Robot())
+    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(*place, 0.0),)), scenario, 0, [])
+    assert seen is not None
+    assert seen.found == found

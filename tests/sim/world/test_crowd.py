@@ -1,0 +1,261 @@
+"""People who yield come and go through doors, find their way, keep clear of the robot or react to it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limo_hog.follow.twist import Twist
+from limo_sim.run.arena import Arena
+from limo_sim.world.crowd import STEP_S, Crowd
+from limo_sim.world.person import Pose
+from limo_sim.world.scenario import Camera, Furniture, Group, Person, Robot, Room, Scenario, Wall
+from limo_sim.world.schema import ScenarioError
+
+YIELDS = Person(route=((-2, 1, 0), (2, 1, 1.0), (2, 3, 0)), behaviour="social_force")
+CORNER = Robot(x=-4.5, y=-4.5)
+
+
+def poses(
+    scenario: Scenario, seconds: float, robot: tuple[float, float, float] = (-4.5, -4.5, 0.0), seed: int = 0
+) -> list[tuple[Pose | None, ...]]:
+    scenario.check()
+    crowd = Crowd(scenario, seed)
+    seen = [crowd.poses]
+    for step in range(1, round(seconds / STEP_S) + 1):
+        crowd.advance(step * STEP_S, robot)
+        seen.append(crowd.poses)
+    return seen
+
+
+def there(pose: Pose | None) -> Pose:
+    assert pose is not None
+    return pose
+
+
+def test_the_corners_of_the_route_are_visited_in_order_with_their_pauses() -> None:
+    seen = [there(one) for (one,) in poses(Scenario(people=(YIELDS,), robot=CORNER), 25.0)]
+    reached = []
+    for x, y, _ in YIELDS.route[1:]:
+        reached.append(next(index for index, pose in enumerate(seen) if math.dist((pose.x, pose.y), (x, y)) < 0.3))
+    assert reached == sorted(reached)
+    still = sum(math.dist((pose.x, pose.y), (2, 1)) < 0.1 and pose.swing < 0.5 for pose in seen) * STEP_S
+    assert 0.8 < still < 2.0
+
+
+def test_each_leg_is_walked_at_its_own_speed() -> None:
+    person = dataclasses.replace(YIELDS, route=((-3, 1, 0), (3, 1, 0), (3, -1, 0)), speeds=(0.4, 0.9, 0.6))
+    seen = [there(one) for (one,) in poses(Scenario(people=(person,), robot=CORNER), 18.0)]
+    paces = [math.dist((a.x, a.y), (b.x, b.y)) / STEP_S for a, b in pairwise(seen)]
+    first = [pace for pace, pose in zip(paces, seen, strict=False) if -1 < pose.x < 2.5 and pose.y > 0.95]
+    second = [pace for pace, pose in zip(paces, seen, strict=False) if pose.x > 2.7 and -0.5 < pose.y < 0]
+    assert np.mean(first) == pytest.approx(0.4, rel=0.05)
+    assert np.mean(second) == pytest.approx(0.9, rel=0.05)
+
+
+def test_headings_and_gait_are_those_of_somebody_who_walks() -> None:
+    seen = [there(one) for (one,) in poses(Scenario(people=(YIELDS,), robot=CORNER), 25.0)]
+    turns = [math.remainder(b.yaw - a.yaw, math.tau) for a, b in pairwise(seen)]
+    assert max(map(abs, turns)) < math.radians(6)
+    at = seen[150]
+    assert at.swing == 1.0
+    assert abs(at.yaw) < 0.1
+    metres = sum(math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(seen[:151]))
+    assert at.phase == pytest.approx(math.tau * metres / 0.75 % math.tau, abs=1e-6)
+
+
+def test_somebody_finds_the_door_between_two_rooms() -> None:
+    walls = Wall((0, -4.9), (0, 2.0)), Wall((0, 2.8), (0, 4.9))
+    person = dataclasses.replace(YIELDS, route=((-2, -2, 0), (2, -2, 30)))
+    seen = [there(one) for (one,) in poses(Scenario(people=(person,), walls=walls, robot=CORNER), 25.0)]
+    crossing = next(pose for pose in seen if pose.x > 0)
+    assert 2.1 < crossing.y < 2.7
+    assert math.dist((seen[-1].x, seen[-1].y), (2, -2)) < 0.1
+
+
+def test_who_arrives_walks_in_through_a_door_and_who_leaves_walks_out() -> None:
+    person = dataclasses.replace(YIELDS, arrives_s=1.0, leaves_s=14.0, enters=(-4.9, 2.0), exits=(0.5, 4.9))
+    seen = [one for (one,) in poses(Scenario(people=(person,), robot=CORNER), 30.0)]
+    assert seen[49] is None
+    first, inside = there(seen[50]), [pose for pose in seen if pose is not None]
+    assert (first.x, first.y) == pytest.approx((-5.4, 2.0), abs=0.05)
+    assert seen[-1] is None
+    last = inside[-1]
+    assert (last.x, last.y) == pytest.approx((0.5, 5.4), abs=0.1)
+    steps = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(inside)]
+    assert max(steps) < 1.3 * 0.75 * STEP_S + 1e-9
+    # In the outer walls' plane they are within a door, nowhere else.
+    for pose in inside:
+        if max(abs(pose.x), abs(pose.y)) > 4.6:
+            assert min(math.hypot(pose.y - 2.0, pose.x + 4.9), math.hypot(pose.x - 0.5, pose.y - 4.9)) < 0.65
+
+
+def test_without_a_door_of_their_own_people_take_the_nearest() -> None:
+    person = dataclasses.replace(YIELDS, route=((-3.5, 1, 0), (2, 1, 0)), arrives_s=2.0)
+    seen = [one for (one,) in poses(Scenario(people=(person,), robot=CORNER), 4.0)]
+    first = next(pose for pose in seen if pose is not None)
+    assert (first.x, first.y) == pytest.approx((-5.4, 1.0), abs=0.05)
+
+
+def test_two_who_walk_at_each_other_give_way() -> None:
+    one, other = (dataclasses.replace(YIELDS, route=((s * 3, 0, 0), (-s * 3, 0, 900))) for s in (-1, 1))
+    seen = poses(Scenario(people=(one, other), robot=CORNER), 14.0)
+    gaps = [math.dist((there(a).x, there(a).y), (there(b).x, there(b).y)) for a, b in seen]
+    assert min(gaps) > 0.26 * 0.9
+    assert there(seen[-1][0]).x > 2.8
+    assert there(seen[-1][1]).x < -2.8
+
+
+def test_who_yields_walks_round_somebody_on_a_timetable() -> None:
+    walker = dataclasses.replace(YIELDS, route=((-3, 0, 0), (3, 0, 900)))
+    rail = Person(route=((3, 0.02, 0), (-3, 0.02, 900)), speed=0.5)
+    seen = poses(Scenario(people=(rail, walker), robot=CORNER), 12.0)
+    assert max(abs(there(a).y - 0.02) for a, _ in seen) < 1e-9
+    assert min(math.dist((there(a).x, there(a).y), (there(b).x, there(b).y)) for a, b in seen) > 0.26 * 0.9
+    assert there(seen[-1][1]).x > 2.8
+
+
+def test_a_group_steps_aside_for_the_robot_and_comes_back() -> None:
+    group = Group(x=1.0, y=0.0, size=4, radius=0.5, behaviour="social_force").members()
+    arena = Arena(Scenario(people=group, robot=Robot(x=-1.5)), 0)
+    homes = [person.route[0][:2] for person in group]
+
+    def strayed() -> float:
+        return max(math.dist((p.x, p.y), home) for p, home in zip(arena.truth().people, homes, strict=True) if p)
+
+    assert strayed() < 0.05
+    while arena.truth().robot[0] < 1.0:
+        arena.command(Twist(0.3, 0.0))
+        arena.step()
+    assert strayed() > 0.15
+    while arena.truth().robot[0] < 4.0:
+        arena.command(Twist(0.5, 0.0))
+        arena.step()
+    assert arena.contacts.person == 0
+    assert strayed() < 0.1
+
+
+@pytest.mark.parametrize(("reaction", "least", "most"), [("approach", 1.0, 1.35), ("block", 0.85, 1.2)])
+def test_some_come_up_to_the_robot_or_stand_in_its_way(reaction: str, least: float, most: float) -> None:
+    person = dataclasses.replace(YIELDS, route=((3, -3, 0), (3, 3, 0)), reaction=reaction)
+    robot = (0.0, 0.0, 0.3)
+    pose = there(poses(Scenario(people=(person,)), 15.0, robot)[-1][0])
+    assert least < math.hypot(pose.x, pose.y) < most
+    assert abs(math.remainder(pose.yaw - math.atan2(-pose.y, -pose.x), math.tau)) < 0.1
+    assert pose.swing < 0.2
+    if reaction == "block":
+        assert math.atan2(pose.y, pose.x) == pytest.approx(0.3, abs=0.1)
+
+
+def test_nobody_is_drawn_to_a_robot_behind_a_wall() -> None:
+    person = dataclasses.replace(YIELDS, route=((2, 0, 0),), reaction="approach")
+    scenario = Scenario(people=(person,), walls=(Wall((1, -2), (1, 2)),))
+    pose = there(poses(scenario, 5.0, (0.0, 0.0, 0.0))[-1][0])
+    assert math.dist((pose.x, pose.y), (2, 0)) < 0.1
+
+
+def crowd_of(order: tuple[int, ...]) -> Scenario:
+    people = [dataclasses.replace(YIELDS, route=((-3, 0.8 * n, 0), (3, -0.8 * n, 0))) for n in range(4)]
+    return Scenario(people=tuple(people[n] for n in order), robot=CORNER)
+
+
+def test_the_same_seed_gives_the_same_walks_and_another_seed_others() -> None:
+    one, again, other = (poses(crowd_of((0, 1, 2, 3)), 6.0, seed=seed)[-1] for seed in (3, 3, 4))
+    assert one == again
+    assert one != other
+
+
+def test_frames_that_come_late_show_people_where_they_were() -> None:
+    late = Scenario(people=(YIELDS,), robot=CORNER, camera=Camera(latency_s=0.4))
+    prompt, delayed = Arena(dataclasses.replace(late, camera=Camera()), 0), Arena(late, 0)
+    for _ in range(100):
+        prompt.step()
+        delayed.step()
+    was = prompt.frame().truth
+    for _ in range(20):
+        delayed.step()
+    frame = delayed.frame()
+    assert frame.stamp == was.stamp == 2.0
+    assert frame.truth.people == was.people
+
+
+def test_a_crowd_in_a_furnished_room_stays_inside_and_out_of_the_furniture() -> None:
+    random = np.random.default_rng(5)
+    furniture = tuple(Furniture("pillar", x, y) for x, y in ((-2, -2), (0, 2.5), (2, -1.5), (2.5, 2)))
+    people = tuple(
+        Person(
+            route=tuple(
+                (float(x), float(y), 0.5)
+                for x, y in random.permutation(
+                    [(-3.5, -3.5), (3.5, 3.5), (-3.5, 3.5), (3.5, -3.5), (0, 0.5), (-1, -3.5), (1, 4.0), (-3.5, 0.5)]
+                )[:4]
+            ),
+            behaviour="social_force",
+            speed=float(random.uniform(0.4, 1.0)),
+        )
+        for _ in range(8)
+    )
+    scenario = Scenario(people=people, furniture=furniture, robot=Robot(x=4.5, y=0.0, yaw=1.0))
+    for step in poses(scenario, 30.0, (4.5, 0.0, 1.0)):
+        for pose in step:
+            assert max(abs(there(pose).x), abs(there(pose).y)) < 4.9 - 0.1
+            assert all(math.dist((there(pose).x, there(pose).y), (f.x, f.y)) > 0.15 + 0.1 for f in furniture)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("behaviour = 'fly'", "people[0].behaviour: got 'fly', want one of route, social_force"),
+        ("reaction = 'flee'", "people[0].reaction: got 'flee', want one of avoid, ignore, approach, block"),
+        ("reaction = 'block'", "people[0].reaction: got 'block', want behaviour = \"social_force\" with it"),
+        ("enters = [4.9, 1]", "people[0].enters: got (4.9, 1.0), want behaviour"),
+        (
+            "behaviour = 'social_force'\nexits = [4.0, 1.0]",
+            "people[0].exits: got [4.0, 1.0], want [x, y] on an outer wall: the one or the other ±4.9",
+        ),
+        ("behaviour = 'social_force'\nenters = [4.9]", "people[0].enters: got [4.9], want [x, y] on an outer wall"),
+        (
+            "behaviour = 'social_force'\n"
+            "[[walls]]\nstart = [0, 2]\nend = [4.9, 2]\n[[walls]]\nstart = [0, 2]\nend = [0, 4.9]",
+            "people[0].route[1]: no way leads there from the first corner, want doors of at least 0.56 m",
+        ),
+        (
+            "behaviour = 'social_force'\n[[furniture]]\nkind = 'pillar'\nx = 3.0\ny = 1.4",
+            "people[0].route[0]: is 0.25 m from furniture[0] (pillar), want at least 0.35 m",
+        ),
+        ("sits = true", "people[0].sits: got true with 2 corners, want a route of one corner"),
+        ("[[groups]]\nx = 1", "groups[0].y: missing"),
+        ("[[groups]]\nx = 1\ny = 4", "groups[0], one of its people.route[0]"),
+        ("[[groups]]\nx = 1\ny = 2\nsize = 40", "groups[0].size: got 40, want a number in 2 … 12"),
+        ("[[groups]]\nx = 1\ny = 2\ncount = 4", "groups[0].count: unknown key, want one of x, y, size"),
+    ],
+)
+def test_what_people_cannot_do_is_refused_by_its_key(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("[[people]]\nroute = [[3, 1, 0], [3, 3, 0]]\n" + text, encoding="utf-8")
+    with pytest.raises(ScenarioError) as refused:
+        Scenario.load(path)
+    assert str(refused.value).startswith(f"mine.toml: {message}"), str(refused.value)
+
+
+def test_a_group_in_a_file_becomes_people_who_look_at_its_middle(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("[[people]]\nroute = [[3, 1, 0]]\n[[groups]]\nx = -2\ny = 1\nsize = 5\nradius = 0.7\n")
+    people = Scenario.load(path).people
+    assert len(people) == 6
+    for person in people[1:]:
+        x, y, _ = person.route[0]
+        assert math.dist((x, y), (-2, 1)) == pytest.approx(0.7)
+        assert (x + 0.7 * math.cos(person.facing), y + 0.7 * math.sin(person.facing)) == pytest.approx((-2, 1))
+
+
+def test_a_larger_room_has_its_doors_farther_out() -> None:
+    person = dataclasses.replace(YIELDS, arrives_s=0.5, enters=(0.0, -8.0))
+    seen = [one for (one,) in poses(Scenario(people=(person,), room=Room(8.0), robot=CORNER), 1.0)]
+    first = next(pose for pose in seen if pose is not None)
+    assert (first.x, first.y) == pytest.approx((0.0, -8.5), abs=0.05)

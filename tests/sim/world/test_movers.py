@@ -1,0 +1,84 @@
+"""Furniture that moves is seen, felt and walked round where it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limo_sim.run.arena import Arena
+from limo_sim.world.crowd import STEP_S, Crowd
+from limo_sim.world.movers import Movers
+from limo_sim.world.scenario import Camera, Mover, Person, Robot, Scenario
+from limo_sim.world.schema import ScenarioError
+
+TROLLEY = Scenario(movers=(Mover("trolley", ((2.0, -1.0, 0), (2.0, 1.0, 0)), 0.5),))
+
+
+def test_a_mover_keeps_its_timetable() -> None:
+    for time, y in ((0.0, -1.0), (2.0, 0.0), (4.0, 1.0), (6.0, 0.0), (10.0, 0.0)):
+        (piece,) = Movers(TROLLEY.movers).at(time)
+        assert (piece.x, piece.y) == pytest.approx((2.0, y))
+
+
+def test_camera_and_lidar_see_a_mover_where_it_was_when_they_looked() -> None:
+    scenario = dataclasses.replace(TROLLEY, camera=Camera(latency_s=0.4))
+    arena = Arena(scenario, 0)
+    while arena.time < 2.4 - 1e-9:
+        arena.step()
+    frame, scan = arena.frame(), arena.scan()
+    assert frame.stamp == pytest.approx(2.0)
+    # Long side along y: the trolley drives sideways to the camera, 0.17 m deep.
+    assert frame.depth[200:280, 320].min() == pytest.approx(2.0 - 0.17 - 0.084, abs=0.03)
+    angles = np.linspace(-2.0, 2.0, 292)
+    hit = scan.ranges < 2.5
+    assert np.median(np.sin(angles[hit]) * scan.ranges[hit]) == pytest.approx(0.5 * (scan.stamp - 2.0), abs=0.1)
+
+
+def test_a_mover_pushes_the_robot_aside_which_counts_as_a_contact() -> None:
+    arena = Arena(Scenario(movers=(Mover("trolley", ((1.0, 0.05, 0), (-1.0, 0.05, 0)), 0.4),)), 0)
+    while arena.time < 4.0:
+        arena.step()
+    assert arena.contacts.wall == 1
+    assert arena.contacts.person == 0
+    assert arena.truth().robot[0] < -0.3
+
+
+def test_who_yields_walks_round_a_mover() -> None:
+    person = Person(route=((-1.0, 0.03, 0), (4.0, 0.03, 900)), behaviour="social_force", speed=0.7)
+    scenario = dataclasses.replace(
+        TROLLEY, people=(person,), robot=Robot(x=-4), movers=(Mover("trolley", ((4.2, 0, 0), (-2.0, 0, 0)), 0.4),)
+    )
+    scenario.check()
+    crowd, movers = Crowd(scenario, 0), Movers(scenario.movers)
+    nearest = math.inf
+    for step in range(1, 500):
+        crowd.advance(step * STEP_S, (-4.0, 0.0, 0.0))
+        pose, (piece,) = crowd.poses[0], movers.at(step * STEP_S)
+        assert pose is not None
+        nearest = min(nearest, math.dist((pose.x, pose.y), (piece.x, piece.y)))
+    assert nearest > 0.17 + 0.1
+    assert pose is not None
+    assert pose.x > 3.8
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("kind = 'sofa'\nroute = [[2, 0, 0]]", "movers[0].kind: got 'sofa', want one of pillar"),
+        ("kind = 'trolley'", "movers[0].route: missing"),
+        ("kind = 'trolley'\nroute = [[2, 0, 0]]\nspeed = 9", "movers[0].speed: got 9.0, want a number in 0.05 … 2"),
+        ("kind = 'trolley'\nroute = [[2, 0, 0], [2, 4.6, 0]]", "movers[0].route[1]: (2, 4.6) is in a wall"),
+        ("kind = 'trolley'\nroute = [[0.3, 0, 0]]", "movers[0].route[0]: is 0.00 m from the robot's centre"),
+        ("kind = 'chair'\nroute = [[2, 0, 0]]\n[walls_texture]\nkind = 'silk'", "walls_texture.kind: got 'silk'"),
+    ],
+)
+def test_movers_that_do_not_fit_are_refused_by_their_key(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("[[movers]]\n" + text, encoding="utf-8")
+    with pytest.raises(ScenarioError) as refused:
+        Scenario.load(path)
+    assert str(refused.value).startswith(f"mine.toml: {message}"), str(refused.value)

@@ -1,0 +1,156 @@
+"""People push each other and keep from walls as the paper of 1995 says."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_sim.world.crowd import STEP_S, Crowd
+from limo_sim.world.scenario import Person, Robot, Room, Scenario, Wall
+from limo_sim.world.social_force import F64, People, SocialForce, acceleration
+
+MODEL = SocialForce()
+ADULT = MODEL.adult_m
+FREE = np.full((1, 1, 2), np.inf)
+
+
+def two(at: tuple[float, float], velocity: tuple[float, float], wanted: tuple[float, float] = (1.0, 0.0)) -> People:
+    """Return a person at `at` who looks along x, and another at the origin with a velocity."""
+    return People(
+        position=np.array([at, (0.0, 0.0)]),
+        velocity=np.array([wanted, velocity]),
+        radius=np.full(2, 0.13 * ADULT),
+        height=np.full(1, ADULT),
+        wanted=np.array([wanted]),
+        ahead=np.array([[1.0, 0.0]]),
+    )
+
+
+def potential(at: F64, velocity: F64) -> float:
+    """Return V of equation (3), b of equation (4) [m²/s²]."""
+    step = velocity * 2.0
+    both = math.hypot(*at) + math.hypot(*(at - step))
+    return 2.1 * math.exp(-0.5 * math.sqrt(both**2 - step @ step) / 0.3)
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.9, 0.0), (-0.3, 1.1)])
+@pytest.mark.parametrize("at", [(-0.9, 0.3), (-1.4, -0.6), (-0.6, 0.02)])
+def test_people_are_pushed_down_the_slope_of_the_papers_potential(
+    at: tuple[float, float], velocity: tuple[float, float]
+) -> None:
+    place, pace, tiny = np.array(at), np.array(velocity), 1e-6
+    downhill = [
+        -(potential(place + tiny * axis, pace) - potential(place - tiny * axis, pace)) / (2 * tiny)
+        for axis in np.eye(2)
+    ]
+    felt = acceleration(two(at, velocity), FREE, np.zeros((1, 2), bool), MODEL)[0]
+    in_sight = -downhill[0] >= math.cos(math.radians(100.0)) * math.hypot(*downhill)
+    np.testing.assert_allclose(felt, np.array(downhill) * (1.0 if in_sight else 0.5), rtol=1e-5)
+
+
+def test_what_is_behind_counts_half_and_what_a_wall_hides_not_at_all() -> None:
+    before = acceleration(two((-0.8, 0.0), (0.0, 0.0)), FREE, np.zeros((1, 2), bool), MODEL)[0]
+    behind = acceleration(two((0.8, 0.0), (0.0, 0.0)), FREE, np.zeros((1, 2), bool), MODEL)[0]
+    hidden = acceleration(two((-0.8, 0.0), (0.0, 0.0)), FREE, np.array([[False, True]]), MODEL)[0]
+    assert before[0] == pytest.approx(-7.0 * math.exp(-0.8 / 0.3))
+    assert behind[0] == pytest.approx(-0.5 * before[0])
+    assert hidden.tolist() == [0.0, 0.0]
+
+
+def test_a_wall_pushes_with_the_papers_strength_and_a_child_feels_it_in_proportion() -> None:
+    for height in (ADULT, ADULT / 2):
+        scale = height / ADULT
+        rest = np.zeros((1, 2))
+        alone = People(rest, rest, np.array([0.13 * height]), np.array([height]), rest, np.array([[1.0, 0.0]]))
+        felt = acceleration(alone, np.array([[[0.0, 0.4 * scale]]]), np.zeros((1, 1), bool), MODEL)[0]
+        np.testing.assert_allclose(felt, [0.0, scale * 50.0 * math.exp(-2.0)])
+
+
+def test_bodies_that_touch_are_pushed_apart() -> None:
+    near, touching = (
+        acceleration(two((-gap, 0.0), (0.0, 0.0)), FREE, np.zeros((1, 2), bool), MODEL)[0][0]
+        for gap in (0.26 * ADULT + 0.01, 0.26 * ADULT - 0.01)
+    )
+    assert touching - near == pytest.approx(-15.0, abs=1.0)
+
+
+def walked(scenario: Scenario, seconds: float, robot: tuple[float, float, float], seed: int = 0) -> F64:
+    """Return everybody's places, float64 (steps, people, 2)."""
+    scenario.check()
+    crowd = Crowd(scenario, seed)
+    places = [crowd.poses]
+    for step in range(1, round(seconds / STEP_S) + 1):
+        crowd.advance(step * STEP_S, robot)
+        places.append(crowd.poses)
+    return np.array([[(pose.x, pose.y) for pose in poses if pose is not None] for poses in places])
+
+
+def speeds(places: F64) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(np.diff(places, axis=0), axis=2)) / STEP_S
+
+
+def test_somebody_alone_reaches_the_wanted_speed_in_the_papers_half_second() -> None:
+    alone = Scenario(
+        people=(Person(route=((-3, 0, 0), (4, 0, 900)), speed=1.34, height=ADULT, behaviour="social_force"),),
+        robot=Robot(y=-4),
+    )
+    places = walked(alone, 3.0, (0.0, -4.0, 0.0))
+    times = STEP_S * np.arange(1, 126)
+    assert np.abs(speeds(places)[:125, 0] - 1.34 * (1 - np.exp(-times / 0.5))).max() < 0.08
+    assert np.abs(places[..., 1]).max() < 0.1
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_two_streams_pass_a_door_by_turns(seed: int) -> None:
+    """As in the paper's figure 2: where one has got through others follow, until the other side gets a chance."""
+    half, side = 9.0, []
+    people = []
+    for index in range(9):
+        row, column = divmod(index, 3)
+        for sign in (-1, 1):
+            start = (sign * (2.5 + 0.9 * row), 0.9 * (column - 1), 0)
+            through = (-sign * 6.0, 1.5 * (column - 1), 0)
+            away = (-sign * 7.5, 1.5 * (column - 1) + 0.6 * row, 900)
+            people.append(Person(route=(start, through, away), speed=1.34, height=1.75, behaviour="social_force"))
+            side.append(sign)
+    door = Wall((0, -half), (0, -0.6)), Wall((0, 0.6), (0, half))
+    scenario = Scenario(people=tuple(people), walls=door, room=Room(half), robot=Robot(x=-8, y=-8))
+    places = walked(scenario, 45.0, (-8.0, -8.0, 0.0), seed)
+
+    across = places[..., 0] * -np.array(side) > 0
+    assert across[-1].all()
+    order = [side[index] for index in np.argsort(across.argmax(axis=0))]
+    turns = sum(one != other for one, other in pairwise(order))
+    # Of 18 people in random order 9 on average follow one from the other side, and 5 or fewer in 3 of 100 orders.
+    assert 1 <= turns <= 5
+    gaps = np.hypot(*np.moveaxis(places[:, :, None] - places[:, None], 3, 0)) + 9.0 * np.eye(len(people))
+    # Shoulders overlap by no more than a tenth of their breadth.
+    assert gaps.min() > 0.9 * 0.26 * 1.75
+    assert speeds(places).max() < 1.3 * 1.34 + 1e-6
+    in_door = np.abs(places[..., 0]) < 0.05
+    assert np.abs(places[..., 1][in_door]).max() < 0.6 - 0.13 * 1.75
+
+
+@pytest.mark.parametrize(("height", "speed"), [(0.9, 0.7), (1.75, 1.34)])
+@pytest.mark.parametrize("aside", [0.0, 0.05, -0.2])
+def test_somebody_who_meets_a_standing_robot_walks_round_it_and_on(height: float, speed: float, aside: float) -> None:
+    person = Person(route=((-3, aside, 0), (3, aside, 900)), speed=speed, height=height, behaviour="social_force")
+    places = walked(Scenario(people=(person,)), 16.0, (0.0, 0.0, 0.0))[:, 0]
+    gap = np.hypot(*places.T).min() - person.radius
+    assert gap > 0.19 + 0.05
+    assert math.dist(places[-1], (3, aside)) < 0.1
+    # No farther off the line than there is need for, and at the wanted speed before and behind.
+    assert np.abs(places[:, 1]).max() < 1.3
+    pace = speeds(places[:, None])[:, 0]
+    behind = np.flatnonzero(places[:-1, 0] > 1.2)
+    assert pace[behind][:10].mean() == pytest.approx(speed, rel=0.1)
+
+
+def test_somebody_who_ignores_the_robot_walks_straight_through_its_place() -> None:
+    person = Person(route=((-3, 0, 0), (3, 0, 900)), behaviour="social_force", reaction="ignore")
+    places = walked(Scenario(people=(person,)), 8.0, (0.0, 0.0, 0.0))[:, 0]
+    assert np.hypot(*places.T).min() < 0.1

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from limo_hog.follow.tracks.trust import Trust
 from numpy.typing import NDArray
 from tests.follow.views import boxes, flat, look
 
@@ -201,15 +200,6 @@ def test_the_distance_to_a_box_with_a_range_is_that_of_two_points_in_the_plane(t
     seen = Measurement(0.2 + turn, range_, 120, 0.0, 1.0)
     there = [(r * math.cos(b), r * math.sin(b)) for b, r in ((0.2, 2.0), (0.2 + turn, range_))]
     assert distance_to(person, seen, pose) == pytest.approx(math.dist(*there))
-
-
-def test_misses_are_counted_since_the_last_evidence() -> None:
-    person = initiate(1, Measurement(0.0, 2.0, 120, 0.0, 1.0), 0.0, POSE, NOISE, UnknownRange())
-    counted = []
-    for evidence in (0.5, 0.0, 0.0, 0.0, 1.0, 0.0):
-        person = Trust().update_trust(person, evidence)
-        counted.append((person.misses, person.age))
-    assert counted == [(0, 2), (1, 3), (2, 4), (3, 5), (0, 6), (1, 7)]
 
 
 def test_clothes_of_which_one_number_is_missing_are_unknown() -> None:

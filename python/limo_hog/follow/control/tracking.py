@@ -202,22 +202,22 @@ class TrackingController:
         other = any(self.selection.is_stranger(one, tracks, choice, appearance) for one in tracks.in_view)
         lost = choice.measured is not None
         if lost and not other and state.ground is not None and state.known is not None and observation.scan is not None:
-            now = observation.now
-            if now - state.known.stamp < self.lookout.give_up_s:
-                return self._look_round(state, state.known, state.ground, observation.scan, now)
+            if observation.now - state.known.stamp < self.lookout.give_up_s:
+                return self._look_round(state, state.known, state.ground, observation.scan, observation)
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
         return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
 
     def _look_round(
-        self, state: TrackingState, known: Track, ground: Ground, scan: Scan, now: float
+        self, state: TrackingState, known: Track, ground: Ground, scan: Scan, observation: Observation
     ) -> Decision[TrackingState]:
+        now = observation.now
         pose = pose_at(state.tracks.poses, now)
         hunt = state.hunt or self.lookout.begin(known, state.choice.number or 0, self.grid, ground)
         hunt = self.lookout.step(hunt, scan, now, pose, self.grid, ground)
         points, turn = scan_points(scan, self.robot), Twist(0.0, state.side * self.search.rate)
         twist, reason = self.lookout.command(hunt, pose, points, self.detour, self.robot, turn)
         places, way = self.lookout.ways(hunt, pose)
-        belief = Belief(None, (), places, way)
+        belief = Belief(None, self._believed(state, observation), places, way)
         return Decision(twist, replace(state, hunt=hunt), Mode.LOST, reason, belief=belief)
 
     def _aim(

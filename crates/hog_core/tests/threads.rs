@@ -7,7 +7,7 @@ use common::{Detector, Picture};
 use hog_core::pyramid::Pyramid;
 use hog_core::{Grouping, Hog, Interrupt, Search};
 
-const SEARCH: Search = Search { hit_threshold: -0.5, win_stride: (8, 8), padding: (8, 8) };
+const SEARCH: Search = Search { hit_threshold: -3.0, win_stride: (8, 8), padding: (8, 8) };
 
 #[test]
 fn threads_that_share_a_detector_find_what_one_alone_finds() {

@@ -201,9 +201,16 @@ class TrackingController:
         tracks, choice, appearance = state.tracks, state.choice, self.tracker.association.appearance
         other = any(self.selection.is_stranger(one, tracks, choice, appearance) for one in tracks.in_view)
         lost = choice.measured is not None
-        if lost and not other and state.ground is not None and state.known is not None and observation.scan is not None:
-            if observation.now - state.known.stamp < self.lookout.give_up_s:
-                return self._look_round(state, state.known, state.ground, observation.scan, observation)
+        known, ground, scan = state.known, state.ground, observation.scan
+        if (
+            lost
+            and not other
+            and known is not None
+            and ground is not None
+            and scan is not None
+            and observation.now - known.stamp < self.lookout.give_up_s
+        ):
+            return self._look_round(state, known, ground, scan, observation)
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
         return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
 

@@ -101,7 +101,7 @@ def test_every_reset_of_random_makes_up_another_scenario(monkeypatch: pytest.Mon
         numbers.append(number)
         return Scenario()
 
-    monkeypatch.setattr("limo_sim.env.made_up", noted)
+    monkeypatch.setattr("limo_sim.env.first.made_up", noted)
     monkeypatch.setattr(LimoFollow, "_observe", lambda _: {})
     env = LimoFollow("random")
     for _ in range(300):

@@ -31,7 +31,7 @@ FOLLOW, ROS2, SIM = "python/limo_hog/follow", "python/limo_hog/ros2", "sim/limo_
 ROOMS: dict[str, tuple[list[str], list[str]]] = {
     "safety": (
         [f"{FOLLOW}/safety/*.py", f"{FOLLOW}/sense/clearance.py"],
-        ["tests/follow/test_safety.py", "tests/follow/test_clearance.py", "tests/follow/test_pipeline.py"],
+        ["tests/follow/safety/test_safety.py", "tests/follow/sense/test_clearance.py", "tests/follow/test_pipeline.py"],
     ),
     "score": (
         [f"{SIM}/run/score.py", f"{SIM}/run/matching.py"],
@@ -41,33 +41,50 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
         [f"{FOLLOW}/control/*.py", f"{FOLLOW}/twist.py", f"{FOLLOW}/zones.py"],
         [
             *(
-                "tests/follow/test_steer.py",
-                "tests/follow/test_workshop_controllers.py",
-                "tests/follow/test_clearance.py",
+                "tests/follow/control/test_steer.py",
+                "tests/follow/control/test_workshop_controllers.py",
+                "tests/follow/sense/test_clearance.py",
             ),
-            *("tests/follow/test_tracking.py", "tests/follow/test_people.py", "tests/follow/test_pipeline.py"),
+            *(
+                "tests/follow/control/test_tracking.py",
+                "tests/follow/tracks/test_people.py",
+                "tests/follow/test_pipeline.py",
+            ),
         ],
     ),
     "tracks": (
         [f"{FOLLOW}/tracks/*.py"],
         [
-            *("tests/follow/test_kalman.py", "tests/follow/test_poses.py", "tests/follow/test_people.py"),
-            "tests/follow/test_tracking.py",
+            *(
+                "tests/follow/tracks/test_kalman.py",
+                "tests/follow/tracks/test_poses.py",
+                "tests/follow/tracks/test_people.py",
+            ),
+            "tests/follow/control/test_tracking.py",
         ],
     ),
     "sense": (
         [f"{FOLLOW}/sense/{name}.py" for name in ("appearance", "measurement", "ranging", "region", "visibility")],
         [
-            *("tests/follow/test_appearance.py", "tests/follow/test_region.py", "tests/follow/test_people.py"),
-            *("tests/follow/test_workshop_controllers.py", "tests/follow/test_tracking.py"),
+            *(
+                "tests/follow/sense/test_appearance.py",
+                "tests/follow/sense/test_region.py",
+                "tests/follow/tracks/test_people.py",
+            ),
+            "tests/follow/control/test_workshop_controllers.py",
+            "tests/follow/control/test_tracking.py",
             "tests/follow/test_pipeline.py",
         ],
     ),
     "run": (
         [f"{SIM}/run/{name}.py" for name in ("arena", "episode", "detector_faults", "sweep")],
         [
-            *("tests/sim/run/test_arena.py", "tests/sim/run/test_episode.py", "tests/sim/run/test_detector_faults.py"),
-            *("tests/sim/run/test_score_sweep.py", "tests/sim/run/test_score.py", "tests/sim/world/test_robot.py"),
+            "tests/sim/run/test_arena.py",
+            "tests/sim/run/test_episode.py",
+            "tests/sim/run/test_detector_faults.py",
+            "tests/sim/run/test_score_sweep.py",
+            "tests/sim/run/test_score.py",
+            "tests/sim/world/test_robot.py",
             "tests/sim/run/test_unchanged.py",
         ],
     ),

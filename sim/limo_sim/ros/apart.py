@@ -26,7 +26,8 @@ from typing import Any
 
 from limo_hog.exceptions import LimoHogError
 from limo_sim.ros.lockstep.patience import DiedError, HungError
-from limo_sim.ros.lockstep.world import Log, Past, StubError, World
+from limo_sim.ros.lockstep.records import Log, Past, StubError
+from limo_sim.ros.lockstep.world import World
 from limo_sim.ros.script import Ended, finished, run_script
 from limo_sim.run.episode import Moment
 from limo_sim.world.scenario import Scenario

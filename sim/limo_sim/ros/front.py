@@ -10,8 +10,9 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.lockstep.threads import in_turns
-from limo_sim.ros.lockstep.world import StubError, World
+from limo_sim.ros.lockstep.world import World
 from limo_sim.ros.offer import offered
 from limo_sim.ros.rclpy_stub import context
 

@@ -13,9 +13,10 @@ from limo_hog.ros2 import names
 from limo_sim.ros.front import in_front
 from limo_sim.ros.launching.programs import SUFFIX, launch
 from limo_sim.ros.lockstep.patience import DiedError, HungError
+from limo_sim.ros.lockstep.records import Log, StubError
 from limo_sim.ros.lockstep.turns import ExternalShutdownException, RunOver
 from limo_sim.ros.lockstep.windows import watched_cv2
-from limo_sim.ros.lockstep.world import Log, StubError, World
+from limo_sim.ros.lockstep.world import World
 from limo_sim.ros.rclpy_stub.context import Context
 from limo_sim.run.episode import Episode, Moment
 from limo_sim.run.score import ScoreCard, score

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_sim.ros.lockstep.calls import Calls
-from limo_sim.ros.lockstep.world import LOGGER, Command, Found, Shown, World
+from limo_sim.ros.lockstep.records import Command, Found, Shown
+from limo_sim.ros.lockstep.world import LOGGER, World
 from limo_sim.ros.script import Outcome, run_script
 from limo_sim.run.episode import Moment
 from limo_sim.world.scenario import Person, Scenario

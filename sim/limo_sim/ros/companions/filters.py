@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from limo_sim.ros.interfaces import Message
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.node import Node
 from limo_sim.ros.rclpy_stub.qos import QoSProfile
 

@@ -11,7 +11,7 @@ import numpy as np
 from limo_hog.ros2 import names
 from limo_sim.ros.companions.quaternions import IDENTITY, Rigid, slerp
 from limo_sim.ros.interfaces import Message, message_class
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.clock import Duration, Time
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import ReentrantCallbackGroup

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from limo_sim.ros.launching.packages import share_directory
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.records import StubError
 
 #: Launch arguments by name.
 Configurations = dict[str, str]

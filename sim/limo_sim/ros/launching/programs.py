@@ -21,7 +21,8 @@ from limo_sim.ros.launching.description import (
     text_of,
 )
 from limo_sim.ros.launching.packages import Executable, executable, look_around
-from limo_sim.ros.lockstep.world import LOGGER, StubError, World
+from limo_sim.ros.lockstep.records import StubError
+from limo_sim.ros.lockstep.world import LOGGER, World
 from limo_sim.ros.rclpy_stub.context import Context, RosArguments, read_parameters
 
 #: A launch file's name ends so.

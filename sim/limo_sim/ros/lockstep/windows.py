@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from limo_hog.cv2_api.install import install_into_cv2
 from limo_hog.detections import Detections
 from limo_hog.extras import needed
-from limo_sim.ros.lockstep.world import Found, World
+from limo_sim.ros.lockstep.records import Found
+from limo_sim.ros.lockstep.world import World
 
 with needed(by="limo-hog run", what="OpenCV", install="'limo-hog[cv]'"):
     import cv2

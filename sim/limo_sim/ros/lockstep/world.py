@@ -11,16 +11,14 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
-from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.pipeline import CONTROL_PERIOD
 from limo_hog.follow.twist import Twist
@@ -29,6 +27,7 @@ from limo_hog.ros2.messages import to_twist
 from limo_sim.ros.interfaces import Message, from_wire
 from limo_sim.ros.lockstep.calls import PUBLISHED, Calls, nearest_topic
 from limo_sim.ros.lockstep.patience import Patience
+from limo_sim.ros.lockstep.records import Callback, Command, Found, Log, Past, Reader, Shown, StubError
 from limo_sim.ros.lockstep.turns import RunOver, ThreadEnded, Turns
 from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
@@ -40,77 +39,6 @@ from limo_sim.world.scenario import Scenario
 UNHEARD_AFTER = 2.0
 #: The name under which the run itself logs.
 LOGGER = "limo-hog"
-
-#: Takes what a script logs: time [s], level, logger, message.
-Log = Callable[[float, str, str, str], None]
-
-
-class StubError(LimoHogError):
-    """A script uses something that `limo-hog run` does not offer, or sends a command that is not finite."""
-
-
-class Reader(Protocol):
-    """A subscription; one that `keeps` is given what was published before it."""
-
-    topic: str
-    keeps: bool
-
-    def offer(self, message: Message) -> None:
-        """Queue a message, which is the reader's own."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """What the script's HOG detector found in one image, in pixels of that image."""
-
-    shape: tuple[int, ...]
-    detections: Detections
-    ms: float
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A command the script sent, when [s], and from which line of the script."""
-
-    time: float
-    twist: Twist
-    line: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Shown:
-    """A picture in a window, and when [s]."""
-
-    time: float
-    picture: NDArray[np.uint8]
-
-
-@dataclass(frozen=True, slots=True)
-class Callback:
-    """When a callback began [s], how long it slept [s of simulated time], and how long it took [s of wall time]."""
-
-    time: float
-    slept: float
-    worked: float
-
-
-@dataclass
-class Past:
-    """What is known of a run that another process began: enough to go on with it.
-
-    Attributes
-    ----------
-    steps, commands
-        Every control period, and every command.
-    asked, target_distance
-        As `World` has them.
-    """
-
-    steps: list[Step] = field(default_factory=list)
-    commands: list[Command] = field(default_factory=list)
-    asked: list[str] = field(default_factory=list)
-    target_distance: float | None = None
 
 
 class World:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from limo_sim.ros.lockstep.world import StubError, World
+from limo_sim.ros.lockstep.records import StubError
+from limo_sim.ros.lockstep.world import World
 
 
 @dataclass

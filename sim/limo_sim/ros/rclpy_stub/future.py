@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import Any
 
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.records import StubError
 
 
 class Future:

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.future import Future
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup

@@ -10,7 +10,7 @@ from typing import Any
 from limo_hog.ros2 import names
 from limo_sim.ros.interfaces import Message
 from limo_sim.ros.lockstep.calls import PUBLISHED
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.offered import Offered

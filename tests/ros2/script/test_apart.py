@@ -15,12 +15,12 @@ import pytest
 from limo_hog.cli.main import main
 from limo_sim.ros import apart
 from limo_sim.ros.apart import run_apart
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.script import Ended, run_script
 from limo_sim.run.episode import Moment
 from limo_sim.world.scenario import Scenario
 
-from .conftest import HEAD, STANDING, node
+from ..conftest import HEAD, STANDING, node
 from .test_run import DRIVE, FOLLOW
 
 #: Drives for ten images, then does something else.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from .conftest import Run
+from ..conftest import Run
 
 NODE = "import threading, time\nrclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\n"
 SERVICE = "from std_srvs.srv import Trigger\n"

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.test_people import NOISE, POSE, box, somebody
+from tests.follow.tracks.test_people import NOISE, POSE, box, somebody
 from tests.follow.views import FOCAL, HEIGHT, before_wall, flat
 
 from limo_hog.follow.sense.ranging import stands_out, top_row

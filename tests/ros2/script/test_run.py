@@ -14,13 +14,13 @@ import pytest
 
 from limo_hog.cli.main import main
 from limo_hog.ros2 import names
-from limo_sim.ros.lockstep.world import StubError
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.script import run_script, score_of
 from limo_sim.run.episode import Moment
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Person
 
-from .conftest import NOBODY, STANDING, Run, node
+from ..conftest import NOBODY, STANDING, Run, node
 
 DRIVE = "twist = Twist(); twist.linear.x = 0.2; self.pub.publish(twist)"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.follow.onnx_file import dark_cells
+from tests.follow.sense.onnx_file import dark_cells
 
 from limo_hog.detections import Detections
 from limo_hog.detector import PeopleDetector

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +155,9 @@ class Renderer:
         return [self._seen_of(piece, depth, camera) for piece in (*self._scenario.furniture, *movers)]
 
     def _seen_of(self, piece: Furniture, depth: F32, camera: CameraPose) -> Seen:
-        canvas = self._cast(camera, piece, self._sun.seen_from(camera))
+        model = self._model_of(piece)
+        bounds = _bounds(model, camera, piece)
+        canvas = self._cast(model, bounds, camera, self._sun.seen_from(camera))
         if canvas is None or not canvas.inside.any():
             return 0.0, None
         left, top, right, bottom = canvas.window
@@ -162,7 +165,7 @@ class Renderer:
         seen = np.count_nonzero(inside & (canvas.depth <= depth[top:bottom, left:right]))
         rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
         box = int(left + columns[0]), int(top + rows[0]), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
-        share = seen / np.count_nonzero(inside) * _share_inside(self._bounds(camera, piece))
+        share = seen / np.count_nonzero(inside) * _share_inside(bounds)
         return share, box if self._lens.is_plain else self._lens.box(box)
 
     def _picture(self, past: Past, age: float) -> U8:
@@ -220,13 +223,14 @@ class Renderer:
         self, image: U32 | None, depth: F32, camera: CameraPose, piece: Furniture, sun: Sun, *, hides: bool
     ) -> None:
         """Draw a piece; `hides`: whether there may be people behind it."""
-        if canvas := self._cast(camera, piece, sun):
-            self._blend(image, depth, canvas, self._model_of(piece)[1], _NO_PERSON if hides else None)
+        model = self._model_of(piece)
+        if canvas := self._cast(model, _bounds(model, camera, piece), camera, sun):
+            self._blend(image, depth, canvas, model.palette, _NO_PERSON if hides else None)
 
-    def _cast(self, camera: CameraPose, piece: Furniture, sun: Sun) -> Canvas | None:
+    def _cast(self, model: _Model, bounds: Bounds | None, camera: CameraPose, sun: Sun) -> Canvas | None:
         """Draw a piece by itself; None where all of it is outside of the image."""
-        solids = self._model_of(piece)[0]
-        window = _window(self._bounds(camera, piece))
+        solids = model.solids
+        window = _window(bounds)
         if window is None:
             return None
         canvas = Canvas(window, self._sheet, solids=len(solids))
@@ -238,11 +242,7 @@ class Renderer:
         canvas.finish()
         return canvas
 
-    def _bounds(self, camera: CameraPose, piece: Furniture) -> Bounds | None:
-        radius, height = self._model_of(piece)[2]
-        return upright_bounds(*camera.ahead_of(piece.x, piece.y), radius, 0.0, height)
-
-    def _model_of(self, piece: Furniture) -> tuple[list[Frustum | Box], U32, tuple[float, float]]:
+    def _model_of(self, piece: Furniture) -> _Model:
         # What moves is somewhere else in every frame.
         return self._models.get(piece) or _model(piece)
 
@@ -300,8 +300,20 @@ def _shade_floor(room: U8, depth: F32, at: tuple[float, float], radius: float) -
     patch[:] = np.rint(patch * (1.0 - _SHADOW * dark))
 
 
-def _model(piece: Furniture) -> tuple[list[Frustum | Box], U32, tuple[float, float]]:
-    """Solids of a piece where it stands, their colours, and the radius and height of all of it [m]."""
+class _Model(NamedTuple):
+    """A piece where it stands: its solids, their colours, and the radius and height of all of it [m]."""
+
+    solids: list[Frustum | Box]
+    palette: U32
+    extent: tuple[float, float]
+
+
+def _bounds(model: _Model, camera: CameraPose, piece: Furniture) -> Bounds | None:
+    radius, height = model.extent
+    return upright_bounds(*camera.ahead_of(piece.x, piece.y), radius, 0.0, height)
+
+
+def _model(piece: Furniture) -> _Model:
     cos, sin = math.cos(piece.yaw), math.sin(piece.yaw)
     solids: list[Frustum | Box] = []
     for solid in KINDS[piece.kind].solids:
@@ -310,7 +322,7 @@ def _model(piece: Furniture) -> tuple[list[Frustum | Box], U32, tuple[float, flo
             solids.append(dataclasses.replace(solid, x=x, y=y, yaw=solid.yaw + piece.yaw))
         else:
             solids.append(dataclasses.replace(solid, x=x, y=y))
-    return solids, _palette([solid.colour for solid in solids]), KINDS[piece.kind].extent
+    return _Model(solids, _palette([solid.colour for solid in solids]), KINDS[piece.kind].extent)
 
 
 def _bytes(pixels: U32) -> U8:

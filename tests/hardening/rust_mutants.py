@@ -33,6 +33,7 @@ PYRAMIDS = "pyramids_are"
 TESTS: list[tuple[str, list[str], int]] = [
     ("hog_core", [], 8),
     ("opencv", [], 8),
+    ("calls", [], 8),
     ("backends", ["--skip", PYRAMIDS], 8),
     ("backends", [PYRAMIDS], 2),
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -197,6 +198,8 @@ class Tracker:
         height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
         if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
             return person, tracks
+        # Walls and furniture that are known already are nobody's legs.
+        is_ground = None if ground is None else partial(grid.is_near_blocked, ground)
         now = person
         for returns in tracks.scans:
             # The track of an unseen person already contains the scans up to `felt`: each may count only once.
@@ -204,11 +207,7 @@ class Tracker:
                 # Legs continue a track; after a gap, whatever stands there could be taken for them.
                 break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
-                if ground is not None:
-                    # Walls and furniture that are known already are nobody's legs.
-                    known = grid.is_near_blocked(ground, returns.points)
-                    returns = replace(returns, points=returns.points[~known])
-                track = self.legs.update(now.track, returns, self.noise)
+                track = self.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = tuple(kept if one.number == person.number else one for one in tracks.people)

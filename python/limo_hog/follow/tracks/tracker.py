@@ -159,6 +159,8 @@ class Tracker:
             elif seen.window > window:
                 window, centre = seen.window, seen.middle
         clothes = self._clothes(person, seen)
+        fits = self.association.fits_size(person, seen)
+        worn, tall = seen.clothes if fits else None, seen.window if fits and seen.whole and seen.window else None
         evidence = self.existence.of_box(seen, recall)
         if person.confirmed and self.existence.is_solid(seen):
             # Near by, and on parts of the body, HOG's scores are low for people, too.
@@ -168,7 +170,8 @@ class Tracker:
         if seen.range is not None and track.stamp - person.measured > self.restart_s:
             track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, self.noise)
         fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
-        if fit.distance2 > self.association.gate:
+        strained = fit.distance2 > self.association.gate
+        if strained:
             place = self.association.same_place**2
             loose = track.covariance + np.diag([place, place, self.turn_speed**2, self.turn_speed**2])
             track = replace(track, covariance=loose)
@@ -180,6 +183,9 @@ class Tracker:
             window=window,
             centre=centre,
             clothes=clothes,
+            worn=worn,
+            tall=tall,
+            strained=strained or not fits,
         )
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:

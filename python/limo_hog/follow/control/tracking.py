@@ -163,10 +163,12 @@ class TrackingController:
 
         Returns the decision, and the person followed as of the newest stamp.
         """
-        appearance = self.tracker.association.appearance
         tracks, boxes = self.tracker.update(observation, state.tracks)
-        choice = self.selection.choose(tracks, state.choice, self.search.after_s, appearance)
+        before, choice = state.choice.measured, self.selection.choose(tracks, state.choice)
+        another = before is not None and (choice.measured or 0.0) - before > self.selection.reidentify_s
         state = self._map(replace(state, tracks=tracks, choice=choice), observation)
+        if choice.candidates:
+            return self._look_at(state, observation), None
         person = tracks.person(choice.number)
         if person is None:
             return self._search(state, observation), None
@@ -179,7 +181,7 @@ class TrackingController:
         lost_s = min(unseen_s, observation.now - person.felt)
         if lost_s <= self.tracker.scan_period_s:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
-            known = person.track if person.confirmed else state.known
+            known = person.track if person.confirmed and self._is_sure(person, choice) else state.known
             state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None)
             speed = math.hypot(*person.track.mean[2:])
             share = self.brisk_share if speed > state.brisk else self.brisk_share / 100
@@ -201,7 +203,7 @@ class TrackingController:
             in_view=unseen_s == 0,
             lost_s=lost_s,
         )
-        if appearance.is_other(choice.clothes, person.clothes):
+        if another:
             reason = "following another person: the lost one was not found"
         elif keeps > self.target_distance + self.steering.distance_tolerance and mode in (Mode.HOLD, Mode.FOLLOW):
             reason += ", further off than asked: nearer the camera would not show all of them"
@@ -278,21 +280,39 @@ class TrackingController:
         return replace(state, ground=self.grid.update(state.ground, scan, pose, people, depth_points, self.robot))
 
     def _search(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
-        tracks, choice, appearance = state.tracks, state.choice, self.tracker.association.appearance
-        other = any(self.selection.is_stranger(one, tracks, choice, appearance) for one in tracks.in_view)
+        tracks, choice = state.tracks, state.choice
+        other = any(self.selection.is_stranger(one, choice) for one in tracks.in_view)
         lost = choice.measured is not None
         known, ground, scan = state.known, state.ground, observation.scan
         if (
             lost
-            and not other
             and known is not None
             and ground is not None
             and scan is not None
             and observation.now - known.stamp < self.lookout.give_up_s
         ):
-            return self._look_round(state, known, ground, scan, observation)
+            decision = self._look_round(state, known, ground, scan, observation)
+            return replace(decision, reason=f"{decision.reason}: another is in view") if other else decision
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
         return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
+
+    def _look_at(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
+        """Stand and keep those in view of whom one is the person followed, until it shows which."""
+        likeness, tracks = state.choice.likeness, state.tracks
+        people = [one for one in tracks.people if one.number in state.choice.candidates]
+        pose = pose_at(tracks.poses, observation.now)
+        chances = [likeness.of(one.number) if likeness else 1.0 for one in people]
+        offs = [bearing_range(predict(one.track, observation.now, self.tracker.noise), pose)[0] for one in people]
+        off = sum(chance * off for chance, off in zip(chances, offs, strict=True)) / max(sum(chances), 1e-6)
+        limit = self.steering.max_angular
+        twist = Twist(0.0, min(max(self.steering.angular_gain * off, -limit), limit))
+        reason = f"not sure which of {len(people)} is the person followed"
+        belief = Belief(None, self._believed(state, observation))
+        return Decision(twist, replace(state, since_full=0), Mode.HOLD, reason, belief=belief)
+
+    def _is_sure(self, person: Person, choice: Choice) -> bool:
+        """Whether a track is the person followed, and not only the likeliest of those in view."""
+        return choice.likeness is None or choice.likeness.of(person.number) >= self.selection.identity.sure
 
     def _look_round(
         self, state: TrackingState, known: Track, ground: Ground, scan: Scan, observation: Observation
@@ -358,7 +378,7 @@ class TrackingController:
 
     def _believed(self, state: TrackingState, observation: Observation) -> tuple[Believed, ...]:
         """Return everyone tracked, in the base frame, as of the newest stamp."""
-        now, boxes = observation.now, dict(state.tracks.boxes)
+        now, boxes, likeness = observation.now, dict(state.tracks.boxes), state.choice.likeness
         pose = pose_at(state.tracks.poses, now)
         people = []
         for one in state.tracks.people:
@@ -374,6 +394,7 @@ class TrackingController:
                     speed * math.cos(heading),
                     speed * math.sin(heading),
                     boxes.get(one.number),
+                    None if likeness is None else likeness.of(one.number),
                 )
             )
         return tuple(people)
@@ -393,6 +414,9 @@ class TrackingController:
     def _region(self, person: Person, state: TrackingState, observation: Observation) -> Region | None:
         """Return where the person should be in the next frame; None to search all of it."""
         if state.since_full + 1 >= self.full_every or not self.selection.is_candidate(person):
+            return None
+        if not self._is_sure(person, state.choice):
+            # The person may be beside the one who is followed.
             return None
         stamp = observation.stamp + state.tracks.period
         pose = pose_at(state.tracks.poses, stamp)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -165,6 +166,8 @@ class Tracker:
             elif seen.window > window:
                 window, centre = seen.window, seen.middle
         clothes = self._clothes(person, seen)
+        fits = self.association.fits_size(person, seen)
+        worn, tall = seen.clothes if fits else None, seen.window if fits and seen.whole and seen.window else None
         evidence = self.existence.of_box(seen, recall)
         if person.confirmed and self.existence.is_solid(seen):
             # Near by, and on parts of the body, HOG's scores are low for people, too.
@@ -174,7 +177,8 @@ class Tracker:
         if seen.range is not None and track.stamp - person.measured > self.restart_s:
             track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, self.noise)
         fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
-        if fit.distance2 > self.association.gate:
+        strained = fit.distance2 > self.association.gate
+        if strained:
             place = self.association.same_place**2
             loose = track.covariance + np.diag([place, place, self.turn_speed**2, self.turn_speed**2])
             track = replace(track, covariance=loose)
@@ -186,6 +190,9 @@ class Tracker:
             window=window,
             centre=centre,
             clothes=clothes,
+            worn=worn,
+            tall=tall,
+            strained=strained or not fits,
         )
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
@@ -204,6 +211,8 @@ class Tracker:
         height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
         if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
             return person, tracks
+        # Walls and furniture that are known already are nobody's legs.
+        is_ground = None if ground is None else partial(grid.is_near_blocked, ground)
         now = person
         for returns in tracks.scans:
             # The track of an unseen person already contains the scans up to `felt`: each may count only once.
@@ -211,11 +220,7 @@ class Tracker:
                 # Legs continue a track; after a gap, whatever stands there could be taken for them.
                 break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
-                if ground is not None:
-                    # Walls and furniture that are known already are nobody's legs.
-                    known = grid.is_near_blocked(ground, returns.points)
-                    returns = replace(returns, points=returns.points[~known])
-                track = self.legs.update(now.track, returns, self.noise)
+                track = self.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = tuple(kept if one.number == person.number else one for one in tracks.people)

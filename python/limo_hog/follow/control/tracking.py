@@ -146,7 +146,7 @@ class TrackingController:
             known = person.track if person.confirmed and self._is_sure(person, choice) else state.known
             state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None)
         can_look = state.ground is not None and state.known is not None and person.confirmed
-        if can_look and aim.hidden and state.ground is not None:
+        if can_look and aim.hidden and state.ground is not None and state.hunt is None:
             # Behind another person one is hidden for a moment; waiting is better than driving round people.
             pose = pose_at(state.tracks.poses, observation.now)
             can_look = self._hides(state.ground, pose, person.track.mean[:2])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from limo_hog.follow.control.backing import Backing
+from limo_hog.follow.control.company import Backing
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.clearance import NO_POINTS

@@ -279,11 +279,11 @@ class Backing:
     Attributes
     ----------
     lately_s
-        Ground that was not seen to be free within this is unknown [s]. Chosen: at .75 m/s a person comes up from 3.5 m,
-        the reach of the legs in the scan.
+        With others about, ground that was not seen to be free within this is unknown [s]. Chosen: at .75 m/s a person
+        comes up from 3.5 m, the reach of the legs in the scan.
     blind_speed, alone_s
-        So fast at most it backs onto unknown ground [m/s], if nobody but the person followed was measured for so long
-        [s]; else not at all. Chosen: the limit of `Guard`; a person who was near half a minute ago may be behind now.
+        If nobody but the person followed was measured for so long [s], ground seen within that is known, and it backs
+        onto other ground at this speed at most [m/s]; else not at all. Chosen: what `Guard` remembers, and its limit.
     glance_turn, glance_from
         Turn rate to look behind before backing, and how much too near a person must be for that [rad/s, m]. Chosen:
         82°, which shows the ground behind, in .7 s; a body's depth. Until then it stands.
@@ -293,24 +293,36 @@ class Backing:
 
     lately_s: float = bounded(5.0, 0, 600)
     blind_speed: float = bounded(0.2, 0, 1)
-    alone_s: float = bounded(30.0, 0, 3600)
+    alone_s: float = bounded(29.0, 0, 3600)
     glance_turn: float = bounded(3.0, 0, 6)
     glance_from: float = bounded(0.15, 0, 2)
     depths: tuple[float, ...] = (0.1, 0.2, 0.3)
 
-    def is_known(self, places: Points, pose: Odometry, grid: Grid, ground: Ground | None) -> NDArray[np.bool_]:
-        """Return whether the ground at places, float64 (N, 2) [m] in the base frame, was seen to be free, bool (N,)."""
+    def is_known(
+        self, places: Points, pose: Odometry, grid: Grid, ground: Ground | None, others_at: float
+    ) -> NDArray[np.bool_]:
+        """Return whether the ground at places, float64 (N, 2) [m] in the base frame, was seen to be free, bool (N,).
+
+        `others_at` is when another person than the one followed was measured [s].
+        """
         if ground is None:
             return np.ones(len(places), bool)
-        return grid.is_free_since(ground, to_odometry(places, pose), ground.stamp - self.lately_s)
+        lately_s = self.lately_s if ground.stamp - others_at < self.alone_s else self.alone_s
+        return grid.is_free_since(ground, to_odometry(places, pose), ground.stamp - lately_s)
 
     def is_known_behind(
-        self, bearing: float, pose: Odometry, grid: Grid, ground: Ground | None, robot: RobotGeometry
+        self,
+        bearing: float,
+        pose: Odometry,
+        grid: Grid,
+        ground: Ground | None,
+        others_at: float,
+        robot: RobotGeometry,
     ) -> bool:
         """Whether the ground is known that is behind the robot when it faces a bearing [rad]."""
         far, side = np.meshgrid(self.depths, (-robot.half_width, 0.0, robot.half_width))
         behind = np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
-        return bool(self.is_known(behind, replace(pose, yaw=pose.yaw + bearing), grid, ground).all())
+        return bool(self.is_known(behind, replace(pose, yaw=pose.yaw + bearing), grid, ground, others_at).all())
 
     def blind_limit(self, others_at: float, now: float) -> float:
         """Return how fast to back onto unknown ground [m/s]; `others_at` is when another person was measured [s]."""

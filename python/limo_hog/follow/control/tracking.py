@@ -158,7 +158,7 @@ class TrackingController:
         twist = replace(twist, angular=float(np.clip(twist.angular, -most, most)))
         pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
         if twist.linear < 0 and not self.backing.is_known_behind(
-            aim.bearing, pose, self.grid, state.ground, self.robot
+            aim.bearing, pose, self.grid, state.ground, state.others_at, self.robot
         ):
             limit = self.backing.blind_limit(state.others_at, observation.now)
             twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
@@ -186,8 +186,10 @@ class TrackingController:
             yaw, speed, since = state.way_out
             begun = Way(wrap(yaw - pose.yaw), speed, observation.now - since)
 
+        others_at = state.others_at
+
         def is_known(places: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-            return self.backing.is_known(places, pose, self.grid, state.ground)
+            return self.backing.is_known(places, pose, self.grid, state.ground, others_at)
 
         tracks, others = self.tracker.around(state.tracks, person, observation.now, self.steering.coast_s)
         walkers = [walker_of(track, pose) for track in tracks]

@@ -113,6 +113,8 @@ class Selection:
         if followed is not None and followed in self.measured(tracks) and likeness.of(followed.number) < self.possible:
             # The track went over to another person.
             return replace(choice, number=None)
+        if followed is not None and not self.is_candidate(followed):
+            return replace(choice, number=None)
         return choice
 
     def measured(self, tracks: Tracks) -> list[Person]:

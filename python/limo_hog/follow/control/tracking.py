@@ -133,7 +133,7 @@ class TrackingController:
             share = self.brisk_share if speed > state.brisk else self.brisk_share / 100
             state = replace(state, brisk=state.brisk + share * (speed - state.brisk))
         can_look = state.ground is not None and state.known is not None and person.confirmed
-        if can_look and aim.hidden and state.ground is not None:
+        if can_look and aim.hidden and state.ground is not None and state.hunt is None:
             # Behind another person one is hidden for a moment; waiting is better than driving round people.
             pose = pose_at(state.tracks.poses, observation.now)
             can_look = self._hides(state.ground, pose, person.track.mean[:2])

@@ -89,6 +89,12 @@ class Tracker:
     turn_speed
         Standard deviation added to each component of the velocity of a person whose box is outside the gate [m/s], and
         `association.same_place` to the position's. Chosen: a sharp turn at 0.75 m/s changes the velocity by 1.06 m/s.
+    astray
+        A box whose range differs by more from the person's may be another's, who passes before them [m]. Chosen: half
+        of what people keep from each other; the depth at a box's centre strays by less but for an arm.
+    stature_from
+        From nearer the outline's top is no measure of the stature [m]. Measured in the arena: at 1.25 m it is a tenth
+        too low, since the head touches the image's edge.
     poses_s, scans_s
         How long odometry and scans are kept [s]: a camera image may be as late as this.
     scan_period_s
@@ -110,6 +116,8 @@ class Tracker:
     restart_s: float = 1.0
     size_rate: float = 0.2
     turn_speed: float = 1.0
+    astray: float = 0.25
+    stature_from: float = 1.4
     poses_s: float = 2.0
     scans_s: float = 1.0
     scan_period_s: float = 0.13
@@ -137,7 +145,8 @@ class Tracker:
                 recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
                 people.append(self.correct(person, measured[pairs[who]], pose, chance))
-            elif expected:
+            elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
+                # Later than that it shows only that the person walked on, not that there is none.
                 people.append(self.existence.update(person, self.existence.of_miss(chance), found=False))
             else:
                 people.append(person)
@@ -167,7 +176,15 @@ class Tracker:
                 window, centre = seen.window, seen.middle
         clothes = self._clothes(person, seen)
         fits = self.association.fits_size(person, seen)
-        worn, tall = seen.clothes if fits else None, seen.window if fits and seen.whole and seen.window else None
+        off = 0.0 if seen.range is None else abs(seen.range - bearing_range(person.track, pose)[1])
+        in_place = off < self.astray
+        # Where the head is cut off, the box sits lower, and its patches are not on shirt and trousers.
+        aligned = seen.range is None or (seen.whole and not seen.is_low(self.association.low))
+        worn = seen.clothes if fits and aligned else None
+        # A box on a part of the body still shows the stature, by the depth image.
+        tall = seen.window if in_place and seen.whole and seen.window and seen.range else None
+        if seen.range is not None and seen.range < self.stature_from:
+            tall = None
         evidence = self.existence.of_box(seen, recall)
         if person.confirmed and self.existence.is_solid(seen):
             # Near by, and on parts of the body, HOG's scores are low for people, too.
@@ -192,7 +209,7 @@ class Tracker:
             clothes=clothes,
             worn=worn,
             tall=tall,
-            strained=strained or not fits,
+            strained=strained or not in_place,
         )
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:

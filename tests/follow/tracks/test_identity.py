@@ -92,7 +92,7 @@ def test_a_track_too_far_off_to_be_walked_to_is_another() -> None:
 
 def test_the_stature_tells_apart_people_in_one_kind_of_clothes() -> None:
     known = replace(followed(), others=(Traits(7, IN_RED, 1.1 * WINDOW),))
-    for frame in range(11, 40):
+    for frame in range(11, 71):
         stamp = 0.1 * frame
         known = IDENTITY.update(known, at(stamp, person(1, stamp, tall=1.1 * WINDOW)))
     assert known.of(1) < 0.3

@@ -80,14 +80,16 @@ class Identity:
         Share of boxes in which something else is seen in the shirt's or the trousers' place [1]. Measured in the arena,
         424 whole boxes: one shirt, three trousers; chosen higher, for hands, bags and shadows.
     stature_sigma
-        Standard deviation of the stature in the depth image, as a share [1]. Measured in the arena: .01; chosen for
-        shoes, hats and gait.
+        Standard deviation of the stature in the depth image, as a share [1]. Measured in the arena: .01 from frame to
+        frame, and up to .04 between far and near; chosen for shoes, hats and gait as well.
     strange_stature, odd_stature
         As for clothes [1]. Chosen: people's statures differ by a tenth; three outlines in ten are wrong, since
         an arm or another's head is taken for the person's.
     again
         Share of its own evidence that a box counts for after a track's first [1]. Chosen: neighbouring frames show
         nearly the same, as in `Existence`.
+    steady
+        The same for the stature, whose error lasts as long as the distance [1]. Chosen: a second is worth one box.
     most
         The most that a box can tell either way [log-odds]. Chosen: a factor of twelve.
     passes, strained
@@ -119,10 +121,11 @@ class Identity:
     strange_trousers: float = 0.5
     odd_shirt: float = 0.1
     odd_trousers: float = 0.3
-    stature_sigma: float = 0.03
+    stature_sigma: float = 0.05
     strange_stature: float = 0.3
     odd_stature: float = 0.3
     again: float = 0.5
+    steady: float = 0.1
     most: float = 2.5
     passes: float = 0.002
     strained: float = 0.1
@@ -181,6 +184,11 @@ class Identity:
                 chances[other] *= 1.0 - taken
             chances[number] = gained
         measured = [one for one in people.values() if stamp - one.measured <= self.unseen_s]
+        absent = max(1.0 - sum(chances.values()), 0.0)
+        own = known.traits.number
+        if own in chances and people[own] in measured:
+            # What was taken for another person's box may have been none.
+            chances[own] += self.passes * absent
         for left, right in itertools.combinations(measured, 2):
             if separation(left, right) < self.meets:
                 swapped = self.swaps * (chances[right.number] - chances[left.number])
@@ -193,30 +201,29 @@ class Identity:
         # A track that was another person before is compared with that one, any other with all who are about.
         others = [traits for traits in known.others if traits.number == person.number]
         others = others or [traits for traits in known.others if traits.number != known.traits.number]
-        same, strange = self._fit(person, known.traits), self._fit(person, None)
-        evidence = same - max([strange, *(self._fit(person, traits) for traits in others)])
-        evidence = min(max(evidence, -self.most), self.most)
-        return evidence if first else self.again * evidence
+        same, strange = self._fit(person, known.traits, first=first), self._fit(person, None, first=first)
+        evidence = same - max([strange, *(self._fit(person, traits, first=first) for traits in others)])
+        return min(max(evidence, -self.most), self.most)
 
-    def _fit(self, person: Person, traits: Traits | None) -> float:
+    def _fit(self, person: Person, traits: Traits | None, *, first: bool) -> float:
         """Return how likely a person's last box is on one who looks like this, or on anybody [log]."""
-        fit = 0.0
+        clothes = stature = 0.0
         if person.worn is not None:
             for part, strange, odd in (
                 (0, self.strange_shirt, self.odd_shirt),
                 (1, self.strange_trousers, self.odd_trousers),
             ):
                 if traits is None or traits.clothes is None:
-                    fit += math.log(strange)
+                    clothes += math.log(strange)
                 else:
                     same = math.exp(-float(((traits.clothes[part] - person.worn[part]) ** 2).sum()) / 2)
-                    fit += math.log((1.0 - odd) * same + odd * strange)
+                    clothes += math.log((1.0 - odd) * same + odd * strange)
         if person.tall is not None and traits is None:
-            fit += math.log(self.strange_stature)
+            stature = math.log(self.strange_stature)
         elif person.tall is not None and traits is not None:
             same = math.exp(-((math.log(person.tall / traits.window) / self.stature_sigma) ** 2) / 2)
-            fit += math.log((1.0 - self.odd_stature) * same + self.odd_stature * self.strange_stature)
-        return fit
+            stature = math.log((1.0 - self.odd_stature) * same + self.odd_stature * self.strange_stature)
+        return clothes + stature if first else self.again * clothes + self.steady * stature
 
     def _learnt(self, known: Likeness, person: Person, tracks: Tracks) -> Likeness:
         """Learn from a box who looks how: of the person followed where that is sure, of others where they are not."""
@@ -238,7 +245,7 @@ class Identity:
         clothes, window = traits.clothes, traits.window
         if person.worn is not None:
             clothes = person.worn if clothes is None else self._mixed(clothes, person.worn, rate)
-        if person.tall is not None and abs(math.log(person.tall / window)) < 2 * self.stature_sigma:
+        if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)
         return Traits(person.number, clothes, window, traits.boxes + 1)
 

@@ -24,8 +24,11 @@ fn crops_are_described_as_the_exact_path_describes_each() {
     let plain =
         HogParams { win_size: (24, 36), block_size: (12, 12), block_stride: (6, 6), ..HogParams::default() };
     let other = HogParams { cell_size: (6, 6), ..plain };
+    let cell = (8, 8);
+    let one =
+        HogParams { win_size: cell, block_size: cell, block_stride: cell, nbins: 1, ..HogParams::default() };
     let geometries = sizes.map(|win_size| HogParams { win_size, ..HogParams::default() });
-    for params in geometries.iter().chain([&other]) {
+    for params in geometries.iter().chain([&other, &one]) {
         for backend in available() {
             let hog = Hog::with_backend(params, None, backend).unwrap();
             let (win, elements) = (hog.spec().win, hog.spec().descriptor_len());
@@ -117,6 +120,27 @@ fn places_of_ones_own_are_decided_as_all_windows_are() {
         let found = hog.detect(picture.view(), &search, Some(&places), &Interrupt::NEVER).unwrap();
         let hits: Vec<_> = windows.iter().rev().copied().filter(|hit| hit.weight >= hit_threshold).collect();
         assert_same(&found, &hits, 0.0, "places");
+    }
+}
+
+#[test]
+fn padding_wider_than_the_image_is_mirrored_as_the_exact_path_mirrors_it() {
+    let detector = Detector::people();
+    for (size, padding) in
+        [((64, 70), (192, 32)), ((40, 90), (256, 40)), ((90, 33), (16, 160)), ((3, 5), (104, 136))]
+    {
+        for channels in [1, 3] {
+            let picture = Picture::new(size.0, size.1, channels, 3);
+            let search = Search { hit_threshold: -1e9, padding, ..STEPS };
+            let wanted = detector.every_window(picture.view(), &search);
+            assert!(wanted.len() > 10);
+            for backend in available() {
+                let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
+                let found = hog.detect(picture.view(), &search, None, &Interrupt::NEVER).unwrap();
+                let what = format!("{} {size:?}x{channels} {padding:?}", backend.name());
+                assert_same(&found, &wanted, detector.rounding(), &what);
+            }
+        }
     }
 }
 

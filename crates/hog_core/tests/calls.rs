@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Detector, Picture, assert_same, available, reached_by};
+use hog_core::group::{Candidate, group_candidates, group_rectangles, mean_shift};
 use hog_core::pyramid::{Pyramid, Tap, resize, taps};
 use hog_core::{Grouping, Guide, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
 
@@ -142,6 +143,25 @@ fn padding_wider_than_the_image_is_mirrored_as_the_exact_path_mirrors_it() {
             }
         }
     }
+}
+
+#[test]
+fn a_caller_who_wants_no_answer_any_more_gets_none() {
+    let (detector, picture) = (Detector::people(), Picture::new(150, 190, 3, 2));
+    let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
+    let interrupt = Interrupt::when(&|| true);
+    let rects = [Rect { x: 1, y: 1, width: 9, height: 9 }; 5];
+    assert!(group_rectangles(&rects, 1, 0.2, &interrupt).is_err());
+    let candidates = rects.map(|rect| Candidate { rect, weight: 1.0, scale: 1.0 });
+    assert!(group_candidates(&candidates, 2, &interrupt).is_err());
+    assert!(mean_shift(&candidates, 0.0, (64, 128), &interrupt).is_err());
+    assert!(hog.detect(picture.view(), &STEPS, None, &interrupt).is_err());
+    assert!(hog.detect(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt).is_err());
+    assert!(hog.gradient(picture.view(), [0; 4], &interrupt).is_err());
+    let mut out = vec![0.0; hog.compute_len(picture.view(), &STEPS, None).unwrap()];
+    assert!(hog.compute(picture.view(), &STEPS, None, &interrupt, &mut out).is_err());
+    assert!(hog.compute(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt, &mut out).is_err());
+    assert!(hog.describe(&[0; 64 * 128], 1, 1, &interrupt, &mut out[..3780]).is_err());
 }
 
 fn guided(detector: &Detector, picture: &Picture, guide: Option<Guide>, threshold: f64) -> Vec<(Rect, f64)> {

@@ -110,8 +110,8 @@ class PeopleDetector:
     def __post_init__(self) -> None:
         model = load_model(self.model)
         self._set(_model=model)
-        self._check_sizes()
         self._check_nms()
+        self._check_sizes()
         self._set(
             threshold=None if self.threshold is None else _number("threshold", self.threshold, -math.inf, math.inf),
             scale=_number("scale", self.scale, _FINEST_SCALE, math.inf),

@@ -289,3 +289,50 @@ def test_nothing_depends_on_anything_but_what_is_handed_in() -> None:
     assert run(one, 3.0).twist == run(two, 3.0).twist
     assert not math.isnan(one.bearing)
     assert CONTROLLER.step(replace(one.observe(), detections=NOBODY), CONTROLLER.start()).target is None
+
+
+def test_it_does_not_back_into_what_its_map_shows_behind_though_the_lidar_sees_it_no_more() -> None:
+    # A person comes towards it; a wall that it saw before it turned round is .15 m behind.
+    world = World()
+    state = run(world, 12.0).state
+    world.velocity = (-0.3, 0.0)
+    state = run(world, 1.5, state).state
+    assert state.ground is not None
+    backing = CONTROLLER.step(world.observe(), state)
+    assert backing.twist.linear < -0.05
+    ground, x = state.ground, world.robot[0] - CONTROLLER.robot.half_length - 0.15
+    wall = CONTROLLER.grid.flat(ground, np.array([(x, y) for y in np.arange(-0.5, 0.5, 0.05)]))
+    ground.occupied.flat[wall], ground.freed.flat[wall] = 2.0, -np.inf
+    stopped = CONTROLLER.step(world.observe(), state)
+    assert stopped.twist.linear == 0
+    assert stopped.reason == "a known obstacle is behind"
+
+
+def test_between_two_alike_it_stands_and_looks_and_says_that_it_is_not_sure() -> None:
+    world = World(person=(2.5, 0.0))
+    state = run(world, 4.0).state
+    other = World(person=(2.5, 0.9), robot=world.robot, time=world.time)
+    for _ in range(8):
+        view, second = world.observe(), other.observe().detections
+        together = Detections(
+            np.concatenate([view.detections.boxes, second.boxes]),
+            np.concatenate([view.detections.scores, second.scores]),
+        )
+        state = CONTROLLER.step(replace(view, detections=together), state).state
+        world.time, other.time = world.time + 0.1, other.time + 0.1
+    one, two = (person.number for person in state.tracks.people)
+    likeness = state.choice.likeness
+    assert likeness is not None
+    doubtful = replace(likeness, chances=((one, 0.5), (two, 0.45)))
+    decision = CONTROLLER.step(
+        replace(world.observe(), odometry=Odometry(world.time, *world.robot)),
+        replace(state, choice=replace(state.choice, likeness=doubtful)),
+    )
+    assert decision.mode is Mode.HOLD
+    assert decision.reason == "not sure which of 2 is the person followed"
+    assert decision.twist.linear == 0
+    # Both are kept in view: it turns to between them.
+    assert decision.twist.angular > 0.1
+    assert decision.target is None
+    same = [round(person.same or 0.0, 1) for person in decision.belief.people]
+    assert same == [0.5, 0.5] or same == [0.5, 0.4]

@@ -320,9 +320,19 @@ class Backing:
         robot: RobotGeometry,
     ) -> bool:
         """Whether the ground is known that is behind the robot when it faces a bearing [rad]."""
+        facing = replace(pose, yaw=pose.yaw + bearing)
+        return bool(self.is_known(self._behind(robot), facing, grid, ground, others_at).all())
+
+    def is_blocked(self, pose: Odometry, grid: Grid, ground: Ground | None, robot: RobotGeometry) -> bool:
+        """Whether the map shows something that lasts close behind: `Guard` remembers for a shorter time."""
+        if ground is None:
+            return False
+        return bool(grid.is_blocked(ground, to_odometry(self._behind(robot), pose), lasting=True).any())
+
+    def _behind(self, robot: RobotGeometry) -> Points:
+        """Return places behind the robot's outline, float64 (N, 2) [m] in the base frame."""
         far, side = np.meshgrid(self.depths, (-robot.half_width, 0.0, robot.half_width))
-        behind = np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
-        return bool(self.is_known(behind, replace(pose, yaw=pose.yaw + bearing), grid, ground, others_at).all())
+        return np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
 
     def blind_limit(self, others_at: float, now: float) -> float:
         """Return how fast to back onto unknown ground [m/s]; `others_at` is when another person was measured [s]."""

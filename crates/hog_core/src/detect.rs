@@ -107,7 +107,7 @@ impl Hog {
             return Err(ParameterError::PaddedArea { width: size.width, height: size.height }.into());
         }
         let padding = Padding { left, top, size };
-        Ok((exact::gradient(image, padding, self.spec(), &self.exact.tables, interrupt)?, size))
+        Ok((exact::gradient(image, padding, self.spec(), interrupt)?, size))
     }
 
     /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).

@@ -336,8 +336,9 @@ impl Hog {
         };
         let some = grids.iter().enumerate().filter(|&(level, _)| guide.is_whole(level));
         let regions = memory::collect(some.map(whole))?;
-        let mut found = fast::search(task(regions, threshold - guide.margin), how.threads, interrupt)?;
-        let regions = guide.between(levels, &grids, &found, self.spec())?;
+        let least = threshold - guide.margin;
+        let mut found = fast::search(task(regions, least), how.threads, interrupt)?;
+        let regions = guide.between(levels, &grids, &found, least, self.spec())?;
         let between = fast::search(task(regions, threshold), how.threads, interrupt)?;
         for (found, mut between) in found.iter_mut().zip(between) {
             // Regions may share windows.

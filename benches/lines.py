@@ -23,7 +23,7 @@ from limo_hog import _core
 from limo_hog.cli.support.race import Rounds, race
 from limo_hog.cli.support.scene import street
 
-ROUNDS = Rounds(seconds=3.0, most=100_000)
+ROUNDS = Rounds(seconds=2.0, most=100_000)
 SEARCH: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
 #: What differs from the default geometry: block, block stride and cell [px], bins, signed gradients.
 CORNERS = {

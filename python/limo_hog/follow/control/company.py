@@ -286,7 +286,7 @@ class Backing:
         onto other ground at this speed at most [m/s]; else not at all. Chosen: what `Guard` remembers, and its limit.
     glance_turn, glance_from
         Turn rate to look behind before backing, and how much too near a person must be for that [rad/s, m]. Chosen:
-        82°, which shows the ground behind, in .7 s; a body's depth. Until then it stands.
+        82°, which shows the ground behind, in .7 s; nearer, HOG would miss the head. Until then it stands.
     depths
         So far behind the outline the ground must be known [m]. Chosen: from .4 m/s the robot stops within .26 m.
     """
@@ -295,7 +295,7 @@ class Backing:
     blind_speed: float = bounded(0.2, 0, 1)
     alone_s: float = bounded(29.0, 0, 3600)
     glance_turn: float = bounded(3.0, 0, 6)
-    glance_from: float = bounded(0.15, 0, 2)
+    glance_from: float = bounded(0.25, 0, 2)
     depths: tuple[float, ...] = (0.1, 0.2, 0.3)
 
     def is_known(

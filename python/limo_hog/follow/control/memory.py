@@ -41,6 +41,8 @@ class TrackingState:
     way_out
         Direction in the odometry frame [rad] and speed [m/s] by which it gives way, and since when [s]; None while it
         does not.
+    gave_way_at
+        When it last gave way [s].
     acceleration
         Of the wheels, as learnt [m/s²].
     sent
@@ -62,6 +64,7 @@ class TrackingState:
     way: Points = field(default_factory=lambda: NO_POINTS)
     way_at: float = -math.inf
     way_out: tuple[float, float, float] | None = None
+    gave_way_at: float = -math.inf
     acceleration: float = 1.0
     sent: Twist = field(default_factory=Twist)
     others_at: float = -math.inf

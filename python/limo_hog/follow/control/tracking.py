@@ -138,6 +138,9 @@ class TrackingController:
             pose = pose_at(state.tracks.poses, observation.now)
             can_look = self._hides(state.ground, pose, person.track.mean[:2])
         patience = self.lookout.after_s if can_look else self.tracker.forget_s if aim.hidden else self.search.after_s
+        if observation.now - state.gave_way_at < self.tracker.movers.unseen_s:
+            # It turned away from a person who walks on where nothing looks; it turns to them before it looks round.
+            patience = max(patience, self.tracker.movers.unseen_s)
         if lost_s > patience:
             return self._search(state, observation), person
         twist, mode, reason = self.steering.command(
@@ -201,6 +204,7 @@ class TrackingController:
             twist, driven, walkers, points, self.robot, begun, acceleration, is_known, blind_speed
         )
         if way is not None:
+            state = replace(state, gave_way_at=observation.now)
             twist, reason = self.company.command(way, acceleration, self.robot), "giving way to a person"
             mode = mode if mode in (Mode.LOST, Mode.SEARCH) else Mode.FOLLOW
         twist = self.wheels.within_reach(twist, driven, acceleration, state.tracks.period, self.robot)

@@ -47,6 +47,8 @@ class Believed(NamedTuple):
         Velocity over the ground, along the base frame's axes [m/s].
     box
         Index into `observation.detections`; None where HOG did not find them in this frame.
+    same
+        Probability that it is the person followed, 0 … 1; None while none was followed.
     """
 
     x: float
@@ -56,6 +58,7 @@ class Believed(NamedTuple):
     vx: float = 0.0
     vy: float = 0.0
     box: int | None = None
+    same: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -384,12 +384,20 @@ def _hits(scan: Scan | None, poses: list[tuple[float, float, float, float]]) -> 
     return rounded
 
 
-def _believed(step: Step) -> list[list[float]]:
-    """Return where the follower takes people to be, x, y [m] in the arena's frame, and with which probability."""
+def _believed(step: Step) -> list[list[float | None]]:
+    """Return where the follower takes people to be, x, y [m] in the arena's frame, with two probabilities.
+
+    They are of being a person, and of being the person followed; None for that before one was followed.
+    """
     x, y, yaw = step.truth.robot
     cos, sin = math.cos(yaw), math.sin(yaw)
     return [
-        [round(x + cos * one.x - sin * one.y, 2), round(y + sin * one.x + cos * one.y, 2), round(one.probability, 2)]
+        [
+            round(x + cos * one.x - sin * one.y, 2),
+            round(y + sin * one.x + cos * one.y, 2),
+            round(one.probability, 2),
+            None if one.same is None else round(one.same, 2),
+        ]
         for one in step.decision.belief.people
     ]
 

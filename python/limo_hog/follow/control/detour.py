@@ -99,9 +99,11 @@ class Detour:
     ) -> float | None:
         """Return the best direction in which the robot can drive at least `reach` [m]."""
         most = self.steps if steps is None else steps
+        # What is further off is in no direction's way.
+        near = obstacles[np.hypot(*obstacles.T) < reach + robot.half_length + self.margin.ahead]
         detours = [self.step * index for index in range(-most, most + 1)]
         for detour in sorted(detours, key=lambda detour: abs(detour) + self.preference * abs(detour - preferred)):
             cos, sin = math.cos(bearing + detour), math.sin(bearing + detour)
-            if room_ahead(obstacles @ np.array([[cos, -sin], [sin, cos]]), self.margin, robot) >= reach:
+            if len(near) == 0 or room_ahead(near @ np.array([[cos, -sin], [sin, cos]]), self.margin, robot) >= reach:
                 return bearing + detour
         return None

@@ -1,12 +1,14 @@
-"""Which of the tracked people to follow: stay with one, and recognise them after a loss."""
+"""Which of the tracked people to follow: stay with one, say so where that is not sure, recognise them after a loss."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from limo_hog.follow.parameters import bounded
-from limo_hog.follow.sense.appearance import Appearance, Clothes
-from limo_hog.follow.tracks.person import Person, separation
+from limo_hog.follow.tracks.identity import Identity, Likeness
+from limo_hog.follow.tracks.kalman import bearing_range
+from limo_hog.follow.tracks.person import Person
+from limo_hog.follow.tracks.poses import pose_at
 from limo_hog.follow.tracks.tracker import Tracks
 
 
@@ -18,15 +20,21 @@ class Choice:
     ----------
     number
         Of the person; None while none is followed.
-    clothes
-        What the confirmed person followed last wears; None where no colour image tells.
+    likeness
+        What the confirmed person followed last looks like, and which track that is; None where none was followed yet.
     measured
         When that person was last measured [s]; None where none was followed yet.
+    candidates
+        Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
+    unsure_at
+        Since when that is not sure [s]; None where it is.
     """
 
     number: int | None = None
-    clothes: Clothes | None = None
+    likeness: Likeness | None = None
     measured: float | None = None
+    candidates: tuple[int, ...] = ()
+    unsure_at: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,65 +50,100 @@ class Selection:
         A track that is not confirmed after so many frames, and less likely than `min_existence`, is given up [1].
         Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
     reidentify_s
-        How long to look for a lost person before one in other clothes is followed [s]. Chosen: two full turns of the
-        search.
-    same_place, speed
-        A new track nearer than this to the lost person, and so much more for each second, may be the same person [m,
-        m/s]. Chosen: a body's width, and a walk.
+        How long to look for a lost person before another is followed [s]. Chosen: two full turns of the search.
     lead
         Probability by which another must exceed the track that is faced already [1]. Chosen: one frame of evidence.
+    aside
+        What a person is less likely to be meant for each radian off straight ahead, before one is followed [1]. Chosen:
+        at the image's edge three frames of evidence.
+    likely
+        Probability of being the person followed from which a track in view is followed [1]. Chosen: more likely than
+        not.
+    odds
+        And it must be so many times as likely as any other in view; else it is not sure which of them it is [1].
+        Chosen: one wrong in four guesses would be too many.
+    possible
+        A track in view that is less likely than this is another person [1]. Chosen.
+    decide_s
+        After so long the likeliest is taken [s]. Chosen: people part within a few seconds, or leave the view.
+    identity
+        Which track the person followed is.
     """
 
     min_existence: float = bounded(0.4, 0, 1)
     max_unconfirmed_frames: int = bounded(30, 1, 1000)
     reidentify_s: float = bounded(20.0, 0, 600)
-    same_place: float = bounded(0.5, 0, 5)
-    speed: float = bounded(1.0, 0, 5)
     lead: float = bounded(0.1, 0, 1)
+    aside: float = bounded(0.6, 0, 5)
+    likely: float = bounded(0.5, 0, 1)
+    odds: float = bounded(3.0, 1, 100)
+    possible: float = bounded(0.1, 0, 1)
+    decide_s: float = bounded(4.0, 0, 60)
+    identity: Identity = field(default_factory=Identity)
 
-    def choose(self, tracks: Tracks, choice: Choice, wait_s: float, appearance: Appearance) -> Choice:
-        """Stay with a confirmed person while they are tracked; else take the likeliest track in view.
-
-        Parameters
-        ----------
-        wait_s
-            A confirmed person is not given up for another before they are unmeasured for so long [s].
-        """
+    def choose(self, tracks: Tracks, choice: Choice) -> Choice:
+        """Follow the track that is the person followed so far; before there is one, the likeliest person in view."""
+        now = tracks.stamp or 0.0
         followed = tracks.person(choice.number)
-        if followed is not None and followed.confirmed:
-            choice = replace(choice, clothes=followed.clothes, measured=followed.measured)
-        candidates = [
-            one
-            for one in tracks.in_view
-            if self.is_candidate(one) and not self.is_stranger(one, tracks, choice, appearance)
-        ]
-        if followed is not None and followed.confirmed:
-            lost_s = followed.track.stamp - followed.measured
-            if lost_s <= wait_s:
-                return choice
-            # A track that begins where the lost person can have walked to is taken for them.
-            reach = self.same_place + self.speed * lost_s
-            candidates = [one for one in candidates if separation(one, followed) < reach]
-            if not candidates:
-                return choice
-        elif (
-            followed is not None
-            and self.is_candidate(followed)
-            and not self.is_stranger(followed, tracks, choice, appearance)
-        ):
+        if choice.likeness is None or choice.measured is None or now - choice.measured > self.reidentify_s:
+            choice = self._anybody(tracks, choice)
+            followed = tracks.person(choice.number)
+            if followed is not None and followed.confirmed and followed.seen == now:
+                likeness = self.identity.begin(followed)
+                return Choice(followed.number, likeness, followed.measured)
+            return choice
+        likeness = self.identity.update(choice.likeness, tracks)
+        choice = replace(choice, likeness=likeness)
+        about = [one for one in self.measured(tracks) if likeness.of(one.number) >= self.possible]
+        about.sort(key=lambda one: -likeness.of(one.number))
+        if about:
+            best, *rest = about
+            chance = likeness.of(best.number)
+            next_best = likeness.of(rest[0].number) if rest else 0.0
+            if chance >= self.likely and chance >= self.odds * next_best:
+                measured = best.measured if chance >= self.identity.sure else choice.measured
+                return Choice(best.number, likeness, measured)
+            if rest and sum(likeness.of(one.number) for one in about) >= self.likely:
+                since = now if choice.unsure_at is None else choice.unsure_at
+                if now - since > self.decide_s:
+                    likeness = replace(likeness, chances=((best.number, self.likely),))
+                    return Choice(best.number, likeness, choice.measured)
+                return replace(choice, candidates=tuple(one.number for one in about), unsure_at=since)
+        choice = replace(choice, candidates=(), unsure_at=None)
+        if followed is not None and followed in self.measured(tracks) and likeness.of(followed.number) < self.possible:
+            # The track went over to another person.
+            return replace(choice, number=None)
+        if followed is not None and not self.is_candidate(followed):
+            return replace(choice, number=None)
+        return choice
+
+    def measured(self, tracks: Tracks) -> list[Person]:
+        """Return the people who may be followed and were measured just now."""
+        now, lately = tracks.stamp or 0.0, self.identity.unseen_s
+        return [one for one in tracks.people if now - one.measured <= lately and self.is_candidate(one)]
+
+    def _anybody(self, tracks: Tracks, choice: Choice) -> Choice:
+        """Take the likeliest person in view, and of two the one straight ahead."""
+        followed = tracks.person(choice.number)
+        if followed is not None and followed.confirmed and followed.measured == tracks.stamp:
+            return choice
+        candidates = [one for one in tracks.in_view if self.is_candidate(one)]
+        if followed is not None and followed not in candidates and self.is_candidate(followed):
             candidates.append(followed)
         if not candidates:
             return replace(choice, number=None)
-        best = max(candidates, key=lambda one: one.existence + self.lead * (one is followed))
-        return replace(choice, number=best.number)
+        pose = pose_at(tracks.poses, tracks.stamp or 0.0)
+
+        def rank(one: Person) -> float:
+            off = abs(bearing_range(one.track, pose)[0])
+            return one.existence - self.aside * off + self.lead * (one is followed)
+
+        return replace(choice, number=max(candidates, key=rank).number)
 
     def is_candidate(self, person: Person) -> bool:
         """Whether a track is a person, or may yet turn out to be one."""
         return person.confirmed or person.age < self.max_unconfirmed_frames or person.existence > self.min_existence
 
-    def is_stranger(self, person: Person, tracks: Tracks, choice: Choice, appearance: Appearance) -> bool:
-        """Whether a person wears other clothes than the lost one, and it is too early to follow another."""
-        if choice.measured is None or tracks.stamp is None:
-            return False
-        early = tracks.stamp - choice.measured <= self.reidentify_s
-        return early and appearance.is_other(choice.clothes, person.clothes)
+    def is_stranger(self, person: Person, choice: Choice) -> bool:
+        """Whether a person is not the one followed before."""
+        return choice.likeness is not None and choice.likeness.of(person.number) < self.likely

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from limo_hog.follow.control.company import Company, Walker
+from limo_hog.follow.control.company import Backing, Company, Way, walker_of
 from limo_hog.follow.control.detour import Detour
-from limo_hog.follow.control.lookout import Hunt, Lookout
+from limo_hog.follow.control.lookout import Lookout
+from limo_hog.follow.control.memory import TrackingState
 from limo_hog.follow.control.search import Search
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.control.steer import Aim, Steering
@@ -24,46 +25,9 @@ from limo_hog.follow.space.routes import point_ahead
 from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates, wrap
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.poses import pose_at
-from limo_hog.follow.tracks.tracker import Tracker, Tracks
+from limo_hog.follow.tracks.tracker import Tracker
 from limo_hog.follow.twist import Twist
-
-
-@dataclass(frozen=True, slots=True)
-class TrackingState:
-    """What the controller remembers.
-
-    Attributes
-    ----------
-    tracks
-        All tracked people.
-    choice
-        Which of them is followed.
-    side
-        Which way to search: 1 left, -1 right.
-    detour
-        How far off the direct way to the person the robot drives [rad].
-    since_full
-        Frames since the whole image was searched [1].
-    ground
-        What stands where; None before the first scan.
-    known
-        The followed person's track when last measured; None before anyone was followed.
-    hunt
-        What is remembered while looking for that person; None while they are measured.
-    way, way_at
-        float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
-    """
-
-    tracks: Tracks = field(default_factory=Tracks)
-    choice: Choice = field(default_factory=Choice)
-    side: float = 1.0
-    detour: float = 0.0
-    since_full: int = 0
-    ground: Ground | None = None
-    known: Track | None = None
-    hunt: Hunt | None = None
-    way: Points = field(default_factory=lambda: NO_POINTS)
-    way_at: float = -math.inf
+from limo_hog.follow.wheels import Wheels, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +40,10 @@ class TrackingController:
         Distance to hold, as the depth image measures it [m].
     full_every
         Every so many frames the whole image is searched [1]. Chosen: another person is noticed within 1.5 s.
-    back_s
-        Ground behind the robot that was seen to be free within this is backed onto [s]. Chosen: less than the memory
-        of `Guard`, which stops the robot where it has seen nothing.
+    aside_s, brisk_share
+        A person who walks fast is kept off by so many seconds of their way, at 1 m/s² of the wheels, and what the image
+        is late [s]; share by which a faster frame, and a hundredth of that by which a slower one, moves the speed [1].
+        Computed: .2 s to notice a start, .7 s to turn aside, .8 s to drive .3 m; at a walk that is less than 1.5 m.
     near_hiding, foresight_s
         Distance to hold to a person who will be out of sight after so long [m, s]. Chosen: the edge of Hall's personal
         zone; the time in which the robot comes up by that much.
@@ -94,8 +59,10 @@ class TrackingController:
         How much of the image to search.
     tracker
         Where all people are.
-    company
-        How to give way to people.
+    company, backing
+        How to give way to people, and when to back.
+    wheels
+        What the wheels can do.
     lookout, grid, depth_grid
         How to look for a lost person, how the ground is mapped, and which depth pixels are looked at for it.
     robot
@@ -104,7 +71,8 @@ class TrackingController:
 
     target_distance: float = bounded(1.5, 0.1, 8)
     full_every: int = bounded(15, 1, 1000)
-    back_s: float = bounded(29.0, 0, 600)
+    aside_s: float = bounded(1.7, 0, 5)
+    brisk_share: float = bounded(0.15, 0, 1)
     near_hiding: float = bounded(1.2, 0.5, 8)
     foresight_s: float = bounded(1.0, 0, 5)
     steering: Steering = field(default_factory=Steering)
@@ -114,6 +82,8 @@ class TrackingController:
     region: RegionSize = field(default_factory=RegionSize)
     tracker: Tracker = field(default_factory=Tracker)
     company: Company = field(default_factory=Company)
+    backing: Backing = field(default_factory=Backing)
+    wheels: Wheels = field(default_factory=Wheels)
     lookout: Lookout = field(default_factory=Lookout)
     grid: Grid = field(default_factory=Grid)
     depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))
@@ -121,17 +91,33 @@ class TrackingController:
 
     def start(self) -> TrackingState:
         """Return the state before the first observation: no people."""
-        return TrackingState()
+        return TrackingState(acceleration=self.wheels.acceleration)
 
     def step(self, observation: Observation, state: TrackingState) -> Decision[TrackingState]:
-        """Bring the tracks up to the frame, choose the person to follow, and steer to where they are now."""
-        appearance = self.tracker.association.appearance
+        """Follow a person, give way to all, and ask of the wheels what they can do."""
+        wheels, before = observation.odometry, state.tracks.poses[-1:]
+        if wheels is not None:
+            believed = state.acceleration
+            for last in before:
+                believed = self.wheels.learn(believed, state.sent, last, wheels, self.robot)
+            state = replace(state, acceleration=believed)
+        decision, person = self._follow(observation, state)
+        return self._give_way(decision, person, observation)
+
+    def _follow(self, observation: Observation, state: TrackingState) -> tuple[Decision[TrackingState], Person | None]:
+        """Bring the tracks up to the frame, choose the person to follow, and steer to where they are now.
+
+        Returns the decision, and the person followed as of the newest stamp.
+        """
         tracks, boxes = self.tracker.update(observation, state.tracks)
-        choice = self.selection.choose(tracks, state.choice, self.search.after_s, appearance)
+        before, choice = state.choice.measured, self.selection.choose(tracks, state.choice)
+        another = before is not None and (choice.measured or 0.0) - before > self.selection.reidentify_s
         state = self._map(replace(state, tracks=tracks, choice=choice), observation)
+        if choice.candidates:
+            return self._look_at(state, observation), None
         person = tracks.person(choice.number)
         if person is None:
-            return self._search(state, observation)
+            return self._search(state, observation), None
         unseen_s = observation.stamp - person.seen
         person, tracks = self.tracker.follow_legs(person, tracks, self.grid, state.ground)
         state = replace(state, tracks=tracks)
@@ -141,16 +127,19 @@ class TrackingController:
         lost_s = min(unseen_s, observation.now - person.felt)
         if lost_s <= self.tracker.scan_period_s:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
-            known = person.track if person.confirmed else state.known
+            known = person.track if person.confirmed and self._is_sure(person, choice) else state.known
             state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None)
+            speed = math.hypot(*person.track.mean[2:])
+            share = self.brisk_share if speed > state.brisk else self.brisk_share / 100
+            state = replace(state, brisk=state.brisk + share * (speed - state.brisk))
         can_look = state.ground is not None and state.known is not None and person.confirmed
-        if can_look and aim.hidden and state.ground is not None:
+        if can_look and aim.hidden and state.ground is not None and state.hunt is None:
             # Behind another person one is hidden for a moment; waiting is better than driving round people.
             pose = pose_at(state.tracks.poses, observation.now)
             can_look = self._hides(state.ground, pose, person.track.mean[:2])
         patience = self.lookout.after_s if can_look else self.tracker.forget_s if aim.hidden else self.search.after_s
         if lost_s > patience:
-            return self._search(state, observation)
+            return self._search(state, observation), person
         twist, mode, reason = self.steering.command(
             aim,
             keeps,
@@ -160,17 +149,19 @@ class TrackingController:
             in_view=unseen_s == 0,
             lost_s=lost_s,
         )
-        if appearance.is_other(choice.clothes, person.clothes):
+        if another:
             reason = "following another person: the lost one was not found"
         elif keeps > self.target_distance + self.steering.distance_tolerance and mode in (Mode.HOLD, Mode.FOLLOW):
             reason += ", further off than asked: nearer the camera would not show all of them"
-        walkers = self._walkers(person, state, observation)
-        wheels = observation.odometry or Odometry()
-        driven = Twist(wheels.linear, wheels.angular)
-        may_back = self._may_back(state, observation)
-        way_out = self.company.command(twist, driven, walkers, points, self.robot, may_back)
-        if way_out is not None:
-            twist, mode, reason = way_out, Mode.FOLLOW, "giving way to a person"
+        off = aim.bearing if aim.heading is None else max(aim.bearing, aim.heading, key=abs)
+        most = stoppable_turn(off, state.acceleration, self.robot) + abs(aim.bearing_rate)
+        twist = replace(twist, angular=float(np.clip(twist.angular, -most, most)))
+        pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
+        if twist.linear < 0 and not self.backing.is_known_behind(
+            aim.bearing, pose, self.grid, state.ground, state.others_at, self.robot
+        ):
+            limit = self.backing.blind_limit(state.others_at, observation.now)
+            twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(
             state,
@@ -178,13 +169,52 @@ class TrackingController:
             detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
         )
         belief = Belief(keeps, self._believed(state, observation), followed=person.number)
-        return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief)
+        return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief), person
+
+    def _give_way(
+        self, decision: Decision[TrackingState], person: Person | None, observation: Observation
+    ) -> Decision[TrackingState]:
+        """Replace a command by a way out of the way of people, where there is need, and by what the wheels can do."""
+        state, twist, mode, reason = decision.state, decision.twist, decision.mode, decision.reason
+        wheels, acceleration = observation.odometry, state.acceleration
+        if wheels is None:
+            return decision
+        driven, pose = Twist(wheels.linear, wheels.angular), pose_at(state.tracks.poses, observation.now)
+        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
+        begun = None
+        if state.way_out is not None:
+            yaw, speed, since = state.way_out
+            begun = Way(wrap(yaw - pose.yaw), speed, observation.now - since)
+
+        others_at = state.others_at
+
+        def is_known(places: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+            return self.backing.is_known(places, pose, self.grid, state.ground, others_at)
+
+        tracks, others = self.tracker.around(state.tracks, person, observation.now, self.steering.coast_s)
+        walkers = [walker_of(track, pose) for track in tracks]
+        state = replace(state, others_at=observation.now if others else state.others_at)
+        blind_speed = self.backing.blind_limit(state.others_at, observation.now)
+        way = self.company.way_out(
+            twist, driven, walkers, points, self.robot, begun, acceleration, is_known, blind_speed
+        )
+        if way is not None:
+            twist, reason = self.company.command(way, acceleration, self.robot), "giving way to a person"
+            mode = mode if mode in (Mode.LOST, Mode.SEARCH) else Mode.FOLLOW
+        twist = self.wheels.within_reach(twist, driven, acceleration, state.tracks.period, self.robot)
+        way_out = None if way is None else (pose.yaw + way.turn, way.speed, observation.now - way.age)
+        return replace(
+            decision, state=replace(state, way_out=way_out, sent=twist), twist=twist, mode=mode, reason=reason
+        )
 
     def _map(self, state: TrackingState, observation: Observation) -> TrackingState:
-        """Enter a new scan, and the depth image, into the map of the ground."""
+        """Enter a new scan into what moves, and with the depth image into the map of the ground."""
         scan, tracks = observation.scan, state.tracks
         if scan is None or observation.odometry is None:
             return state
+        half_view = min(-scan.angle_min, scan.angle_max)
+        tracks = self.tracker.follow_movers(tracks, half_view, self.grid, state.ground)
+        state = replace(state, tracks=tracks)
         if state.ground is not None and scan.stamp < state.ground.stamp + self.grid.period_s:
             return state
         pose = pose_at(tracks.poses, scan.stamp)
@@ -198,21 +228,39 @@ class TrackingController:
         return replace(state, ground=self.grid.update(state.ground, scan, pose, people, depth_points, self.robot))
 
     def _search(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
-        tracks, choice, appearance = state.tracks, state.choice, self.tracker.association.appearance
-        other = any(self.selection.is_stranger(one, tracks, choice, appearance) for one in tracks.in_view)
+        tracks, choice = state.tracks, state.choice
+        other = any(self.selection.is_stranger(one, choice) for one in tracks.in_view)
         lost = choice.measured is not None
         known, ground, scan = state.known, state.ground, observation.scan
         if (
             lost
-            and not other
             and known is not None
             and ground is not None
             and scan is not None
             and observation.now - known.stamp < self.lookout.give_up_s
         ):
-            return self._look_round(state, known, ground, scan, observation)
+            decision = self._look_round(state, known, ground, scan, observation)
+            return replace(decision, reason=f"{decision.reason}: another is in view") if other else decision
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
         return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
+
+    def _look_at(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
+        """Stand and keep those in view of whom one is the person followed, until it shows which."""
+        likeness, tracks = state.choice.likeness, state.tracks
+        people = [one for one in tracks.people if one.number in state.choice.candidates]
+        pose = pose_at(tracks.poses, observation.now)
+        chances = [likeness.of(one.number) if likeness else 1.0 for one in people]
+        offs = [bearing_range(predict(one.track, observation.now, self.tracker.noise), pose)[0] for one in people]
+        off = sum(chance * off for chance, off in zip(chances, offs, strict=True)) / max(sum(chances), 1e-6)
+        limit = self.steering.max_angular
+        twist = Twist(0.0, min(max(self.steering.angular_gain * off, -limit), limit))
+        reason = f"not sure which of {len(people)} is the person followed"
+        belief = Belief(None, self._believed(state, observation))
+        return Decision(twist, replace(state, since_full=0), Mode.HOLD, reason, belief=belief)
+
+    def _is_sure(self, person: Person, choice: Choice) -> bool:
+        """Whether a track is the person followed, and not only the likeliest of those in view."""
+        return choice.likeness is None or choice.likeness.of(person.number) >= self.selection.identity.sure
 
     def _look_round(
         self, state: TrackingState, known: Track, ground: Ground, scan: Scan, observation: Observation
@@ -257,40 +305,18 @@ class TrackingController:
         reach = min(aim.distance - 2 * self.detour.person_radius, self.detour.look_ahead)
         return self.detour.free(lasting, aim.bearing, 0.0, reach, self.robot, 0) is not None
 
-    def _may_back(self, state: TrackingState, observation: Observation) -> bool:
-        """Whether the ground behind the robot was seen to be free lately, as `Guard` wants it."""
-        ground = state.ground
-        if ground is None:
-            return True
-        behind = np.array([(-self.robot.half_length - far, 0.0) for far in (0.1, 0.2, 0.3)])
-        cells = self.grid.flat(ground, to_odometry(behind, pose_at(state.tracks.poses, observation.now)))
-        return bool((ground.freed.flat[cells] > observation.now - self.back_s).all())
-
     def _hides(self, ground: Ground, pose: Odometry, place: Points) -> bool:
         """Whether something that lasts is between the robot and a place (2,) in the odometry frame."""
         return not self.grid.sees(ground, np.array([[pose.x, pose.y]]), place[None], lasting=True)[0, 0]
-
-    def _walkers(self, person: Person, state: TrackingState, observation: Observation) -> list[Walker]:
-        """Return everybody measured lately, with the followed person as measured last, in the base frame."""
-        now = observation.now
-        pose = pose_at(state.tracks.poses, now)
-        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-        walkers = []
-        for one in state.tracks.people:
-            one = person if one.number == person.number else one
-            if not one.confirmed or now - one.measured > self.steering.coast_s:
-                continue
-            x, y, vx, vy = predict(one.track, now, self.tracker.noise).mean.tolist()
-            dx, dy = x - pose.x, y - pose.y
-            walkers.append(Walker(cos * dx + sin * dy, cos * dy - sin * dx, cos * vx + sin * vy, cos * vy - sin * vx))
-        return walkers
 
     def _keeps(self, person: Person, state: TrackingState, observation: Observation) -> float:
         """Return the distance to hold from the camera [m]: the target, but none from which a person is cut off."""
         if not person.confirmed:
             return self.target_distance
         least = self.tracker.visibility.least_distance(person.window, person.centre, observation.height)
-        keeps = max(self.target_distance, least - self.robot.camera_x)
+        late_s = observation.now - observation.stamp + state.tracks.period
+        notice_s = late_s + self.aside_s / math.sqrt(state.acceleration)
+        keeps = max(self.target_distance, least - self.robot.camera_x, notice_s * state.brisk)
         if keeps > self.near_hiding and state.ground is not None:
             pose = pose_at(state.tracks.poses, observation.now)
             soon = predict(person.track, observation.now + self.foresight_s, self.tracker.noise).mean[:2]
@@ -300,7 +326,7 @@ class TrackingController:
 
     def _believed(self, state: TrackingState, observation: Observation) -> tuple[Believed, ...]:
         """Return everyone tracked, in the base frame, as of the newest stamp."""
-        now, boxes = observation.now, dict(state.tracks.boxes)
+        now, boxes, likeness = observation.now, dict(state.tracks.boxes), state.choice.likeness
         pose = pose_at(state.tracks.poses, now)
         people = []
         for one in state.tracks.people:
@@ -316,6 +342,7 @@ class TrackingController:
                     speed * math.cos(heading),
                     speed * math.sin(heading),
                     boxes.get(one.number),
+                    None if likeness is None else likeness.of(one.number),
                 )
             )
         return tuple(people)
@@ -335,6 +362,9 @@ class TrackingController:
     def _region(self, person: Person, state: TrackingState, observation: Observation) -> Region | None:
         """Return where the person should be in the next frame; None to search all of it."""
         if state.since_full + 1 >= self.full_every or not self.selection.is_candidate(person):
+            return None
+        if not self._is_sure(person, state.choice):
+            # The person may be beside the one who is followed.
             return None
         stamp = observation.stamp + state.tracks.period
         pose = pose_at(state.tracks.poses, stamp)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limo_hog.follow.sense.observation import Observation, Odometry, Scan
 
@@ -46,13 +47,22 @@ def _boxes(observation: Observation) -> str:
     return f"box ({box}) lies outside the {observation.width}x{observation.height} image"
 
 
+#: One in so many rows and columns of the depth image is looked at first [px].
+_STEP = 40
+
+
+def _any_valid(depth: NDArray[np.float32]) -> bool:
+    return bool(np.any(np.isfinite(depth) & (depth > 0)))
+
+
 def _depth(observation: Observation) -> str:
     depth = observation.depth
     if depth is None:
         return ""
     if depth.shape != (observation.height, observation.width):
         return f"the depth image is {depth.shape}, the camera's {(observation.height, observation.width)}"
-    if not np.any(np.isfinite(depth) & (depth > 0)):
+    # Among a few pixels one is nearly always valid; to look at all takes a tenth of the follower's time.
+    if not _any_valid(depth[::_STEP, ::_STEP]) and not _any_valid(depth):
         return "the depth image has no valid pixel"
     return ""
 

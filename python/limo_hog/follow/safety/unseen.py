@@ -44,8 +44,10 @@ def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry
     x, y = np.meshgrid(-robot.half_length - depths, across, indexing="ij")
     ground = to_odometry(np.stack([x.ravel(), y.ravel()], axis=1), pose)
     seen = np.zeros(len(ground), bool)
-    for look in looks:
-        seen |= _was_free(ground, look, robot)
+    for look in reversed(looks):
+        seen[~seen] = _was_free(ground[~seen], look, robot)
+        if seen.all():
+            return FARTHEST
     unseen = ~seen.reshape(x.shape).all(axis=1)
     return float(depths[int(np.argmax(unseen))] - STEP) if unseen.any() else FARTHEST
 

@@ -97,20 +97,20 @@ class Appearance:
     other: float = 12.0
     rate: float = 0.05
 
-    def cost(self, known: Clothes | None, seen: Clothes | None) -> float:
+    def cost(self, known: Clothes | None, seen: Clothes | None, *, slips: bool = True) -> float:
         """Return how much the colours in a box differ from known clothes [chi-squared].
 
         At most `max_shirt` + `max_trousers`; 0 where either is unknown. A box that is too low shows trousers in the
-        place of the shirt, so the smaller cost of both readings counts.
+        place of the shirt: where it may have slipped, the smaller cost of both readings counts.
         """
         if known is None or seen is None:
             return 0.0
-        slipped = known[[1, 1]]
-        return min(float(np.minimum(_chi_squared(lower, seen), self._most()).sum()) for lower in (known, slipped))
+        readings = (known, known[[1, 1]]) if slips else (known,)
+        return min(float(np.minimum(_chi_squared(reading, seen), self._most()).sum()) for reading in readings)
 
     def is_other(self, known: Clothes | None, seen: Clothes | None) -> bool:
         """Whether clothes are clearly not the known ones."""
-        return self.cost(known, seen) > self.other
+        return self.cost(known, seen, slips=False) > self.other
 
     def learn(self, known: Clothes, seen: Clothes) -> Clothes:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""

@@ -5,6 +5,7 @@ Points are float64 (N, 2): x forward, y left in the base frame [m].
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -19,13 +20,23 @@ Points = NDArray[np.float64]
 NO_POINTS: Points = np.empty((0, 2))
 
 
+@functools.lru_cache(maxsize=8)
+def beam_directions(angle_min: float, angle_max: float, count: int) -> Points:
+    """Return the unit vectors of a scan's beams, float64 (N, 2), read only: the same for every scan of a lidar."""
+    angles = np.linspace(angle_min, angle_max, count)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    directions.flags.writeable = False
+    return directions
+
+
 def scan_points(scan: Scan, robot: RobotGeometry) -> Points:
     """Return the valid returns of a scan."""
     ranges = scan.ranges.astype(np.float64)
-    angles = np.linspace(scan.angle_min, scan.angle_max, len(ranges))
-    hit = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
-    x = robot.lidar_x + ranges[hit] * np.cos(angles[hit])
-    return np.stack([x, ranges[hit] * np.sin(angles[hit])], axis=1)
+    # False for a range that is no number.
+    hit = (ranges >= scan.range_min) & (ranges <= scan.range_max) & (ranges < np.inf)
+    points: Points = ranges[hit, None] * beam_directions(scan.angle_min, scan.angle_max, len(ranges))[hit]
+    points[:, 0] += robot.lidar_x
+    return points
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +60,12 @@ class DepthGrid:
         height, width = depth.shape
         rows = np.arange(self.step // 2, height, self.step)
         columns = np.arange(self.step // 2, width, self.step)
-        z = depth[np.ix_(rows, columns)].astype(np.float64)
+        z = depth[self.step // 2 :: self.step, self.step // 2 :: self.step].astype(np.float64)
         with np.errstate(invalid="ignore"):
             above_floor = robot.camera_z - (rows[:, None] + 0.5 - height / 2) / focal_px * z
-            near = np.isfinite(z) & (z > 0) & (z < reach) & (above_floor > self.floor)
-        left = (width / 2 - columns[None, :] - 0.5) / focal_px * z
-        return np.stack([robot.camera_x + z[near], left[near]], axis=1)
+            row, column = np.nonzero((z > 0) & (z < reach) & (above_floor > self.floor))
+        z = z[row, column]
+        return np.stack([robot.camera_x + z, (width / 2 - columns[column] - 0.5) / focal_px * z], axis=1)
 
 
 @dataclass(frozen=True, slots=True)

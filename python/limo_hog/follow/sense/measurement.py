@@ -50,6 +50,12 @@ class Measurement:
     middle: float = 0.0
     whole: bool = True
 
+    def is_low(self, share: float) -> bool:
+        """Whether the box sits too low on the person by this share of its height; true where that is not known."""
+        if self.range is None or not self.window:
+            return True
+        return self.centre - self.middle / self.range > share * self.height
+
 
 def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]:
     """Return every box as a measurement, in the boxes' order; the range is from the depth image."""

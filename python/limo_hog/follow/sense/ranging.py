@@ -33,7 +33,16 @@ def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int =
     half = side // 2
     patch = depth[max(y - half, 0) : max(y + half, 0), max(x - half, 0) : max(x + half, 0)]
     valid = patch[np.isfinite(patch) & (patch > 0)]
-    return float(np.median(valid)) if valid.size else None
+    return median(valid) if valid.size else None
+
+
+def median(values: NDArray[np.float32]) -> float:
+    """Return the median of (N,) finite numbers, N > 0: as `numpy.median`, without the checks that take most of it."""
+    half = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, half)[half])
+    low, high = np.partition(values, (half - 1, half))[half - 1 : half + 1]
+    return float((low + high) / 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,15 +96,15 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
     band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
     centre = x + w / 2
 
-    def median(left: float, right: float) -> float | None:
+    def depth_of(left: float, right: float) -> float | None:
         strip = band[:, max(round(centre + left * w), 0) : max(round(centre + right * w), 0)]
         if strip.size == 0:
             return None
         valid = strip[np.isfinite(strip) & (strip > 0)]
-        return float(np.median(valid)) if valid.size > strips.known * strip.size else strips.beyond
+        return median(valid) if valid.size > strips.known * strip.size else strips.beyond
 
-    middle = median(-strips.chest, strips.chest)
-    sides = [median(-strips.outer, -strips.inner), median(strips.inner, strips.outer)]
+    middle = depth_of(-strips.chest, strips.chest)
+    sides = [depth_of(-strips.outer, -strips.inner), depth_of(strips.inner, strips.outer)]
     seen = [side for side in sides if side is not None]
     if middle is None or not seen:
         return None

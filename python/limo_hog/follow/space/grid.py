@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.clearance import Points, beam_directions, to_odometry
 from limo_hog.follow.sense.observation import Odometry, Scan
 
 Cells = NDArray[np.int64]
@@ -121,9 +121,7 @@ class Grid:
             Where the lidar sits.
         """
         ground = self._moved(ground or self.start(pose), pose)
-        occupied, seen, freed = ground.occupied.copy(), ground.seen.copy(), ground.freed.copy()
         ranges = scan.ranges.astype(np.float64)
-        angles = pose.yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
         at = np.array([pose.x + robot.lidar_x * math.cos(pose.yaw), pose.y + robot.lidar_x * math.sin(pose.yaw)])
         returned = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
         # A beam that hits nothing is free as far as it reaches; one that is no number says nothing.
@@ -132,28 +130,31 @@ class Grid:
         beams = slice(None, None, self.every)
         # So far before the end that it is in another cell.
         free = steps[None, :] < clear[beams, None] - 1.5 * self.cell
-        directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        points = (at + steps[None, :, None] * directions[beams, None, :])[free]
-        ends = at + ranges[returned & (ranges < self.reach), None] * directions[returned & (ranges < self.reach)]
+        turn = replace(pose, x=0.0, y=0.0)
+        directions = to_odometry(beam_directions(scan.angle_min, scan.angle_max, len(ranges)), turn)
+        beam, step = np.nonzero(free)
+        points = at + steps[step, None] * directions[beams][beam]
+        near = returned & (ranges < self.reach)
+        ends = at + ranges[near, None] * directions[near]
         ends = np.concatenate([ends, depth_points])
         if len(people) and len(ends):
             gaps = np.hypot(ends[:, None, 0] - people[None, :, 0], ends[:, None, 1] - people[None, :, 1])
             ends = ends[gaps.min(axis=1) > self.person_radius]
         own = np.arange(-self.own_radius, self.own_radius + 1e-9, self.cell)
         under = np.array([pose.x, pose.y]) + np.stack(np.meshgrid(own, own), axis=-1).reshape(-1, 2)
-        cleared, filled = self.flat(ground, np.concatenate([points, under])), self.flat(ground, ends)
-        occupied.flat[cleared] = np.maximum(occupied.flat[cleared] - self.free, self.lowest)
-        occupied.flat[filled] = np.minimum(ground.occupied.flat[filled] + self.hit, self.highest)
-        seen.flat[cleared] = scan.stamp
-        seen.flat[filled] = scan.stamp
-        clear_now = cleared[occupied.flat[cleared] <= 0]
-        freed.flat[clear_now] = scan.stamp
+        cleared, filled = self._mask(ground, np.concatenate([points, under])), self._mask(ground, ends)
+        before, stamp = ground.occupied, np.float32(scan.stamp)
+        lower = np.maximum(before - np.float32(self.free), np.float32(self.lowest))
+        higher = np.minimum(before + np.float32(self.hit), np.float32(self.highest))
+        occupied = np.where(filled, higher, np.where(cleared, lower, before))
+        seen = np.where(cleared | filled, stamp, ground.seen)
+        freed = np.where(cleared & (occupied <= 0), stamp, ground.freed)
         return Ground(ground.corner, occupied, seen, freed, scan.stamp)
 
     def index(self, ground: Ground, points: Points) -> tuple[Cells, NDArray[np.bool_]]:
         """Return the cell of each point, int64 (N, 2), and whether it is in the square, bool (N,)."""
         cells: Cells = np.floor(points / self.cell).astype(np.int64) - ground.corner
-        inside: NDArray[np.bool_] = np.all((cells >= 0) & (cells < self.cells), axis=1)
+        inside: NDArray[np.bool_] = self._inside(cells[:, 0]) & self._inside(cells[:, 1])
         return cells, inside
 
     def flat(self, ground: Ground, points: Points) -> NDArray[np.int64]:
@@ -172,12 +173,18 @@ class Grid:
         With `lasting`, only cells count that were not free within `lasts_s`: what came in since can go away as well.
         """
         cells, inside = self.index(ground, points)
-        blocked = np.zeros(len(points), bool)
-        rows, columns = cells[inside].T
-        blocked[inside] = ground.occupied[rows, columns] > 0
+        stands = ground.occupied > 0
         if lasting:
-            blocked[inside] &= ground.freed[rows, columns] < ground.stamp - self.lasts_s
-        return blocked
+            stands &= ground.freed < ground.stamp - self.lasts_s
+        flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
+        return np.asarray(stands.ravel()[flat] & inside)
+
+    def is_free_since(self, ground: Ground, points: Points, stamp: float) -> NDArray[np.bool_]:
+        """Return whether each point was seen to be free after a stamp [s], bool (N,); outside of the square none."""
+        cells, inside = self.index(ground, points)
+        free = np.zeros(len(points), bool)
+        free[inside] = ground.freed[cells[inside, 0], cells[inside, 1]] > stamp
+        return free
 
     def is_near_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
         """Return whether an occupied cell is within half a cell of each point, bool (N,)."""
@@ -200,6 +207,15 @@ class Grid:
             len(origins), len(places), samples
         )
         return np.asarray(~blocked.any(axis=2))
+
+    def _inside(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        return (cells >= 0) & (cells < self.cells)
+
+    def _mask(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
+        """Return which cells hold a point, bool (N, N)."""
+        mask = np.zeros(self.cells**2, bool)
+        mask[self.flat(ground, points)] = True
+        return mask.reshape(self.cells, self.cells)
 
     def _corner(self, pose: Odometry) -> tuple[int, int]:
         half = self.cells // 2

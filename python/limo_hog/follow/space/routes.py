@@ -66,17 +66,24 @@ class Router:
         ]
         distance[x, y] = 0.0
         closed = np.where(free, np.float32(self.detour * grid.cell) * wider, np.float32(np.inf)).astype(np.float32)
-        for _ in range(int(self.farthest / grid.cell)):
-            nearer = np.full_like(distance, np.inf)
-            for dx, dy, cost in _NEIGHBOURS:
-                there = nearer[_at(dx), _at(dy)]
-                np.minimum(there, distance[_at(-dx), _at(-dy)] + np.float32(cost * grid.cell), out=there)
-            nearer += closed
-            np.minimum(nearer, distance, out=nearer)
-            if np.array_equal(nearer, distance):
+        straight, diagonal = np.float32(grid.cell), np.float32(math.sqrt(2) * grid.cell)
+        # With an edge of cells that no way leads to, every cell has eight neighbours.
+        edged = np.pad(distance, 1, constant_values=np.inf)
+        for step in range(1, int(self.farthest / grid.cell) + 1):
+            # After so many steps nothing further off has been reached.
+            (x0, x1), (y0, y1) = ((max(at - step, 0), min(at + step + 1, grid.cells)) for at in (x, y))
+            around = edged[x0 : x1 + 2, y0 : y1 + 2]
+            across = np.minimum(around[:, :-2], around[:, 2:])
+            beside = np.minimum(np.minimum(around[:-2, 1:-1], around[2:, 1:-1]), across[1:-1])
+            corners = np.minimum(across[:-2], across[2:])
+            nearer = np.minimum(beside + straight, corners + diagonal)
+            nearer += closed[x0:x1, y0:y1]
+            before = around[1:-1, 1:-1]
+            np.minimum(nearer, before, out=nearer)
+            if np.array_equal(nearer, before):
                 break
-            distance = nearer
-        return Field(distance)
+            before[...] = nearer
+        return Field(edged[1:-1, 1:-1])
 
     def way_towards(self, grid: Grid, ground: Ground, pose: Odometry, place: Points) -> Points:
         """Return the shortest way to the cell nearest to a place (2,) [m] of those that a way leads to."""

@@ -36,6 +36,9 @@ class Association:
     size_tolerance
         A range is not the person's where height times range differs from the known window by more than this share
         [1]. Chosen; from .2 to .6 the pixel error in `crossing` changes by less than .5 px (seed 3).
+    low
+        A box lower than the person by more than this shows trousers in the shirt's place [window heights]. Measured in
+        the arena: of 424 boxes 98 % are within .12 of the middle.
     appearance
         Compares clothes.
     unknown
@@ -46,6 +49,7 @@ class Association:
     max_cost: float = 24.0
     same_place: float = 0.5
     size_tolerance: float = 0.35
+    low: float = 0.12
     appearance: Appearance = field(default_factory=Appearance)
     unknown: UnknownRange = field(default_factory=UnknownRange)
 
@@ -87,7 +91,9 @@ class Association:
 
         A box of another size than the person's is on a part of a body, and its patches are not on shirt and trousers.
         """
-        return self.appearance.cost(person.clothes, seen.clothes) if self.fits_size(person, seen) else 0.0
+        if not self.fits_size(person, seen):
+            return 0.0
+        return self.appearance.cost(person.clothes, seen.clothes, slips=seen.is_low(self.low))
 
     def fits_size(self, person: Person, seen: Measurement) -> bool:
         """Whether a box is as high as the person's window at its range; true where the range is unknown."""
@@ -107,7 +113,7 @@ class Association:
 
     def _is_double(self, seen: Measurement, other: Measurement) -> bool:
         """Whether two boxes are on one person: at the same place, in the same clothes."""
-        if self.appearance.is_other(other.clothes, seen.clothes):
+        if self.appearance.cost(other.clothes, seen.clothes) > self.appearance.other:
             return False
         turn = wrap(seen.bearing - other.bearing)
         one, two = seen.range or other.range, other.range or seen.range

@@ -7,9 +7,11 @@ where a person is. It cannot tell a person from a chair, so it may continue a tr
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
@@ -67,14 +69,25 @@ class Legs:
     sigma: float = 0.1
     fewest: int = 2
 
-    def update(self, track: Track, returns: Returns, noise: Noise) -> Track | None:
-        """Return the track predicted for the scan's stamp and corrected by its legs; None where there are none."""
+    def update(
+        self,
+        track: Track,
+        returns: Returns,
+        noise: Noise,
+        is_ground: Callable[[Points], NDArray[np.bool_]] | None = None,
+    ) -> Track | None:
+        """Return the track predicted for the scan's stamp and corrected by its legs; None where there are none.
+
+        `is_ground` tells of points (N, 2), odometry frame, which of them are on what is known to stand there: no legs.
+        """
         track = predict(track, returns.stamp, noise)
         pose = returns.pose
         distance = bearing_range(track, pose)[1]
         if distance > self.reach:
             return None
         legs = returns.points[np.hypot(*(returns.points - track.mean[:2]).T) < self.radius]
+        if is_ground is not None and len(legs):
+            legs = legs[~is_ground(legs)]
         if len(legs) < self.fewest or np.hypot(*np.ptp(legs, axis=0)) > self.widest:
             return None
         dx, dy = legs.mean(axis=0) - (pose.x, pose.y)

@@ -36,6 +36,10 @@ class Person:
         Frames in which the person should have been found, and those since they were.
     clothes
         What they wear; None while no colour image tells.
+    worn, tall
+        Clothes and window as the last box showed them; None where it did not.
+    strained
+        Whether the last box was not where the person was expected, or not of their size.
     """
 
     number: int
@@ -49,6 +53,9 @@ class Person:
     misses: int = 0
     felt: float = -math.inf
     clothes: Clothes | None = None
+    worn: Clothes | None = None
+    tall: float | None = None
+    strained: bool = False
 
     @property
     def existence(self) -> float:
@@ -92,7 +99,8 @@ def initiate(
     track = kalman.initiate(stamp, seen.bearing, distance, pose, noise)
     window = seen.window or seen.height * distance
     centre = seen.middle if seen.window else seen.centre * distance
-    return Person(number, track, stamp, log_odds, window, centre, clothes=seen.clothes)
+    worn, tall = seen.clothes, window if seen.whole and seen.window else None
+    return Person(number, track, stamp, log_odds, window, centre, clothes=worn, worn=worn, tall=tall)
 
 
 def predict(person: Person, stamp: float, noise: Noise) -> Person:

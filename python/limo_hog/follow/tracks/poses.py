@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from dataclasses import replace
-
-import numpy as np
-from numpy.typing import NDArray
 
 from limo_hog.follow.sense.observation import Odometry
 
@@ -26,8 +24,12 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
         x = last.x + last.linear * ahead * math.cos(last.yaw)
         y = last.y + last.linear * ahead * math.sin(last.yaw)
         return replace(last, stamp=stamp, x=x, y=y, yaw=yaw)
-    stamps = np.array([pose.stamp for pose in poses])
-    columns: NDArray[np.float64] = np.array([(pose.x, pose.y, pose.yaw) for pose in poses])
-    columns[:, 2] = np.unwrap(columns[:, 2])
-    x, y, yaw = (float(np.interp(stamp, stamps, column)) for column in columns.T)
+    after = bisect.bisect_left(poses, stamp, key=lambda pose: pose.stamp)
+    if after == 0:
+        first = poses[0]
+        return replace(last, stamp=stamp, x=first.x, y=first.y, yaw=first.yaw)
+    one, other = poses[after - 1], poses[after]
+    share = (stamp - one.stamp) / (other.stamp - one.stamp)
+    yaw = one.yaw + share * math.remainder(other.yaw - one.yaw, math.tau)
+    x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
     return replace(last, stamp=stamp, x=x, y=y, yaw=yaw)

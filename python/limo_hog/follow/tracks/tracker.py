@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,8 +17,9 @@ from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Association
 from limo_hog.follow.tracks.existence import Existence, Recall
-from limo_hog.follow.tracks.kalman import Noise, bearing_range, innovation
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
 from limo_hog.follow.tracks.legs import Legs, Returns, returns_of
+from limo_hog.follow.tracks.movers import Mover, Movers
 from limo_hog.follow.tracks.person import Person, initiate, predict
 from limo_hog.follow.tracks.poses import pose_at
 
@@ -39,6 +42,8 @@ class Tracks:
         Stamp of the last frame, None before the first, and the time between the last two [s].
     recall
         How often people are found, as learnt so far.
+    movers, moved_at
+        What may move in the scan, whether the camera shows it or not, and the stamp of that scan [s].
     """
 
     people: tuple[Person, ...] = ()
@@ -49,6 +54,8 @@ class Tracks:
     stamp: float | None = None
     period: float = 0.1
     recall: Recall = field(default_factory=Recall)
+    movers: tuple[Mover, ...] = ()
+    moved_at: float = -math.inf
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
@@ -66,7 +73,7 @@ class Tracker:
 
     Attributes
     ----------
-    noise, association, existence, legs, visibility
+    noise, association, existence, legs, movers, visibility
         The parts, each with its parameters.
     forget_s
         An unmeasured person is forgotten after so long [s]. Chosen: the time the
@@ -82,6 +89,12 @@ class Tracker:
     turn_speed
         Standard deviation added to each component of the velocity of a person whose box is outside the gate [m/s], and
         `association.same_place` to the position's. Chosen: a sharp turn at 0.75 m/s changes the velocity by 1.06 m/s.
+    astray
+        A box whose range differs by more from the person's may be another's, who passes before them [m]. Chosen: half
+        of what people keep from each other; the depth at a box's centre strays by less but for an arm.
+    stature_from
+        From nearer the outline's top is no measure of the stature [m]. Measured in the arena: at 1.25 m it is a tenth
+        too low, since the head touches the image's edge.
     poses_s, scans_s
         How long odometry and scans are kept [s]: a camera image may be as late as this.
     scan_period_s
@@ -96,12 +109,15 @@ class Tracker:
     association: Association = field(default_factory=Association)
     existence: Existence = field(default_factory=Existence)
     legs: Legs = field(default_factory=Legs)
+    movers: Movers = field(default_factory=Movers)
     visibility: Visibility = field(default_factory=Visibility)
     forget_s: float = 8.0
     legs_only_s: float = 4.0
     restart_s: float = 1.0
     size_rate: float = 0.2
     turn_speed: float = 1.0
+    astray: float = 0.25
+    stature_from: float = 1.4
     poses_s: float = 2.0
     scans_s: float = 1.0
     scan_period_s: float = 0.13
@@ -129,7 +145,8 @@ class Tracker:
                 recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
                 people.append(self.correct(person, measured[pairs[who]], pose, chance))
-            elif expected:
+            elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
+                # Later than that it shows only that the person walked on, not that there is none.
                 people.append(self.existence.update(person, self.existence.of_miss(chance), found=False))
             else:
                 people.append(person)
@@ -158,6 +175,16 @@ class Tracker:
             elif seen.window > window:
                 window, centre = seen.window, seen.middle
         clothes = self._clothes(person, seen)
+        fits = self.association.fits_size(person, seen)
+        off = 0.0 if seen.range is None else abs(seen.range - bearing_range(person.track, pose)[1])
+        in_place = off < self.astray
+        # Where the head is cut off, the box sits lower, and its patches are not on shirt and trousers.
+        aligned = seen.range is None or (seen.whole and not seen.is_low(self.association.low))
+        worn = seen.clothes if fits and aligned else None
+        # A box on a part of the body still shows the stature, by the depth image.
+        tall = seen.window if in_place and seen.whole and seen.window and seen.range else None
+        if seen.range is not None and seen.range < self.stature_from:
+            tall = None
         evidence = self.existence.of_box(seen, recall)
         if person.confirmed and self.existence.is_solid(seen):
             # Near by, and on parts of the body, HOG's scores are low for people, too.
@@ -167,7 +194,8 @@ class Tracker:
         if seen.range is not None and track.stamp - person.measured > self.restart_s:
             track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, self.noise)
         fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
-        if fit.distance2 > self.association.gate:
+        strained = fit.distance2 > self.association.gate
+        if strained:
             place = self.association.same_place**2
             loose = track.covariance + np.diag([place, place, self.turn_speed**2, self.turn_speed**2])
             track = replace(track, covariance=loose)
@@ -179,6 +207,9 @@ class Tracker:
             window=window,
             centre=centre,
             clothes=clothes,
+            worn=worn,
+            tall=tall,
+            strained=strained or not in_place,
         )
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
@@ -197,6 +228,8 @@ class Tracker:
         height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
         if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
             return person, tracks
+        # Walls and furniture that are known already are nobody's legs.
+        is_ground = None if ground is None else partial(grid.is_near_blocked, ground)
         now = person
         for returns in tracks.scans:
             # The track of an unseen person already contains the scans up to `felt`: each may count only once.
@@ -204,15 +237,39 @@ class Tracker:
                 # Legs continue a track; after a gap, whatever stands there could be taken for them.
                 break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
-                if ground is not None:
-                    # Walls and furniture that are known already are nobody's legs.
-                    known = grid.is_near_blocked(ground, returns.points)
-                    returns = replace(returns, points=returns.points[~known])
-                track = self.legs.update(now.track, returns, self.noise)
+                track = self.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = tuple(kept if one.number == person.number else one for one in tracks.people)
         return now, replace(tracks, people=people)
+
+    def follow_movers(self, tracks: Tracks, half_view: float, grid: Grid, ground: Ground | None) -> Tracks:
+        """Enter the newest scan, whose lidar looks `half_view` [rad] to either side, into what moves."""
+        if not tracks.scans or tracks.scans[-1].stamp <= tracks.moved_at:
+            return tracks
+        newest = tracks.scans[-1]
+        movers = self.movers.update(tracks.movers, newest, half_view, self.noise, grid, ground)
+        return replace(tracks, movers=movers, moved_at=newest.stamp)
+
+    def around(self, tracks: Tracks, followed: Person | None, now: float, lately_s: float) -> tuple[list[Track], bool]:
+        """Return all people, seen by the camera or moving in the scan, as of `now` [s], and whether any is another.
+
+        `followed` is the person followed, as measured last; people found by the camera count for `lately_s` [s].
+        """
+        people, others = [], False
+        for one in tracks.people:
+            is_followed = followed is not None and one.number == followed.number
+            one = followed if followed is not None and is_followed else one
+            if one.confirmed and now - one.measured <= lately_s:
+                people.append(kalman.predict(one.track, now, self.noise))
+                others |= not is_followed
+        for mover in self.movers.moving(tracks.movers):
+            track = kalman.predict(mover.track, now, self.noise)
+            gaps = [math.dist(track.mean[:2], other.mean[:2]) for other in people]
+            if min(gaps, default=math.inf) > self.association.same_place:
+                people.append(track)
+                others = True
+        return people, others
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
         poses, odometry = tracks.poses, observation.odometry

@@ -316,15 +316,16 @@ function drawMap() {
     if (i === now.followed) pen.fill();
     else pen.stroke();
   });
-  // Where the follower takes people to be: a ring, and how sure it is.
+  // Where the follower takes people to be: a ring, how sure it is, and how likely this is the person followed.
   pen.lineWidth = 1.5;
   pen.setLineDash([4, 3]);
-  for (const [x, y, probability] of past ? [] : now.believed) {
+  for (const [x, y, probability, same] of past ? [] : now.believed) {
     disc(x, y, 0.3);
     pen.strokeStyle = pen.fillStyle = colours.believed;
     pen.stroke();
     pen.textAlign = "left";
-    pen.fillText(percent(probability), at(x + 0.36, y)[0], at(x, y)[1] + 4);
+    const label = same === null ? percent(probability) : `${percent(probability)}, same ${percent(same)}`;
+    pen.fillText(label, at(x + 0.36, y)[0], at(x, y)[1] + 4);
   }
   pen.setLineDash([]);
   pen.save();

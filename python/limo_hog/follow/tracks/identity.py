@@ -1,0 +1,256 @@
+"""Which track is the person followed? A probability for each track, and the rest for none of them.
+
+Every frame multiplies the probabilities by how much more likely the clothes and the stature in a track's box are for
+the person followed than for another (Bayes), and lets some of them pass to where the person may have gone: from a track
+that is not measured to one that begins, between two that meet, from every track to none.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+from limo_hog.follow.sense.appearance import Clothes
+from limo_hog.follow.tracks.person import Person, separation
+from limo_hog.follow.tracks.tracker import Tracks
+
+
+@dataclass(frozen=True, slots=True)
+class Traits:
+    """What a person looks like.
+
+    Attributes
+    ----------
+    number
+        Of the track it was learnt from.
+    clothes
+        What is worn; None where no colour image tells.
+    window
+        Height of the detection window, times the distance [px m]: the stature.
+    boxes
+        Boxes it was learnt from [1].
+    """
+
+    number: int
+    clothes: Clothes | None
+    window: float
+    boxes: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """The person followed, and which track that is.
+
+    Attributes
+    ----------
+    traits
+        What the person looks like.
+    place, at
+        Where and when the person was last measured for sure: x, y [m] in the odometry frame, [s].
+    chances
+        Number and probability of each track; what is missing to 1 is the probability that none is the person.
+    others
+        What other people look like, who were about lately.
+    """
+
+    traits: Traits
+    place: tuple[float, float]
+    at: float
+    chances: tuple[tuple[int, float], ...]
+    others: tuple[Traits, ...] = ()
+
+    def of(self, number: int) -> float:
+        """Return the probability that a track is the person followed."""
+        return dict(self.chances).get(number, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Moves the probabilities from frame to frame.
+
+    Attributes
+    ----------
+    sure
+        From this probability on the person's place, clothes and stature are learnt [1]. Chosen: one in twenty wrong.
+    strange_shirt, strange_trousers
+        How likely it is that another person wears just this, in parts of how likely the person themself does [1].
+        Chosen: a tenth of the shirts are alike, half of the trousers are dark.
+    odd_shirt, odd_trousers
+        Share of boxes in which something else is seen in the shirt's or the trousers' place [1]. Measured in the arena,
+        424 whole boxes: one shirt, three trousers; chosen higher, for hands, bags and shadows.
+    stature_sigma
+        Standard deviation of the stature in the depth image, as a share [1]. Measured in the arena: .01 from frame to
+        frame, and up to .04 between far and near; chosen for shoes, hats and gait as well.
+    strange_stature, odd_stature
+        As for clothes [1]. Chosen: people's statures differ by a tenth; three outlines in ten are wrong, since
+        an arm or another's head is taken for the person's.
+    again
+        Share of its own evidence that a box counts for after a track's first [1]. Chosen: neighbouring frames show
+        nearly the same, as in `Existence`.
+    steady
+        The same for the stature, whose error lasts as long as the distance [1]. Chosen: a second is worth one box.
+    most
+        The most that a box can tell either way [log-odds]. Chosen: a factor of twelve.
+    passes, strained
+        Chance that a track's next box is another person's, who is not tracked: where the box fits, and where its place
+        or size contradicts the track [1]. Chosen: once in a minute; once in a second.
+    fades_s
+        Time constant with which a track that is not measured stops to be where the person is [s]. Chosen: people turn
+        within a second.
+    meets, swaps
+        Two tracks nearer than this to each other may swap their people [m], with this chance in a frame [1]. Chosen: a
+        body's width and a stride; in the second in which they pass, one in five.
+    unseen_s
+        A person not measured for longer than this may be a track that begins [s], and surely may be after two seconds.
+        Chosen: three frames.
+    reach, speed
+        A track that begins nearer than this to the last place, and so much more for each second since, may be the
+        person's [m, m/s]. Chosen: a body's width, and a walk.
+    clear
+        A shirt or trousers that differ by more are not learnt [chi-squared of 3 numbers]. Chosen: half of
+        `Appearance.other`; other light stays below.
+    rate
+        Share by which one box moves clothes and stature once they are learnt [1]. Chosen: as in `Appearance`.
+    remembered
+        So many other people are remembered [1].
+    """
+
+    sure: float = 0.95
+    strange_shirt: float = 0.1
+    strange_trousers: float = 0.5
+    odd_shirt: float = 0.1
+    odd_trousers: float = 0.3
+    stature_sigma: float = 0.05
+    strange_stature: float = 0.3
+    odd_stature: float = 0.3
+    again: float = 0.5
+    steady: float = 0.1
+    most: float = 2.5
+    passes: float = 0.002
+    strained: float = 0.1
+    fades_s: float = 2.0
+    meets: float = 0.5
+    swaps: float = 0.02
+    unseen_s: float = 0.3
+    reach: float = 0.5
+    speed: float = 1.0
+    clear: float = 6.0
+    rate: float = 0.05
+    remembered: int = 8
+
+    def begin(self, person: Person) -> Likeness:
+        """Begin with a person who is followed from now on."""
+        x, y = person.track.mean[:2].tolist()
+        traits = Traits(person.number, person.clothes, person.window)
+        return Likeness(traits, (x, y), person.measured, ((person.number, 1.0 - self.passes),))
+
+    def update(self, known: Likeness, tracks: Tracks) -> Likeness:
+        """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
+        people = {one.number: one for one in tracks.people}
+        chances = self._passed(known, people, tracks)
+        odds = dict(chances)
+        for one in tracks.in_view:
+            odds[one.number] *= math.exp(self._evidence(known, one, first=one.age <= 1))
+        total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
+        chances = {number: value / total for number, value in odds.items()}
+        known = replace(known, chances=tuple(chances.items()))
+        for one in tracks.in_view:
+            known = self._learnt(known, one, tracks)
+        return known
+
+    def _passed(self, known: Likeness, people: dict[int, Person], tracks: Tracks) -> dict[int, float]:
+        """Return the probabilities of the tracks before the frame's boxes are looked at."""
+        stamp = tracks.stamp or 0.0
+        chances = {number: chance for number, chance in known.chances if number in people}
+        for number in chances:
+            one = people[number]
+            if stamp - one.measured > self.unseen_s:
+                leaves = 1.0 - math.exp(-tracks.period / self.fades_s)
+            else:
+                leaves = self.strained if one.strained and one.seen == stamp else self.passes
+            chances[number] *= 1.0 - leaves
+        lost_s = stamp - known.at
+        share = min(max(lost_s - self.unseen_s, 0.0) / self.fades_s, 1.0) / (2 + len(known.others))
+        for number, one in people.items():
+            if number in chances:
+                continue
+            near = math.dist(one.track.mean[:2].tolist(), known.place) < self.reach + self.speed * lost_s
+            taken = share if near else 0.0
+            gone = [other for other in chances if stamp - people[other].measured > self.unseen_s]
+            absent = max(1.0 - sum(chances.values()), 0.0)
+            gained = taken * (absent + sum(chances[other] for other in gone))
+            for other in gone:
+                chances[other] *= 1.0 - taken
+            chances[number] = gained
+        measured = [one for one in people.values() if stamp - one.measured <= self.unseen_s]
+        absent = max(1.0 - sum(chances.values()), 0.0)
+        own = known.traits.number
+        if own in chances and people[own] in measured:
+            # What was taken for another person's box may have been none.
+            chances[own] += self.passes * absent
+        for left, right in itertools.combinations(measured, 2):
+            if separation(left, right) < self.meets:
+                swapped = self.swaps * (chances[right.number] - chances[left.number])
+                chances[left.number] += swapped
+                chances[right.number] -= swapped
+        return chances
+
+    def _evidence(self, known: Likeness, person: Person, *, first: bool) -> float:
+        """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""
+        # A track that was another person before is compared with that one, any other with all who are about.
+        others = [traits for traits in known.others if traits.number == person.number]
+        others = others or [traits for traits in known.others if traits.number != known.traits.number]
+        same, strange = self._fit(person, known.traits, first=first), self._fit(person, None, first=first)
+        evidence = same - max([strange, *(self._fit(person, traits, first=first) for traits in others)])
+        return min(max(evidence, -self.most), self.most)
+
+    def _fit(self, person: Person, traits: Traits | None, *, first: bool) -> float:
+        """Return how likely a person's last box is on one who looks like this, or on anybody [log]."""
+        clothes = stature = 0.0
+        if person.worn is not None:
+            for part, strange, odd in (
+                (0, self.strange_shirt, self.odd_shirt),
+                (1, self.strange_trousers, self.odd_trousers),
+            ):
+                if traits is None or traits.clothes is None:
+                    clothes += math.log(strange)
+                else:
+                    same = math.exp(-float(((traits.clothes[part] - person.worn[part]) ** 2).sum()) / 2)
+                    clothes += math.log((1.0 - odd) * same + odd * strange)
+        if person.tall is not None and traits is None:
+            stature = math.log(self.strange_stature)
+        elif person.tall is not None and traits is not None:
+            same = math.exp(-((math.log(person.tall / traits.window) / self.stature_sigma) ** 2) / 2)
+            stature = math.log((1.0 - self.odd_stature) * same + self.odd_stature * self.strange_stature)
+        return clothes + stature if first else self.again * clothes + self.steady * stature
+
+    def _learnt(self, known: Likeness, person: Person, tracks: Tracks) -> Likeness:
+        """Learn from a box who looks how: of the person followed where that is sure, of others where they are not."""
+        chance = known.of(person.number)
+        if chance >= self.sure:
+            x, y = person.track.mean[:2].tolist()
+            known = replace(known, place=(x, y), at=person.measured)
+            # Beside another person the box may show that one.
+            alone = all(separation(one, person) > self.meets for one in tracks.people if one is not person)
+            return replace(known, traits=self._moved(known.traits, person)) if alone else known
+        if not person.confirmed or chance > 1.0 - self.sure:
+            return known
+        rest = [traits for traits in known.others if traits.number != person.number]
+        mine = Traits(person.number, person.clothes, person.window)
+        return replace(known, others=(*rest, mine)[-self.remembered :])
+
+    def _moved(self, traits: Traits, person: Person) -> Traits:
+        rate = max(self.rate, 1.0 / (traits.boxes + 1))
+        clothes, window = traits.clothes, traits.window
+        if person.worn is not None:
+            clothes = person.worn if clothes is None else self._mixed(clothes, person.worn, rate)
+        if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
+            window += rate * (person.tall - window)
+        return Traits(person.number, clothes, window, traits.boxes + 1)
+
+    def _mixed(self, clothes: Clothes, worn: Clothes, rate: float) -> Clothes:
+        """Return clothes moved towards those in a box, but for a shirt or trousers that clearly differ."""
+        same = ((worn - clothes) ** 2).sum(axis=1) < self.clear
+        moved: Clothes = clothes + rate * same[:, None] * (worn - clothes)
+        return moved

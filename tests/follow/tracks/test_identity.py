@@ -1,0 +1,134 @@
+"""Which track is the person followed: by way, clothes and stature together, with doubt where they do not tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from limo_hog.follow.control.selection import Choice, Selection
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.tracks import kalman
+from limo_hog.follow.tracks.identity import Identity, Likeness, Traits
+from limo_hog.follow.tracks.kalman import Noise
+from limo_hog.follow.tracks.person import Person
+from limo_hog.follow.tracks.tracker import Tracks
+
+IDENTITY, SELECTION = Identity(), Selection()
+IN_RED: NDArray[np.float64] = np.array([[10.0, 4.0, 10.0], [6.0, 6.0, 9.0]])
+IN_GREEN: NDArray[np.float64] = np.array([[5.0, 10.0, 10.0], [6.0, 6.0, 9.0]])
+WINDOW = 536.0
+
+
+def person(
+    number: int,
+    stamp: float,
+    y: float = 0.0,
+    clothes: NDArray[np.float64] | None = IN_RED,
+    *,
+    tall: float = WINDOW,
+    measured: float | None = None,
+    age: int = 50,
+) -> Person:
+    """Return a confirmed person 2 m ahead, found in the frame of `stamp` unless `measured` says when."""
+    track = kalman.initiate(stamp, 0.0, 2.0, Odometry(), Noise())
+    track = replace(track, mean=np.array([2.0, y, 0.0, 0.0]))
+    seen = stamp if measured is None else measured
+    return Person(number, track, seen, 5.0, tall, -120.0, True, age, clothes=clothes, worn=clothes, tall=tall)
+
+
+def at(stamp: float, *people: Person) -> Tracks:
+    """Return the tracks of a frame."""
+    return Tracks(people, stamp=stamp)
+
+
+def followed() -> Likeness:
+    """Return what is known of a person in red who was followed for a second and stands 2 m ahead."""
+    known = IDENTITY.begin(person(1, 0.0))
+    for frame in range(1, 11):
+        known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame)))
+    assert known.of(1) > 0.99
+    return known
+
+
+def test_a_track_that_goes_over_to_another_shirt_is_not_the_person_any_more() -> None:
+    known = followed()
+    for frame in range(11, 26):
+        known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame, clothes=IN_GREEN, tall=0.95 * WINDOW)))
+    assert known.of(1) < 0.1
+    # What the other person wears was not learnt.
+    assert known.traits.clothes is not None
+    assert known.traits.clothes[0] == pytest.approx(IN_RED[0])
+
+
+def test_one_box_of_odd_colours_does_not_lose_the_person() -> None:
+    known = IDENTITY.update(followed(), at(1.1, person(1, 1.1, clothes=IN_GREEN)))
+    assert known.of(1) > 0.9
+
+
+def test_a_lost_person_is_known_again_by_the_clothes_and_another_is_not() -> None:
+    for clothes, low, high in ((IN_RED, 0.8, 1.0), (IN_GREEN, 0.0, 0.2)):
+        known = followed()
+        for frame in range(11, 60):
+            known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame, measured=1.0)))
+        for frame in range(60, 70):
+            found = person(2, 0.1 * frame, 0.5, clothes, age=frame - 59)
+            known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame, measured=1.0), found))
+        assert low <= known.of(2) <= high
+
+
+def test_a_track_that_begins_while_the_person_is_measured_is_another() -> None:
+    known = IDENTITY.update(followed(), at(1.1, person(1, 1.1), person(2, 1.1, 0.8, age=1)))
+    assert known.of(2) == 0.0
+    assert known.of(1) > 0.99
+
+
+def test_a_track_too_far_off_to_be_walked_to_is_another() -> None:
+    known = IDENTITY.update(followed(), at(2.0, person(2, 2.0, 4.0, age=1)))
+    assert known.of(2) == 0.0
+
+
+def test_the_stature_tells_apart_people_in_one_kind_of_clothes() -> None:
+    known = replace(followed(), others=(Traits(7, IN_RED, 1.1 * WINDOW),))
+    for frame in range(11, 71):
+        stamp = 0.1 * frame
+        known = IDENTITY.update(known, at(stamp, person(1, stamp, tall=1.1 * WINDOW)))
+    assert known.of(1) < 0.3
+
+
+def test_two_alike_who_meet_cannot_be_told_apart_after_it() -> None:
+    known = followed()
+    for frame in range(11, 71):
+        stamp = 0.1 * frame
+        known = IDENTITY.update(known, at(stamp, person(1, stamp), person(2, stamp, 0.3)))
+    assert known.of(1) < 0.9
+    assert known.of(2) > 0.1
+
+
+def chosen(chances: tuple[tuple[int, float], ...], stamp: float, unsure_at: float | None = None) -> Choice:
+    """Return the choice between two people in view, who look alike, with these probabilities."""
+    likeness = replace(followed(), chances=chances, at=stamp)
+    choice = Choice(1, likeness, stamp, unsure_at=unsure_at)
+    people = at(stamp, person(1, stamp, clothes=None, tall=WINDOW), person(2, stamp, 1.0, None))
+    return SELECTION.choose(replace(people, people=tuple(replace(one, tall=None) for one in people.people)), choice)
+
+
+def test_between_two_as_likely_none_is_chosen_until_it_shows_or_takes_too_long() -> None:
+    assert chosen(((1, 0.9), (2, 0.1)), 2.0).candidates == ()
+    unsure = chosen(((1, 0.5), (2, 0.45)), 2.0)
+    assert set(unsure.candidates) == {1, 2}
+    assert unsure.unsure_at == 2.0
+    late = chosen(((1, 0.5), (2, 0.45)), 2.0, unsure_at=2.0 - SELECTION.decide_s - 0.1)
+    assert (late.number, late.candidates) == (1, ())
+
+
+def test_the_likelier_of_two_is_followed_even_if_the_other_was() -> None:
+    assert chosen(((1, 0.1), (2, 0.85)), 2.0).number == 2
+    assert chosen(((1, 0.02), (2, 0.02)), 2.0).number is None
+
+
+def test_before_one_is_followed_the_one_straight_ahead_is_meant() -> None:
+    ahead, aside = person(1, 0.0), person(2, 0.0, -1.0)
+    assert SELECTION.choose(at(0.0, aside, ahead), Choice()).number == 1

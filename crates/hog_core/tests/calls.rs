@@ -50,6 +50,24 @@ fn crops_are_described_as_the_exact_path_describes_each() {
 }
 
 #[test]
+fn a_block_of_many_cells_or_bins_has_nearly_unit_length() {
+    for (block, cell, nbins) in [(40, 8, 9), (24, 8, 70), (24, 8, 9), (16, 8, 70), (64, 8, 130), (32, 8, 9)] {
+        let side = (block, block);
+        let params = HogParams {
+            block_size: side,
+            block_stride: (cell, cell),
+            cell_size: (cell, cell),
+            ..HogParams::default()
+        };
+        let hog = Hog::new(&HogParams { win_size: side, nbins, ..params }, None).unwrap();
+        let picture = Picture::new(block as usize, block as usize, 1, 7);
+        let found = descriptor(&hog, &picture.data, 1);
+        let length = found.iter().map(|element| element * element).sum::<f32>().sqrt();
+        assert!((0.9..=1.001).contains(&length), "{block} {nbins}: {length}");
+    }
+}
+
+#[test]
 fn crops_that_do_not_fit_their_answer_are_refused() {
     let params = HogParams { win_size: (16, 16), ..HogParams::default() };
     let hog = Hog::new(&params, None).unwrap();

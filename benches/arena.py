@@ -16,6 +16,7 @@ import numpy as np
 
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
+from limo_sim.run.catalogue import load
 from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import CameraPose
 from limo_sim.sensing.renderer import Renderer
@@ -115,7 +116,7 @@ def main() -> None:
     cv2.setNumThreads(1)
     print(f"{'ms':20}{'frame: median p95 max':>27}{'scan: median p95 max':>27}")
     for name in args.scenarios:
-        frames, scans = zip(*drive(Scenario.load(name), args.seconds), strict=True)
+        frames, scans = zip(*drive(load(name), args.seconds), strict=True)
         print(f"{name:20}{summary(frames)} {summary(scans)}", flush=True)
     for people, word in ((1, "person"), (2, "two")):
         for distance in (0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 3.0, 4.0, 6.0):

@@ -159,12 +159,7 @@ def table(summaries: Sequence[Summary]) -> list[str]:
 
 def cell(estimate: Estimate | None, name: str, factor: int, style: str) -> str:
     """Return a mean with its interval; of the clearance, the least."""
-    if estimate is None:
-        return "–"
-    if name == "clearance_min_m":
-        return format(estimate.least, style)
-    interval = "" if estimate.interval is None else f" ± {format(factor * estimate.interval, style)}"
-    return format(factor * estimate.mean, style) + interval
+    return "–" if estimate is None else " ".join(estimate.written(name, factor, style)).rstrip()
 
 
 def successes(suite: Suite, summaries: Sequence[Summary]) -> list[str]:
@@ -192,9 +187,8 @@ def differences(comparisons: Sequence[Comparison]) -> list[str]:
         cells = []
         for name, _, factor, style in shown:
             difference = one.differences[name]
-            text = cell(difference, name, factor, f"+{style}").replace("± +", "± ")
-            sure = difference is not None and difference.interval is not None
-            cells.append(f"**{text}**" if sure and abs(difference.mean) > difference.interval else text)  # type: ignore[union-attr, operator]
+            text = cell(difference, name, factor, f"+{style}")
+            cells.append(f"**{text}**" if difference is not None and difference.is_sure else text)
         lines.append(f"| `{one.controller}` | " + " | ".join(cells) + " |")
     return lines
 

@@ -1,8 +1,10 @@
-//! Writes a copy of a crate's sources in which every mutant is there at once: `a + b` becomes
+//! Writes a copy of a crate's sources in which many mutants are there at once: `a + b` becomes
 //! `if mutant::on(7) { a - b } else { a + b }`. The variable MUTANT chooses one when the tests run, so all are compiled once.
 //!
-//! `hog_core-mutants CRATE OUT FILE...`: FILE is relative to CRATE/src. The list of mutants goes to standard output.
+//! `hog_core-mutants list CRATE FILE...` lists every mutant; FILE is relative to CRATE/src.
+//! `hog_core-mutants write CRATE OUT FILE...` writes those whose numbers standard input holds into the copy OUT.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use quote::{ToTokens, quote};
@@ -14,19 +16,21 @@ struct Mutator<'a> {
     file: &'a str,
     next: &'a mut u32,
     list: &'a mut Vec<String>,
+    chosen: &'a HashSet<u32>,
 }
 
 impl Mutator<'_> {
-    fn id(&mut self, line: usize, told: &str) -> u32 {
+    /// The number of the next mutant, where it is one of those to write.
+    fn id(&mut self, line: usize, told: &str) -> Option<u32> {
         let id = *self.next;
         *self.next += 1;
         self.list.push(format!("{id}\t{}:{line}\t{told}", self.file));
-        id
+        self.chosen.contains(&id).then_some(id)
     }
 
     /// `expr`, or `other` where the mutant is chosen.
     fn either(&mut self, expr: &Expr, other: &Expr, line: usize, told: &str) -> Expr {
-        let id = self.id(line, told);
+        let Some(id) = self.id(line, told) else { return expr.clone() };
         let tokens = quote!((if crate::mutant::on(#id) { (#other) } else { (#expr) }));
         syn::parse2(tokens.clone()).unwrap_or_else(|error| panic!("{}:{line}: {error}: {tokens}", self.file))
     }
@@ -118,8 +122,7 @@ impl VisitMut for Mutator<'_> {
         };
         let told: String = stmt.to_token_stream().to_string().chars().take(40).collect();
         visit_mut::visit_stmt_mut(self, stmt);
-        if lost {
-            let id = self.id(line, &format!("lost: {told}"));
+        if lost && let Some(id) = self.id(line, &format!("lost: {told}")) {
             let kept = stmt.clone();
             *stmt = parse_quote!(if !crate::mutant::on(#id) { #kept });
         }
@@ -129,8 +132,7 @@ impl VisitMut for Mutator<'_> {
         let line = expr.cond.span().start().line;
         let plain = !has_let(&expr.cond);
         visit_mut::visit_expr_if_mut(self, expr);
-        if plain {
-            let id = self.id(line, "condition inverted");
+        if plain && let Some(id) = self.id(line, "condition inverted") {
             let cond = &expr.cond;
             expr.cond = parse_quote!((crate::mutant::on(#id) != (#cond)));
         }
@@ -226,21 +228,34 @@ pub mod mutant {
 "#;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let arguments: Vec<String> = std::env::args().collect();
-    let [_, source, out, files @ ..] = arguments.as_slice() else {
-        return Err("want CRATE OUT FILE...".into());
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let (source, out, files) = match arguments.as_slice() {
+        ["list", source, files @ ..] => (Path::new(source), None, files),
+        ["write", source, out, files @ ..] => (Path::new(source), Some(Path::new(out)), files),
+        _ => return Err("want list CRATE FILE..., or write CRATE OUT FILE...".into()),
     };
-    let (source, out) = (Path::new(source), Path::new(out));
+    let mut chosen = HashSet::new();
+    if out.is_some() {
+        for number in std::io::read_to_string(std::io::stdin())?.split_whitespace() {
+            chosen.insert(number.parse()?);
+        }
+    }
     let (mut next, mut list) = (1, Vec::new());
     for file in files {
         let mut parsed = syn::parse_file(&std::fs::read_to_string(source.join("src").join(file))?)?;
-        Mutator { file, next: &mut next, list: &mut list }.visit_file_mut(&mut parsed);
-        std::fs::write(out.join("src").join(file), prettyplease::unparse(&parsed))?;
+        Mutator { file, next: &mut next, list: &mut list, chosen: &chosen }.visit_file_mut(&mut parsed);
+        if let Some(out) = out {
+            std::fs::write(out.join("src").join(file), prettyplease::unparse(&parsed))?;
+        }
     }
-    let library = std::fs::read_to_string(source.join("src/lib.rs"))?;
-    std::fs::write(out.join("src/lib.rs"), library + SWITCH)?;
-    for line in list {
-        println!("{line}");
+    if let Some(out) = out {
+        let library = std::fs::read_to_string(source.join("src/lib.rs"))?;
+        std::fs::write(out.join("src/lib.rs"), library + SWITCH)?;
+    } else {
+        for line in list {
+            println!("{line}");
+        }
     }
     Ok(())
 }

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from typing_extensions import Self
 
 __all__ = [
+    "Canvas",
     "Hog",
     "available_backends",
     "backend",
@@ -30,6 +31,8 @@ __all__ = [
 ]
 
 _Pair: TypeAlias = tuple[int, int]
+_Window: TypeAlias = tuple[int, int, int, int]
+_Light: TypeAlias = tuple[float, float, float, float, float]
 
 @final
 class Hog:
@@ -232,6 +235,112 @@ class Hog:
         ------
         ImageError, ParameterError
             As `compute`.
+        """
+
+@final
+class Canvas:
+    """What the arena's camera (`limo_sim`) sees of one object: a z-buffer over a window of its image.
+
+    It is here because numpy is the limit there: a person is 23 solids, each some thirty passes over its pixels. All in
+    single precision, in the order of numpy's elementwise sums: the same picture on every CPU.
+
+    A window is the first column, the first row, the last column + 1 and the last row + 1 [px]. Light is a unit vector
+    towards the sun (x right, y down, z forward), then base and gain: a surface's brightness is base + gain × cosine.
+    Arrays are in C order and of the image's size, (height, width).
+
+    Solids are cast half a pixel too wide, and how much of a pixel is covered falls from 1 to 0 over the last pixel.
+    The tone of a pixel is 4 times the number of the solid, `part`, plus its brightness.
+    """
+
+    def __new__(cls, height: int, width: int, focal: float) -> Self:
+        """Make an empty canvas for images of a size and a focal length [px], whose principal point is their middle.
+
+        Raises
+        ------
+        ParameterError
+            A side is less than 1 or more than 16384. The other calls raise it for a window or an array that does not
+            fit the image.
+        """
+
+    def begin(self, window: _Window) -> None:
+        """Empty the canvas for another object within a window."""
+
+    def strips(self, rows: NDArray[np.float64], light: _Light) -> None:
+        """Cast tapered capsules, which are small against their distance.
+
+        `rows`: float64 (N, 12): part, u, v, axis u, axis v, length, radius [px], taper, depth [m], depth per px, m per
+        px, sine of the angle between axis and image.
+        """
+
+    def ellipses(self, rows: NDArray[np.float64], light: _Light) -> None:
+        """Cast ellipsoids, which are small against their distance.
+
+        `rows`: float64 (N, 12): part, u, v, the three entries of the lower-triangular whitening matrix, half height
+        and half width [px], depth [m], depth per canonical x and y, bulge [m].
+        """
+
+    def frustum(self, row: Sequence[float], light: _Light) -> None:
+        """Cast an upright cone or cylinder.
+
+        `row`: part; left, top, right, bottom [px]; x and z of the axis [m]; radius per metre of height; radius at the
+        camera's height; half a pixel there [m]; x² + z² - radius² [m²]; how far the top is above and the foot below the
+        camera [m].
+        """
+
+    def slab(self, row: Sequence[float]) -> None:
+        """Cast an upright box.
+
+        `row`: left, top, right, bottom [px]; for each axis of the box where its two sides are, from the camera [m]; the
+        optical axis and the image's rows along the first axis, then along the second; the tones of the three faces.
+        """
+
+    def draw(
+        self,
+        image: NDArray[np.uint32] | None,
+        depth: NDArray[np.float32],
+        palette: NDArray[np.uint32],
+        owners: NDArray[np.int16] | None = None,
+        owner: int = 0,
+    ) -> int:
+        """Draw the object wherever it is nearer than what is there; return the number of its pixels, seen or not.
+
+        Parameters
+        ----------
+        image
+            Blue, green, red, 0; None to draw depth alone.
+        depth
+            Of what has been drawn [m]; changed.
+        palette
+            The colour of every tone, in steps of 1/128.
+        owners, owner
+            Whose each pixel is, and whose the object's pixels are.
+        """
+
+    def seen(self, depth: NDArray[np.float32]) -> tuple[int, int, _Window | None]:
+        """Return the number of the object's pixels, of those that nothing is nearer than, and the window they fill."""
+
+    def shade_floor(
+        self,
+        grey: NDArray[np.uint8],
+        depth: NDArray[np.float32],
+        floor: NDArray[np.float32],
+        columns: NDArray[np.float32],
+        window: _Window,
+        at: tuple[float, float],
+        radius: float,
+        strength: float,
+    ) -> None:
+        """Darken the floor of a grey picture softly around what stands on it.
+
+        Parameters
+        ----------
+        floor, columns
+            float32 (height,): depth of the floor in every row [m]; (width,): how far to the right a column's ray goes
+            for every metre ahead.
+        at, radius
+            Of the shadow: to the right of and ahead of the camera [m].
+        strength
+            Share of the brightness that its middle loses.
         """
 
 def group_rectangles(

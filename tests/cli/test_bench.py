@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import limo_hog
+from limo_hog import detector
 from limo_hog.cli import bench
 from limo_hog.cli.main import main
 from limo_hog.cli.support.race import Rounds, race
@@ -85,3 +86,16 @@ def test_the_street_is_the_same_each_time_and_has_people_in_it() -> None:
     picture = street(640, 480, 3)
     assert np.array_equal(picture, street(640, 480, 3))
     assert len(limo_hog.PeopleDetector().detect(picture)) >= 3
+
+
+def test_a_guided_search_may_miss_what_the_exact_one_finds(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ["--search", "guided", "--size", "128x160", "--channels", "gray", "--threads", "1"]
+    (row,) = _bench(capsys, *arguments)["rows"]
+    assert (row["search"], row["rects_equal"]) == ("guided", True)
+    assert row["ratio"] > 0
+    monkeypatch.setattr(bench, "street", lambda *_: street(640, 480, 1))
+    monkeypatch.setitem(detector._GUIDES, "guided", (40, 0.0, 0))
+    (row,) = _bench(capsys, *arguments)["rows"]
+    assert row["rects_equal"] is False

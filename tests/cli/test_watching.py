@@ -83,6 +83,16 @@ def test_the_recording_is_read_by_another_library_than_wrote_it(kept: Path) -> N
     assert boxes > 10
 
 
+def test_a_recording_says_how_the_scenarios_lens_bends(tmp_path: Path) -> None:
+    scenario, path = tmp_path / "lens.toml", tmp_path / "run.mcap"
+    scenario.write_text("[camera]\nk1 = -0.1\nk2 = 0.02\n", encoding="utf-8")
+    assert main(["follow", "--scenario", str(scenario), "--seconds", "1", "--record", str(path)]) == 0
+    with AnyReader([path]) as reader:
+        infos = [one for one in reader.connections if one.topic == "/limo_camera/camera_info"]
+        told = {tuple(reader.deserialize(data, one.msgtype).d) for one, _, data in reader.messages(infos)}
+    assert told == {(-0.1, 0.02, 0.0, 0.0, 0.0)}
+
+
 def test_a_recording_replayed_gives_the_same_detections(
     kept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

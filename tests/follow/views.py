@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,7 @@ class World:
     time: float = 0.0
     period: float = 0.1
     lidar: bool = True
+    told: Twist = field(default_factory=Twist)
 
     @property
     def bearing(self) -> float:
@@ -91,7 +92,7 @@ class World:
         """What the robot sees now: the person's box and depth where they are in view."""
         x, y, yaw = self.robot
         depth = self.distance * math.cos(self.bearing) - 0.084
-        odometry = Odometry(self.time, x, y, yaw)
+        odometry = Odometry(self.time, x, y, yaw, self.told.linear, self.told.angular)
         seen = replace(
             look(stamp=self.time),
             depth=flat(8.0),
@@ -109,6 +110,7 @@ class World:
 
     def drive(self, twist: Twist) -> None:
         """Let a control period pass."""
+        self.told = twist
         x, y, yaw = self.robot
         yaw += twist.angular * self.period
         x += twist.linear * self.period * math.cos(yaw)

@@ -1,6 +1,6 @@
 """Random calls of the public Python API, each made of its number alone: an answer or a named error is wanted.
 
-`python -m tests.hardening.api --calls 10000000 --state FILE` makes the calls in processes of 20,000 each and writes
+`python -m tests.hardening.api --calls 10000000 --state FILE` makes the calls in processes of 100,000 each and writes
 what it found to FILE; started again, it goes on where it stopped. `--only N` makes call N alone, here.
 
 A share of the calls with ordinary arguments is also put to OpenCV 4.14 (`opencv.py`), in a process of its own.
@@ -27,8 +27,8 @@ from typing import Any
 from tests.hardening.calls import call
 from tests.hardening.opencv import Asked, Opencv, disagreement
 
-#: Calls of one process.
-BATCH = 20_000
+#: Calls of one process: each costs two seconds to start, with OpenCV beside it.
+BATCH = 100_000
 #: A call that computes longer is a finding [s of this process's time].
 LATEST = 30
 #: Memory that a process may have [bytes]: larger wishes must end in a MemoryError.

@@ -34,7 +34,7 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
         ["tests/follow/safety/test_safety.py", "tests/follow/sense/test_clearance.py", "tests/follow/test_pipeline.py"],
     ),
     "score": (
-        [f"{SIM}/run/score.py", f"{SIM}/run/matching.py"],
+        [f"{SIM}/run/score/*.py", f"{SIM}/run/matching.py"],
         ["tests/sim/run/test_score.py", "tests/sim/run/test_score_sweep.py"],
     ),
     "control": (

@@ -1,36 +1,46 @@
 """A seeded sample of mutants of the Rust crate: all are compiled at once, and a variable chooses one for the tests.
 
-`python -m tests.hardening.rust_mutants exact --count 300 --state FILE` prints those that no test of the crate notices.
-The copy of the crate that holds them lies in target/mutants; FILE keeps what was decided, and a later run goes on.
+`python -m tests.hardening.rust_mutants --count 440 --state FILE` prints those that no test of the crate notices. The
+copy of the crate that holds them lies in target/mutants; FILE keeps what was decided, and a later run goes on.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
-import time
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 CRATE, BUILD = ROOT / "crates/hog_core", ROOT / "target/mutants"
-#: What is changed, in two builds: the compiler takes long over the kernels, as each instruction set has its own.
-FILES = {
-    "exact": (
-        *("detect.rs", "rescore.rs", "params.rs", "group/candidate.rs", "group/mean_shift.rs", "group/similar.rs"),
-        *("pyramid/grid.rs", "pyramid/levels.rs", "pyramid/resize.rs", "exact/blocks.rs", "exact/gradient.rs"),
-        *("exact/polar.rs", "exact/svm.rs", "exact/tables.rs", "exact/windows.rs", "fast/plan.rs"),
-    ),
-    "fast": ("fast/level.rs", "fast/rows.rs", "fast/score.rs", "fast/strip.rs"),
-}
-#: Test binaries, those that tell soonest first.
-TESTS = ("hog_core", "opencv", "backends")
-#: A mutant under which the tests take longer hangs [s].
-LATEST_S = 240.0
+#: What is changed: the search, the exact path, the kernels and the grouping.
+FILES = (
+    *("detect.rs", "describe.rs", "guided.rs", "rescore.rs", "params.rs", "image.rs"),
+    *("group/candidate.rs", "group/mean_shift.rs", "group/similar.rs"),
+    *("pyramid/grid.rs", "pyramid/levels.rs", "pyramid/resize.rs"),
+    *(f"exact/{name}.rs" for name in ("blocks", "gradient", "polar", "svm", "tables", "windows")),
+    *(f"fast/{name}.rs" for name in ("describe", "plan", "rows", "score", "search", "strip", "tile")),
+)
+#: Test programs, those that tell soonest first: name, arguments, cases of random tests. One test takes half the time.
+PYRAMIDS = "pyramids_are"
+TESTS: list[tuple[str, list[str], int]] = [
+    ("hog_core", [], 8),
+    ("opencv", [], 8),
+    ("calls", [], 8),
+    ("backends", ["--skip", PYRAMIDS], 8),
+    ("backends", [PYRAMIDS], 2),
+]
+#: A mutant under which a test program takes this much more processor time than without one hangs [times, s].
+LATEST = 3.0, 3.0
+#: Memory of a test program [bytes].
+MEMORY = 8_000_000_000
 MANIFEST = """[workspace]
 members = ["hog_core"]
 resolver = "3"
@@ -42,19 +52,41 @@ license = "MIT"
 repository = ""
 [workspace.lints.rust]
 [profile.test]
-opt-level = 1
+opt-level = 2
+codegen-units = 16
 debug = 0
 """
 
 
-def built(part: str) -> tuple[dict[int, str], list[Path]]:
-    """Write and compile the crate with the mutants of a part; return what they are, and the test programs."""
-    subprocess.run(
-        ["cargo", "build", "--quiet", "--manifest-path", "mutants/Cargo.toml", "--target-dir", BUILD / "tool"],
-        cwd=ROOT,
-        check=True,
+@dataclass(frozen=True)
+class Run:
+    """Some tests of a program, and how many cases a random test has."""
+
+    program: Path
+    arguments: tuple[str, ...]
+    cases: int
+
+
+def tool(*arguments: str | Path, said: str = "") -> str:
+    """Run the program in mutants/ for the files; return its output."""
+    program = BUILD / "tool/debug/hog_core-mutants"
+    done = subprocess.run(
+        [str(part) for part in (program, *arguments, *FILES)], check=True, stdout=subprocess.PIPE, input=said, text=True
     )
-    copy = BUILD / part
+    return done.stdout
+
+
+def mutants() -> dict[int, str]:
+    """Return every mutant's number and what it changes."""
+    build = ["cargo", "build", "--quiet", "--manifest-path", "mutants/Cargo.toml", "--target-dir", str(BUILD / "tool")]
+    subprocess.run(build, cwd=ROOT, check=True)
+    listed = (line.split("\t", 1) for line in tool("list", CRATE).splitlines())
+    return {int(number): what for number, what in listed}
+
+
+def built(sample: list[int]) -> tuple[Path, list[Run]]:
+    """Write and compile the crate with these mutants; return its folder, and the tests."""
+    copy = BUILD / "crate"
     shutil.rmtree(copy, ignore_errors=True)
     shutil.copytree(CRATE, copy / "hog_core")
     (copy / "Cargo.toml").write_text(MANIFEST)
@@ -63,13 +95,7 @@ def built(part: str) -> tuple[dict[int, str], list[Path]]:
     lines = manifest.read_text().split("[[bench]]")[0].splitlines()
     manifest.write_text("\n".join(line for line in lines if not line.startswith("criterion")))
     shutil.copy(ROOT / "Cargo.lock", copy)
-    told = subprocess.run(
-        [str(path) for path in (BUILD / "tool/debug/hog_core-mutants", CRATE, copy / "hog_core", *FILES[part])],
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout
-    mutants = dict(line.split("\t", 1) for line in told.splitlines())
+    tool("write", CRATE, copy / "hog_core", said=" ".join(map(str, sample)))
     cargo = [
         "cargo",
         "test",
@@ -86,66 +112,71 @@ def built(part: str) -> tuple[dict[int, str], list[Path]]:
         message = json.loads(line)
         if message.get("executable") and message["profile"]["test"]:
             programs[message["target"]["name"]] = Path(message["executable"])
-    return {int(number): what for number, what in mutants.items()}, [programs[name] for name in TESTS]
+    return copy / "hog_core", [Run(programs[name], tuple(arguments), cases) for name, arguments, cases in TESTS]
 
 
-def noticed(number: int, programs: list[Path], folder: Path) -> bool:
-    """Whether a test fails, or does not end, with this mutant; 0 is none."""
-    environment = os.environ | {"MUTANT": str(number), "PROPTEST_CASES": "8", "RUST_BACKTRACE": "0"}
-    until = time.monotonic() + LATEST_S
-    for program in programs:
-        with subprocess.Popen(
-            [program, "--test-threads=1"],
-            cwd=folder,
-            env=environment | {"PROPTEST_FAILURE_PERSISTENCE": "off"},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        ) as run:
-            assert run.stdout
-            os.set_blocking(run.stdout.fileno(), False)
-            said = ""
-            while (code := run.poll()) is None and "FAILED" not in said and time.monotonic() < until:
-                said += run.stdout.read() or ""
-                time.sleep(0.02)
-            if code is None:
-                run.kill()
-            if code != 0:
-                return True
-    return False
+def passes(run: Run, folder: Path, number: int, seconds: int) -> tuple[bool, float]:
+    """Run tests with a mutant, 0 is none; return whether all pass, and their processor time [s]."""
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+    chosen = {"MUTANT": str(number), "PROPTEST_CASES": str(run.cases), "PROPTEST_FAILURE_PERSISTENCE": "off"}
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    with subprocess.Popen(
+        [run.program, "--test-threads=1", *run.arguments],
+        cwd=folder,
+        env=os.environ | chosen | {"RUST_BACKTRACE": "0"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=limited,
+    ) as process:
+        assert process.stdout
+        # The first failure is enough.
+        if any(b"FAILED" in line for line in process.stdout):
+            process.kill()
+    return process.returncode == 0, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def noticed(number: int, runs: dict[Run, int], folder: Path) -> bool:
+    """Whether a test fails, or does not end in its time [s], with this mutant."""
+    return not all(passes(run, folder, number, seconds)[0] for run, seconds in runs.items())
 
 
 def main() -> int:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("part", choices=list(FILES))
-    parser.add_argument("--count", type=int, default=400)
+    parser.add_argument("--count", type=int, default=440)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--state", type=Path, help="where it is kept which were noticed")
-    parser.add_argument("--only", help="mutants of files whose path begins so")
     args = parser.parse_args()
-    mutants, programs = built(args.part)
-    folder = BUILD / args.part / "hog_core"
-    if noticed(0, programs, folder):
-        print("the tests fail without a mutant")
-        return 2
+    every = mutants()
+    sample = random.Random(args.seed).sample(list(every), min(args.count, len(every)))
+    folder, runs = built(sample)
+    limits: dict[Run, int] = {}
+    for run in runs:
+        passed, took = passes(run, folder, 0, 3600)
+        if not passed:
+            print(f"{run.program.name}: the tests fail without a mutant")
+            return 2
+        limits[run] = math.ceil(LATEST[0] * took + LATEST[1])
+    print("without a mutant the tests pass", flush=True)
     state: dict[str, bool] = {}
     if args.state and args.state.exists():
         state = json.loads(args.state.read_text())
-    every = [number for number, what in mutants.items() if not args.only or what.startswith(args.only)]
-    sample = random.Random(args.seed).sample(every, min(args.count, len(every)))
     for number in sample:
-        key = f"{number} {mutants[number]}"
+        key = f"{number} {every[number]}"
         if key not in state:
-            state[key] = noticed(number, programs, folder)
+            state[key] = noticed(number, limits, folder)
             if args.state:
                 args.state.write_text(json.dumps(state, indent=1))
-    decided = {number: state[f"{number} {mutants[number]}"] for number in sample}
+    decided = {number: state[f"{number} {every[number]}"] for number in sample}
     caught = sum(decided.values())
     print(f"{caught} of {len(sample)} noticed ({caught / max(len(sample), 1):.1%}) of {len(every)} there are")
     for number in sorted(sample):
         if not decided[number]:
-            print(f"  {number} {mutants[number]}")
+            print(f"  {number} {every[number]}")
     return 0
 
 

@@ -7,6 +7,8 @@
 //! 5. `rescore` takes the hits from `fast`, and lets `exact` decide those that are too close to the threshold.
 //! 6. [`group`] makes one rectangle of many overlapping ones.
 //!
+//! `canvas` draws solids for the arena's camera, and is no part of the detector.
+//!
 //! [`Hog`] composes these stages. Each follows Dalal and Triggs, "Histograms of Oriented Gradients for Human
 //! Detection" (CVPR 2005), with OpenCV's roundings, so that its trained models give the same answers here.
 
@@ -19,6 +21,8 @@ pub mod model;
 pub mod params;
 pub mod pyramid;
 
+#[cfg_attr(not(feature = "python"), allow(dead_code, unused_imports, reason = "Python alone calls it"))]
+mod canvas;
 mod describe;
 mod detect;
 mod fast;

@@ -39,10 +39,12 @@ def run(args: argparse.Namespace) -> int:
     """Run one episode and show its score card."""
     from limo_sim.run.catalogue import load
     from limo_sim.run.episode import run_episode
-    from limo_sim.run.score import score
+    from limo_sim.run.score import Scorer
     from limo_sim.view.tuning import Tunable
+    from limo_sim.world.variants import of_run
 
-    scenario = load(args.scenario)
+    scenario = of_run(load(args.scenario), args.seed)
+    scorer = Scorer(scenario)
     controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
     with watching(args, scenario, controller) as audience:
@@ -51,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
             def watch(moment: Moment) -> None:
                 bar.update(task, completed=round(moment.step.time, 1), description=moment.step.decision.mode.value)
+                scorer.add(moment.step)
                 audience.watch(moment)
 
             episode = run_episode(
@@ -61,8 +64,10 @@ def run(args: argparse.Namespace) -> int:
                 args.seed,
                 names=(args.controller, args.detector),
                 watch=watch,
+                # (The figure shows all of them.)
+                keep=args.plot is not None,
             )
-        card = score(episode)
+        card = scorer.card(episode)
         audience.end(episode, card)
     if args.json:
         write_json(args.json, card.to_json())

@@ -61,22 +61,10 @@ def _table(
 def _cell(estimate: Estimate | None, name: str, unit: str, style: str) -> str:
     if estimate is None:
         return "[dim]–[/]"
-    if name == "clearance_min_m":
-        # What counts is the worst run, which has no interval.
-        return format(estimate.least, style)
-    return _with_interval(estimate, 100 if unit == "%" else 1, style)
+    mean, interval = estimate.written(name, 100 if unit == "%" else 1, style)
+    return f"{mean}\n[dim]{interval.replace(' ', '')}[/]" if interval else mean
 
 
-def _difference(estimate: Estimate | None, _name: str, unit: str, style: str) -> str:
-    if estimate is None:
-        return "[dim]–[/]"
-    text = _with_interval(estimate, 100 if unit == "%" else 1, f"+{style}")
-    sure = estimate.interval is not None and abs(estimate.mean) > estimate.interval
-    return f"[bold]{text}[/]" if sure else text
-
-
-def _with_interval(estimate: Estimate, factor: int, style: str) -> str:
-    mean = format(factor * estimate.mean, style)
-    if estimate.interval is None:
-        return mean
-    return f"{mean}\n[dim]±{format(factor * estimate.interval, style.removeprefix('+'))}[/]"
+def _difference(estimate: Estimate | None, name: str, unit: str, style: str) -> str:
+    text = _cell(estimate, name, unit, f"+{style}")
+    return f"[bold]{text}[/]" if estimate is not None and estimate.is_sure else text

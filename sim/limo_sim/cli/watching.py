@@ -122,7 +122,7 @@ def watching(
         if args.record is not None:
             from limo_sim.view.record import recorded
 
-            all_.keepers.append(stack.enter_context(recorded(args.record)))
+            all_.keepers.append(stack.enter_context(recorded(args.record, scenario.camera)))
         if args.rerun is not None:
             from limo_sim.view.rerun_log import logged
 

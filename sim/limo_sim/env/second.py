@@ -24,7 +24,7 @@ from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.schema import ScenarioError
-from limo_sim.world.variants import made_up
+from limo_sim.world.variants import SIGHTING_STREAM, made_up
 
 with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
     import cv2
@@ -35,8 +35,6 @@ KINDS = ("camera", "gray", "state")
 SMALL = WIDTH // 8, HEIGHT // 8
 # The furthest that `depth.far_m` may be [m].
 _DEPTH_REACH = 20.0
-# Of the run's generator; the others are in `run` and `world`.
-_STATE_STREAM = 9
 # Standard deviations of a sighting [rad, m]. Measured in the arena: the middle of HOG's box strays by 2.7 … 6.4 px of a
 # focal length of 449 px, and its depth by about 5 cm.
 _BEARING_NOISE, _RANGE_NOISE = 0.011, 0.05
@@ -144,7 +142,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         scenario = drawn if isinstance(drawn, Scenario) else made_up(int(self.np_random.integers(2**31)))
         arena = self._arena = Arena(scenario, int(self.np_random.integers(2**31)))
         self._walls = hiding(arena.scenario)
-        self._noise = np.random.default_rng([arena.seed, _STATE_STREAM])
+        self._noise = np.random.default_rng([arena.seed, SIGHTING_STREAM])
         self._misses: list[Missing] = []
         if scenario.detector != DetectorFaults():
             self._misses = misses_of(scenario.detector, scenario.camera.rate_hz, 1, arena.seed)

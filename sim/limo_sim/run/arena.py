@@ -28,7 +28,15 @@ from limo_sim.world.person import Pose, earlier, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
 from limo_sim.world.scenario import Furniture, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
-from limo_sim.world.variants import of_run
+from limo_sim.world.variants import (
+    CAMERA_STREAM,
+    DROP_STREAM,
+    IMU_STREAM,
+    LIDAR_STREAM,
+    PATTERN_STREAM,
+    SLIP_STREAM,
+    of_run,
+)
 
 STEPS_PER_SECOND = round(1 / STEP_S)
 
@@ -38,7 +46,6 @@ _SAME_CONTACT = STEPS_PER_SECOND // 2  # touching again within half a second is 
 _SLOP = 0.001  # how deep bodies may overlap before pymunk parts them [m]; its default, 0.1, is for pixels
 _MASS = 4.2  # of the robot [kg]; without effect, since everything it can touch is immovable
 _FRICTION = 0.3  # of every surface; chosen, the outcome of a contact hardly depends on it
-_CAMERA_STREAM, _LIDAR_STREAM, _IMU_STREAM, _DROP_STREAM, _SLIP_STREAM, _PATTERN_STREAM = range(6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +93,7 @@ class Arena:
         self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario.movers)
         robot = scenario.robot
         self._drive = Drive(robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
-        self._slip = self._stream(_SLIP_STREAM)
+        self._slip = self._stream(SLIP_STREAM)
         self._touched = {_OBSTACLE: -STEPS_PER_SECOND, _PERSON: -STEPS_PER_SECOND}
         self._contacts = {_OBSTACLE: 0, _PERSON: 0}
         self._space = pymunk.Space()
@@ -117,7 +124,7 @@ class Arena:
             self._state,
             latency_s=camera.latency_s,
             drop_probability=camera.drop_probability,
-            drops=self._stream(_DROP_STREAM),
+            drops=self._stream(DROP_STREAM),
         )
         self._lidar = Channel(scenario.lidar.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.lidar.latency_s)
         self._wheels = Channel(
@@ -191,7 +198,7 @@ class Arena:
             image, depth, seen = self._render().render(
                 _camera_at(exposure.state),
                 exposure.state.people,
-                self._stream(_CAMERA_STREAM, exposure),
+                self._stream(CAMERA_STREAM, exposure),
                 self._movers.at(exposure.state.time),
                 time=exposure.state.time,
                 past=Past(partial(self._earlier, exposure.state), exposure.state.turn_rate),
@@ -214,7 +221,7 @@ class Arena:
             ranges = lidar.measure(
                 lidar.cast(x, y, state.yaw, shapes, self.scenario.room.half),
                 self.scenario.lidar.noise_m,
-                self._stream(_LIDAR_STREAM, exposure),
+                self._stream(LIDAR_STREAM, exposure),
             )
             scan = Scan(state.time, ranges, -lidar.ANGLE_MAX, lidar.ANGLE_MAX, lidar.RANGE_MIN, lidar.RANGE_MAX)
             self._scan = exposure.index, scan
@@ -230,7 +237,7 @@ class Arena:
         gained = [(new - old) / STEP_S for new, old in zip(now.velocity, before.velocity, strict=True)]
         cos, sin = math.cos(now.yaw), math.sin(now.yaw)
         forward, sideways = cos * gained[0] + sin * gained[1], cos * gained[1] - sin * gained[0]
-        noise = np.random.default_rng([self.seed, _IMU_STREAM, now.step])
+        noise = np.random.default_rng([self.seed, IMU_STREAM, now.step])
         return tuple(
             imu.sample(now.time - early, now.turn_rate, forward, sideways, self.scenario.imu, noise)
             for early in (1 / imu.RATE_HZ, 0.0)
@@ -255,7 +262,7 @@ class Arena:
 
     def _render(self) -> Renderer:
         if self._renderer is None:
-            self._renderer = Renderer(self.scenario, self._stream(_PATTERN_STREAM))
+            self._renderer = Renderer(self.scenario, self._stream(PATTERN_STREAM))
         return self._renderer
 
     def _earlier(self, state: _State, age: float) -> tuple[CameraPose, list[Pose | None], tuple[Furniture, ...]]:

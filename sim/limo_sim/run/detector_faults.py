@@ -21,9 +21,7 @@ from limo_sim.run.matching import NO_PERSON, person_of
 from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import DetectorFaults
 from limo_sim.world.truth import Truth
-
-# Streams of the run's generator; the arena's sensors have 0 … 5.
-_MISS_STREAM, _FALSE_STREAM = 6, 7
+from limo_sim.world.variants import FALSE_STREAM, MISS_STREAM
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +169,7 @@ class Misses:
 
 def misses_of(faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> list[Missing]:
     """Return when each person of a run is missed by a camera of `rate_hz` [Hz]."""
-    randoms = [np.random.default_rng([seed, _MISS_STREAM, person]) for person in range(people)]
+    randoms = [np.random.default_rng([seed, MISS_STREAM, person]) for person in range(people)]
     if faults.model == "none":
         return [Misses(faults, rate_hz, random) for random in randoms]
     return [FittedMisses(fit_of(faults.model), rate_hz, random) for random in randoms]
@@ -244,7 +242,7 @@ class FaultyDetector:
 
     def _false(self, period: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return false boxes int64 (N, 4) in the camera's image [px] and their scores (N,)."""
-        random = np.random.default_rng([self._seed, _FALSE_STREAM, period])
+        random = np.random.default_rng([self._seed, FALSE_STREAM, period])
         count = random.poisson(self._false_rate)
         height = FALSE_BOXES.least_height * 2.0 ** random.exponential(FALSE_BOXES.octaves, count)
         height = np.minimum(height, HEIGHT)

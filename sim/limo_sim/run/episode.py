@@ -103,7 +103,7 @@ class Episode:
     seconds
         Simulated time [s].
     steps
-        Every control period.
+        Every control period; nothing where the run kept none.
     contacts
         How often the robot touched a person, and a wall or furniture.
     wall_seconds
@@ -133,6 +133,7 @@ def run_episode(
     *,
     names: tuple[str, str] = ("controller", "detector"),
     watch: Callable[[Moment], None] | None = None,
+    keep: bool = True,
 ) -> Episode:
     """Let a controller drive the robot, behind the safety layer.
 
@@ -151,6 +152,9 @@ def run_episode(
         What the log calls the controller and the detector.
     watch
         Called with every control period.
+    keep
+        Whether the log holds the steps, 4 kB each. Without them a run's memory does not grow, and a `Scorer` that
+        `watch` feeds measures it.
     """
     began = time.perf_counter()
     arena = Arena(scenario, seed)
@@ -160,7 +164,7 @@ def run_episode(
         detector = faulty = FaultyDetector(detector, scenario.detector, rate, people, seed)
     follower = Follower(controller, detector)
     region: Region | None = None
-    steps = []
+    steps: list[Step] = []
     last_frame, last_command = -np.inf, -np.inf
     while arena.time < seconds:
         drawing = time.perf_counter()
@@ -184,7 +188,8 @@ def run_episode(
             arena.command(decision.twist)
             last_command = arena.time
             step = Step(arena.time, arena.truth(), decision, record)
-            steps.append(step)
+            if keep:
+                steps.append(step)
             if watch is not None:
                 watch(Moment(step, frame if fresh else None, scan, odometry))
         arena.step()

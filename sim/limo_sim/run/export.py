@@ -16,8 +16,7 @@ from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.sensing.camera import Frame
 from limo_sim.world.scenario import Scenario
-
-_STREAM = 9  # of the run's generator; 0 … 8 are the sensors', the detector's and the people's
+from limo_sim.world.variants import WANDERING_STREAM
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +84,7 @@ def labelled_frames(
     """
     wandering = wandering or Wandering()
     arena = Arena(scenario, seed)
-    random = np.random.default_rng([seed, _STREAM])
+    random = np.random.default_rng([seed, WANDERING_STREAM])
     labels = labels_of(scenario)
     steps = round(CONTROL_PERIOD * STEPS_PER_SECOND)
     turn, turning, leg_ends, next_s = 0.0, False, 0.0, 0.0

@@ -64,6 +64,22 @@ class Estimate:
     least: float
     most: float
 
+    @property
+    def is_sure(self) -> bool:
+        """Whether the interval leaves out 0."""
+        return self.interval is not None and abs(self.mean) > self.interval
+
+    def written(self, name: str, factor: float, style: str) -> tuple[str, str]:
+        """Return what a table shows of a figure of this name: the mean, and "± " with the interval or nothing.
+
+        Of the clearance the worst run counts, which has no interval. A `style` that begins with "+" is that of a
+        difference.
+        """
+        if name == "clearance_min_m" and not style.startswith("+"):
+            return format(self.least, style), ""
+        interval = "" if self.interval is None else f"± {format(factor * self.interval, style.removeprefix('+'))}"
+        return format(factor * self.mean, style), interval
+
 
 @dataclass(frozen=True, slots=True)
 class Summary:

@@ -16,16 +16,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog._core import Canvas
 from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_Y, FOCAL_PX, HEIGHT, MOUNT_HEIGHT, WIDTH, CameraPose
 from limo_sim.sensing.optics import Lens, Shutter
 from limo_sim.sensing.room import COLUMNS, FLOOR_DEPTH, Room
 from limo_sim.sensing.solids import (
-    BAND,
     F32,
     TONES,
     Bounds,
-    Canvas,
     Outline,
     Sun,
     Window,
@@ -51,7 +50,7 @@ Seen = tuple[float, tuple[int, int, int, int] | None]
 _SHADOW = 0.35  # share of the floor's brightness that is lost right under a person or a piece of furniture; by eye
 _BANK_MARGIN = 64  # by how much the noise patterns are larger than a frame, which takes a window of them [px]
 _NO_PERSON = -1
-_LEVELS = 128  # of brightness, from black to the full colour
+_LEVELS = 128  # of brightness, from black to the full colour; as in `_core.Canvas`
 _COARSE = 64  # rows of the grid on which the part of a silhouette outside the image is measured
 
 _FAR = np.full((HEIGHT, WIDTH), np.inf, np.float32)
@@ -87,10 +86,12 @@ class Renderer:
         shape = (HEIGHT + _BANK_MARGIN, WIDTH + _BANK_MARGIN)
         unit = noise.standard_normal(shape, dtype=np.float32)
         grey = np.rint(unit * np.float32(scenario.camera.noise))
-        self._grain = np.clip([grey, -grey], 0, 255).astype(np.uint8)
+        self._brighter, self._darker = (
+            cv2.cvtColor(np.clip(part, 0, 255).astype(np.uint8), cv2.COLOR_GRAY2BGR) for part in (grey, -grey)
+        )
         self._stretch = 1 + np.float32(scenario.depth.noise) * noise.standard_normal(shape, dtype=np.float32)
         self._colours = np.empty((HEIGHT, WIDTH), np.uint32)
-        self._sheet = np.empty((3, HEIGHT * WIDTH), np.float32)
+        self._canvas = Canvas(HEIGHT, WIDTH, FOCAL_PX)
         self._owner = np.empty((HEIGHT, WIDTH), np.int16)
         self._dead = round(scenario.depth.invalid * WIDTH * HEIGHT)
 
@@ -131,9 +132,9 @@ class Renderer:
         if not self._lens.is_plain:
             image, depth = self._lens.image(image), self._lens.depth(depth)
         row, column = noise.integers(_BANK_MARGIN, size=2)
-        brighter, darker = self._grain[:, row : row + HEIGHT, column : column + WIDTH]
-        cv2.add(image, cv2.cvtColor(brighter, cv2.COLOR_GRAY2BGR), dst=image)
-        cv2.subtract(image, cv2.cvtColor(darker, cv2.COLOR_GRAY2BGR), dst=image)
+        window = np.s_[row : row + HEIGHT, column : column + WIDTH]
+        cv2.add(image, self._brighter[window], dst=image)
+        cv2.subtract(image, self._darker[window], dst=image)
         row, column = noise.integers(_BANK_MARGIN, size=2)
         depth *= self._stretch[row : row + HEIGHT, column : column + WIDTH]
         settings = self._scenario.depth
@@ -157,15 +158,13 @@ class Renderer:
     def _seen_of(self, piece: Furniture, depth: F32, camera: CameraPose) -> Seen:
         model = self._model_of(piece)
         bounds = _bounds(model, camera, piece)
-        canvas = self._cast(model, bounds, camera, self._sun.seen_from(camera))
-        if canvas is None or not canvas.inside.any():
+        if not self._cast(model, bounds, camera, self._sun.seen_from(camera)):
             return 0.0, None
-        left, top, right, bottom = canvas.window
-        inside = canvas.inside
-        seen = np.count_nonzero(inside & (canvas.depth <= depth[top:bottom, left:right]))
-        rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
-        box = int(left + columns[0]), int(top + rows[0]), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
-        share = seen / np.count_nonzero(inside) * _share_inside(bounds)
+        inside, visible, within = self._canvas.seen(depth)
+        if within is None:
+            return 0.0, None
+        box = within[0], within[1], within[2] - within[0], within[3] - within[1]
+        share = visible / inside * _share_inside(bounds)
         return share, box if self._lens.is_plain else self._lens.box(box)
 
     def _picture(self, past: Past, age: float) -> U8:
@@ -186,14 +185,14 @@ class Renderer:
             if pose is None:
                 continue
             if room is not None:
-                _shade_floor(room, depth, camera.ahead_of(pose.x, pose.y), 0.25 * person.height)
+                self._shade_floor(room, depth, camera.ahead_of(pose.x, pose.y), 0.25 * person.height)
             if shape := outline(body(person, pose), camera):
                 outlines[index] = shape
                 order.append((math.hypot(pose.x - camera.x, pose.y - camera.y), index))
         for piece in (*scenario.furniture, *movers):
             order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), piece))
             if room is not None:
-                _shade_floor(room, depth, camera.ahead_of(piece.x, piece.y), 0.25)
+                self._shade_floor(room, depth, camera.ahead_of(piece.x, piece.y), 0.25)
         if image is not None and room is not None:
             cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=_bytes(image))
             self._room.decorate(_bytes(image), columns, camera)
@@ -204,13 +203,10 @@ class Renderer:
             if isinstance(thing, Furniture):
                 self._draw_furniture(image, depth, camera, thing, sun, hides=bool(drawn))
             elif window := _window(outlines[thing].bounds):
-                area = _area_outside(outlines[thing])
-                canvas = Canvas(
-                    window, self._sheet, solids=len(outlines[thing].strips) + len(outlines[thing].ellipses) + 1
-                )
-                cast_body(canvas, outlines[thing], sun)
-                self._blend(image, depth, canvas, self._palettes[thing], thing)
-                area += np.count_nonzero(canvas.inside)
+                self._canvas.begin(window)
+                cast_body(self._canvas, outlines[thing], sun)
+                inside = self._canvas.draw(image, depth, self._palettes[thing], self._owner, thing)
+                area = _area_outside(outlines[thing]) + inside
                 drawn.append((thing, window, area))
         for index, (left, top, right, bottom), area in drawn:
             visible = np.count_nonzero(self._owner[top:bottom, left:right] == index)
@@ -219,85 +215,41 @@ class Renderer:
             seen[index] = share, box if self._lens.is_plain else self._lens.box(box)
         return depth, seen
 
+    def _shade_floor(self, room: U8, depth: F32, at: tuple[float, float], radius: float) -> None:
+        """Darken the floor softly around something that stands on it, to the right of and ahead of the camera [m]."""
+        # the nearest floor that the camera sees lies at the image's lower edge
+        bounds = upright_bounds(*at, radius, 0.0, 0.0, near=MOUNT_HEIGHT * FOCAL_PX / (HEIGHT - CENTRE_Y))
+        if window := _window(bounds):
+            left, top, right, bottom = window
+            top = max(top, HEIGHT // 2)
+            if top < bottom:
+                within = left, top, right, bottom
+                self._canvas.shade_floor(room, depth, FLOOR_DEPTH[:, 0], COLUMNS, within, at, radius, _SHADOW)
+
     def _draw_furniture(
         self, image: U32 | None, depth: F32, camera: CameraPose, piece: Furniture, sun: Sun, *, hides: bool
     ) -> None:
         """Draw a piece; `hides`: whether there may be people behind it."""
         model = self._model_of(piece)
-        if canvas := self._cast(model, _bounds(model, camera, piece), camera, sun):
-            self._blend(image, depth, canvas, model.palette, _NO_PERSON if hides else None)
+        if self._cast(model, _bounds(model, camera, piece), camera, sun):
+            self._canvas.draw(image, depth, model.palette, self._owner if hides else None, _NO_PERSON)
 
-    def _cast(self, model: _Model, bounds: Bounds | None, camera: CameraPose, sun: Sun) -> Canvas | None:
-        """Draw a piece by itself; None where all of it is outside of the image."""
-        solids = model.solids
+    def _cast(self, model: _Model, bounds: Bounds | None, camera: CameraPose, sun: Sun) -> bool:
+        """Put a piece on the canvas, by itself; return whether any of it is within the image."""
         window = _window(bounds)
         if window is None:
-            return None
-        canvas = Canvas(window, self._sheet, solids=len(solids))
-        for part, solid in enumerate(solids):
+            return False
+        self._canvas.begin(window)
+        for part, solid in enumerate(model.solids):
             if isinstance(solid, Box):
-                cast_box(canvas, solid, camera, self._sun, part)
+                cast_box(self._canvas, solid, camera, self._sun, part)
             else:
-                cast_frustum(canvas, solid, camera, sun, part)
-        canvas.finish()
-        return canvas
+                cast_frustum(self._canvas, solid, camera, sun, part)
+        return True
 
     def _model_of(self, piece: Furniture) -> _Model:
         # What moves is somewhere else in every frame.
         return self._models.get(piece) or _model(piece)
-
-    def _blend(self, image: U32 | None, depth: F32, canvas: Canvas, palette: U32, owner: int | None) -> None:
-        """Draw an object wherever it is nearer than what has been drawn; `owner`: what the map of people says there."""
-        left, top, right, bottom = canvas.window
-        step = max(1, BAND // (right - left))
-        for row in range(top, bottom, step):
-            at = np.s_[row : min(row + step, bottom), left:right]
-            of = np.s_[row - top : at[0].stop - top]
-            there, new, cover = depth[at], canvas.depth[of], canvas.cover[of]
-            nearer = new < there
-            if image is not None:
-                tone = canvas.tone[of] if len(canvas.tone) > 1 else canvas.tone
-                with np.errstate(invalid="ignore"):  # where the only solid of a canvas is not hit
-                    colour = palette.take((tone * _LEVELS).astype(np.int32), mode="clip")
-                if len(colour) != len(new):
-                    colour = np.repeat(colour, len(new), axis=0)
-                full = cover >= 1.0
-                full &= nearer
-                edge = cover > 0.0
-                edge &= nearer
-                edge ^= full
-                patch = image[at]
-                cv2.copyTo(colour.view(np.int32), full.view(np.uint8), patch.view(np.int32))
-                where = np.divmod(np.flatnonzero(edge), right - left)
-                if len(where[0]):
-                    share = cover[where][:, None]
-                    over, under = (_bytes(pixels[where][:, None]) for pixels in (colour, patch))
-                    patch[where] = cv2.blendLinear(over, under, share, 1.0 - share).view(np.uint32)[:, 0, 0]
-            nearer &= cover >= 0.5
-            cv2.copyTo(new, nearer.view(np.uint8), there)
-            if owner is not None:
-                cv2.copyTo(np.full(nearer.shape, owner, np.int16), nearer.view(np.uint8), self._owner[at])
-
-
-def _shade_floor(room: U8, depth: F32, at: tuple[float, float], radius: float) -> None:
-    """Darken the floor softly around something that stands on it, to the right of and ahead of the camera [m]."""
-    across, ahead = at
-    # the nearest floor that the camera sees lies at the image's lower edge
-    bounds = upright_bounds(across, ahead, radius, 0.0, 0.0, near=MOUNT_HEIGHT * FOCAL_PX / (HEIGHT - CENTRE_Y))
-    window = _window(bounds)
-    if window is None:
-        return
-    left, top, right, bottom = window
-    top = max(top, HEIGHT // 2)
-    if top >= bottom:
-        return
-    floor = FLOOR_DEPTH[top:bottom]
-    gap = (floor * COLUMNS[left:right] - across) ** 2
-    gap += (floor - ahead) ** 2
-    dark = np.maximum(1.0 - gap / radius**2, 0.0)
-    dark *= depth[top:bottom, left:right] >= floor * 0.999
-    patch = room[top:bottom, left:right]
-    patch[:] = np.rint(patch * (1.0 - _SHADOW * dark))
 
 
 class _Model(NamedTuple):

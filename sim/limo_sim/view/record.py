@@ -12,13 +12,17 @@ from limo_hog.ros2.findings import detections_message
 from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
 from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FOCAL_PX
+from limo_sim.world.scenario import Camera
 
 DETECTIONS = "/limo_camera/detections"
 
 
 @contextmanager
-def recorded(path: Path) -> Iterator[Callable[[Moment], None]]:
-    """Give a function that records a moment: what was sensed, what was found in it, and then the command."""
+def recorded(path: Path, camera: Camera) -> Iterator[Callable[[Moment], None]]:
+    """Give a function that records a moment: what was sensed, what was found in it, and then the command.
+
+    `camera` says how the lens bends.
+    """
     with bag_writer(path) as write:
         stamps: dict[str, float] = {}
 
@@ -36,7 +40,9 @@ def recorded(path: Path) -> Iterator[Callable[[Moment], None]]:
                 write(ODOMETRY, now, messages.odometry(moment.odometry))
             if frame is not None:
                 height, width = frame.image.shape[:2]
-                write(CAMERA_INFO, now, messages.camera_info(frame.stamp, width, height, FOCAL_PX))
+                write(
+                    CAMERA_INFO, now, messages.camera_info(frame.stamp, width, height, FOCAL_PX, (camera.k1, camera.k2))
+                )
                 write(DEPTH, now, messages.image(frame.stamp, frame.depth))
                 write(IMAGE, now, messages.image(frame.stamp, frame.image))
                 found = detections_message(frame.stamp, step.detections, messages.CAMERA_FRAME)

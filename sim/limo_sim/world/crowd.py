@@ -20,12 +20,12 @@ from limo_sim.world.people import ROBOT_RADIUS, Person, before_door, doors
 from limo_sim.world.person import STRIDE, Pose, Walk, smooth
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.social_force import People, SocialForce, acceleration
+from limo_sim.world.variants import CROWD_STREAM
 
 F64 = NDArray[np.float64]
 Point = tuple[float, float]
 RobotPose = tuple[float, float, float]
 
-_STREAM = 9  # of the run's generator; 0 … 8 are taken by the sensors, the detector and `variants`
 STEP_S = 0.02
 """Of the arena [s]."""
 _AWAY, _ENTERING, _INSIDE, _LEAVING, _GOING_OUT, _GONE = range(6)
@@ -242,7 +242,7 @@ class Crowd:
         self._walks = {index: Walk(person) for index, person in enumerate(people) if not person.yields}
         self._walkers = {
             index: Walker(
-                person, scenario, around.plan(person.way_margin), np.random.default_rng([seed, _STREAM, index])
+                person, scenario, around.plan(person.way_margin), np.random.default_rng([seed, CROWD_STREAM, index])
             )
             for index, person in enumerate(people)
             if person.yields

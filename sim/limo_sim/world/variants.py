@@ -10,9 +10,18 @@ import numpy as np
 from limo_sim.world.scenario import Camera, Depth, Furniture, Light, Person, Scenario, Vary
 from limo_sim.world.schema import ScenarioError
 
+# The random streams of a run: what draws from one is `default_rng([seed, number, …])`, so that none changes another.
+# Every published figure rests on these numbers: a new stream takes the next one, and none is changed.
+CAMERA_STREAM, LIDAR_STREAM, IMU_STREAM, DROP_STREAM, SLIP_STREAM, PATTERN_STREAM = range(6)  # of `run.arena`
+MISS_STREAM, FALSE_STREAM = 6, 7  # of the detector's faults, `run.detector_faults`
+PEOPLE_STREAM = 8  # of the people's clothes, statures, speeds and starts, below
+CROWD_STREAM = 9  # of the people who give way, each with its own number behind
+# Two that were given the crowd's number, and keep it for the figures: the robot's way in `run.export`, and the errors
+# of the sightings in `env.second`. The first person who gives way draws the same numbers there.
+WANDERING_STREAM = SIGHTING_STREAM = CROWD_STREAM
+
 _SKIN = ((236, 196, 168), (198, 154, 124), (150, 104, 76), (96, 66, 50))
 _HAIR = ((28, 24, 24), (56, 38, 28), (120, 92, 58), (150, 148, 144))
-_PEOPLE_STREAM = 8  # of the run's generator; 0 … 7 are the sensors' and the detector's
 # Named, so that a new kind of furniture leaves the scenarios of every seed as they were.
 _PIECES = ("bollard", "chair", "coat_rack", "cone", "pillar")
 _TRIES = 200  # measured: of the seeds 0 … 299 none needs more than 6
@@ -47,7 +56,7 @@ def of_run(scenario: Scenario, seed: int) -> Scenario:
     """
     if scenario.vary == Vary():
         return scenario
-    random = np.random.default_rng([seed, _PEOPLE_STREAM])
+    random = np.random.default_rng([seed, PEOPLE_STREAM])
     for _ in range(_TRIES):
         people = tuple(_another(person, scenario.vary, random) for person in scenario.people)
         drawn = dataclasses.replace(scenario, people=people, vary=Vary())

@@ -42,7 +42,8 @@ def test_speed_is_gain_times_error_plus_the_persons_own_speed_within_the_limits(
     assert command(replace(at(2.0), range_rate=0.2))[0].linear == pytest.approx(0.8 * 0.5 + 0.2)
     assert command(at(4.0))[0].linear == 0.7
     assert command(at(0.4))[0].linear == -0.7
-    assert command(at(2.0, 1.0))[0].angular == 1.5
+    assert command(at(2.0, 0.61))[0].angular == 1.5
+    assert command(at(2.0, 2.0))[0].angular == 3.0  # out of the image
 
 
 def test_the_robot_turns_before_it_drives_to_the_side() -> None:

@@ -25,7 +25,7 @@ from limo_hog.follow import (
 from limo_hog.follow.control.tracking import TrackingState
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.episode import Episode, run_episode
-from limo_sim.run.score import score
+from limo_sim.run.score import Scorer, score
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
 
@@ -54,6 +54,20 @@ def run(scenario: str, seconds: float, controller: Any = None, detector: Any = N
 
 def test_the_same_seed_gives_the_same_score_but_for_the_wall_clock() -> None:
     one, two = (score(run("followable", 3.0)).to_json() for _ in range(2))
+    for name in WALL_CLOCK:
+        assert one.pop(name) is not None
+        two.pop(name)
+    assert one == two
+
+
+def test_a_run_that_keeps_no_steps_is_scored_as_it_goes() -> None:
+    scenario = Scenario.load("followable")
+    scorer = Scorer(scenario)
+    short = run_episode(
+        scenario, TrackingController(), detector_named("hog"), 3.0, 0, watch=lambda m: scorer.add(m.step), keep=False
+    )
+    assert short.steps == ()
+    one, two = scorer.card(short).to_json(), score(run("followable", 3.0)).to_json()
     for name in WALL_CLOCK:
         assert one.pop(name) is not None
         two.pop(name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_sim.run.episode import Episode, FrameRecord, Step
 from limo_sim.run.matching import on_person
-from limo_sim.run.score import ScoreCard, score
+from limo_sim.run.score import ScoreCard, Scorer, score
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
@@ -65,6 +66,24 @@ def test_fractions_begin_when_the_person_is_first_in_view() -> None:
     assert result.in_view == 0.75
     assert result.detected == 1.0
     assert result.first_detection_s == pytest.approx(0.5)
+
+
+def test_a_score_as_the_run_goes_needs_12_bytes_a_frame() -> None:
+    scorer = Scorer(Scenario.load("two_people"))
+
+    def add(first: int, last: int) -> int:
+        for k in range(first, last):
+            scorer.add(step(k, person(), boxes=[ON], target=0))
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        before = add(0, 1000)
+        grown = add(1000, 5000) - before
+    finally:
+        tracemalloc.stop()
+    # an array is made larger by up to a sixteenth more than it needs
+    assert 0 < grown < 1.2 * 12 * 4000
 
 
 def test_nothing_to_measure_is_none() -> None:

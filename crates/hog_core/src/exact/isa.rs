@@ -8,14 +8,14 @@
 )]
 
 /// a·b + c with one rounding or two: OpenCV fuses where the CPU can, so equal bits need the same.
-pub(super) trait MulAdd {
+pub(crate) trait MulAdd {
     fn mul_add(a: f32, b: f32, c: f32) -> f32;
 }
 
 #[allow(dead_code, reason = "which of the two is used depends on the architecture")]
-pub(super) struct Fused;
+pub(crate) struct Fused;
 #[allow(dead_code, reason = "which of the two is used depends on the architecture")]
-pub(super) struct Separate;
+pub(crate) struct Separate;
 
 impl MulAdd for Fused {
     #[inline(always)]
@@ -32,13 +32,13 @@ impl MulAdd for Separate {
 }
 
 /// A loop to be compiled for several instruction sets; `run` must be `#[inline(always)]`.
-pub(super) trait Work {
+pub(crate) trait Work {
     type Output;
     fn run<M: MulAdd>(self) -> Self::Output;
 }
 
 /// Runs `work` as compiled for this CPU.
-pub(super) fn run<W: Work>(work: W) -> W::Output {
+pub(crate) fn run<W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: both instruction sets were found on this CPU.

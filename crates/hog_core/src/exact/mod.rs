@@ -7,7 +7,7 @@
 
 mod blocks;
 mod gradient;
-mod isa;
+pub(crate) mod isa;
 mod polar;
 mod svm;
 mod tables;

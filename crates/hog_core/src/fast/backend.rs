@@ -9,6 +9,8 @@ use crate::error::{BackendError, Result};
 pub enum Backend {
     /// The architecture's baseline.
     Scalar,
+    /// SSSE3 and SSE4.1.
+    Sse41,
     /// AVX2 and FMA.
     Avx2,
     /// AVX-512 F, BW, VL, DQ, VBMI and VNNI.
@@ -22,12 +24,13 @@ const VARIABLE: &str = "LIMO_HOG_BACKEND";
 
 impl Backend {
     /// All of them, the fastest first.
-    pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Scalar];
+    pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Sse41, Self::Neon, Self::Scalar];
 
     /// The name that `LIMO_HOG_BACKEND` knows it by.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
+            Self::Sse41 => "sse41",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
             Self::Neon => "neon",
@@ -38,6 +41,8 @@ impl Backend {
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse41 => is_x86_feature_detected!("ssse3") && is_x86_feature_detected!("sse4.1"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]

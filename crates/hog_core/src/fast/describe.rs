@@ -79,6 +79,8 @@ impl OnLane for Describe<'_> {
             scratch.prepare(l, geometry, crops, abreast)?;
             for (pixels, out) in groups {
                 interrupt.check()?;
+                // The last group may be smaller: a lone crop fits a narrow vector.
+                let abreast = pixels.len() / crop_bytes;
                 scratch.blocks_of(l, geometry, Crops { pixels, ..crops }, abreast)?;
                 scratch.descriptors(geometry, cells, abreast, out);
             }
@@ -125,7 +127,8 @@ impl Scratch {
         let cells = width / CELL;
         let (lanes, plane) = (Self::lanes(cells, abreast), Self::plane(cells, abreast));
         let stride = plane * crops.channels;
-        l.compiled(Fill { crops, stride, plane, to: &mut self.pixels });
+        // (Bytes are split into planes by shuffles of 16.)
+        l.narrow().compiled(Fill { crops, stride, plane, to: &mut self.pixels });
         self.edge.clear();
         memory::resize(&mut self.edge, geometry.blocks.height, [0.0; BLOCK])?;
         let origin = std::array::from_fn(|channel| {
@@ -170,11 +173,13 @@ impl Scratch {
         let lanes = Self::lanes(cells, abreast);
         let blocks = self.blocks.numbers();
         for (crop, out) in out.chunks_exact_mut(width * height * BLOCK).enumerate() {
-            for (index, out) in out.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
-                let (x, y) = (index / height, index % height);
-                let from = &blocks[y * BLOCK * lanes + crop * cells + x..];
-                for (to, from) in out.iter_mut().zip(from.chunks(lanes)) {
-                    *to = from[0];
+            let out = out.as_chunks_mut::<BLOCK>().0;
+            for (y, row) in blocks.chunks_exact(BLOCK * lanes).take(height).enumerate() {
+                for x in 0..width {
+                    let from = row[crop * cells + x..].iter().step_by(lanes);
+                    for (to, from) in out[x * height + y].iter_mut().zip(from) {
+                        *to = *from;
+                    }
                 }
             }
         }

@@ -13,7 +13,7 @@ use super::lane::Lane;
 use super::lane::neon::Neon;
 use super::lane::portable::Portable;
 #[cfg(target_arch = "x86_64")]
-use super::lane::{Kernel, avx2::Avx2, avx512::Avx512};
+use super::lane::{Kernel, avx2::Avx2, avx512::Avx512, sse41::Sse41};
 use super::plan::{Geometry, Plan};
 use super::rows::Planes;
 
@@ -24,7 +24,7 @@ pub(crate) fn geometry(backend: Backend, spec: &HogSpec) -> Option<Geometry> {
 
 /// The plan of the fast path for this geometry and SVM, if the kernels can serve them.
 pub(crate) fn plan(backend: Backend, geometry: &Geometry, svm: &Svm) -> Option<Plan> {
-    Plan::new(geometry.clone(), svm, backend != Backend::Avx2)
+    Plan::new(geometry.clone(), svm, !matches!(backend, Backend::Avx2 | Backend::Sse41))
 }
 
 /// Whether the backend's estimated square root is right for every pixel value; CPUs differ in their estimates.
@@ -78,6 +78,9 @@ pub(super) fn on_lane<W: OnLane>(backend: Backend, work: W) -> W::Output {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
         Backend::Avx2 => work.run(unsafe { Avx2::new() }),
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Sse41 => work.run(unsafe { Sse41::new() }),
         #[cfg(target_arch = "aarch64")]
         // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
         Backend::Neon => work.run(unsafe { Neon::new() }),
@@ -91,6 +94,9 @@ pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageVie
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available; AVX-512 implies AVX2.
         Backend::Avx512 | Backend::Avx2 => planes.fill(unsafe { Avx2::new() }, image),
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Sse41 => planes.fill(unsafe { Sse41::new() }, image),
         #[cfg(target_arch = "aarch64")]
         // SAFETY: as in `on_lane`.
         Backend::Neon => planes.fill(unsafe { Neon::new() }, image),

@@ -247,7 +247,8 @@ fn mirror(row: &mut [u8], left: usize, width: usize, [before, after]: [usize; 2]
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may fail")]
 mod tests {
-    use super::super::lane::portable::Portable;
+    use super::super::backend::Backend;
+    use super::super::dispatch::{OnLane, on_lane};
     use super::*;
     use crate::pyramid::resize;
 
@@ -288,24 +289,19 @@ mod tests {
         assert_rows::<L, 3>(l, Size::new(70, 50), Size::new(70, 50), 3);
     }
 
+    struct Levels;
+
+    impl OnLane for Levels {
+        type Output = ();
+        fn run<L: Lane>(self, l: L) {
+            assert_levels(l);
+        }
+    }
+
     #[test]
     fn rows_are_those_of_the_exact_resize_however_much_the_image_shrinks() {
-        assert_levels(Portable);
-        #[cfg(target_arch = "x86_64")]
-        {
-            use super::super::backend::Backend;
-            use super::super::lane::{avx2::Avx2, avx512::Avx512};
-            if Backend::Avx2.is_available() {
-                // SAFETY: the CPU has it.
-                assert_levels(unsafe { Avx2::new() });
-            }
-            if Backend::Avx512.is_available() {
-                // SAFETY: the CPU has it.
-                assert_levels(unsafe { Avx512::new() });
-            }
+        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+            on_lane(backend, Levels);
         }
-        #[cfg(target_arch = "aarch64")]
-        // SAFETY: every aarch64 CPU has it.
-        assert_levels(unsafe { super::super::lane::neon::Neon::new() });
     }
 }

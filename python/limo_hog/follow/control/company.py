@@ -1,12 +1,13 @@
-"""Giving way: people are predicted, and of the commands the robot can carry out, one that stays clear of them is taken.
+"""Giving way: people are predicted, and of the ways out the robot can drive, one that stays clear of them is taken.
 
-The dynamic window approach (Fox, Burgard and Thrun 1997), with obstacles that move.
+The dynamic window approach (Fox, Burgard and Thrun 1997), with obstacles that move, and with directions in place of
+turn rates: a robot that cannot drive sideways turns first.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,10 @@ from numpy.typing import NDArray
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.tracks.kalman import Track
 from limo_hog.follow.twist import Twist
+from limo_hog.follow.wheels import advanced, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,16 +38,49 @@ class Walker:
     vy: float
 
 
+def walker_of(track: Track, pose: Odometry) -> Walker:
+    """Return a track in the odometry frame as a walker in the base frame of a robot at `pose`."""
+    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+    x, y, vx, vy = (track.mean - (pose.x, pose.y, 0.0, 0.0)).tolist()
+    return Walker(cos * x + sin * y, cos * y - sin * x, cos * vx + sin * vy, cos * vy - sin * vx)
+
+
 @dataclass(frozen=True, slots=True)
-class Company:
-    """Chooses a command that stays clear of people who come near.
+class Way:
+    """A way out: turn to a direction, and drive.
 
     Attributes
     ----------
+    turn
+        From the robot's present direction [rad].
+    speed
+        At which to drive once it is turned to, negative to back [m/s].
+    age
+        How long the robot has been on it [s].
+    """
+
+    turn: float
+    speed: float
+    age: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Company:
+    """Chooses a way that stays clear of people who come near.
+
+    Attributes
+    ----------
+    notice_s
+        People who come near within this are given way to [s]. Chosen: at 1.5 m/s a person comes from 4 m away.
     horizon_s, step_s
-        How far people are predicted, and in which steps [s]. Chosen: at 1.3 m/s a person comes from 3 m away.
+        How far ways are compared, and in which steps [s]. Chosen: longer, since a person walks faster than the robot
+        backs and would catch up with it.
     slowest
         People slower than this do not come [m/s]. Chosen: twice what a standing person's estimate strays.
+    sway
+        Error of a person's velocity across their way [m/s]. Measured: up to .4 while the robot turns. Chosen: half.
+    weights
+        Of the distances without, with and against this error [1]. Chosen: the prediction counts most.
     clear
         Distance wanted between the robot's outline and a person's axis [m]. Chosen: the .3 m of clearance asked for,
         half a trunk of .15 m, and .1 m for the prediction.
@@ -52,37 +89,57 @@ class Company:
     walls
         Distance kept from everything else [m]. Chosen: `Guard` keeps more ahead and behind, where it can.
     speeds, turns
-        Commands compared [m/s, rad/s]. Chosen: what the drive can do; `Guard` limits the way back to .4 m/s.
-    unseen
-        Speed back onto ground that was not seen lately [m/s]: that of `Guard`.
-    acceleration
-        Of each wheel [m/s²]: the Limo's.
+        Ways compared [m/s, rad]. Chosen: what the drive can do, `Guard` limits the way back to .4 m/s; directions half
+        a person's width apart after half a metre, none from which a person ahead is out of the lidar's sight.
+    turn_gain, max_turn
+        Turn rate for each radian to turn [1/s], and its limit [rad/s]. Chosen: to a right angle in .8 s.
     ease
-        What a change of speed by 1 m/s is worth [m]. Chosen: a decimetre of clearance.
+        What a change of speed by 1 m/s, and a turn by 2.5 rad, are worth [m]. Chosen: of ways that clear people alike,
+        to within the error of their places, the easiest.
+    settle_s, stay
+        A way is left for another only after so long [s], unless it ends at a wall, and if the other is worth more by so
+        much [m]. Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by
+        .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
+    half_view, unseen
+        How far to either side the lidar looks [rad], and what a way costs on which nobody who comes is in its sight
+        [m]. Chosen: the Limo's; the error of a place that is not measured for a second.
+    look_back
+        The ground must be known so far behind the outline to back onto it [m]. Chosen: from .4 m/s it stops within .26.
     """
 
-    horizon_s: float = bounded(2.4, 0, 10)
+    notice_s: float = bounded(2.8, 0, 10)
+    horizon_s: float = bounded(4.0, 0, 10)
     step_s: float = 0.2
     slowest: float = bounded(0.3, 0, 2)
+    sway: float = bounded(0.2, 0, 1)
+    weights: tuple[float, float, float] = (0.7, 0.15, 0.15)
     clear: float = bounded(0.55, 0, 3)
     wanted: float = 0.7
     walls: float = 0.1
     speeds: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.3, 0.6)
-    unseen: float = -0.2
-    acceleration: float = 1.0
-    turns: tuple[float, ...] = (-2.2, -1.1, 0.0, 1.1, 2.2)
-    ease: float = 0.1
+    turns: tuple[float, ...] = (-1.6, -1.1, -0.5, 0.0, 0.5, 1.1, 1.6)
+    turn_gain: float = 4.0
+    max_turn: float = bounded(3.0, 0, 6)
+    ease: float = 0.06
+    settle_s: float = 0.8
+    stay: float = 0.35
+    half_view: float = 2.0
+    unseen: float = 0.1
+    look_back: float = 0.3
 
-    def command(
+    def way_out(
         self,
         wanted: Twist,
         now: Twist,
         walkers: Sequence[Walker],
         points: Points,
         robot: RobotGeometry,
-        may_back: bool = True,
-    ) -> Twist | None:
-        """Return the command to give way with; None where the wanted one stays clear of everybody.
+        begun: Way | None = None,
+        acceleration: float = 1.0,
+        is_known: Callable[[Points], NDArray[np.bool_]] | None = None,
+        blind_speed: float = 0.0,
+    ) -> Way | None:
+        """Return the way to give way by; None where the wanted command stays clear of everybody.
 
         Parameters
         ----------
@@ -94,8 +151,15 @@ class Company:
             float64 (N, 2) [m], base frame: what the lidar sees; people in it count as they stand.
         robot
             The robot's outline.
-        may_back
-            Whether the ground behind the robot is known to be free.
+        begun
+            The way it is on already.
+        acceleration
+            Of each wheel [m/s²].
+        is_known
+            Whether the ground at float64 (N, 2) points [m], base frame, was seen to be free lately, bool (N,); None
+            where all of it counts as free.
+        blind_speed
+            At most so fast it backs onto other ground [m/s].
         """
         people = np.array([(one.x, one.y, one.vx, one.vy) for one in walkers]).reshape(-1, 4)
         coming = np.hypot(people[:, 2], people[:, 3]) > self.slowest
@@ -104,67 +168,112 @@ class Company:
         if not coming.any():
             return None
         people = people[coming]
-        commands = np.array(
-            [(wanted.linear, wanted.angular), *((speed, turn) for speed in self.speeds for turn in self.turns)]
-        )
-        # `Guard` lets nothing drive back faster.
-        commands[0, 0] = max(wanted.linear, self.speeds[0])
-        if not may_back:
-            commands[:, 0] = np.maximum(commands[:, 0], self.unseen)
-        poses = self._driven(commands, now, robot)
-        gaps = self._gaps(poses, people, robot)
-        if gaps[0] > self.clear:
+        ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]
+        if begun is not None:
+            ways.append(begun)
+        poses, backs = self._driven(ways, wanted, now, acceleration, robot)
+        places = self._places(people)
+        gaps = _outline_gap(poses[:, :, None, None], places[None], robot).min(axis=3)
+        soon = gaps[0, : round(self.notice_s / self.step_s)].min(axis=0)
+        if (soon[0] if begun is None else soon.min()) > self.clear:
             return None
-        others = points[np.hypot(*(points[:, None] - people[None, :, :2]).transpose(2, 0, 1)).min(axis=1) > 0.45]
-        near = others[np.hypot(*others.T) < 1.5][::2]
-        room = self._room(poses, near, robot)
-        effort = self.ease * (np.abs(commands - commands[0]) @ (1.0, 0.1))
-        worth = np.minimum(gaps, self.wanted) - effort
-        worth[room < self.walls] -= 2.0
-        best = int(np.argmax(worth))
-        return Twist(float(commands[best, 0]), float(commands[best, 1]))
+        gaps = gaps.min(axis=1)
+        near = points[np.hypot(*points.T) < 1.5][::2]
+        near = near[np.hypot(*(near[:, None] - people[None, :, :2]).transpose(2, 0, 1)).min(axis=1) > 0.45]
+        speeds = np.array([way.speed for way in ways])
+        effort = self.ease * (np.abs(speeds - now.linear) + 0.4 * np.abs([way.turn for way in ways]))
+        worth = np.minimum(gaps[1:], self.wanted) @ self.weights - effort
+        worth -= self.unseen * self._unseen(poses[1:], places[:, 0])
+        worth[self._room(poses[1:], near, robot) < self.walls] -= 2.0
+        if is_known is not None:
+            worth[(speeds < -blind_speed) & self._backs_blindly(poses[1:], backs[1:], is_known, robot)] -= 2.0
+        if begun is not None:
+            worth[-1] += self.stay if begun.age > self.settle_s else 1.0
+        return ways[int(np.argmax(worth))]
 
-    def _driven(self, commands: NDArray[np.float64], now: Twist, robot: RobotGeometry) -> NDArray[np.float64]:
-        """Return where each of K commands leads in T steps: float64 (K, T, 3), x, y [m] and yaw [rad].
+    def command(self, way: Way, acceleration: float, robot: RobotGeometry) -> Twist:
+        """Return the command that begins a way, with wheels of an acceleration [m/s²]."""
+        linear, angular = self._wanted(np.array(way.turn), np.array(way.speed), acceleration, robot)
+        return Twist(float(linear), float(angular))
 
-        Each wheel changes its speed at `acceleration`, so that a robot that also has to turn about its direction of
-        travel turns later.
+    def _wanted(
+        self, turn: NDArray[np.float64], speed: NDArray[np.float64], acceleration: float, robot: RobotGeometry
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the speeds with which ways are driven that are `turn` [rad] off: the turn first."""
+        most = np.minimum(stoppable_turn(turn, acceleration, robot), self.max_turn)
+        linear = speed * np.maximum(np.cos(turn), 0.0) ** 2
+        return np.asarray(linear), np.asarray(np.clip(self.turn_gain * turn, -most, most))
+
+    def _driven(
+        self, ways: Sequence[Way], wanted: Twist, now: Twist, acceleration: float, robot: RobotGeometry
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return where the wanted command, then each of K ways, leads in T steps, and in which of these it backs.
+
+        float64 (1 + K, T, 3): x, y [m], yaw [rad]; bool (1 + K, T). What is wanted is taken to turn for half of
+        the time.
         """
-        times = np.arange(self.step_s, self.horizon_s + 1e-9, self.step_s)
-        half = robot.wheel_separation / 2
-        most = self.acceleration * times
-        # After the first half the robot drives straight on: a turn is to get out of the way, not to come back.
-        wheels = []
-        for side in (-half, half):
-            begun = now.linear + side * now.angular
-            turning = commands[:, :1] + side * commands[:, 1:]
-            wanted = np.where(times < self.horizon_s / 2, turning, commands[:, :1])
-            wheels.append(begun + np.clip(wanted - begun, -most, most))
-        linear, angular = (wheels[0] + wheels[1]) / 2, (wheels[1] - wheels[0]) / robot.wheel_separation
-        yaw = np.clip(np.cumsum(angular, axis=1) * self.step_s, -math.pi / 2, math.pi / 2)
-        x = np.cumsum(linear * np.cos(yaw), axis=1) * self.step_s
-        y = np.cumsum(linear * np.sin(yaw), axis=1) * self.step_s
-        return np.stack([x, y, yaw], axis=2)
+        turns = np.array([0.0, *(way.turn for way in ways)])
+        speeds = np.array([0.0, *(way.speed for way in ways)])
+        count, steps = len(turns), round(self.horizon_s / self.step_s)
+        linear, angular = np.full(count, now.linear), np.full(count, now.angular)
+        x, y, yaw = np.zeros((3, count))
+        poses, backs = np.empty((count, steps, 3)), np.empty((count, steps), bool)
+        for step in range(steps):
+            for_linear, for_angular = self._wanted(turns - yaw, speeds, acceleration, robot)
+            for_linear[0], for_angular[0] = wanted.linear, wanted.angular if step < steps / 2 else 0.0
+            begun = linear, angular
+            linear, angular = advanced(for_linear, for_angular, linear, angular, acceleration * self.step_s, robot)
+            turn = (begun[1] + angular) / 2 * self.step_s
+            far = (begun[0] + linear) / 2 * self.step_s
+            x, y = x + far * np.cos(yaw + turn / 2), y + far * np.sin(yaw + turn / 2)
+            yaw = yaw + turn
+            poses[:, step] = np.stack([x, y, yaw], axis=1)
+            backs[:, step] = far < 0
+        return poses, backs
 
-    def _gaps(
-        self, poses: NDArray[np.float64], people: NDArray[np.float64], robot: RobotGeometry
-    ) -> NDArray[np.float64]:
-        """Return for each of K commands the least distance from the outline to a person's axis [m], float64 (K,)."""
-        times = np.arange(1, poses.shape[1] + 1) * self.step_s
-        places = people[:, None, :2] + times[None, :, None] * people[:, None, 2:]
-        return np.asarray(_outline_gap(poses[:, :, None], places.transpose(1, 0, 2)[None], robot).min(axis=(1, 2)))
+    def _places(self, people: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where N people are in T steps, float64 (T, 3, N, 2) [m]: as predicted, and to either side of that."""
+        times = np.arange(1, round(self.horizon_s / self.step_s) + 1) * self.step_s
+        velocity = people[:, 2:]
+        aside = velocity[:, ::-1] * (-1.0, 1.0) / np.hypot(*velocity.T)[:, None] * self.sway
+        velocities = np.stack([velocity, velocity - aside, velocity + aside])
+        return np.asarray(people[:, :2] + times[:, None, None, None] * velocities)
+
+    def _unseen(self, poses: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return for each of K ways the share of time and people out of the lidar's sight, float64 (K,)."""
+        to = places[None] - poses[:, :, None, :2]
+        off = np.arctan2(to[..., 1], to[..., 0]) - poses[:, :, None, 2]
+        return np.asarray((np.cos(off) < math.cos(self.half_view)).mean(axis=(1, 2)))
 
     def _room(self, poses: NDArray[np.float64], points: Points, robot: RobotGeometry) -> NDArray[np.float64]:
-        """Return for each of K commands the least distance from the outline to a point [m], float64 (K,)."""
+        """Return for each of K ways the least distance from the outline to a point [m], float64 (K,)."""
         if len(points) == 0:
             return np.full(len(poses), np.inf)
         return np.asarray(_outline_gap(poses[:, ::2, None], points[None, None], robot).min(axis=(1, 2)))
 
+    def _backs_blindly(
+        self,
+        poses: NDArray[np.float64],
+        backs: NDArray[np.bool_],
+        is_known: Callable[[Points], NDArray[np.bool_]],
+        robot: RobotGeometry,
+    ) -> NDArray[np.bool_]:
+        """Return for each of K ways whether it backs onto ground that was not seen to be free lately, bool (K,)."""
+        cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+        blind = np.zeros(poses.shape[:2], bool)
+        for far in (self.look_back / 2, self.look_back):
+            for side in (-robot.half_width, 0.0, robot.half_width):
+                x, y = -robot.half_length - far, side
+                rear = np.stack([poses[..., 0] + x * cos - y * sin, poses[..., 1] + x * sin + y * cos], axis=-1)
+                blind |= ~is_known(rear.reshape(-1, 2)).reshape(blind.shape)
+        return np.asarray((blind & backs).any(axis=1))
+
 
 def _outline_gap(poses: NDArray[np.float64], places: NDArray[np.float64], robot: RobotGeometry) -> NDArray[np.float64]:
-    """Return the distance from the robot's rectangle at poses (..., 3) to places (..., 2) [m]."""
+    """Return the distance from the robot's rectangle at poses (..., 3) to places (..., 2) [m]; negative inside it."""
     dx, dy = places[..., 0] - poses[..., 0], places[..., 1] - poses[..., 1]
     cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-    ahead = np.maximum(np.abs(cos * dx + sin * dy) - robot.half_length, 0.0)
-    beside = np.maximum(np.abs(cos * dy - sin * dx) - robot.half_width, 0.0)
-    return np.asarray(np.hypot(ahead, beside))
+    ahead = np.abs(cos * dx + sin * dy) - robot.half_length
+    beside = np.abs(cos * dy - sin * dx) - robot.half_width
+    outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(beside, 0.0))
+    return np.asarray(outside + np.minimum(np.maximum(ahead, beside), 0.0))

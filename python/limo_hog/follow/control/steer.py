@@ -46,6 +46,8 @@ class Steering:
         the wheels' 1 m/s² and the camera's 10 Hz.
     max_linear, max_angular
         Limits of the command, either way [m/s, rad/s]. Chosen: .7 m/s is close to the workshop's walker, .75 m/s.
+    regain_angular
+        Limit of the turn rate while the person is out of the image [rad/s]. Chosen: half a turn a second.
     distance_tolerance, bearing_tolerance
         Smaller errors are not corrected [m, rad]. Chosen: half the standard deviation of the range; one of the bearing.
     steady_bearing_rate, steady_range_rate
@@ -61,6 +63,7 @@ class Steering:
     angular_gain: float = bounded(2.5, 0, 10)
     max_linear: float = bounded(0.7, 0, 1)
     max_angular: float = bounded(1.5, 0, 3)
+    regain_angular: float = bounded(3.0, 0, 6)
     distance_tolerance: float = bounded(0.08, 0, 1)
     bearing_tolerance: float = bounded(0.02, 0, 0.5)
     steady_bearing_rate: float = bounded(0.05, 0, 1)
@@ -97,9 +100,9 @@ class Steering:
             Time since the person was measured, by camera or lidar [s].
         """
         heading = aim.bearing if aim.heading is None else aim.heading
+        most = self.max_angular if abs(aim.bearing) < robot.field_of_view / 2 else self.regain_angular
         facing, angular = (
-            min(max(self.angular_gain * off + aim.bearing_rate, -self.max_angular), self.max_angular)
-            for off in (aim.bearing, heading)
+            min(max(self.angular_gain * off + aim.bearing_rate, -most), most) for off in (aim.bearing, heading)
         )
         error = aim.distance - robot.camera_x - target_distance
         # Driving sideways to the person would lose sight of them: turn first, then drive.

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from limo_hog.follow.control.company import Company, Walker
+from limo_hog.follow.control.backing import Backing
+from limo_hog.follow.control.company import Company, Way, walker_of
 from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.lookout import Hunt, Lookout
 from limo_hog.follow.control.search import Search
@@ -26,6 +27,7 @@ from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.poses import pose_at
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
 from limo_hog.follow.twist import Twist
+from limo_hog.follow.wheels import Wheels, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,17 @@ class TrackingState:
         What is remembered while looking for that person; None while they are measured.
     way, way_at
         float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
+    way_out
+        Direction in the odometry frame [rad] and speed [m/s] by which it gives way, and since when [s]; None while it
+        does not.
+    acceleration
+        Of the wheels, as learnt [m/s²].
+    sent
+        The last command.
+    others_at
+        When another person than the followed one was last measured [s].
+    brisk
+        How fast the followed person walks at most, as far as known [m/s].
     """
 
     tracks: Tracks = field(default_factory=Tracks)
@@ -64,6 +77,11 @@ class TrackingState:
     hunt: Hunt | None = None
     way: Points = field(default_factory=lambda: NO_POINTS)
     way_at: float = -math.inf
+    way_out: tuple[float, float, float] | None = None
+    acceleration: float = 1.0
+    sent: Twist = field(default_factory=Twist)
+    others_at: float = -math.inf
+    brisk: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +94,10 @@ class TrackingController:
         Distance to hold, as the depth image measures it [m].
     full_every
         Every so many frames the whole image is searched [1]. Chosen: another person is noticed within 1.5 s.
-    back_s
-        Ground behind the robot that was seen to be free within this is backed onto [s]. Chosen: less than the memory
-        of `Guard`, which stops the robot where it has seen nothing.
-    behind
-        So far behind the outline the map is looked at before backing [m]. Chosen: steps of a cell; from .2 m/s the
-        robot stops within .09 m.
+    aside_s, brisk_share
+        A person who walks fast is kept off by so many seconds of their way, at 1 m/s² of the wheels, and what the image
+        is late [s]; share by which a faster frame, and a hundredth of that by which a slower one, moves the speed [1].
+        Computed: .2 s to notice a start, .7 s to turn aside, .8 s to drive .3 m; at a walk that is less than 1.5 m.
     near_hiding, foresight_s
         Distance to hold to a person who will be out of sight after so long [m, s]. Chosen: the edge of Hall's personal
         zone; the time in which the robot comes up by that much.
@@ -97,8 +113,10 @@ class TrackingController:
         How much of the image to search.
     tracker
         Where all people are.
-    company
-        How to give way to people.
+    company, backing
+        How to give way to people, and when to back.
+    wheels
+        What the wheels can do.
     lookout, grid, depth_grid
         How to look for a lost person, how the ground is mapped, and which depth pixels are looked at for it.
     robot
@@ -107,8 +125,8 @@ class TrackingController:
 
     target_distance: float = bounded(1.5, 0.1, 8)
     full_every: int = bounded(15, 1, 1000)
-    back_s: float = bounded(29.0, 0, 600)
-    behind: tuple[float, ...] = (0.05, 0.15, 0.25)
+    aside_s: float = bounded(1.7, 0, 5)
+    brisk_share: float = bounded(0.15, 0, 1)
     near_hiding: float = bounded(1.2, 0.5, 8)
     foresight_s: float = bounded(1.0, 0, 5)
     steering: Steering = field(default_factory=Steering)
@@ -118,6 +136,8 @@ class TrackingController:
     region: RegionSize = field(default_factory=RegionSize)
     tracker: Tracker = field(default_factory=Tracker)
     company: Company = field(default_factory=Company)
+    backing: Backing = field(default_factory=Backing)
+    wheels: Wheels = field(default_factory=Wheels)
     lookout: Lookout = field(default_factory=Lookout)
     grid: Grid = field(default_factory=Grid)
     depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))
@@ -125,19 +145,33 @@ class TrackingController:
 
     def start(self) -> TrackingState:
         """Return the state before the first observation: no people."""
-        return TrackingState()
+        return TrackingState(acceleration=self.wheels.acceleration)
 
     def step(self, observation: Observation, state: TrackingState) -> Decision[TrackingState]:
-        """Bring the tracks up to the frame, choose the person to follow, and steer to where they are now."""
+        """Follow a person, give way to all, and ask of the wheels what they can do."""
+        wheels, before = observation.odometry, state.tracks.poses[-1:]
+        if wheels is not None:
+            believed = state.acceleration
+            for last in before:
+                believed = self.wheels.learn(believed, state.sent, last, wheels, self.robot)
+            state = replace(state, acceleration=believed)
+        decision, person = self._follow(observation, state)
+        return self._give_way(decision, person, observation)
+
+    def _follow(self, observation: Observation, state: TrackingState) -> tuple[Decision[TrackingState], Person | None]:
+        """Bring the tracks up to the frame, choose the person to follow, and steer to where they are now.
+
+        Returns the decision, and the person followed as of the newest stamp.
+        """
         tracks, boxes = self.tracker.update(observation, state.tracks)
         before, choice = state.choice.measured, self.selection.choose(tracks, state.choice)
         another = before is not None and (choice.measured or 0.0) - before > self.selection.reidentify_s
         state = self._map(replace(state, tracks=tracks, choice=choice), observation)
         if choice.candidates:
-            return self._look_at(state, observation)
+            return self._look_at(state, observation), None
         person = tracks.person(choice.number)
         if person is None:
-            return self._search(state, observation)
+            return self._search(state, observation), None
         unseen_s = observation.stamp - person.seen
         person, tracks = self.tracker.follow_legs(person, tracks, self.grid, state.ground)
         state = replace(state, tracks=tracks)
@@ -149,6 +183,9 @@ class TrackingController:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
             known = person.track if person.confirmed and self._is_sure(person, choice) else state.known
             state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None)
+            speed = math.hypot(*person.track.mean[2:])
+            share = self.brisk_share if speed > state.brisk else self.brisk_share / 100
+            state = replace(state, brisk=state.brisk + share * (speed - state.brisk))
         can_look = state.ground is not None and state.known is not None and person.confirmed
         if can_look and aim.hidden and state.ground is not None and state.hunt is None:
             # Behind another person one is hidden for a moment; waiting is better than driving round people.
@@ -156,7 +193,7 @@ class TrackingController:
             can_look = self._hides(state.ground, pose, person.track.mean[:2])
         patience = self.lookout.after_s if can_look else self.tracker.forget_s if aim.hidden else self.search.after_s
         if lost_s > patience:
-            return self._search(state, observation)
+            return self._search(state, observation), person
         twist, mode, reason = self.steering.command(
             aim,
             keeps,
@@ -170,15 +207,16 @@ class TrackingController:
             reason = "following another person: the lost one was not found"
         elif keeps > self.target_distance + self.steering.distance_tolerance and mode in (Mode.HOLD, Mode.FOLLOW):
             reason += ", further off than asked: nearer the camera would not show all of them"
-        walkers = self._walkers(person, state, observation)
-        wheels = observation.odometry or Odometry()
-        driven = Twist(wheels.linear, wheels.angular)
-        may_back = self._may_back(state, observation)
-        way_out = self.company.command(twist, driven, walkers, points, self.robot, may_back)
-        if way_out is not None:
-            twist, mode, reason = way_out, Mode.FOLLOW, "giving way to a person"
-        if twist.linear < 0 and self._stands_behind(state, observation):
-            twist, mode, reason = Twist(0.0, twist.angular), Mode.BLOCKED, "a known obstacle is behind"
+        off = aim.bearing if aim.heading is None else max(aim.bearing, aim.heading, key=abs)
+        most = stoppable_turn(off, state.acceleration, self.robot) + abs(aim.bearing_rate)
+        twist = replace(twist, angular=float(np.clip(twist.angular, -most, most)))
+        pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
+        if twist.linear < 0 and not self.backing.is_known_behind(
+            aim.bearing, pose, self.grid, state.ground, self.robot
+        ):
+            stands = self.backing.stands_behind(pose, self.grid, state.ground, self.robot)
+            limit = 0.0 if stands else self.backing.blind_limit(state.others_at, observation.now)
+            twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(
             state,
@@ -186,13 +224,50 @@ class TrackingController:
             detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
         )
         belief = Belief(keeps, self._believed(state, observation), followed=person.number)
-        return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief)
+        return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief), person
+
+    def _give_way(
+        self, decision: Decision[TrackingState], person: Person | None, observation: Observation
+    ) -> Decision[TrackingState]:
+        """Replace a command by a way out of the way of people, where there is need, and by what the wheels can do."""
+        state, twist, mode, reason = decision.state, decision.twist, decision.mode, decision.reason
+        wheels, acceleration = observation.odometry, state.acceleration
+        if wheels is None:
+            return decision
+        driven, pose = Twist(wheels.linear, wheels.angular), pose_at(state.tracks.poses, observation.now)
+        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
+        begun = None
+        if state.way_out is not None:
+            yaw, speed, since = state.way_out
+            begun = Way(wrap(yaw - pose.yaw), speed, observation.now - since)
+
+        def is_known(places: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+            return self.backing.is_known(places, pose, self.grid, state.ground)
+
+        tracks, others = self.tracker.around(state.tracks, person, observation.now, self.steering.coast_s)
+        walkers = [walker_of(track, pose) for track in tracks]
+        state = replace(state, others_at=observation.now if others else state.others_at)
+        blind_speed = self.backing.blind_limit(state.others_at, observation.now)
+        way = self.company.way_out(
+            twist, driven, walkers, points, self.robot, begun, acceleration, is_known, blind_speed
+        )
+        if way is not None:
+            twist, reason = self.company.command(way, acceleration, self.robot), "giving way to a person"
+            mode = mode if mode in (Mode.LOST, Mode.SEARCH) else Mode.FOLLOW
+        twist = self.wheels.within_reach(twist, driven, acceleration, state.tracks.period, self.robot)
+        way_out = None if way is None else (pose.yaw + way.turn, way.speed, observation.now - way.age)
+        return replace(
+            decision, state=replace(state, way_out=way_out, sent=twist), twist=twist, mode=mode, reason=reason
+        )
 
     def _map(self, state: TrackingState, observation: Observation) -> TrackingState:
-        """Enter a new scan, and the depth image, into the map of the ground."""
+        """Enter a new scan into what moves, and with the depth image into the map of the ground."""
         scan, tracks = observation.scan, state.tracks
         if scan is None or observation.odometry is None:
             return state
+        half_view = min(-scan.angle_min, scan.angle_max)
+        tracks = self.tracker.follow_movers(tracks, half_view, self.grid, state.ground)
+        state = replace(state, tracks=tracks)
         if state.ground is not None and scan.stamp < state.ground.stamp + self.grid.period_s:
             return state
         pose = pose_at(tracks.poses, scan.stamp)
@@ -283,49 +358,18 @@ class TrackingController:
         reach = min(aim.distance - 2 * self.detour.person_radius, self.detour.look_ahead)
         return self.detour.free(lasting, aim.bearing, 0.0, reach, self.robot, 0) is not None
 
-    def _may_back(self, state: TrackingState, observation: Observation) -> bool:
-        """Whether the ground behind the robot was seen to be free lately, as `Guard` wants it."""
-        ground = state.ground
-        if ground is None:
-            return True
-        behind = np.array([(-self.robot.half_length - far, 0.0) for far in (0.1, 0.2, 0.3)])
-        cells = self.grid.flat(ground, to_odometry(behind, pose_at(state.tracks.poses, observation.now)))
-        return bool((ground.freed.flat[cells] > observation.now - self.back_s).all())
-
-    def _stands_behind(self, state: TrackingState, observation: Observation) -> bool:
-        """Whether the map shows something that lasts close behind: `Guard` remembers for a shorter time."""
-        if state.ground is None:
-            return False
-        back, half = -self.robot.half_length, self.robot.half_width
-        behind = np.array([(back - far, left) for far in self.behind for left in (-half, 0.0, half)])
-        points = to_odometry(behind, pose_at(state.tracks.poses, observation.now))
-        return bool(self.grid.is_blocked(state.ground, points, lasting=True).any())
-
     def _hides(self, ground: Ground, pose: Odometry, place: Points) -> bool:
         """Whether something that lasts is between the robot and a place (2,) in the odometry frame."""
         return not self.grid.sees(ground, np.array([[pose.x, pose.y]]), place[None], lasting=True)[0, 0]
-
-    def _walkers(self, person: Person, state: TrackingState, observation: Observation) -> list[Walker]:
-        """Return everybody measured lately, with the followed person as measured last, in the base frame."""
-        now = observation.now
-        pose = pose_at(state.tracks.poses, now)
-        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-        walkers = []
-        for one in state.tracks.people:
-            one = person if one.number == person.number else one
-            if not one.confirmed or now - one.measured > self.steering.coast_s:
-                continue
-            x, y, vx, vy = predict(one.track, now, self.tracker.noise).mean.tolist()
-            dx, dy = x - pose.x, y - pose.y
-            walkers.append(Walker(cos * dx + sin * dy, cos * dy - sin * dx, cos * vx + sin * vy, cos * vy - sin * vx))
-        return walkers
 
     def _keeps(self, person: Person, state: TrackingState, observation: Observation) -> float:
         """Return the distance to hold from the camera [m]: the target, but none from which a person is cut off."""
         if not person.confirmed:
             return self.target_distance
         least = self.tracker.visibility.least_distance(person.window, person.centre, observation.height)
-        keeps = max(self.target_distance, least - self.robot.camera_x)
+        late_s = observation.now - observation.stamp + state.tracks.period
+        notice_s = late_s + self.aside_s / math.sqrt(state.acceleration)
+        keeps = max(self.target_distance, least - self.robot.camera_x, notice_s * state.brisk)
         if keeps > self.near_hiding and state.ground is not None:
             pose = pose_at(state.tracks.poses, observation.now)
             soon = predict(person.track, observation.now + self.foresight_s, self.tracker.noise).mean[:2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -16,8 +17,9 @@ from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Association
 from limo_hog.follow.tracks.existence import Existence, Recall
-from limo_hog.follow.tracks.kalman import Noise, bearing_range, innovation
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
 from limo_hog.follow.tracks.legs import Legs, Returns, returns_of
+from limo_hog.follow.tracks.movers import Mover, Movers
 from limo_hog.follow.tracks.person import Person, initiate, predict
 from limo_hog.follow.tracks.poses import pose_at
 
@@ -40,6 +42,8 @@ class Tracks:
         Stamp of the last frame, None before the first, and the time between the last two [s].
     recall
         How often people are found, as learnt so far.
+    movers, moved_at
+        What may move in the scan, whether the camera shows it or not, and the stamp of that scan [s].
     """
 
     people: tuple[Person, ...] = ()
@@ -50,6 +54,8 @@ class Tracks:
     stamp: float | None = None
     period: float = 0.1
     recall: Recall = field(default_factory=Recall)
+    movers: tuple[Mover, ...] = ()
+    moved_at: float = -math.inf
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
@@ -67,7 +73,7 @@ class Tracker:
 
     Attributes
     ----------
-    noise, association, existence, legs, visibility
+    noise, association, existence, legs, movers, visibility
         The parts, each with its parameters.
     forget_s
         An unmeasured person is forgotten after so long [s]. Chosen: the time the
@@ -103,6 +109,7 @@ class Tracker:
     association: Association = field(default_factory=Association)
     existence: Existence = field(default_factory=Existence)
     legs: Legs = field(default_factory=Legs)
+    movers: Movers = field(default_factory=Movers)
     visibility: Visibility = field(default_factory=Visibility)
     forget_s: float = 8.0
     legs_only_s: float = 4.0
@@ -235,6 +242,34 @@ class Tracker:
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = tuple(kept if one.number == person.number else one for one in tracks.people)
         return now, replace(tracks, people=people)
+
+    def follow_movers(self, tracks: Tracks, half_view: float, grid: Grid, ground: Ground | None) -> Tracks:
+        """Enter the newest scan, whose lidar looks `half_view` [rad] to either side, into what moves."""
+        if not tracks.scans or tracks.scans[-1].stamp <= tracks.moved_at:
+            return tracks
+        newest = tracks.scans[-1]
+        movers = self.movers.update(tracks.movers, newest, half_view, self.noise, grid, ground)
+        return replace(tracks, movers=movers, moved_at=newest.stamp)
+
+    def around(self, tracks: Tracks, followed: Person | None, now: float, lately_s: float) -> tuple[list[Track], bool]:
+        """Return all people, seen by the camera or moving in the scan, as of `now` [s], and whether any is another.
+
+        `followed` is the person followed, as measured last; people found by the camera count for `lately_s` [s].
+        """
+        people, others = [], False
+        for one in tracks.people:
+            is_followed = followed is not None and one.number == followed.number
+            one = followed if followed is not None and is_followed else one
+            if one.confirmed and now - one.measured <= lately_s:
+                people.append(kalman.predict(one.track, now, self.noise))
+                others |= not is_followed
+        for mover in self.movers.moving(tracks.movers):
+            track = kalman.predict(mover.track, now, self.noise)
+            gaps = [math.dist(track.mean[:2], other.mean[:2]) for other in people]
+            if min(gaps, default=math.inf) > self.association.same_place:
+                people.append(track)
+                others = True
+        return people, others
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
         poses, odometry = tracks.poses, observation.odometry

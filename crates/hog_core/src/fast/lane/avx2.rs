@@ -219,40 +219,8 @@ impl Lane for Avx2 {
     }
     #[inline(always)]
     unsafe fn deinterleave<const FLIP: u8>(self, from: *const u8, to: [*mut u8; 3], len: usize) {
-        // 16 pixels are three vectors; each plane takes its bytes from all three.
-        isa!({
-            let whole = len - len % 16;
-            let flip = _mm_set1_epi8(FLIP.cast_signed());
-            let shuffle = |channel: usize, vector: usize| {
-                let mut index = [0x80u8; 16];
-                let mut i = 0;
-                while i < 16 {
-                    let at = 3 * i + channel;
-                    if at / 16 == vector {
-                        index[i] = (at % 16) as u8;
-                    }
-                    i += 1;
-                }
-                index
-            };
-            let index = [0, 1, 2].map(|channel| [0, 1, 2].map(|vector| shuffle(channel, vector)));
-            for at in (0..whole).step_by(16) {
-                for (channel, to) in to.iter().enumerate() {
-                    let mut plane = flip;
-                    for (vector, index) in index[channel].iter().enumerate() {
-                        let pixels = _mm_loadu_si128(from.add(3 * at + 16 * vector).cast());
-                        let part = _mm_shuffle_epi8(pixels, _mm_loadu_si128(index.as_ptr().cast()));
-                        plane = _mm_xor_si128(plane, part);
-                    }
-                    _mm_storeu_si128(to.add(at).cast(), plane);
-                }
-            }
-            super::portable::Portable.deinterleave::<FLIP>(
-                from.add(3 * whole),
-                to.map(|to| to.add(whole)),
-                len - whole,
-            );
-        });
+        // SAFETY: AVX2 implies SSSE3; the rest is the caller's promise.
+        unsafe { super::sse41::deinterleave::<FLIP>(from, to, len) };
     }
 }
 

@@ -62,6 +62,8 @@ mod columns;
 #[cfg(target_arch = "aarch64")]
 pub(super) mod neon;
 pub(super) mod portable;
+#[cfg(target_arch = "x86_64")]
+pub(super) mod sse41;
 
 pub(super) use columns::{Columns, RowPointers};
 

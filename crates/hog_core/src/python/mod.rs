@@ -1,5 +1,8 @@
 //! The Python module `limo_hog._core`: reads arguments, releases the GIL, calls, wraps, maps errors. Nothing else.
 
+mod canvas;
+mod errors;
+
 use std::borrow::Cow;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -9,9 +12,10 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOverflowError};
+use pyo3::exceptions::{PyMemoryError, PyOverflowError};
 use pyo3::prelude::*;
 
+use self::errors::{raised, raised_as};
 use crate::error::{ImageError, ParameterError};
 use crate::pyramid::Pyramid;
 use crate::{
@@ -35,29 +39,6 @@ fn threads() -> usize {
         chosen => chosen,
     };
     threads.min(THREADS_MAX)
-}
-
-/// Raises the class of `limo_hog.exceptions` that stands for `error`.
-fn raised(py: Python<'_>, error: &HogError) -> PyErr {
-    let class = match error {
-        HogError::Geometry(_) => "GeometryError",
-        HogError::DetectorSize { .. } => "DetectorSizeError",
-        HogError::Image(_) => "ImageError",
-        HogError::Parameter(_) => "ParameterError",
-        HogError::Backend(_) => "BackendError",
-        HogError::Memory { .. } => return PyMemoryError::new_err(error.to_string()),
-        HogError::Interrupted => return PyKeyboardInterrupt::new_err(error.to_string()),
-    };
-    raised_as(py, class, error.to_string())
-}
-
-/// Raises a class of `limo_hog.exceptions`.
-fn raised_as(py: Python<'_>, class: &str, message: String) -> PyErr {
-    let raise = || {
-        let class = py.import("limo_hog.exceptions")?.getattr(class)?;
-        Ok(PyErr::from_value(class.call1((message,))?))
-    };
-    raise().unwrap_or_else(|missing: PyErr| missing)
 }
 
 /// How often a long call looks for signals: a tenth of the second within which Ctrl-C is to end it, and so rarely that
@@ -326,6 +307,8 @@ mod _core {
 
     #[pymodule_export]
     use super::Hog;
+    #[pymodule_export]
+    use super::canvas::Canvas;
 
     #[pyfunction]
     fn group_rectangles<'py>(

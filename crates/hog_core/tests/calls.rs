@@ -1,0 +1,194 @@
+//! Crops, chosen places, lengths and guided searches: each against the exact path or a formula.
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+mod common;
+
+use common::{Detector, Picture, assert_same, available, reached_by};
+use hog_core::pyramid::{Pyramid, Tap, resize, taps};
+use hog_core::{Grouping, Guide, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
+
+const STEPS: Search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (0, 0) };
+
+/// The descriptor of one crop by the exact path.
+fn descriptor(hog: &Hog, crop: &[u8], channels: usize) -> Vec<f32> {
+    let Size { width, height } = hog.spec().win;
+    let view = ImageView::new(crop, width, height, channels, width * channels).unwrap();
+    let mut out = vec![0.0; hog.spec().descriptor_len()];
+    hog.compute(view, &STEPS, Some(&[(0, 0)]), &Interrupt::NEVER, &mut out).unwrap();
+    out
+}
+
+#[test]
+fn crops_are_described_as_the_exact_path_describes_each() {
+    let sizes = [(64, 128), (16, 16), (24, 40), (48, 96), (136, 24), (40, 16)];
+    let plain =
+        HogParams { win_size: (24, 36), block_size: (12, 12), block_stride: (6, 6), ..HogParams::default() };
+    let other = HogParams { cell_size: (6, 6), ..plain };
+    let geometries = sizes.map(|win_size| HogParams { win_size, ..HogParams::default() });
+    for params in geometries.iter().chain([&other]) {
+        for backend in available() {
+            let hog = Hog::with_backend(params, None, backend).unwrap();
+            let (win, elements) = (hog.spec().win, hog.spec().descriptor_len());
+            // Many crops first: what they leave in the scratch memory must not show in the few that follow.
+            for (count, channels, threads) in
+                [(37, 3, 2), (1, 1, 1), (5, 3, 1), (2, 1, 1), (16, 1, 2), (1, 3, 1)]
+            {
+                let picture = Picture::new(win.width, win.height * count, channels, count as u32);
+                let mut found = vec![-1.0; count * elements];
+                hog.describe(&picture.data, channels, threads, &Interrupt::NEVER, &mut found).unwrap();
+                let crops = picture.data.chunks_exact(win.area() * channels);
+                let wanted: Vec<f32> = crops.flat_map(|crop| descriptor(&hog, crop, channels)).collect();
+                let off = found.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                assert!(off <= 1e-6, "{} {win:?} {count}x{channels}: off by {off:e}", backend.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn crops_that_do_not_fit_their_answer_are_refused() {
+    let params = HogParams { win_size: (16, 16), ..HogParams::default() };
+    let hog = Hog::new(&params, None).unwrap();
+    let elements = hog.spec().descriptor_len();
+    let refused = |bytes: usize, channels: usize, room: usize| {
+        hog.describe(&vec![0; bytes], channels, 1, &Interrupt::NEVER, &mut vec![0.0; room]).is_err()
+    };
+    assert!(!refused(3 * 256, 1, 3 * elements));
+    assert!(!refused(3 * 256, 3, elements));
+    assert!(refused(3 * 256, 1, 2 * elements));
+    assert!(refused(3 * 256, 1, 4 * elements));
+    assert!(refused(3 * 256 + 1, 1, 3 * elements));
+    for channels in [0, 2, 4] {
+        assert!(refused(12 * 256, channels, 3 * elements));
+    }
+}
+
+#[test]
+fn the_length_of_descriptors_is_windows_times_elements() {
+    let hog = Hog::new(&HogParams::default(), None).unwrap();
+    let picture = Picture::new(80, 152, 1, 1);
+    let len = |search: &Search, places| hog.compute_len(picture.view(), search, places).unwrap();
+    assert_eq!(len(&STEPS, None), 3 * 4 * 3780);
+    assert_eq!(len(&Search { padding: (8, 16), ..STEPS }, None), 5 * 8 * 3780);
+    assert_eq!(len(&STEPS, Some(&[(0, 0), (500, 0)])), 2 * 3780);
+    assert_eq!(len(&STEPS, Some(&[])), 0);
+    // The largest number of elements that OpenCV's lists hold is 2³¹ − 1.
+    assert_eq!(len(&STEPS, Some(&vec![(0, 0); 568_117])), 568_117 * 3780);
+    assert!(hog.compute_len(picture.view(), &STEPS, Some(&vec![(0, 0); 568_118])).is_err());
+}
+
+#[test]
+fn all_descriptors_are_those_of_each_place() {
+    for params in [HogParams::default(), HogParams { win_size: (32, 48), nbins: 7, ..HogParams::default() }] {
+        let hog = Hog::new(&params, None).unwrap();
+        let picture = Picture::new(101, 163, 3, 9);
+        let search = Search { win_stride: (8, 16), padding: (8, 8), ..STEPS };
+        let columns = (101 + 16 - hog.spec().win.width) / 8 + 1;
+        let rows = (163 + 16 - hog.spec().win.height) / 16 + 1;
+        let places: Vec<(i64, i64)> = (0..rows as i64)
+            .flat_map(|y| (0..columns as i64).map(move |x| (8 * x - 8, 16 * y - 8)))
+            .collect();
+        let compute = |places: Option<&[(i64, i64)]>| {
+            let mut out = vec![-1.0; hog.compute_len(picture.view(), &search, places).unwrap()];
+            hog.compute(picture.view(), &search, places, &Interrupt::NEVER, &mut out).unwrap();
+            out
+        };
+        assert!(compute(None) == compute(Some(&places)));
+        // The same in any order, and nothing where the window leaves the image.
+        let (first, last) = (places[0], places[places.len() - 1]);
+        let found = compute(Some(&[last, (-9, 0), first, (0, 1_000_000)]));
+        let parts: Vec<&[f32]> = found.chunks_exact(hog.spec().descriptor_len()).collect();
+        assert!(parts[0] == compute(Some(&[last])));
+        assert!(parts[2] == compute(Some(&[first])));
+        assert!(parts[1].iter().chain(parts[3]).all(|&element| element == 0.0));
+    }
+}
+
+#[test]
+fn places_of_ones_own_are_decided_as_all_windows_are() {
+    let (detector, picture) = (Detector::people(), Picture::new(150, 190, 3, 2));
+    let windows = detector.every_window(picture.view(), &STEPS);
+    let mut places: Vec<(i64, i64)> = windows.iter().rev().map(|hit| (hit.x, hit.y)).collect();
+    places.push((1_000, 0));
+    let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
+    for share in [0.0, 0.3, 1.0] {
+        let hit_threshold = reached_by(&windows, share);
+        let search = Search { hit_threshold, ..STEPS };
+        let found = hog.detect(picture.view(), &search, Some(&places), &Interrupt::NEVER).unwrap();
+        let hits: Vec<_> = windows.iter().rev().copied().filter(|hit| hit.weight >= hit_threshold).collect();
+        assert_same(&found, &hits, 0.0, "places");
+    }
+}
+
+fn guided(detector: &Detector, picture: &Picture, guide: Option<Guide>, threshold: f64) -> Vec<(Rect, f64)> {
+    let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
+    let search = Search { hit_threshold: threshold, ..STEPS };
+    let pyramid = Pyramid { first: None, scale: 1.1 };
+    hog.detect_multi_scale(
+        picture.view(),
+        &search,
+        &pyramid,
+        Grouping::Similar(0),
+        guide,
+        1,
+        &Interrupt::NEVER,
+    )
+    .unwrap()
+}
+
+#[test]
+fn a_guided_search_finds_nothing_new_and_misses_nothing_where_it_looks_everywhere() {
+    let (detector, picture) = (Detector::people(), Picture::new(400, 420, 3, 6));
+    let all = guided(&detector, &picture, None, -1.2);
+    assert!(all.len() > 20);
+    let everywhere = [(0, 0.0, 0), (1, 0.0, 0), (2, 1e9, 0), (2, 1e9, 50), (3, 1e9, 50), (5, 1e9, 50)];
+    for (every, margin, reach) in everywhere {
+        let found = guided(&detector, &picture, Some(Guide { every, margin, reach }), -1.2);
+        assert_eq!(found, all, "{every} {margin} {reach}");
+    }
+    for (every, margin, reach) in [(2, 0.0, 0), (2, 0.3, 1), (3, 0.0, 2), (4, 0.5, 3)] {
+        let found = guided(&detector, &picture, Some(Guide { every, margin, reach }), -1.2);
+        assert!(found.iter().all(|hit| all.contains(hit)), "{every} {margin} {reach}");
+        assert!(2 * found.len() > all.len(), "{} of {}", found.len(), all.len());
+    }
+    // The levels between are searched around what was found on the others alone: where that is nothing, nowhere.
+    let nowhere = guided(&detector, &picture, Some(Guide { every: 2, margin: -1e9, reach: 50 }), -1.2);
+    assert!(nowhere.is_empty());
+}
+
+#[test]
+fn taps_are_those_of_the_formula() {
+    assert!(taps(1, 3).eq([Tap { first: 0, second: 0, weight: 0 }; 3]));
+    let tap = |first, second, weight| Tap { first, second, weight };
+    // Centres of the halves: a quarter from each pixel's.
+    let twice = [tap(0, 0, 0), tap(0, 1, 64), tap(0, 1, 192), tap(1, 2, 64), tap(1, 2, 192), tap(2, 2, 0)];
+    assert!(taps(3, 6).eq(twice));
+    assert!(taps(4, 2).eq([tap(0, 1, 128), tap(2, 3, 128)]));
+    assert!(taps(6, 2).eq([tap(1, 2, 0), tap(4, 5, 0)]));
+    assert!(taps(5, 5).eq((0..5).map(|i| if i < 4 { tap(i, i + 1, 0) } else { tap(4, 4, 0) })));
+}
+
+#[test]
+fn enlarged_and_shrunk_images_are_those_of_the_taps_in_each_channel() {
+    for (from, to, channels) in
+        [((1, 1), (4, 3), 1), ((7, 5), (3, 9), 3), ((13, 11), (13, 7), 3), ((2, 9), (1, 1), 1)]
+    {
+        let picture = Picture::new(from.0, from.1, channels, 4);
+        let found = resize(picture.view(), Size::new(to.0, to.1)).unwrap();
+        let at = |x: usize, y: usize, c: usize| u32::from(picture.data[(y * from.0 + x) * channels + c]);
+        for (y, down) in taps(from.1, to.1).enumerate() {
+            for (x, across) in taps(from.0, to.0).enumerate() {
+                for c in 0..channels {
+                    let row = |y| {
+                        at(across.first, y, c) * (256 - across.weight)
+                            + at(across.second, y, c) * across.weight
+                    };
+                    let wanted = row(down.first) * (256 - down.weight) + row(down.second) * down.weight;
+                    assert_eq!(u32::from(found[(y * to.0 + x) * channels + c]), (wanted + (1 << 15)) >> 16);
+                }
+            }
+        }
+    }
+    assert!(resize(Picture::new(3, 3, 1, 0).view(), Size::new(0, 2)).is_err());
+    assert!(resize(Picture::new(3, 3, 1, 0).view(), Size::new(2, 0)).is_err());
+}

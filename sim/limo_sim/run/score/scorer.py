@@ -1,0 +1,247 @@
+"""Measures a run step by step.
+
+The card is about one person, the subject: the first person that the follower chose as its target, or the
+scenario's first person where it never chose one. The indices of people are those of the scenario; `NO_PERSON`
+stands for a box on none of them.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections import Counter, deque
+from collections.abc import Sequence
+
+import numpy as np
+
+from limo_hog.follow.decision import Mode
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.zones import Zone, zone_of
+from limo_sim.run.episode import Episode, Step
+from limo_sim.run.matching import CRITERIA, NO_PERSON, Criteria, person_of
+from limo_sim.run.provenance import code_version, scenario_hash
+from limo_sim.run.score.card import ScoreCard
+from limo_sim.run.score.subject import Mean, Subject
+from limo_sim.world.robot import max_turn_rate
+from limo_sim.world.scenario import Scenario
+from limo_sim.world.truth import Truth
+
+
+def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
+    """Measure an episode by the steps in its log."""
+    scorer = Scorer(episode.scenario, criteria)
+    for step in episode.steps:
+        scorer.add(step)
+    return scorer.card(episode)
+
+
+class Scorer:
+    """Measures a run as it goes, and keeps no steps: its memory grows by 12 bytes a frame, for the percentiles.
+
+    Parameters
+    ----------
+    scenario
+        That of the run: `Arena.scenario`, whose people are drawn.
+    criteria
+        What counts.
+    """
+
+    def __init__(self, scenario: Scenario, criteria: Criteria = CRITERIA) -> None:
+        self._criteria = criteria
+        self._radii = [person.radius for person in scenario.people]
+        self._motion = _Motion(max_turn_rate(scenario.robot.wheel_speed))
+        # Everybody, until one of them is the target: then that one.
+        self._subjects = [Subject(index, criteria) for index in range(max(len(scenario.people), 1))]
+        self._steps = self._frames = self._boxed = self._wrong = self._targets = self._switches = 0
+        self._followed: int | None = None
+        self._detect_ms, self._render_ms = array("f"), array("f")
+        self._anybody = False
+        self._clearance = math.inf
+        self._nearest: Counter[Zone] = Counter()
+        self._modes: Counter[str] = Counter()
+        self._reasons: Counter[str] = Counter()
+
+    def add(self, step: Step) -> None:
+        """Add the next step."""
+        people = step.truth.people
+        hits = (
+            []
+            if step.seen is None
+            else [person_of(box, step.seen.people, self._criteria) for box in step.detections.boxes]
+        )
+        target = None if step.decision.target is None else hits[step.decision.target]
+        for subject in self._subjects:
+            subject.add(step, hits, target)
+        if step.frame is not None:
+            self._frames += 1
+            self._detect_ms.append(step.frame.detect_ms)
+            self._render_ms.append(step.frame.render_ms)
+            self._add_target(target)
+        if hits:
+            self._boxed += 1
+            self._wrong += hits[0] == NO_PERSON
+        self._steps += 1
+        self._modes[step.decision.mode.value] += 1
+        self._reasons[step.decision.reason] += 1
+        self._motion.add(step, target)
+        self._clearance = min(self._clearance, _clearance(step.truth, self._radii))
+        distances = [person.distance for person in people if person]
+        self._anybody = self._anybody or bool(distances)
+        if distances:
+            self._nearest[zone_of(min(distances))] += 1
+
+    def _add_target(self, target: int | None) -> None:
+        self._targets += target is not None
+        if target is None or target == NO_PERSON:
+            return
+        if self._followed is None:
+            self._subjects = [self._subjects[target]]
+        self._switches += self._followed not in (None, target)
+        self._followed = target
+
+    def card(self, episode: Episode) -> ScoreCard:
+        """Return the card of the run whose steps were added; those that the episode holds are not looked at."""
+        subject, target, motion = self._subjects[0], episode.target_distance, self._motion
+        errors, gaps = np.array(subject.pixel_errors, float), subject.gaps
+        detect_ms, render_ms = np.array(self._detect_ms, float), np.array(self._render_ms, float)
+        least = subject.distances.least
+        return ScoreCard(
+            scenario=episode.scenario.name,
+            controller=episode.controller,
+            detector=episode.detector,
+            seed=episode.seed,
+            seconds=round(episode.seconds, 6),
+            scenario_hash=scenario_hash(episode.scenario),
+            code_version=code_version(),
+            target_m=target,
+            kept_m=None if target is None else subject.kept(target),
+            success=self._success(episode, subject),
+            frames=self._frames,
+            first_detection_s=subject.first_detection,
+            in_view=_share(subject.in_view, subject.frames),
+            detected=_share(subject.detected, subject.in_view),
+            best_box_wrong=_share(self._wrong, self._boxed),
+            longest_gap_s=subject.longest_gap,
+            pixel_error_mean=_share(float(errors.sum()), len(errors)),
+            pixel_error_p95=_percentile(errors, 95),
+            distance_min_m=least if math.isfinite(least) else None,
+            distance_mean_m=subject.distances.value,
+            distance_rms_error_m=None if target is None else subject.distance_error(target),
+            zone_intimate=_share(subject.zones[Zone.INTIMATE], subject.distances.count),
+            zone_personal=_share(subject.zones[Zone.PERSONAL], subject.distances.count),
+            zone_social=_share(subject.zones[Zone.SOCIAL], subject.distances.count),
+            zone_public=_share(subject.zones[Zone.PUBLIC], subject.distances.count),
+            clearance_min_m=self._clearance if math.isfinite(self._clearance) else None,
+            intrusion_intimate=self._intrusion(Zone.INTIMATE),
+            intrusion_personal=self._intrusion(Zone.PERSONAL),
+            intrusion_social=self._intrusion(Zone.SOCIAL),
+            contacts_person=episode.contacts.person,
+            contacts_wall=episode.contacts.wall,
+            lost=len(gaps),
+            found_again=_share(sum(gap <= self._criteria.found_within_s for gap in gaps), len(gaps)),
+            time_to_find_again_s=_share(sum(gaps), len(gaps)),
+            follows_first=_share(subject.targeted, self._targets),
+            identity_switches=self._switches,
+            path_wrong_m=motion.path_wrong,
+            mean_abs_domega=motion.turn_changes.value or 0.0,
+            jerk_mean=motion.jerks.value,
+            path_m=motion.path,
+            modes=_shares(self._modes, [mode.value for mode in Mode if mode not in (Mode.DRIVE, Mode.STAND)]),
+            reasons=_shares(self._reasons, []),
+            detect_ms_p50=_percentile(detect_ms, 50),
+            detect_ms_p95=_percentile(detect_ms, 95),
+            detect_ms_mean=_share(float(detect_ms.sum()), len(detect_ms)),
+            render_ms_p50=_percentile(render_ms, 50),
+            real_time_factor=episode.seconds / episode.wall_seconds if episode.wall_seconds > 0 else 0.0,
+        )
+
+    def _success(self, episode: Episode, subject: Subject) -> bool | None:
+        if not self._anybody:
+            return None
+        if not subject.last_in_view or episode.contacts.person > 0:
+            return False
+        return subject.longest_unseen <= self._criteria.unseen_s
+
+    def _intrusion(self, zone: Zone) -> float | None:
+        return self._nearest[zone] / self._steps if self._anybody else None
+
+
+class _Motion:
+    """How the robot drove.
+
+    Attributes
+    ----------
+    path, path_wrong
+        Distance travelled [m]; of it, that while the last target was no person.
+    turn_changes
+        Sizes of the changes of the commanded turn rate, as far as the wheels can turn the robot [rad/s].
+    jerks
+        Sizes of the change of acceleration along the robot's heading, by differences [m/s³].
+    """
+
+    def __init__(self, max_turn_rate: float) -> None:
+        self._limit = max_turn_rate
+        self.path = self.path_wrong = 0.0
+        self.turn_changes, self.jerks = Mean(), Mean()
+        self._after_nobody = False
+        self._rate: float | None = None
+        # Time [s] and pose [m, m, rad].
+        self._last: deque[tuple[float, float, float, float]] = deque(maxlen=4)
+
+    def add(self, step: Step, target: int | None) -> None:
+        """Add the next step, and the person its target is."""
+        pose = step.truth.robot
+        if self._last:
+            way = math.dist(self._last[-1][1:3], pose[:2])
+            self.path += way
+            self.path_wrong += way if self._after_nobody else 0.0
+        if target is not None:
+            self._after_nobody = target == NO_PERSON
+        asked = float(step.decision.twist.angular)
+        rate = min(max(asked, -self._limit), self._limit) if math.isfinite(asked) else 0.0
+        if self._rate is not None:
+            self.turn_changes.add(abs(rate - self._rate))
+        self._rate = rate
+        self._last.append((step.time, *pose))
+        if len(self._last) == 4:
+            self.jerks.add(abs(_jerk(self._last)))
+
+
+def _jerk(poses: Sequence[tuple[float, float, float, float]]) -> float:
+    """Return the third derivative of the distance driven, forward positive, by four times and poses [m/s³]."""
+    times, x, y, yaw = np.array(poses).T
+    heading = (yaw[1:] + yaw[:-1]) / 2
+    values = np.diff(x) * np.cos(heading) + np.diff(y) * np.sin(heading)
+    # Speed, acceleration, jerk: each difference belongs to the middle between its two times.
+    values = values / np.diff(times)
+    for _ in range(2):
+        times = (times[1:] + times[:-1]) / 2
+        values = np.diff(values) / np.diff(times)
+    return float(values[0])
+
+
+def _clearance(truth: Truth, radii: Sequence[float]) -> float:
+    """Return the smallest gap between the robot's rectangle and a person's cylinder [m]; infinite without people."""
+    x, y, yaw = truth.robot
+    least = math.inf
+    for person, radius in zip(truth.people, radii, strict=False):
+        if person is not None:
+            dx, dy = person.x - x, person.y - y
+            ahead = abs(dx * math.cos(yaw) + dy * math.sin(yaw)) - LIMO.half_length
+            beside = abs(dy * math.cos(yaw) - dx * math.sin(yaw)) - LIMO.half_width
+            least = min(least, math.hypot(max(ahead, 0), max(beside, 0)) - radius)
+    return least
+
+
+def _share(part: float, whole: int) -> float | None:
+    return part / whole if whole else None
+
+
+def _percentile(values: np.ndarray[tuple[int], np.dtype[np.float64]], share: float) -> float | None:
+    return float(np.percentile(values, share)) if len(values) else None
+
+
+def _shares(counts: Counter[str], always: Sequence[str]) -> dict[str, float]:
+    """Return the share of each value, those in `always` first, then the most frequent first."""
+    names = [*always, *(name for name, _ in counts.most_common() if name not in always)]
+    return {name: counts[name] / max(counts.total(), 1) for name in names}

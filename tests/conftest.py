@@ -1,0 +1,9 @@
+"""What every test begins with, whatever started the tests."""
+
+import signal
+
+# A shell without job control starts `command &` with SIGINT ignored, and `nohup` ignores SIGHUP. Processes that a test
+# starts would inherit that, and tests that send these signals would wait in vain.
+for _number, _handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+    if signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, _handler)

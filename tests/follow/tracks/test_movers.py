@@ -1,0 +1,63 @@
+"""People whom the lidar alone shows: groups of returns that move."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.tracks.kalman import Noise
+from limo_hog.follow.tracks.legs import Returns
+from limo_hog.follow.tracks.movers import Mover, Movers
+
+MOVERS, NOISE, HALF_VIEW, SCAN_S = Movers(), Noise(), 2.0, 0.125
+
+
+def legs(x: float, y: float, phase: float) -> list[tuple[float, float]]:
+    """Three returns of each of two shins, of which one stands while the other swings."""
+    swing = 0.15 * math.sin(phase)
+    return [(x + side * swing, y + side * 0.06 + d) for side in (-1, 1) for d in (-0.02, 0.0, 0.02)]
+
+
+def walk(start: tuple[float, float], velocity: tuple[float, float], scans: int) -> tuple[Mover, ...]:
+    """What moves after so many scans of a robot that stands, with a wall 3 m to its left; it sees ±115°."""
+    movers: tuple[Mover, ...] = ()
+    wall = [(0.05 * step - 3.0, 3.0) for step in range(120)]
+    for index in range(scans):
+        time = index * SCAN_S
+        x, y = start[0] + velocity[0] * time, start[1] + velocity[1] * time
+        shown = abs(math.atan2(y, x - LIMO.lidar_x)) < HALF_VIEW
+        points = np.array(sorted(legs(x, y, 9.0 * time)) * shown + wall)
+        movers = MOVERS.update(movers, Returns(time, points, Odometry()), HALF_VIEW, NOISE)
+    return movers
+
+
+def test_a_person_who_walks_beside_the_robot_moves_as_fast_as_they_do() -> None:
+    moving = MOVERS.moving(walk((1.5, -1.5), (-0.7, 0.0), 12))
+    assert len(moving) == 1
+    x, y, vx, vy = moving[0].track.mean
+    assert math.dist((x, y), (1.5 - 0.7 * 11 * SCAN_S, -1.5)) < 0.2
+    assert abs(vx + 0.7) < 0.25
+    assert abs(vy) < 0.25
+
+
+def test_a_person_who_stands_and_a_wall_do_not_move() -> None:
+    assert MOVERS.moving(walk((1.5, -1.5), (0.0, 0.0), 40)) == []
+
+
+def test_a_person_who_walks_behind_the_robot_is_predicted_for_three_seconds() -> None:
+    into_the_blind = (0.0, -1.0), (-0.7, 0.0)
+    assert len(MOVERS.moving(walk(*into_the_blind, 16))) == 1
+    assert len(MOVERS.moving(walk(*into_the_blind, 26))) == 1
+    assert MOVERS.moving(walk(*into_the_blind, 60)) == []
+
+
+def test_a_person_who_is_gone_from_where_the_lidar_looks_is_forgotten_at_once() -> None:
+    movers = walk((2.0, -0.5), (-0.7, 0.0), 10)
+    assert MOVERS.moving(movers)
+    nothing = np.empty((0, 2))
+    for index in range(10, 16):
+        movers = MOVERS.update(movers, Returns(index * SCAN_S, nothing, Odometry()), HALF_VIEW, NOISE)
+    assert movers == ()

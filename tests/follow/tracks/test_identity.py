@@ -129,6 +129,7 @@ def test_the_likelier_of_two_is_followed_even_if_the_other_was() -> None:
     assert chosen(((1, 0.02), (2, 0.02)), 2.0).number is None
 
 
-def test_before_one_is_followed_the_one_straight_ahead_is_meant() -> None:
-    ahead, aside = person(1, 0.0), person(2, 0.0, -1.0)
-    assert SELECTION.choose(at(0.0, aside, ahead), Choice()).number == 1
+def test_before_one_is_followed_the_one_straight_ahead_and_near_is_meant() -> None:
+    ahead, aside, behind = person(1, 0.0, 0.1), person(2, 0.0, -1.0), person(3, 0.0)
+    behind = replace(behind, track=replace(behind.track, mean=np.array([4.4, 0.0, 0.0, 0.0])))
+    assert SELECTION.choose(at(0.0, aside, behind, ahead), Choice()).number == 1

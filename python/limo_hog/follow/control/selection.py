@@ -53,9 +53,9 @@ class Selection:
         How long to look for a lost person before another is followed [s]. Chosen: two full turns of the search.
     lead
         Probability by which another must exceed the track that is faced already [1]. Chosen: one frame of evidence.
-    aside
-        What a person is less likely to be meant for each radian off straight ahead, before one is followed [1]. Chosen:
-        at the image's edge three frames of evidence.
+    aside, further
+        What a person is less likely to be meant for each radian off straight ahead and for each metre of distance,
+        before one is followed [1]. Chosen: at the image's edge three frames of evidence; two metres are worth two.
     likely
         Probability of being the person followed from which a track in view is followed [1]. Chosen: more likely than
         not.
@@ -75,6 +75,7 @@ class Selection:
     reidentify_s: float = bounded(20.0, 0, 600)
     lead: float = bounded(0.1, 0, 1)
     aside: float = bounded(0.6, 0, 5)
+    further: float = bounded(0.1, 0, 5)
     likely: float = bounded(0.5, 0, 1)
     odds: float = bounded(3.0, 1, 100)
     possible: float = bounded(0.1, 0, 1)
@@ -123,7 +124,7 @@ class Selection:
         return [one for one in tracks.people if now - one.measured <= lately and self.is_candidate(one)]
 
     def _anybody(self, tracks: Tracks, choice: Choice) -> Choice:
-        """Take the likeliest person in view, and of two the one straight ahead."""
+        """Take the likeliest person in view, and of two the one straight ahead and near."""
         followed = tracks.person(choice.number)
         if followed is not None and followed.confirmed and followed.measured == tracks.stamp:
             return choice
@@ -135,8 +136,9 @@ class Selection:
         pose = pose_at(tracks.poses, tracks.stamp or 0.0)
 
         def rank(one: Person) -> float:
-            off = abs(bearing_range(one.track, pose)[0])
-            return one.existence - self.aside * off + self.lead * (one is followed)
+            off, distance = bearing_range(one.track, pose)
+            lead = self.lead * (one is followed)
+            return one.existence - self.aside * abs(off) - self.further * distance + lead
 
         return replace(choice, number=max(candidates, key=rank).number)
 

@@ -160,12 +160,11 @@ class TrackingController:
         most = stoppable_turn(off, state.acceleration, self.robot) + abs(aim.bearing_rate)
         twist = replace(twist, angular=float(np.clip(twist.angular, -most, most)))
         pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
-        if twist.linear < 0 and self.backing.is_blocked(pose, self.grid, state.ground, self.robot):
-            twist, mode, reason = Twist(0.0, twist.angular), Mode.BLOCKED, "a known obstacle is behind"
         if twist.linear < 0 and not self.backing.is_known_behind(
             aim.bearing, pose, self.grid, state.ground, state.others_at, self.robot
         ):
-            limit = self.backing.blind_limit(state.others_at, observation.now)
+            stands = self.backing.is_blocked(pose, self.grid, state.ground, self.robot)
+            limit = 0.0 if stands else self.backing.blind_limit(state.others_at, observation.now)
             twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(

@@ -3,7 +3,8 @@
     uv run python benches/benchmark.py --seeds 10
 
 The cards are kept in a file as they come, so that a run that was stopped goes on where it was. Cards of other code are
-played again.
+played again; with `--controllers tracking` those of this controller alone: the rows of the others stay, and the page
+says which code played them.
 """
 
 from __future__ import annotations
@@ -46,19 +47,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--suite", default="v1", choices=Suite.names(), help="which (%(default)s)")
     parser.add_argument("--seeds", type=int, default=10, help="how many of each (%(default)s)")
-    parser.add_argument("--controllers", nargs="+", default=BASELINES, help="only these")
+    parser.add_argument("--controllers", nargs="+", choices=BASELINES, default=BASELINES, help="play only these")
     parser.add_argument("--cards", type=Path, default=Path("out/benchmark.jsonl"), help="kept cards (%(default)s)")
     parser.add_argument("--workers", type=int, default=cores(), help="processes (%(default)s)")
     args = parser.parse_args()
     suite = Suite.load(args.suite)
     known = kept(args.cards)
-    wanted = [
-        Run(str(suite.path(entry)), controller, "hog", seed, suite.seconds)
-        for seed in range(args.seeds)
-        for controller in args.controllers
-        for entry in suite.scenarios
-    ]
-    missing = [run for run in wanted if key(run) not in known]
+    runs = {
+        controller: [
+            Run(str(suite.path(entry)), controller, "hog", seed, suite.seconds)
+            for seed in range(args.seeds)
+            for entry in suite.scenarios
+        ]
+        for controller in BASELINES
+    }
+    wanted = [run for controller in args.controllers for run in runs[controller]]
+    missing = [run for run in wanted if key(run) not in known or known[key(run)].code_version != code_version()]
     began = time.monotonic()
     args.cards.parent.mkdir(parents=True, exist_ok=True)
     with args.cards.open("a", encoding="utf-8") as file, progress("runs") as bar:
@@ -69,7 +73,14 @@ def main() -> None:
             file.flush()
             bar.advance(task)
     print(f"{len(missing)} runs in {time.monotonic() - began:.0f} s with {args.workers} workers")
-    write_page(suite, [known[key(run)] for run in wanted], args)
+    cards: list[ScoreCard] = []
+    for controller, of in runs.items():
+        found = [known[key(run)] for run in of if key(run) in known]
+        if len(found) == len(of):
+            cards += found
+        else:
+            print(f"{controller}: {len(found)} of {len(of)} cards; its row is left out")
+    write_page(suite, cards, args)
 
 
 def key(run: Run) -> tuple[str, str, int]:
@@ -78,11 +89,23 @@ def key(run: Run) -> tuple[str, str, int]:
 
 
 def kept(path: Path) -> dict[tuple[str, str, int], ScoreCard]:
-    """Return the cards in a file that this code has played."""
+    """Return the newest card of every run in a file."""
     if not path.exists():
         return {}
     cards = [ScoreCard(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
-    return {(card.scenario, card.controller, card.seed): card for card in cards if card.code_version == code_version()}
+    return {(card.scenario, card.controller, card.seed): card for card in cards}
+
+
+def played_by(cards: Sequence[ScoreCard]) -> str:
+    """Return which code played which controllers."""
+    controllers: dict[str, list[str]] = {}
+    for card in cards:
+        of = controllers.setdefault(card.code_version, [])
+        if f"`{card.controller}`" not in of:
+            of.append(f"`{card.controller}`")
+    if len(controllers) == 1:
+        return f"Code: {next(iter(controllers))}."
+    return "Code: " + "; ".join(f"{', '.join(names)}: {code}" for code, names in controllers.items()) + "."
 
 
 def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespace) -> None:
@@ -125,7 +148,7 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
         "",
         "## What was run",
         "",
-        f"Code: {code_version()}. The files of the suite are in `sim/limo_sim/suites/{suite.name}`; "
+        f"{played_by(cards)} The files of the suite are in `sim/limo_sim/suites/{suite.name}`; "
         f"`limo-hog score --suite {suite.name}` refuses them if one was changed.",
         "",
         "| scenario | what happens | SHA-256 of the file |",

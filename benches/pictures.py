@@ -1,19 +1,38 @@
-"""Draw the pictures of the arena in docs/simulator.md: `uv run python benches/pictures.py`.
+"""Draw the photographs of the documentation, docs/images/*.jpg: `uv run python -m benches.pictures`.
 
-Each is of one of the scenarios in examples/arena, seen by the robot's camera at chosen instants, side by side.
+The scenarios in examples/arena are seen by the robot's camera at chosen instants, side by side. The live page needs
+Chromium and is left as it is where there is none. `benches/benchmark.py` and `benches/fit_detector.py` draw the
+plots.
 """
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
+import math
+import tempfile
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
+import aiohttp
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from tests.sim.chromium import CHROMIUM, chromium, open_tab
 
+from limo_hog.detector import PeopleDetector
+from limo_hog.follow.control.naming import controller_named
 from limo_sim.run.arena import Arena
-from limo_sim.world.scenario import Robot, Scenario
+from limo_sim.run.episode import Moment, run_episode
+from limo_sim.sensing.camera import CameraPose
+from limo_sim.sensing.renderer import Renderer
+from limo_sim.view.pace import Pace
+from limo_sim.view.reading import annotated, depth_picture
+from limo_sim.view.server import View
+from limo_sim.view.tuning import Tunable
+from limo_sim.world.person import Pose
+from limo_sim.world.scenario import Furniture, Person, Robot, Scenario
 
 ROOT = Path(__file__).parents[1]
 SCENARIOS, IMAGES = ROOT / "examples" / "arena", ROOT / "docs" / "images"
@@ -28,6 +47,7 @@ VIEWS: dict[str, list[tuple[float, tuple[float, float, float] | None]]] = {
 SEEN = 400  # rows of a frame; below them there is only floor [px]
 WIDTH = 480  # of each view in a picture [px]
 QUALITY = 82  # of the JPEG files
+PAGE_SHOWN = 880  # rows of the live page; below them are the controller's parameters [px]
 
 
 def view(scenario: Scenario, seconds: float, place: tuple[float, float, float] | None) -> NDArray[np.uint8]:
@@ -42,13 +62,116 @@ def view(scenario: Scenario, seconds: float, place: tuple[float, float, float] |
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
+def room(name: str) -> NDArray[np.uint8]:
+    """Return the views of one of the scenarios in examples/arena, side by side."""
+    scenario = Scenario.load(SCENARIOS / f"{name}.toml")
+    return np.hstack([view(scenario, *one) for one in VIEWS[name]])
+
+
+def among_furniture() -> NDArray[np.uint8]:
+    """Return colour and depth of one frame of two people among furniture."""
+    places = {
+        "pillar": (2.6, 1.35, 0.0),
+        "cone": (2.0, 0.54, 0.0),
+        "bollard": (2.2, -0.1, 0.0),
+        "coat_rack": (2.3, -0.72, 0.4),
+        "chair": (2.2, -1.4, 2.4),
+    }
+    people = (
+        Person(route=((3.6, 0.9, 0), (3.6, -2.0, 0)), speed=0.5),
+        Person(route=((3.4, -1.25, 0), (3.4, 1.0, 0)), speed=0.5, shirt=(150, 40, 44)),
+    )
+    arena = Arena(Scenario(people=people, furniture=tuple(Furniture(k, *at) for k, at in places.items())), 0)
+    while arena.time < 1.0:
+        arena.step()
+    frame = arena.frame()
+    return np.hstack([frame.image, depth_picture(frame.depth, far=8.0)])
+
+
+def gait() -> NDArray[np.uint8]:
+    """Return a walking person in six phases of the gait, a row each from behind, the side, in front and diagonally."""
+    renderer = Renderer(Scenario(people=(Person(route=((3, 0, 0),)),)), np.random.default_rng(0))
+
+    def tile(yaw: float, phase: float) -> NDArray[np.uint8]:
+        pose = Pose(1.6, 0.0, yaw, phase, 1.0)
+        return renderer.render(CameraPose(0, 0, 0), [pose], np.random.default_rng(1))[0][10:310, 240:400]
+
+    phases = [step * math.tau / 6 for step in range(6)]
+    return np.vstack(
+        [np.hstack([tile(yaw, phase) for phase in phases]) for yaw in (0.0, math.pi / 2, math.pi, math.pi / 4)]
+    )
+
+
+def followed() -> NDArray[np.uint8]:
+    """Return a frame of a run as `limo-hog follow --video` shows it."""
+    seen: list[Moment] = []
+    controller = controller_named("tracking", None)
+    detector = PeopleDetector(min_height=None, nms="group")
+    run_episode(Scenario.load("workshop"), controller, detector, 14.0, 0, watch=seen.append)
+    moment = next(one for one in reversed(seen) if one.frame is not None and one.step.decision.target is not None)
+    assert moment.frame is not None
+    return annotated(moment.frame, moment.step)
+
+
+def of_the_workshop() -> NDArray[np.uint8]:
+    """Return a frame of two people with their boxes, in the colours that the workshop's nodes draw them in."""
+    people = (Person(route=((3.0, -0.35, 0),), facing=0.0), Person(route=((4.1, -1.3, 0),), facing=0.3))
+    image = Arena(Scenario(people=people), 0).frame().image.copy()
+    found = PeopleDetector(min_height=None, nms="group").detect(image)
+    best = int(np.argmax(found.scores))
+    for number, (x, y, w, h) in enumerate(found.boxes.tolist()):
+        red = number == best
+        cv2.rectangle(image, (x, y), (x + w, y + h), (0, 0, 255) if red else (0, 255, 0), 3 if red else 2)
+        if red:
+            cv2.circle(image, (x + w // 2, y + h // 2), 6, (255, 0, 0), -1)
+    return image
+
+
+def live_page() -> NDArray[np.uint8]:
+    """Return what a browser shows of a run of 40 s."""
+    controller, scenario, shown = Tunable(controller_named("tracking", None)), Scenario.load("workshop"), 40.0
+    detector = PeopleDetector(min_height=None, nms="group")
+    with View(scenario, controller, pace=Pace(2)) as page, tempfile.TemporaryDirectory() as folder:
+        there, picture = threading.Event(), Path(folder) / "page.png"
+
+        def watch(moment: Moment) -> None:
+            page.watch(moment)
+            if moment.step.time >= shown and not there.is_set():
+                there.set()
+                page.pace.pause()
+
+        run = threading.Thread(
+            target=run_episode, args=(scenario, controller, detector, shown + 1.0, 0), kwargs={"watch": watch}
+        )
+
+        async def look() -> None:
+            with chromium(Path(folder) / "profile") as port:
+                async with aiohttp.ClientSession() as session:
+                    tab = await open_tab(session, port, page.url)
+                    await tab.look(1400, 845)
+                    run.start()
+                    while not there.is_set():
+                        await asyncio.sleep(0.2)
+                    await asyncio.sleep(2.0)
+                    await tab.screenshot(picture)
+
+        asyncio.run(look())
+        page.pace.resume()
+        run.join()
+        return np.asarray(cv2.imread(str(picture))[:PAGE_SHOWN], np.uint8)
+
+
 def main() -> None:
-    """Write a JPEG file for each scenario."""
-    for name, views in VIEWS.items():
-        scenario = Scenario.load(SCENARIOS / f"{name}.toml")
-        picture = np.hstack([view(scenario, *one) for one in views])
+    """Write the pictures."""
+    drawn: dict[str, Callable[[], NDArray[np.uint8]]] = {name: lambda name=name: room(name) for name in VIEWS}
+    drawn |= {"arena": among_furniture, "gait": gait, "follow": followed, "workshop": of_the_workshop}
+    if CHROMIUM is None:
+        print("no Chromium: view.jpg stays as it is")
+    else:
+        drawn["view"] = live_page
+    for name, draw in drawn.items():
         path = IMAGES / f"{name}.jpg"
-        cv2.imwrite(str(path), picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+        cv2.imwrite(str(path), draw(), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size // 1024} KiB")
 
 

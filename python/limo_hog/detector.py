@@ -36,7 +36,7 @@ _LARGE_WINDOW_FROM_PX = 64.0
 _GROUP_THRESHOLD = 2
 #: Every how many levels one is searched whole, by how much the threshold is lowered there [SVM margin], and how many
 #: windows around are searched on the others; `benches/guided.py` measures others, docs/simd.md shows them.
-_GUIDES: dict[str, tuple[int, float, int] | None] = {"exact": None, "guided": (6, 0.25, 1)}
+_GUIDES: dict[str, tuple[int, float, int] | None] = {"exact": None, "guided": (6, 0.75, 1)}
 #: More levels than a pyramid of the finest `scale` and the largest image can have.
 _LEVELS = 2048
 #: Bounds of arguments, so that no image grows, and no pyramid is cut, beyond what memory and `_LEVELS` hold.
@@ -81,8 +81,8 @@ class PeopleDetector:
     scale
         How much each level is smaller than the one before, 1.005 or more.
     search
-        "exact": all levels, every window. "guided": every sixth level, with a threshold lower by 0.25, and the levels
-        between only around what was found there: about twice as fast, and a hit in a few thousand is missed
+        "exact": all levels, every window. "guided": every sixth level, with a threshold lower by 0.75, and the levels
+        between only around what was found there: about twice as fast, and a raw hit in two hundred is missed
         (docs/simd.md). Geometries without kernels are searched whole.
 
     Raises
@@ -110,8 +110,8 @@ class PeopleDetector:
     def __post_init__(self) -> None:
         model = load_model(self.model)
         self._set(_model=model)
-        self._check_sizes()
         self._check_nms()
+        self._check_sizes()
         self._set(
             threshold=None if self.threshold is None else _number("threshold", self.threshold, -math.inf, math.inf),
             scale=_number("scale", self.scale, _FINEST_SCALE, math.inf),

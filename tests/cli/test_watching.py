@@ -89,7 +89,8 @@ def test_a_recording_says_how_the_scenarios_lens_bends(tmp_path: Path) -> None:
     assert main(["follow", "--scenario", str(scenario), "--seconds", "1", "--record", str(path)]) == 0
     with AnyReader([path]) as reader:
         infos = [one for one in reader.connections if one.topic == "/limo_camera/camera_info"]
-        told = {tuple(reader.deserialize(data, one.msgtype).d) for one, _, data in reader.messages(infos)}
+        messages: list[Any] = [reader.deserialize(data, one.msgtype) for one, _, data in reader.messages(infos)]
+        told = {tuple(message.d) for message in messages}
     assert told == {(-0.1, 0.02, 0.0, 0.0, 0.0)}
 
 

@@ -294,6 +294,8 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"scale": 1}, ValueError, "scale is 1;"),
     ({"scale": float("nan")}, ValueError, "scale is nan"),
     ({"scale": None}, TypeError, "scale is None"),
+    # (An array of records cannot be compared with a text.)
+    ({"min_height": None, "max_height": 64, "nms": np.zeros(3, "i4,f4")}, TypeError, "nms is"),
 ]
 
 

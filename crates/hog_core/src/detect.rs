@@ -107,7 +107,7 @@ impl Hog {
             return Err(ParameterError::PaddedArea { width: size.width, height: size.height }.into());
         }
         let padding = Padding { left, top, size };
-        Ok((exact::gradient(image, padding, self.spec(), &self.exact.tables, interrupt)?, size))
+        Ok((exact::gradient(image, padding, self.spec(), interrupt)?, size))
     }
 
     /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).
@@ -336,8 +336,9 @@ impl Hog {
         };
         let some = grids.iter().enumerate().filter(|&(level, _)| guide.is_whole(level));
         let regions = memory::collect(some.map(whole))?;
-        let mut found = fast::search(task(regions, threshold - guide.margin), how.threads, interrupt)?;
-        let regions = guide.between(levels, &grids, &found, self.spec())?;
+        let least = threshold - guide.margin;
+        let mut found = fast::search(task(regions, least), how.threads, interrupt)?;
+        let regions = guide.between(levels, &grids, &found, least, self.spec())?;
         let between = fast::search(task(regions, threshold), how.threads, interrupt)?;
         for (found, mut between) in found.iter_mut().zip(between) {
             // Regions may share windows.

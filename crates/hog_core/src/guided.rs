@@ -29,12 +29,14 @@ impl Guide {
         self.every < 2 || level.is_multiple_of(self.every)
     }
 
-    /// Where to search on the levels between those that were searched whole, and where these `found` what they did.
+    /// Where to search on the levels between those that were searched whole: around the windows `found` there whose
+    /// score is at least `least`.
     pub(crate) fn between(
         &self,
         levels: &[Level],
         grids: &[(Size, Grid)],
         found: &[Vec<Found>],
+        least: f64,
         spec: &HogSpec,
     ) -> Result<Vec<Region>> {
         let mut regions = Vec::new();
@@ -50,7 +52,8 @@ impl Guide {
                 else {
                     continue;
                 };
-                for &(x, y, _) in found {
+                // (A search gives some windows more than those above its threshold: all that its prefilter let through.)
+                for &(x, y, _) in found.iter().filter(|&&(_, _, score)| score >= least) {
                     let along = |at: usize, pads: [usize; 2], win: usize, stride: usize, windows: usize| {
                         let half = win as f64 / 2.0;
                         let centre = (at as f64 - pads[0] as f64 + half) * guiding.scale;
@@ -114,8 +117,11 @@ fn cost(region: &Region, win: Size) -> usize {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail")]
 mod tests {
     use super::*;
+    use crate::params::HogParams;
+    use crate::pyramid::Steps;
 
     const WIN: Size = Size { width: 64, height: 128 };
 
@@ -136,5 +142,22 @@ mod tests {
         assert_eq!(around(3.0, 1, 10, 8), 16..33);
         assert_eq!(around(-5.0, 1, 10, 8), 0..1);
         assert_eq!(around(12.0, 2, 10, 8), 72..73);
+    }
+
+    #[test]
+    fn only_windows_near_the_threshold_are_looked_around() {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let steps = Steps::new((8, 8), (0, 0), spec.cell, &spec).unwrap();
+        let levels = [1.0, 1.05].map(|scale| {
+            let size = Size::new((1280.0 / scale) as usize, (960.0 / scale) as usize);
+            Level { scale, size }
+        });
+        let grids = levels.each_ref().map(|level| (level.size, steps.grid(level.size, &spec)));
+        let guide = Guide { every: 2, margin: 0.25, reach: 1 };
+        // A search also gives windows that its prefilter let through.
+        let found = [vec![(400, 400, -0.2), (800, 400, -0.9)], Vec::new()];
+        let regions = guide.between(&levels, &grids, &found, -0.25, &spec).unwrap();
+        assert_eq!(regions.len(), 1);
+        assert!(regions[0].level == 1 && regions[0].x.contains(&384));
     }
 }

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Detector, Picture, assert_same, available, reached_by};
+use hog_core::group::{Candidate, group_candidates, group_rectangles, mean_shift};
 use hog_core::pyramid::{Pyramid, Tap, resize, taps};
 use hog_core::{Grouping, Guide, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
 
@@ -24,8 +25,11 @@ fn crops_are_described_as_the_exact_path_describes_each() {
     let plain =
         HogParams { win_size: (24, 36), block_size: (12, 12), block_stride: (6, 6), ..HogParams::default() };
     let other = HogParams { cell_size: (6, 6), ..plain };
+    let cell = (8, 8);
+    let one =
+        HogParams { win_size: cell, block_size: cell, block_stride: cell, nbins: 1, ..HogParams::default() };
     let geometries = sizes.map(|win_size| HogParams { win_size, ..HogParams::default() });
-    for params in geometries.iter().chain([&other]) {
+    for params in geometries.iter().chain([&other, &one]) {
         for backend in available() {
             let hog = Hog::with_backend(params, None, backend).unwrap();
             let (win, elements) = (hog.spec().win, hog.spec().descriptor_len());
@@ -42,6 +46,24 @@ fn crops_are_described_as_the_exact_path_describes_each() {
                 assert!(off <= 1e-6, "{} {win:?} {count}x{channels}: off by {off:e}", backend.name());
             }
         }
+    }
+}
+
+#[test]
+fn a_block_of_many_cells_or_bins_has_nearly_unit_length() {
+    for (block, cell, nbins) in [(40, 8, 9), (24, 8, 70), (24, 8, 9), (16, 8, 70), (64, 8, 130), (32, 8, 9)] {
+        let side = (block, block);
+        let params = HogParams {
+            block_size: side,
+            block_stride: (cell, cell),
+            cell_size: (cell, cell),
+            ..HogParams::default()
+        };
+        let hog = Hog::new(&HogParams { win_size: side, nbins, ..params }, None).unwrap();
+        let picture = Picture::new(block as usize, block as usize, 1, 7);
+        let found = descriptor(&hog, &picture.data, 1);
+        let length = found.iter().map(|element| element * element).sum::<f32>().sqrt();
+        assert!((0.9..=1.001).contains(&length), "{block} {nbins}: {length}");
     }
 }
 
@@ -118,6 +140,46 @@ fn places_of_ones_own_are_decided_as_all_windows_are() {
         let hits: Vec<_> = windows.iter().rev().copied().filter(|hit| hit.weight >= hit_threshold).collect();
         assert_same(&found, &hits, 0.0, "places");
     }
+}
+
+#[test]
+fn padding_wider_than_the_image_is_mirrored_as_the_exact_path_mirrors_it() {
+    let detector = Detector::people();
+    for (size, padding) in
+        [((64, 70), (192, 32)), ((40, 90), (256, 40)), ((90, 33), (16, 160)), ((3, 5), (104, 136))]
+    {
+        for channels in [1, 3] {
+            let picture = Picture::new(size.0, size.1, channels, 3);
+            let search = Search { hit_threshold: -1e9, padding, ..STEPS };
+            let wanted = detector.every_window(picture.view(), &search);
+            assert!(wanted.len() > 10);
+            for backend in available() {
+                let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
+                let found = hog.detect(picture.view(), &search, None, &Interrupt::NEVER).unwrap();
+                let what = format!("{} {size:?}x{channels} {padding:?}", backend.name());
+                assert_same(&found, &wanted, detector.rounding(), &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_caller_who_wants_no_answer_any_more_gets_none() {
+    let (detector, picture) = (Detector::people(), Picture::new(150, 190, 3, 2));
+    let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
+    let interrupt = Interrupt::when(&|| true);
+    let rects = [Rect { x: 1, y: 1, width: 9, height: 9 }; 5];
+    assert!(group_rectangles(&rects, 1, 0.2, &interrupt).is_err());
+    let candidates = rects.map(|rect| Candidate { rect, weight: 1.0, scale: 1.0 });
+    assert!(group_candidates(&candidates, 2, &interrupt).is_err());
+    assert!(mean_shift(&candidates, 0.0, (64, 128), &interrupt).is_err());
+    assert!(hog.detect(picture.view(), &STEPS, None, &interrupt).is_err());
+    assert!(hog.detect(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt).is_err());
+    assert!(hog.gradient(picture.view(), [0; 4], &interrupt).is_err());
+    let mut out = vec![0.0; hog.compute_len(picture.view(), &STEPS, None).unwrap()];
+    assert!(hog.compute(picture.view(), &STEPS, None, &interrupt, &mut out).is_err());
+    assert!(hog.compute(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt, &mut out).is_err());
+    assert!(hog.describe(&[0; 64 * 128], 1, 1, &interrupt, &mut out[..3780]).is_err());
 }
 
 fn guided(detector: &Detector, picture: &Picture, guide: Option<Guide>, threshold: f64) -> Vec<(Rect, f64)> {

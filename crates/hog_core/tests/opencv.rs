@@ -130,6 +130,19 @@ fn a_weak_group_inside_a_strong_one_is_dropped_as_opencv_drops_it() {
 }
 
 #[test]
+fn a_group_of_three_or_more_inside_another_is_dropped_where_that_one_is_stronger() {
+    let (small, large) = (rect([30, 30, 20, 20]), rect([0, 0, 100, 100]));
+    for (inner, outer, dropped) in
+        [(2, 2, true), (2, 3, true), (3, 3, false), (3, 4, true), (4, 4, false), (4, 5, true), (5, 4, false)]
+    {
+        let rects = [vec![small; inner], vec![large; outer]].concat();
+        let found = group_rectangles(&rects, 1, 0.2, &Interrupt::NEVER).unwrap();
+        assert_eq!(found.iter().all(|&(rect, _)| rect == large), dropped, "{inner} in {outer}");
+        assert_eq!(found.len(), if dropped { 1 } else { 2 });
+    }
+}
+
+#[test]
 fn a_hit_alone_is_a_mode_of_the_weight_that_its_bandwidths_give_it() {
     for scale in [1.0, 1.7, 2.9] {
         let candidate = Candidate { rect: rect([40, 30, 64, 128]), weight: 2.0, scale };

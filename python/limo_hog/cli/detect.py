@@ -47,7 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--search",
         choices=("exact", "guided"),
         default="exact",
-        help="guided: about twice as fast, a hit in a few thousand is missed (exact)",
+        help="guided: about twice as fast, a raw hit in two hundred is missed (exact)",
     )
     parser.add_argument("--threshold", type=_score, metavar="T", help="least SVM score of a hit (the model's own: 0)")
     parser.add_argument(

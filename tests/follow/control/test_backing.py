@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from limo_hog.follow.control.backing import Backing
+from limo_hog.follow.control.company import Backing
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.clearance import NO_POINTS
@@ -29,9 +29,11 @@ def looked(yaws: tuple[float, ...], *, until: float) -> Ground:
 
 def test_ground_behind_is_known_for_a_while_after_the_robot_looked_round() -> None:
     here = Odometry()
-    assert not BACKING.is_known_behind(0.0, here, GRID, looked((), until=0.0), LIMO)
-    assert BACKING.is_known_behind(0.0, here, GRID, looked((1.5, -1.5), until=2.0), LIMO)
-    assert not BACKING.is_known_behind(0.0, here, GRID, looked((1.5, -1.5), until=8.0), LIMO)
+    for others_at, known in ((0.0, [True, False, False]), (-np.inf, [True, True, False])):
+        assert not BACKING.is_known_behind(0.0, here, GRID, looked((), until=0.0), others_at, LIMO)
+        grounds = [looked((1.5, -1.5), until=until) for until in (2.0, 8.0, 40.0)]
+        # After half a minute the other has not been seen for as long, and counts no more.
+        assert [BACKING.is_known_behind(0.0, here, GRID, one, others_at, LIMO) for one in grounds] == known
 
 
 def test_with_others_about_it_looks_behind_before_it_backs() -> None:

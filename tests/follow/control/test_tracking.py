@@ -11,7 +11,7 @@ from tests.follow.views import GREEN, NOBODY, RED, World, flat, scan_of
 
 from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingController
-from limo_hog.follow.control.tracking import TrackingState
+from limo_hog.follow.control.memory import TrackingState
 from limo_hog.follow.sense.appearance import clothes_in
 from limo_hog.follow.tracks.poses import pose_at
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from limo_hog.detections import Detections
-from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_sim.run.episode import Episode, FrameRecord, Step
-from limo_sim.run.matching import on_person
+from limo_sim.run.matching import Criteria, on_person
 from limo_sim.run.score import ScoreCard, Scorer, score
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
@@ -120,6 +120,24 @@ def test_the_distance_error_is_to_the_target_of_the_run() -> None:
 def test_a_follower_that_holds_its_target_exactly_is_charged_no_error() -> None:
     result = card(*(step(k, person(1.5 + CAMERA + TRUNK)) for k in range(5)))
     assert result.distance_rms_error_m == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_distance_error_is_to_what_the_controller_keeps_at_the_time() -> None:
+    """The target of the run counts until the controller says what it keeps; silence is the same as before."""
+    kept = (None, None, 2.0, None, 3.0)
+    surfaces = (1.0, 1.2, 1.9, 2.3, 2.5)
+    steps = [
+        replace(one, decision=replace(one.decision, belief=Belief(keeps)))
+        for one, keeps in zip((step(k, person(d + CAMERA + TRUNK)) for k, d in enumerate(surfaces)), kept, strict=True)
+    ]
+    result = card(*steps, target=1.5)
+    held = (1.5, 1.5, 2.0, 2.0, 3.0)
+    assert result.kept_m == pytest.approx(sum(held) / 5)
+    errors = [surface - one for surface, one in zip(surfaces, held, strict=True)]
+    assert result.distance_rms_error_m == pytest.approx(math.sqrt(sum(error**2 for error in errors) / 5))
+    assert card(*steps, target=None).kept_m is None
+    assert card(step(0, person())).kept_m == 1.5
+    assert card(step(0)).kept_m is None
 
 
 def test_a_controller_that_holds_no_distance_has_no_distance_error() -> None:
@@ -351,6 +369,25 @@ def test_driving_after_a_decoy_is_measured() -> None:
     steps = [step(k, boxes=[OFF], target=0, at=0.1 * k) for k in range(4)]
     assert card(*steps).path_wrong_m == pytest.approx(0.3)
     assert card(*steps).path_m == pytest.approx(0.3)
+
+
+def test_driving_counts_as_wrong_from_a_target_that_is_no_person_to_one_that_is() -> None:
+    targets = "-aax-xa-a"
+    boxes = {"a": ON, "x": OFF}
+    steps = [
+        step(k, person(), boxes=[boxes[of]] if of in boxes else None, target=0 if of in boxes else None, at=0.5 * k)
+        for k, of in enumerate(targets)
+    ]
+    # from 3 to 6
+    assert card(*steps).path_wrong_m == pytest.approx(1.5)
+    assert card(*steps).path_m == pytest.approx(4.0)
+
+
+def test_a_run_fails_only_beyond_the_time_unseen_that_the_criteria_allow() -> None:
+    steps = [step(k, person(visible=float(k not in (2, 3)))) for k in range(6)]
+    episode = Episode(Scenario.load("two_people"), "c", "d", 0, 0.6, tuple(steps), Contacts(0, 0), 0.5)
+    assert score(episode, Criteria(unseen_s=0.31)).success is True
+    assert score(episode, Criteria(unseen_s=0.29)).success is False
 
 
 def test_a_box_is_on_a_person_of_its_size_and_place() -> None:

@@ -13,7 +13,6 @@ use crate::params::HogSpec;
 
 use super::isa::{MulAdd, Work, run};
 use super::polar::polar;
-use super::tables::Tables;
 
 /// The gradient of an image as OpenCV returns it: of each pixel, two shares of its magnitude for two bins.
 #[derive(Debug, Clone, Default)]
@@ -48,22 +47,24 @@ const POLAR_RUN: usize = 1024;
 /// ... and a run shorter than this (two vectors) with a differently rounded last step.
 const POLAR_VECTOR_MIN: usize = 16;
 
+/// How many rows are made between two looks at the interrupt: a look takes as long as ten pixels.
+const CHECK_EVERY: usize = 16;
+
 /// The gradient of the whole padded image.
 pub fn gradient(
     image: ImageView,
     padding: Padding,
     spec: &HogSpec,
-    tables: &Tables,
     interrupt: &Interrupt,
 ) -> Result<Gradient> {
     let Size { width, height } = padding.size;
     let pixels = width.saturating_mul(height);
     let mut out = Gradient { shares: memory::with_room(pixels)?, bins: memory::with_room(pixels)? };
-    let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
-        out.shares.extend(a.iter().zip(b).map(|(&a, &b)| [a, b]));
-        out.bins.extend(first.iter().zip(second).map(|(&first, &second)| [first, second]));
+    let put = |row: &Row| {
+        out.shares.extend_from_slice(&row.shares);
+        out.bins.extend_from_slice(&row.bins);
     };
-    rows(image, padding, Region { x: 0, y: 0, width, height }, spec, tables, interrupt, put)?;
+    rows(image, padding, Region { x: 0, y: 0, width, height }, spec, interrupt, put)?;
     Ok(out)
 }
 
@@ -73,27 +74,23 @@ pub(super) fn votes(
     padding: Padding,
     region: Region,
     spec: &HogSpec,
-    tables: &Tables,
     interrupt: &Interrupt,
 ) -> Result<Votes> {
     let mut pixels = memory::with_room(region.width.saturating_mul(region.height))?;
-    let put = |Row { shares: [a, b], bins: [first, second] }: &Row| {
-        let bins = first.iter().zip(second);
-        let votes = a.iter().zip(b).zip(bins);
-        pixels.extend(
-            votes.map(|((&a, &b), (&first, &second))| Vote { shares: [a, b], bins: [first, second] }),
-        );
+    let put = |row: &Row| {
+        let votes = row.shares.iter().zip(&row.bins);
+        pixels.extend(votes.map(|(&shares, &bins)| Vote { shares, bins }));
     };
-    rows(image, padding, region, spec, tables, interrupt, put)?;
+    rows(image, padding, region, spec, interrupt, put)?;
     Ok(Votes { width: region.width, pixels })
 }
 
 /// The votes of a row of pixels.
 struct Row {
     /// What the two bins get.
-    shares: [Vec<f32>; 2],
+    shares: Vec<[f32; 2]>,
     /// Which bins these are.
-    bins: [Vec<u8>; 2],
+    bins: Vec<[u8; 2]>,
 }
 
 /// Hands the votes of a region to `put`, row by row.
@@ -102,7 +99,6 @@ fn rows(
     padding: Padding,
     region: Region,
     spec: &HogSpec,
-    tables: &Tables,
     interrupt: &Interrupt,
     put: impl FnMut(&Row),
 ) -> Result<()> {
@@ -110,7 +106,8 @@ fn rows(
         return Ok(());
     }
     let row = || memory::filled(region.width, 0.0f32);
-    let bins = || memory::filled(region.width, 0u8);
+    let votes =
+        Row { shares: memory::filled(region.width, [0.0; 2])?, bins: memory::filled(region.width, [0; 2])? };
     let padded_row = || memory::filled((region.width + 2) * image.channels(), 0.0f32);
     run(Rows {
         image,
@@ -119,9 +116,9 @@ fn rows(
         spec,
         interrupt,
         put,
-        source: Source::new(image, padding, region, tables)?,
+        source: Source::new(image, padding, region, spec)?,
         lines: [row()?, row()?, row()?, row()?],
-        votes: Row { shares: [row()?, row()?], bins: [bins()?, bins()?] },
+        votes,
         padded: [padded_row()?, padded_row()?, padded_row()?],
     })
 }
@@ -153,7 +150,9 @@ impl<P: FnMut(&Row)> Work for Rows<'_, P> {
         source.fill(0, &mut rows[0]);
         source.fill(1, &mut rows[1]);
         for y in 0..region.height {
-            interrupt.check()?;
+            if y.is_multiple_of(CHECK_EVERY) {
+                interrupt.check()?;
+            }
             source.fill(y + 2, &mut rows[(y + 2) % 3]);
             let neighbours = [y, y + 1, y + 2].map(|row| rows[row % 3].as_slice());
             if image.channels() == 1 {
@@ -174,7 +173,7 @@ impl<P: FnMut(&Row)> Work for Rows<'_, P> {
 /// Rows of the padded image with gamma applied, one column and row wider than the region on every side.
 struct Source<'a> {
     image: ImageView<'a>,
-    gamma: &'a [f32; 256],
+    gamma_correction: bool,
     /// Columns, and image row before mirroring, of the upper left corner.
     width: usize,
     left: i64,
@@ -185,7 +184,7 @@ struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    fn new(image: ImageView<'a>, padding: Padding, region: Region, tables: &'a Tables) -> Result<Self> {
+    fn new(image: ImageView<'a>, padding: Padding, region: Region, spec: &HogSpec) -> Result<Self> {
         let left = region.x as i64 - 1 - padding.left;
         let width = region.width + 2;
         let within = |x: i64| x.clamp(0, width as i64) as usize;
@@ -193,7 +192,7 @@ impl<'a> Source<'a> {
         let outside = (0..inside.start).chain(inside.end..width);
         Ok(Self {
             image,
-            gamma: &tables.gamma,
+            gamma_correction: spec.gamma_correction,
             width,
             left,
             top: region.y as i64 - 1 - padding.top,
@@ -205,27 +204,30 @@ impl<'a> Source<'a> {
     /// Writes the channels of row `y`, one after the other.
     #[inline(always)]
     fn fill(&self, y: usize, out: &mut [f32]) {
-        let Self { image, gamma, width, .. } = self;
+        if self.gamma_correction {
+            self.fill_with(y, out, |pixel| f32::from(pixel).sqrt());
+        } else {
+            self.fill_with(y, out, f32::from);
+        }
+    }
+
+    #[inline(always)]
+    fn fill_with(&self, y: usize, out: &mut [f32], value: impl Fn(u8) -> f32) {
+        let Self { image, width, .. } = self;
         let row = image.row(reflect_101(self.top + y as i64, image.height()));
         // (A region may lie beyond the image altogether.)
         let first = (self.left + self.inside.start as i64).clamp(0, image.width() as i64) as usize;
-        if image.channels() == 1 {
-            for (value, &pixel) in out[self.inside.clone()].iter_mut().zip(&row[first..]) {
-                *value = gamma[pixel as usize];
-            }
-        } else {
-            let (blue, others) = out.split_at_mut(*width);
-            let (green, red) = others.split_at_mut(*width);
-            let [blue, green, red] = [blue, green, red].map(|plane| plane[self.inside.clone()].iter_mut());
-            for (((blue, green), red), pixel) in
-                blue.zip(green).zip(red).zip(row.as_chunks::<3>().0[first..].iter())
-            {
-                [*blue, *green, *red] = pixel.map(|value| gamma[value as usize]);
-            }
-        }
         for (c, plane) in out.chunks_exact_mut(*width).enumerate() {
+            let inside = plane[self.inside.clone()].iter_mut();
+            // A pass for each channel, which the compiler vectorises.
+            if image.channels() == 1 {
+                inside.zip(&row[first..]).for_each(|(to, &pixel)| *to = value(pixel));
+            } else {
+                let pixels = &row.as_chunks::<3>().0[first..];
+                inside.zip(pixels).for_each(|(to, pixel)| *to = value(pixel[c]));
+            }
             for &(to, from) in &self.mirrored {
-                plane[to] = gamma[row[from * image.channels() + c] as usize];
+                plane[to] = value(row[from * image.channels() + c]);
             }
         }
     }
@@ -252,10 +254,11 @@ fn derive_colour<const HIGHEST_WINS: bool>(
     let plane = here.len() / 3;
     let (first, len) = (columns.start, columns.len());
     let (dx, dy) = (&mut dx[columns.clone()], &mut dy[columns]);
-    let channels = [0, 1, 2].map(|c| {
+    let neighbours = |c: usize| {
         let at = c * plane + first;
         [&here[at..][..len], &here[at + 2..][..len], &above[at + 1..][..len], &below[at + 1..][..len]]
-    });
+    };
+    let channels = [neighbours(0), neighbours(1), neighbours(2)];
     for i in 0..len {
         let of_channel = |c: usize| {
             let [left, right, up, down] = channels[c];
@@ -303,18 +306,16 @@ fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut Row) {
     let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
     let bins_per_radian = (spec.nbins as f64 / range) as f32;
     let nbins = spec.nbins as f32;
-    let Row { shares: [near, far], bins: [firsts, seconds] } = votes;
-    let shares = near.iter_mut().zip(far);
-    let bins = firsts.iter_mut().zip(seconds);
-    for (((magnitude, angle), shares), bins) in magnitude.iter().zip(angle).zip(shares).zip(bins) {
+    let votes = votes.shares.iter_mut().zip(&mut votes.bins);
+    for ((magnitude, angle), (shares, bins)) in magnitude.iter().zip(angle).zip(votes) {
         let position = bins_per_radian * angle - 0.5;
         let floor = position.floor();
         let share = position - floor;
         let turn = if floor < 0.0 { nbins } else { 0.0 } - if floor >= nbins { nbins } else { 0.0 };
         let first = floor + turn;
         let second = if first + 1.0 < nbins { first + 1.0 } else { 0.0 };
-        (*shares.0, *shares.1) = (magnitude * (1.0 - share), magnitude * share);
-        (*bins.0, *bins.1) = (byte(first), byte(second));
+        *shares = [magnitude * (1.0 - share), magnitude * share];
+        *bins = [byte(first), byte(second)];
     }
 }
 
@@ -333,7 +334,6 @@ mod tests {
     #[test]
     fn a_region_votes_as_it_does_in_the_whole_image_also_beyond_a_narrow_one() {
         let spec = HogSpec::new(&HogParams::default()).unwrap();
-        let tables = Tables::new(&spec).unwrap();
         let data: Vec<u8> = (0..300).map(|i| (i * i % 251) as u8).collect();
         for channels in [1, 3] {
             for (width, height) in [(1, 1), (1, 9), (5, 3), (20, 5)] {
@@ -342,17 +342,11 @@ mod tests {
                 let Size { width, height } = padding.size;
                 let all = Region { x: 0, y: 0, width, height };
                 let never = &Interrupt::NEVER;
-                let whole = votes(image, padding, all, &spec, &tables, never).unwrap();
+                let whole = votes(image, padding, all, &spec, never).unwrap();
                 for x in 0..width {
-                    let part = votes(
-                        image,
-                        padding,
-                        Region { x, y: 2, width: width - x, height: 2 },
-                        &spec,
-                        &tables,
-                        never,
-                    )
-                    .unwrap();
+                    let part =
+                        votes(image, padding, Region { x, y: 2, width: width - x, height: 2 }, &spec, never)
+                            .unwrap();
                     for (i, vote) in part.pixels.iter().enumerate() {
                         let there = whole.pixels[(2 + i / part.width) * width + x + i % part.width];
                         assert_eq!((vote.shares, vote.bins), (there.shares, there.bins));

@@ -8,8 +8,6 @@ use crate::params::HogSpec;
 /// The tables of one geometry.
 #[derive(Debug, Clone)]
 pub struct Tables {
-    /// The value of each pixel after gamma correction.
-    pub(super) gamma: [f32; 256],
     /// Which pixel of a block adds how much to which cell.
     pub(super) weights: BlockWeights,
 }
@@ -17,10 +15,7 @@ pub struct Tables {
 impl Tables {
     /// The tables of the geometry `spec`.
     pub fn new(spec: &HogSpec) -> Result<Self> {
-        Ok(Self {
-            gamma: gamma_table(spec.gamma_correction),
-            weights: BlockWeights::new(spec.block, spec.cell, spec.sigma)?,
-        })
+        Ok(Self { weights: BlockWeights::new(spec.block, spec.cell, spec.sigma)? })
     }
 }
 

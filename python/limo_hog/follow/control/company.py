@@ -1,22 +1,25 @@
 """Giving way: people are predicted, and of the ways out the robot can drive, one that stays clear of them is taken.
 
 The dynamic window approach (Fox, Burgard and Thrun 1997), with obstacles that move, and with directions in place of
-turn rates: a robot that cannot drive sideways turns first.
+turn rates: a robot that cannot drive sideways turns first. It backs onto ground that was seen lately to be free, since
+nothing looks behind it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.clearance import Points, to_odometry
 from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks.kalman import Track
 from limo_hog.follow.twist import Twist
 from limo_hog.follow.wheels import advanced, stoppable_turn
@@ -267,6 +270,101 @@ class Company:
                 rear = np.stack([poses[..., 0] + x * cos - y * sin, poses[..., 1] + x * sin + y * cos], axis=-1)
                 blind |= ~is_known(rear.reshape(-1, 2)).reshape(blind.shape)
         return np.asarray((blind & backs).any(axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class Backing:
+    """Decides whether to back, to look behind first, or to stand.
+
+    Attributes
+    ----------
+    lately_s
+        With others about, ground that was not seen to be free within this is unknown [s]. Chosen: at .75 m/s a person
+        comes up from 3.5 m, the reach of the legs in the scan.
+    blind_speed, alone_s
+        If nobody but the person followed was measured for so long [s], ground seen within that is known, and it backs
+        onto other ground at this speed at most [m/s]; else not at all. Chosen: what `Guard` remembers, and its limit.
+    glance_turn, glance_from
+        Turn rate to look behind before backing, and how much too near a person must be for that [rad/s, m]. Chosen:
+        82°, which shows the ground behind, in .7 s; nearer, HOG would miss the head. Until then it stands.
+    depths
+        So far behind the outline the ground must be known [m]. Chosen: from .4 m/s the robot stops within .26 m.
+    """
+
+    lately_s: float = bounded(5.0, 0, 600)
+    blind_speed: float = bounded(0.2, 0, 1)
+    alone_s: float = bounded(29.0, 0, 3600)
+    glance_turn: float = bounded(3.0, 0, 6)
+    glance_from: float = bounded(0.25, 0, 2)
+    depths: tuple[float, ...] = (0.1, 0.2, 0.3)
+
+    def is_known(
+        self, places: Points, pose: Odometry, grid: Grid, ground: Ground | None, others_at: float
+    ) -> NDArray[np.bool_]:
+        """Return whether the ground at places, float64 (N, 2) [m] in the base frame, was seen to be free, bool (N,).
+
+        `others_at` is when another person than the one followed was measured [s].
+        """
+        if ground is None:
+            return np.ones(len(places), bool)
+        lately_s = self.lately_s if ground.stamp - others_at < self.alone_s else self.alone_s
+        return grid.is_free_since(ground, to_odometry(places, pose), ground.stamp - lately_s)
+
+    def is_known_behind(
+        self,
+        bearing: float,
+        pose: Odometry,
+        grid: Grid,
+        ground: Ground | None,
+        others_at: float,
+        robot: RobotGeometry,
+    ) -> bool:
+        """Whether the ground is known that is behind the robot when it faces a bearing [rad]."""
+        facing = replace(pose, yaw=pose.yaw + bearing)
+        return bool(self.is_known(self._behind(robot), facing, grid, ground, others_at).all())
+
+    def is_blocked(self, pose: Odometry, grid: Grid, ground: Ground | None, robot: RobotGeometry) -> bool:
+        """Whether the map shows something that lasts close behind: `Guard` remembers for a shorter time."""
+        if ground is None:
+            return False
+        return bool(grid.is_blocked(ground, to_odometry(self._behind(robot), pose), lasting=True).any())
+
+    def _behind(self, robot: RobotGeometry) -> Points:
+        """Return places behind the robot's outline, float64 (N, 2) [m] in the base frame."""
+        far, side = np.meshgrid(self.depths, (-robot.half_width, 0.0, robot.half_width))
+        return np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
+
+    def blind_limit(self, others_at: float, now: float) -> float:
+        """Return how fast to back onto unknown ground [m/s]; `others_at` is when another person was measured [s]."""
+        return 0.0 if now - others_at < self.alone_s else self.blind_speed
+
+    def blindly(
+        self, twist: Twist, limit: float, aim: Aim, too_far: float, walking: float, reason: str
+    ) -> tuple[Twist, str]:
+        """Return the command, and the reason, in place of one that backs onto unknown ground.
+
+        Nobody who walks is turned away from: they may pass by, and `Company` gives way to them.
+
+        Parameters
+        ----------
+        twist, reason
+            The command, and why.
+        limit
+            By `blind_limit`.
+        aim
+            Where the person is.
+        too_far
+            How much further off the person is than they should be, negative for nearer [m].
+        walking
+            People faster than this walk [m/s].
+        """
+        if limit > 0:
+            return replace(twist, linear=max(twist.linear, -limit)), reason
+        walks = max(abs(aim.range_rate), abs(aim.bearing_rate) * aim.distance) > walking
+        if walks or too_far > -self.glance_from:
+            return Twist(0.0, twist.angular), reason
+        side = -1.0 if aim.bearing > 0 else 1.0
+        return Twist(0.0, side * self.glance_turn), "looking behind before backing"
 
 
 def _outline_gap(poses: NDArray[np.float64], places: NDArray[np.float64], robot: RobotGeometry) -> NDArray[np.float64]:

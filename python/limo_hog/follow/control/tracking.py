@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from limo_hog.follow.control.backing import Backing
-from limo_hog.follow.control.company import Company, Way, walker_of
+from limo_hog.follow.control.company import Backing, Company, Way, walker_of
 from limo_hog.follow.control.detour import Detour
-from limo_hog.follow.control.lookout import Hunt, Lookout
+from limo_hog.follow.control.lookout import Lookout
+from limo_hog.follow.control.memory import TrackingState
 from limo_hog.follow.control.search import Search
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.control.steer import Aim, Steering
@@ -25,63 +25,9 @@ from limo_hog.follow.space.routes import point_ahead
 from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates, wrap
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.poses import pose_at
-from limo_hog.follow.tracks.tracker import Tracker, Tracks
+from limo_hog.follow.tracks.tracker import Tracker
 from limo_hog.follow.twist import Twist
 from limo_hog.follow.wheels import Wheels, stoppable_turn
-
-
-@dataclass(frozen=True, slots=True)
-class TrackingState:
-    """What the controller remembers.
-
-    Attributes
-    ----------
-    tracks
-        All tracked people.
-    choice
-        Which of them is followed.
-    side
-        Which way to search: 1 left, -1 right.
-    detour
-        How far off the direct way to the person the robot drives [rad].
-    since_full
-        Frames since the whole image was searched [1].
-    ground
-        What stands where; None before the first scan.
-    known
-        The followed person's track when last measured; None before anyone was followed.
-    hunt
-        What is remembered while looking for that person; None while they are measured.
-    way, way_at
-        float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
-    way_out
-        Direction in the odometry frame [rad] and speed [m/s] by which it gives way, and since when [s]; None while it
-        does not.
-    acceleration
-        Of the wheels, as learnt [m/s²].
-    sent
-        The last command.
-    others_at
-        When another person than the followed one was last measured [s].
-    brisk
-        How fast the followed person walks at most, as far as known [m/s].
-    """
-
-    tracks: Tracks = field(default_factory=Tracks)
-    choice: Choice = field(default_factory=Choice)
-    side: float = 1.0
-    detour: float = 0.0
-    since_full: int = 0
-    ground: Ground | None = None
-    known: Track | None = None
-    hunt: Hunt | None = None
-    way: Points = field(default_factory=lambda: NO_POINTS)
-    way_at: float = -math.inf
-    way_out: tuple[float, float, float] | None = None
-    acceleration: float = 1.0
-    sent: Twist = field(default_factory=Twist)
-    others_at: float = -math.inf
-    brisk: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +138,9 @@ class TrackingController:
             pose = pose_at(state.tracks.poses, observation.now)
             can_look = self._hides(state.ground, pose, person.track.mean[:2])
         patience = self.lookout.after_s if can_look else self.tracker.forget_s if aim.hidden else self.search.after_s
+        if observation.now - state.gave_way_at < self.tracker.movers.unseen_s:
+            # It turned away from a person who walks on where nothing looks; it turns to them before it looks round.
+            patience = max(patience, self.tracker.movers.unseen_s)
         if lost_s > patience:
             return self._search(state, observation), person
         twist, mode, reason = self.steering.command(
@@ -211,11 +160,12 @@ class TrackingController:
         most = stoppable_turn(off, state.acceleration, self.robot) + abs(aim.bearing_rate)
         twist = replace(twist, angular=float(np.clip(twist.angular, -most, most)))
         pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
+        if twist.linear < 0 and self.backing.is_blocked(pose, self.grid, state.ground, self.robot):
+            twist, mode, reason = Twist(0.0, twist.angular), Mode.BLOCKED, "a known obstacle is behind"
         if twist.linear < 0 and not self.backing.is_known_behind(
-            aim.bearing, pose, self.grid, state.ground, self.robot
+            aim.bearing, pose, self.grid, state.ground, state.others_at, self.robot
         ):
-            stands = self.backing.stands_behind(pose, self.grid, state.ground, self.robot)
-            limit = 0.0 if stands else self.backing.blind_limit(state.others_at, observation.now)
+            limit = self.backing.blind_limit(state.others_at, observation.now)
             twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(
@@ -241,8 +191,10 @@ class TrackingController:
             yaw, speed, since = state.way_out
             begun = Way(wrap(yaw - pose.yaw), speed, observation.now - since)
 
+        others_at = state.others_at
+
         def is_known(places: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-            return self.backing.is_known(places, pose, self.grid, state.ground)
+            return self.backing.is_known(places, pose, self.grid, state.ground, others_at)
 
         tracks, others = self.tracker.around(state.tracks, person, observation.now, self.steering.coast_s)
         walkers = [walker_of(track, pose) for track in tracks]
@@ -252,6 +204,7 @@ class TrackingController:
             twist, driven, walkers, points, self.robot, begun, acceleration, is_known, blind_speed
         )
         if way is not None:
+            state = replace(state, gave_way_at=observation.now)
             twist, reason = self.company.command(way, acceleration, self.robot), "giving way to a person"
             mode = mode if mode in (Mode.LOST, Mode.SEARCH) else Mode.FOLLOW
         twist = self.wheels.within_reach(twist, driven, acceleration, state.tracks.period, self.robot)

@@ -41,7 +41,7 @@ class Subject:
         self.targeted = 0
         self.first_detection: float | None = None
         self.longest_gap: float | None = None
-        self._stamp = 0.0
+        self._stamp: float | None = None
         self.frames = self.in_view = self.detected = 0
         self.last_in_view = False
         self.longest_unseen = 0.0
@@ -78,7 +78,7 @@ class Subject:
         person = of(seen, self._index)
         visible = person is not None and person.visible >= self._criteria.in_view
         if found:
-            if self.first_detection is None:
+            if self._stamp is None:
                 self.first_detection = seen.stamp
             else:
                 self.longest_gap = max(self.longest_gap or 0.0, seen.stamp - self._stamp)

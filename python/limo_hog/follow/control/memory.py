@@ -1,0 +1,71 @@
+"""What the tracking controller remembers from frame to frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from limo_hog.follow.control.lookout import Hunt
+from limo_hog.follow.control.selection import Choice
+from limo_hog.follow.sense.clearance import NO_POINTS, Points
+from limo_hog.follow.space.grid import Ground
+from limo_hog.follow.tracks.kalman import Track
+from limo_hog.follow.tracks.tracker import Tracks
+from limo_hog.follow.twist import Twist
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingState:
+    """What the controller remembers.
+
+    Attributes
+    ----------
+    tracks
+        All tracked people.
+    choice
+        Which of them is followed.
+    side
+        Which way to search: 1 left, -1 right.
+    detour
+        How far off the direct way to the person the robot drives [rad].
+    since_full
+        Frames since the whole image was searched [1].
+    ground
+        What stands where; None before the first scan.
+    known
+        The followed person's track when last measured; None before anyone was followed.
+    hunt
+        What is remembered while looking for that person; None while they are measured.
+    way, way_at
+        float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
+    way_out
+        Direction in the odometry frame [rad] and speed [m/s] by which it gives way, and since when [s]; None while it
+        does not.
+    gave_way_at
+        When it last gave way [s].
+    acceleration
+        Of the wheels, as learnt [m/s²].
+    sent
+        The last command.
+    others_at
+        When another person than the followed one was last measured [s].
+    brisk
+        How fast the followed person walks at most, as far as known [m/s].
+    """
+
+    tracks: Tracks = field(default_factory=Tracks)
+    choice: Choice = field(default_factory=Choice)
+    side: float = 1.0
+    detour: float = 0.0
+    since_full: int = 0
+    ground: Ground | None = None
+    known: Track | None = None
+    hunt: Hunt | None = None
+    way: Points = field(default_factory=lambda: NO_POINTS)
+    way_at: float = -math.inf
+    way_out: tuple[float, float, float] | None = None
+    gave_way_at: float = -math.inf
+    acceleration: float = 1.0
+    sent: Twist = field(default_factory=Twist)
+    others_at: float = -math.inf
+    brisk: float = 0.0

@@ -91,6 +91,11 @@ class Company:
         Of more distance than this nothing is gained [m]. Chosen: the edge of Hall's intimate zone, and half a trunk.
     walls
         Distance kept from everything else [m]. Chosen: `Guard` keeps more ahead and behind, where it can.
+    near, person_radius
+        What the lidar sees further off than `near`, or nearer than `person_radius` to one who comes, is no wall [m].
+        Chosen: what the robot backs in the time compared; as `Grid`'s.
+    never
+        What a way costs that ends at a wall or backs blindly [m]. Chosen: more than all distances together are worth.
     speeds, turns
         Ways compared [m/s, rad]. Chosen: what the drive can do, `Guard` limits the way back to .4 m/s; directions half
         a person's width apart after half a metre, none from which a person ahead is out of the lidar's sight.
@@ -100,7 +105,7 @@ class Company:
         What a change of speed by 1 m/s, and a turn by 2.5 rad, are worth [m]. Chosen: of ways that clear people alike,
         to within the error of their places, the easiest.
     settle_s, stay
-        A way is left for another only after so long [s], unless it ends at a wall, and if the other is worth more by so
+        A way is left for another only after so long [s], unless it costs `never`, and if the other is worth more by so
         much [m]. Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by
         .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
     half_view, unseen
@@ -119,6 +124,9 @@ class Company:
     clear: float = bounded(0.55, 0, 3)
     wanted: float = 0.7
     walls: float = 0.1
+    near: float = 1.5
+    person_radius: float = 0.45
+    never: float = 2.0
     speeds: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.3, 0.6)
     turns: tuple[float, ...] = (-1.6, -1.1, -0.5, 0.0, 0.5, 1.1, 1.6)
     turn_gain: float = 4.0
@@ -181,15 +189,16 @@ class Company:
         if (soon[0] if begun is None else soon.min()) > self.clear:
             return None
         gaps = gaps.min(axis=1)
-        near = points[np.hypot(*points.T) < 1.5][::2]
-        near = near[np.hypot(*(near[:, None] - people[None, :, :2]).transpose(2, 0, 1)).min(axis=1) > 0.45]
+        near = points[np.hypot(*points.T) < self.near][::2]
+        gap = np.hypot(*(near[:, None] - people[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
+        near = near[gap > self.person_radius]
         speeds = np.array([way.speed for way in ways])
         effort = self.ease * (np.abs(speeds - now.linear) + 0.4 * np.abs([way.turn for way in ways]))
         worth = np.minimum(gaps[1:], self.wanted) @ self.weights - effort
         worth -= self.unseen * self._unseen(poses[1:], places[:, 0])
-        worth[self._room(poses[1:], near, robot) < self.walls] -= 2.0
+        worth[self._room(poses[1:], near, robot) < self.walls] -= self.never
         if is_known is not None:
-            worth[(speeds < -blind_speed) & self._backs_blindly(poses[1:], backs[1:], is_known, robot)] -= 2.0
+            worth[(speeds < -blind_speed) & self._backs_blindly(poses[1:], backs[1:], is_known, robot)] -= self.never
         if begun is not None:
             worth[-1] += self.stay if begun.age > self.settle_s else 1.0
         return ways[int(np.argmax(worth))]

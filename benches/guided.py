@@ -1,8 +1,8 @@
 """The guided search beside the exact one: for each guide, how many pictures have the same rectangles, and how fast.
 
-`uv run python benches/guided.py [--every 4 ...] [--margin 0.5 ...] [--reach 1 ...]` reads every picture and every tenth
-frame of the videos in `../shared/data`; one thread, both searches in turn, least of two calls each. With `--labels FILE`
-it evaluates `PeopleDetector` with either search on labelled pictures instead.
+`uv run python benches/guided.py [--every 4 ...] [--margin 0.5 ...] [--reach 1 ...]` reads every picture and every
+tenth frame of the videos in `../shared/data`; one thread, both searches in turn, least of two calls each. With
+`--labels FILE` it evaluates `PeopleDetector` with either search on labelled pictures instead.
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ class TrackingController:
         if person is None:
             return self._search(state, observation), None
         unseen_s = observation.stamp - person.seen
-        person, tracks = self.tracker.follow_legs(person, tracks, self.grid, state.ground)
+        person, tracks = self.tracker.follow_legs(person, state.tracks, self.grid, state.ground)
         state = replace(state, tracks=tracks)
         keeps = self._keeps(person, state, observation)
         points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)

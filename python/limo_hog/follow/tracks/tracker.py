@@ -223,7 +223,7 @@ class Tracker:
         if tracks.stamp is None:
             return person, tracks
         unseen = tracks.stamp - person.seen
-        if not person.confirmed or unseen > self.legs_only_s:
+        if not person.confirmed:
             return person, tracks
         height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
         if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
@@ -233,43 +233,68 @@ class Tracker:
         now = person
         for returns in tracks.scans:
             # The track of an unseen person already contains the scans up to `felt`: each may count only once.
-            if returns.stamp - now.measured > self.restart_s:
+            if returns.stamp - now.measured > self.restart_s or unseen > self.legs_only_s:
                 # Legs continue a track; after a gap, whatever stands there could be taken for them.
                 break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
                 track = self.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
+        for mover in self.movers.moving(tracks.movers):
+            # What stands could be a chair; what moved on from where the person was is the person.
+            if unseen > 0 and mover.number == person.number and mover.felt > now.measured:
+                now = replace(now, track=mover.track, felt=mover.felt)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = tuple(kept if one.number == person.number else one for one in tracks.people)
         return now, replace(tracks, people=people)
 
-    def follow_movers(self, tracks: Tracks, half_view: float, grid: Grid, ground: Ground | None) -> Tracks:
-        """Enter the newest scan, whose lidar looks `half_view` [rad] to either side, into what moves."""
+    def follow_movers(
+        self, tracks: Tracks, half_view: float, camera: float, grid: Grid, ground: Ground | None
+    ) -> Tracks:
+        """Enter the newest scan into what moves; lidar and camera look `half_view` and `camera` [rad] to either side."""
         if not tracks.scans or tracks.scans[-1].stamp <= tracks.moved_at:
             return tracks
         newest = tracks.scans[-1]
-        movers = self.movers.update(tracks.movers, newest, half_view, self.noise, grid, ground)
+        movers = self.movers.update(tracks.movers, newest, half_view, self.noise, grid, ground, camera)
+        found = [one for one in tracks.in_view if one.confirmed]
+        movers = tuple(self._named(mover, found) for mover in movers)
         return replace(tracks, movers=movers, moved_at=newest.stamp)
+
+    def _named(self, mover: Mover, found: list[Person]) -> Mover:
+        """Return a mover with the number of the person of those found who is there."""
+        near = min(found, key=lambda one: math.dist(one.track.mean[:2], mover.track.mean[:2]), default=None)
+        if near is None or math.dist(near.track.mean[:2], mover.track.mean[:2]) > self.association.same_place:
+            return mover
+        return replace(mover, number=near.number, shown=0)
 
     def around(self, tracks: Tracks, followed: Person | None, now: float, lately_s: float) -> tuple[list[Track], bool]:
         """Return all people, seen by the camera or moving in the scan, as of `now` [s], and whether any is another.
 
         `followed` is the person followed, as measured last; people found by the camera count for `lately_s` [s].
         """
-        people, others = [], False
+        people: dict[int, Track] = {}
         for one in tracks.people:
-            is_followed = followed is not None and one.number == followed.number
-            one = followed if followed is not None and is_followed else one
+            one = followed if followed is not None and one.number == followed.number else one
             if one.confirmed and now - one.measured <= lately_s:
-                people.append(kalman.predict(one.track, now, self.noise))
-                others |= not is_followed
-        for mover in self.movers.moving(tracks.movers):
-            track = kalman.predict(mover.track, now, self.noise)
-            gaps = [math.dist(track.mean[:2], other.mean[:2]) for other in people]
-            if min(gaps, default=math.inf) > self.association.same_place:
-                people.append(track)
-                others = True
-        return people, others
+                people[one.number] = kalman.predict(one.track, now, self.noise)
+        places = [track.mean[:2] for track in people.values()]
+        nameless = [
+            track
+            for mover in self.movers.moving(tracks.movers)
+            if mover.number not in people
+            for track in [kalman.predict(mover.track, now, self.noise)]
+            if all(math.dist(track.mean[:2], place) > self.association.same_place for place in places)
+        ]
+        others = set(people) - {None if followed is None else followed.number}
+        return [*people.values(), *nameless], bool(others or nameless)
+
+    def may_be(self, number: int | None, tracks: Tracks, now: float) -> list[Track]:
+        """Return what moves in the scan and may be the person of a number, or one not shown yet, as of `now` [s]."""
+        moving = [
+            one
+            for one in self.movers.moving(tracks.movers)
+            if one.number in (number, None) and one.shown < self.movers.looks
+        ]
+        return [kalman.predict(one.track, now, self.noise) for one in moving]
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
         poses, odometry = tracks.poses, observation.odometry

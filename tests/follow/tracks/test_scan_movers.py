@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.kalman import Noise
 from limo_hog.follow.tracks.legs import Returns
 from limo_hog.follow.tracks.movers import Mover, Movers
 
-MOVERS, NOISE, HALF_VIEW, SCAN_S = Movers(), Noise(), 2.0, 0.125
+MOVERS, NOISE, HALF_VIEW, SCAN_S, GRID = Movers(), Noise(), 2.0, 0.125, Grid()
+#: Ground that is free from now on, wherever nothing is.
+FREE = replace(GRID.start(Odometry()), freed=np.full((GRID.cells, GRID.cells), np.inf, np.float32))
 
 
 def legs(x: float, y: float, phase: float) -> list[tuple[float, float]]:
@@ -29,8 +33,9 @@ def walk(start: tuple[float, float], velocity: tuple[float, float], scans: int) 
         time = index * SCAN_S
         x, y = start[0] + velocity[0] * time, start[1] + velocity[1] * time
         shown = abs(math.atan2(y, x - LIMO.lidar_x)) < HALF_VIEW
-        points = np.array(sorted(legs(x, y, 9.0 * time)) * shown + wall)
-        movers = MOVERS.update(movers, Returns(time, points, Odometry()), HALF_VIEW, NOISE)
+        # In the order of the beams.
+        points = np.array(sorted(legs(x, y, 9.0 * time) * shown + wall, key=lambda one: math.atan2(one[1], one[0])))
+        movers = MOVERS.update(movers, Returns(time, points, Odometry()), HALF_VIEW, NOISE, GRID, FREE)
     return movers
 
 
@@ -59,5 +64,33 @@ def test_a_person_who_is_gone_from_where_the_lidar_looks_is_forgotten_at_once() 
     assert MOVERS.moving(movers)
     nothing = np.empty((0, 2))
     for index in range(10, 16):
-        movers = MOVERS.update(movers, Returns(index * SCAN_S, nothing, Odometry()), HALF_VIEW, NOISE)
+        movers = MOVERS.update(movers, Returns(index * SCAN_S, nothing, Odometry()), HALF_VIEW, NOISE, GRID, FREE)
     assert movers == ()
+
+
+def test_what_is_seen_of_a_wall_beside_a_nearer_post_does_not_begin_to_move() -> None:
+    wall = [(2.0, 0.05 * step) for step in range(6)]
+    beside_a_post = np.array([(1.0, -0.1), (1.0, -0.05), *wall])
+    alone = np.array([(3.0, -0.9), (3.0, -0.5), *wall])
+    for points, begun in ((beside_a_post, 1), (alone, 1)):
+        movers = MOVERS.update((), Returns(0.0, points, Odometry()), HALF_VIEW, NOISE, GRID, FREE)
+        assert len(movers) == begun
+    assert math.dist(movers[0].began, (2.0, 0.125)) < 1e-6
+
+
+def test_the_end_of_a_wall_that_comes_into_view_does_not_move_for_it_is_still_wall_where_it_began() -> None:
+    wall_stays = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
+    for ground, moving in ((FREE, 1), (wall_stays, 0)):
+        movers: tuple[Mover, ...] = ()
+        for index in range(12):
+            seen = np.array([(2.0, 0.07 * index + 0.05 * step) for step in range(5)])
+            movers = MOVERS.update(movers, Returns(index * SCAN_S, seen, Odometry()), HALF_VIEW, NOISE, GRID, ground)
+        assert len(MOVERS.moving(movers)) == moving
+
+
+def test_what_the_camera_has_shown_for_long_is_counted() -> None:
+    movers: tuple[Mover, ...] = ()
+    for index in range(10):
+        points = np.array(legs(2.0, 0.06 * index - 0.3, 1.0 * index))
+        movers = MOVERS.update(movers, Returns(index * SCAN_S, points, Odometry()), HALF_VIEW, NOISE, GRID, FREE, 0.5)
+    assert movers[0].shown == movers[0].scans - 1

@@ -50,6 +50,6 @@ class Search:
         return turn, Mode.SEARCH, "searching for a person"
 
     def towards(self, bearing: float, *, lost: bool) -> tuple[Twist, Mode, str]:
-        """Return the command, the mode and the reason, where the lidar shows something that moves, at a bearing [rad]."""
+        """Return the command, the mode and the reason, where something moves in the scan at a bearing [rad]."""
         turn = Twist(0.0, min(max(self.gain * bearing, -self.max_rate), self.max_rate))
         return turn, Mode.LOST if lost else Mode.SEARCH, "turning to what moves in the scan"

@@ -179,11 +179,11 @@ class Grid:
         flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
         return np.asarray(stands.ravel()[flat] & inside)
 
-    def is_free_since(self, ground: Ground, points: Points, stamp: float) -> NDArray[np.bool_]:
-        """Return whether each point was seen to be free after a stamp [s], bool (N,); outside of the square none."""
+    def is_free_since(self, ground: Ground, points: Points, stamps: float | NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether each point was seen to be free after its stamp [s], bool (N,); outside of the square none."""
         cells, inside = self.index(ground, points)
         free = np.zeros(len(points), bool)
-        free[inside] = ground.freed[cells[inside, 0], cells[inside, 1]] > stamp
+        free[inside] = ground.freed[cells[inside, 0], cells[inside, 1]] > np.broadcast_to(stamps, len(points))[inside]
         return free
 
     def is_near_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:

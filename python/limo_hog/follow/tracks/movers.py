@@ -6,6 +6,7 @@ people who stand are nothing to be predicted.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field, replace
 
@@ -27,8 +28,10 @@ class Mover:
     ----------
     track
         Position and velocity.
-    began
-        Where it was first, x and y in the odometry frame [m].
+    began, since
+        Where it was first, x and y in the odometry frame [m], and when [s].
+    left
+        Whether that place was seen to be empty since.
     felt
         Stamp of the last scan that showed it [s].
     scans, shown
@@ -39,7 +42,9 @@ class Mover:
 
     track: Track
     began: tuple[float, float]
+    since: float
     felt: float
+    left: bool = False
     scans: int = 1
     shown: int = 0
     number: int | None = None
@@ -48,6 +53,9 @@ class Mover:
 @dataclass(frozen=True, slots=True)
 class Movers:
     """Follows what moves in the scan.
+
+    The end of what is seen of a wall, where a corner or a person hides the rest, moves as well; what it has moved from
+    is still wall. So a group moves only when the place where it began is empty.
 
     Attributes
     ----------
@@ -85,16 +93,17 @@ class Movers:
         returns: Returns,
         half_view: float,
         noise: Noise,
-        grid: Grid | None = None,
-        ground: Ground | None = None,
+        grid: Grid,
+        ground: Ground | None,
         camera: float = 0.0,
     ) -> tuple[Mover, ...]:
-        """Return what may move after a scan, whose lidar looks `half_view` [rad] to either side, and the camera `camera`.
+        """Return what may move after a scan; lidar and camera look `half_view` and `camera` [rad] to either side.
 
-        `grid` and `ground` tell what has stood for long: its returns are not looked at.
+        `grid` and `ground` tell what has stood for long, whose returns are not looked at, and what is empty; before the
+        first map nothing moves.
         """
         points = returns.points
-        if grid is not None and ground is not None:
+        if ground is not None:
             points = points[~grid.is_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
         for mover in movers:
@@ -105,7 +114,16 @@ class Movers:
                 points = points[np.hypot(*(points - track.mean[:2]).T) > self.legs.radius]
             elif returns.stamp - mover.felt < self._patience(mover, returns, half_view):
                 kept.append(mover)
-        begun = [self._begin(place, returns, noise) for place in self._groups(points, returns)]
+        if ground is not None:
+            began, since = np.array([one.began for one in kept]).reshape(-1, 2), np.array([one.since for one in kept])
+            left = grid.is_free_since(ground, began, since)
+            kept = [replace(one, left=one.left or gone) for one, gone in zip(kept, left.tolist(), strict=True)]
+        known = np.array([one.track.mean[:2] for one in kept]).reshape(-1, 2)
+        places = self._groups(returns)
+        if ground is not None and len(places):
+            places = places[~grid.is_blocked(ground, places, lasting=True)]
+        new = np.hypot(*(places[:, None] - known).transpose(2, 0, 1)).min(axis=1, initial=np.inf) > self.legs.radius
+        begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)
 
     def moving(self, movers: tuple[Mover, ...]) -> list[Mover]:
@@ -113,7 +131,7 @@ class Movers:
         return [
             one
             for one in movers
-            if one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
+            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
         ]
 
     def _patience(self, mover: Mover, returns: Returns, half_view: float) -> float:
@@ -121,19 +139,23 @@ class Movers:
             return self.forget_s
         return self.unseen_s
 
-    def _groups(self, points: Points, returns: Returns) -> list[Points]:
-        """Return the middle of each group of returns that is as wide as legs, float64 (2,) [m], odometry frame."""
-        if len(points) == 0:
-            return []
+    def _groups(self, returns: Returns) -> Points:
+        """Return the middle of each group of returns that is as wide as legs, float64 (N, 2) [m], odometry frame.
+
+        A group beside which something nearer ends may be what that leaves to be seen of a wall.
+        """
+        points = returns.points
+        far = np.hypot(points[:, 0] - returns.pose.x, points[:, 1] - returns.pose.y)
         ends = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) > self.gap) + 1
-        groups = []
-        for group in np.split(points, ends):
-            middle = group.mean(axis=0)
-            far = math.hypot(middle[0] - returns.pose.x, middle[1] - returns.pose.y)
-            wide = np.hypot(*np.ptp(group, axis=0))
-            if len(group) >= self.legs.fewest and far < self.legs.reach and wide < self.legs.widest:
-                groups.append(middle)
-        return groups
+        middles = []
+        for begin, end in itertools.pairwise([0, *ends.tolist(), len(points)]):
+            hidden = (begin > 0 and far[begin - 1] < far[begin]) or (end < len(points) and far[end] < far[end - 1])
+            if hidden or end - begin < self.legs.fewest or far[begin:end].mean() >= self.legs.reach:
+                continue
+            group = points[begin:end]
+            if np.hypot(*np.ptp(group, axis=0)) < self.legs.widest:
+                middles.append(group.mean(axis=0))
+        return np.array(middles).reshape(-1, 2)
 
     def _begin(self, place: Points, returns: Returns, noise: Noise) -> Mover:
         pose = returns.pose
@@ -144,7 +166,7 @@ class Movers:
         sigma = self.legs.sigma
         legs_noise = replace(noise, bearing=sigma / max(far, 0.3), range=sigma)
         track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, legs_noise)
-        return Mover(track, (float(place[0]), float(place[1])), returns.stamp)
+        return Mover(track, (float(place[0]), float(place[1])), returns.stamp, returns.stamp)
 
 
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry) -> bool:

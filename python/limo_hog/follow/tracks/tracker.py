@@ -250,7 +250,7 @@ class Tracker:
     def follow_movers(
         self, tracks: Tracks, half_view: float, camera: float, grid: Grid, ground: Ground | None
     ) -> Tracks:
-        """Enter the newest scan into what moves; lidar and camera look `half_view` and `camera` [rad] to either side."""
+        """Enter the newest scan into what moves; see `Movers.update`."""
         if not tracks.scans or tracks.scans[-1].stamp <= tracks.moved_at:
             return tracks
         newest = tracks.scans[-1]

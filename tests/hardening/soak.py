@@ -1,18 +1,25 @@
 """Long runs whose memory, descriptors and times must stay flat.
 
 `python -m tests.hardening.soak view --seconds 3600` follows for so much simulated time, as fast as it can, before 20
-clients of the page, 5 of which stop reading; `python -m tests.hardening.soak detect --count 1000000` searches images
-of changing size. Each prints what it measured every now and then, and at the end the slope.
+clients of the page, 5 of which stop reading; `node` in its place runs a node that only drives, as `limo-hog run` does;
+`python -m tests.hardening.soak detect --count 1000000` searches images of changing size. Each prints what it measured
+every now and then, and at the end the slope.
+
+A reading of a process's memory holds what is on its way just then: pictures, and what the allocator may give back.
+What stays is seen in the lowest reading of each minute: the slope is that of a straight line through these.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import ctypes
 import gc
+import multiprocessing
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from array import array
 from pathlib import Path
@@ -22,6 +29,8 @@ import numpy as np
 import limo_hog
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
+from limo_sim.ros.apart import run_apart
+from limo_sim.ros.script import score_of
 from limo_sim.run.catalogue import load
 from limo_sim.run.episode import Moment, run_episode
 from limo_sim.run.score import Scorer
@@ -31,13 +40,50 @@ from limo_sim.view.server import View
 READERS, STALLED = 15, 5
 #: Control periods of a run, at most.
 STEPS = 100_000
+#: What the C library tells of its heap.
+HEAP = ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost")
+#: A node that drives in a circle, ten commands a second.
+NODE = """
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+
+rclpy.init()
+node = Node("circle")
+commands = node.create_publisher(Twist, "cmd_vel", 10)
+
+
+def drive():
+    twist = Twist()
+    twist.linear.x, twist.angular.z = 0.1, 0.3
+    commands.publish(twist)
+
+
+node.create_timer(0.1, drive)
+rclpy.spin(node)
+"""
 #: What comes before is not counted, as caches fill [s of simulated time, share of the detections].
 WARM_S, WARM = 600.0, 0.1
 
 
-def resident_mb() -> float:
-    """Return this process's memory [MB]."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+def resident_mb(process: int | str = "self") -> float:
+    """Return a process's memory [MB]."""
+    return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def in_use_mb() -> float:
+    """Return what of the C library's heap is in use [MB]: without Python's small objects; not a number elsewhere."""
+
+    class Info(ctypes.Structure):
+        _fields_ = tuple((name, ctypes.c_size_t) for name in HEAP)
+
+    try:
+        mallinfo = ctypes.CDLL("libc.so.6").mallinfo2
+    except (OSError, AttributeError):
+        return float("nan")
+    mallinfo.restype = Info
+    heap = mallinfo()
+    return float(heap.uordblks + heap.hblkhd) / 1e6
 
 
 def descriptors() -> int:
@@ -45,14 +91,16 @@ def descriptors() -> int:
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
-def slope(times: list[float], values: list[float]) -> float:
-    """Return the least-squares slope [of the values' unit per that of the times]."""
-    return float(np.polyfit(times, values, 1)[0]) if len(times) > 2 else float("nan")
+def slope(times: list[float], values: list[float], of: int = 1) -> float:
+    """Return the least-squares slope [of the values' unit per that of the times] of the least of each `of` values."""
+    groups = [range(at, min(at + of, len(values))) for at in range(0, len(values), of)]
+    least = [min(group, key=values.__getitem__) for group in groups]
+    return float(np.polyfit([times[k] for k in least], [values[k] for k in least], 1)[0]) if len(least) > 2 else np.nan
 
 
 def watch_a_page(seconds: float, seed: int) -> None:
     """Follow before an audience."""
-    rows: list[tuple[float, float, int]] = []
+    rows: list[tuple[float, float, float, int]] = []
     # Of the thread that simulates, so that what else the machine does counts little; without growing lists.
     times, took = array("d", bytes(8 * STEPS)), array("d", bytes(8 * STEPS))
     made, last = 0, [time.thread_time(), 0.0]
@@ -73,11 +121,12 @@ def watch_a_page(seconds: float, seed: int) -> None:
             if moment.step.time - last[1] >= 10.0:
                 last[1] = moment.step.time
                 gc.collect()
-                rows.append((moment.step.time, resident_mb(), descriptors()))
+                rows.append((moment.step.time, resident_mb(), in_use_mb(), descriptors()))
                 if len(rows) % 6 == 0:
                     p95 = np.percentile(took[max(0, made - 600) : made], 95)
-                    at, mb, open_ = rows[-1]
-                    print(f"{at:.0f} s: {mb:.1f} MB, {open_} descriptors, p95 of a frame {p95:.1f} ms", flush=True)
+                    at, mb, used, open_ = rows[-1]
+                    told = f"{mb:.1f} MB, {used:.1f} in use, {open_} descriptors, p95 of a frame {p95:.1f} ms"
+                    print(f"{at:.0f} s: {told}", flush=True)
 
         controller = controller_named("tracking", None)
         episode = run_episode(scenario, controller, PeopleDetector(), seconds, seed, watch=watch, keep=False)
@@ -88,10 +137,15 @@ def watch_a_page(seconds: float, seed: int) -> None:
     hours = [row[0] / 3600 for row in warm]
     late = np.array(times[:made]) > seconds / 2
     p95 = [np.percentile(np.array(took[:made])[half], 95) for half in (~late, late)]
+    held, used = [row[1] for row in warm], [row[2] for row in warm]
+    for name, values in (("memory", held), ("heap in use", used)):
+        print(
+            f"{name}: {slope(hours, values, 6):+.2f} MB an hour by each minute's least, {slope(hours, values):+.2f} by "
+            f"all readings, {min(values):.1f} to {max(values):.1f} MB"
+        )
     print(
-        f"{seconds:.0f} s: {slope(hours, [row[1] for row in warm]):+.2f} MB an hour, descriptors "
-        f"{min(row[2] for row in warm)} to {max(row[2] for row in warm)}, p95 of a frame {p95[0]:.2f} ms of "
-        f"processor time in the first half and {p95[1]:.2f} ms in the second"
+        f"descriptors {min(row[3] for row in warm)} to {max(row[3] for row in warm)}, p95 of a frame "
+        f"{p95[0]:.2f} ms of processor time in the first half and {p95[1]:.2f} ms in the second"
     )
 
 
@@ -114,6 +168,33 @@ async def read_pages(url: str) -> None:
     await asyncio.gather(*[read() for _ in range(READERS)], *[stall() for _ in range(STALLED)], return_exceptions=True)
 
 
+def run_a_node(seconds: float, seed: int) -> None:
+    """Run a node in a process of its own, and score it as it goes."""
+    scenario = load("followable")
+    scorer = Scorer(scenario)
+    rows: list[tuple[float, float, float]] = []
+
+    def watch(moment: Moment) -> None:
+        scorer.add(moment.step)
+        if not rows or moment.step.time - rows[-1][0] >= 10.0:
+            gc.collect()
+            (node,) = multiprocessing.active_children()
+            rows.append((moment.step.time, resident_mb(), resident_mb(node.pid or 0)))
+            if len(rows) % 30 == 0:
+                print("{:.0f} s: {:.1f} MB, the node's process {:.1f} MB".format(*rows[-1]), flush=True)
+
+    with tempfile.TemporaryDirectory() as folder:
+        script = Path(folder) / "node.py"
+        script.write_text(NODE, encoding="utf-8")
+        ended = run_apart(script, scenario, seconds, seed, watch=watch, pictures=False, keep=False)
+    print(f"{score_of(ended, scorer).frames} frames {ended.failure}")
+    warm = [row for row in rows if row[0] > min(WARM_S, seconds / 4)]
+    hours = [row[0] / 3600 for row in warm]
+    for name, values in (("here", [row[1] for row in warm]), ("the node's process", [row[2] for row in warm])):
+        told = f"{slope(hours, values, 6):+.2f} MB an hour, {min(values):.1f} to {max(values):.1f} MB"
+        print(f"{name}: {told}")
+
+
 def detect(count: int) -> None:
     """Search small images of changing size."""
     limo_hog.set_num_threads(2)
@@ -133,7 +214,7 @@ def detect(count: int) -> None:
             rows.append((number / 1e6, resident_mb()))
     warm = [row for row in rows if row[0] > WARM * count / 1e6]
     print(
-        f"{count} detections: {slope(*map(list, zip(*warm, strict=True))):+.2f} MB a million; "
+        f"{count} detections: {slope([row[0] for row in warm], [row[1] for row in warm]):+.2f} MB a million; "
         f"{min(row[1] for row in warm):.1f} to {max(row[1] for row in warm):.1f} MB, {descriptors()} descriptors"
     )
 
@@ -141,7 +222,7 @@ def detect(count: int) -> None:
 def main() -> None:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", choices=["view", "detect", "clients"])
+    parser.add_argument("what", choices=["view", "node", "detect", "clients"])
     parser.add_argument("--seconds", type=float, default=3600.0, help="simulated time")
     parser.add_argument("--count", type=lambda text: int(float(text)), default=1_000_000)
     parser.add_argument("--seed", type=int, default=0)
@@ -149,6 +230,8 @@ def main() -> None:
     args = parser.parse_args()
     if args.what == "view":
         watch_a_page(args.seconds, args.seed)
+    elif args.what == "node":
+        run_a_node(args.seconds, args.seed)
     elif args.what == "detect":
         detect(args.count)
     else:

@@ -129,7 +129,8 @@ class View:
         self._host, self._port = host, port
         self.pace = pace or Pace()
         self._newest: Moment | None = None
-        self._pictured: Moment | None = None
+        # The newest moment with a frame, with its number.
+        self._pictured: tuple[int, Moment] | None = None
         self._rows: deque[list[float | None]] = deque(maxlen=_REMEMBERED)
         self._written = 0
         # Index of the person followed last; None before, and during a search.
@@ -139,7 +140,7 @@ class View:
         self._ended: Mapping[str, Any] | None = None
         # Open pages, each with the task that shows it the run; the newest pictures, encoded once for all of them.
         self._pages: dict[_Page, asyncio.Task[None]] = {}
-        self._encoded: tuple[Moment, asyncio.Future[list[bytes]]] | None = None
+        self._encoded: tuple[int, asyncio.Future[list[bytes]]] | None = None
         self._over = asyncio.Event()
         self._access = Access(host, loopback=True)
         self._loop = asyncio.new_event_loop()
@@ -155,7 +156,7 @@ class View:
     def watch(self, moment: Moment) -> None:
         """Show a moment, and return when the run may go on."""
         if moment.frame is not None:
-            self._pictured = moment
+            self._pictured = self._written, moment
         now, robot = reading(moment.step), moment.step.truth.robot
         people = [(None, None) if p is None else (p.x, p.y) for p in moment.step.truth.people]
         measured = measured_m(moment.frame, moment.step)
@@ -283,25 +284,29 @@ class View:
         }
 
     async def _show(self, page: _Page) -> None:
-        """Send a page what is new, as fast as it takes it and no faster than `PERIOD`; nothing else sends to it."""
+        """Send a page what is new, as fast as it takes it and no faster than `PERIOD`; nothing else sends to it.
+
+        While a page takes its time, this holds no moment, whose frame is 2 MB: numbers tell what was sent.
+        """
         shown: tuple[Any, ...] = ()
-        pictured, told = None, 0
+        pictured, told = -1, 0
         with suppress(OSError):
             await page.send(self._welcome())
             while not page.client.closed:
                 while page.complaints:
                     await page.send({"complaint": page.complaints.popleft()})
-                newest, frame = self._newest, self._pictured
-                now = (newest, self.pace.paused, self.pace.speed)
-                if newest is not None and now != shown:
+                written = self._written
+                now = (written, self.pace.paused, self.pace.speed)
+                if self._newest is not None and now != shown:
                     shown = now
-                    written = self._written
                     rows = list(self._rows)[-(written - told) :] if written > told else []
                     told = written
-                    await page.send({"state": self._state(newest), "rows": rows})
-                    if frame is not None and frame is not pictured:
-                        pictured = frame
-                        for picture in await self._pictures_of(frame):
+                    encoded = self._newest_pictures()
+                    await page.send({"state": self._state(self._newest), "rows": rows})
+                    if encoded is not None and encoded[0] != pictured:
+                        pictured, pictures = encoded
+                        # A page that leaves does not take the pictures from the others.
+                        for picture in await asyncio.shield(pictures):
                             await page.send(picture)
                 if self._over.is_set():
                     await page.send({"ended": _finite(self._ended or {})})
@@ -311,12 +316,12 @@ class View:
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(self._over.wait(), PERIOD if self.pace.speed else 2 * PERIOD)
 
-    async def _pictures_of(self, moment: Moment) -> list[bytes]:
-        """Encode the pictures of a moment, once for all pages and beside the server's loop."""
-        if self._encoded is None or self._encoded[0] is not moment:
-            self._encoded = moment, self._loop.run_in_executor(None, self._pictures, moment)
-        # A page that leaves does not take the pictures from the others.
-        return await asyncio.shield(self._encoded[1])
+    def _newest_pictures(self) -> tuple[int, asyncio.Future[list[bytes]]] | None:
+        """Encode the newest pictures, once for all pages and beside the server's loop; None without any."""
+        if self._pictured is not None and (self._encoded is None or self._encoded[0] != self._pictured[0]):
+            number, moment = self._pictured
+            self._encoded = number, self._loop.run_in_executor(None, self._pictures, moment)
+        return self._encoded
 
     def _state(self, moment: Moment) -> dict[str, Any]:
         step = moment.step

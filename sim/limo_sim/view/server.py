@@ -10,32 +10,37 @@ import asyncio
 import itertools
 import json
 import logging
-import math
 import socket
 import threading
 from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from typing import Any
 
-import numpy as np
 from aiohttp import WSMsgType, web
-from numpy.typing import NDArray
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
-from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.zones import ZONE_ENDS
 from limo_hog.imaging.writing import jpeg
-from limo_sim.run.episode import Moment, Step
+from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FIELD
-from limo_sim.sensing.lidar import MOUNT_AHEAD
 from limo_sim.view.access import HEADERS, Access, QuietLogger
 from limo_sim.view.controls import MAX_BYTES, apply
 from limo_sim.view.pace import Pace
-from limo_sim.view.reading import annotated, depth_colours, depth_picture, followed_person, measured_m, reading
+from limo_sim.view.reading import (
+    annotated,
+    believed,
+    depth_colours,
+    depth_picture,
+    followed_person,
+    hits,
+    measured_m,
+    reading,
+)
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.furniture import Disc
 from limo_sim.world.scenario import Scenario
@@ -144,6 +149,8 @@ class View:
         self._over = asyncio.Event()
         self._access = Access(host, loopback=True)
         self._loop = asyncio.new_event_loop()
+        # One thread encodes: what it makes serves all pages, and each thread more would keep megabytes of its own.
+        self._loop.set_default_executor(ThreadPoolExecutor(1, thread_name_prefix="limo-hog pictures"))
         self._thread = threading.Thread(target=self._loop.run_forever, name="limo-hog view", daemon=True)
         self._runner: web.AppRunner | None = None
 
@@ -332,9 +339,9 @@ class View:
             "robot": step.truth.robot,
             "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
             "followed": self._followed,
-            "believed": _believed(step),
+            "believed": believed(step),
             "measured_m": measured_m(moment.frame, step),
-            "scan": _hits(moment.scan, list(self._poses)),
+            "scan": hits(moment.scan, list(self._poses)),
             "detect_ms": step.frame.detect_ms or None if step.frame else None,
             "boxes": len(step.detections),
             "contacts": asdict(step.truth.contacts),
@@ -366,45 +373,6 @@ def _page(name: str, kind: str) -> Any:
         return web.Response(body=body, content_type=kind, charset="utf-8", headers={"Cache-Control": "no-cache"})
 
     return answer
-
-
-def _hits(scan: Scan | None, poses: list[tuple[float, float, float, float]]) -> list[list[float]]:
-    """Return every second lidar hit in the arena's frame [m], to the centimetre, by the pose at the scan's time."""
-    if scan is None:
-        return []
-    times, *pose = np.array(poses).T
-    x, y, yaw = (float(np.interp(scan.stamp, times, values)) for values in (*pose[:2], np.unwrap(pose[2])))
-    ranges: NDArray[np.float64] = scan.ranges.astype(np.float64)
-    angles = yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
-    hit = np.isfinite(ranges)
-    hit[1::2] = False
-    points = np.stack(
-        [
-            x + MOUNT_AHEAD * math.cos(yaw) + ranges[hit] * np.cos(angles[hit]),
-            y + MOUNT_AHEAD * math.sin(yaw) + ranges[hit] * np.sin(angles[hit]),
-        ],
-        axis=1,
-    )
-    rounded: list[list[float]] = np.round(points, 2).tolist()
-    return rounded
-
-
-def _believed(step: Step) -> list[list[float | None]]:
-    """Return where the follower takes people to be, x, y [m] in the arena's frame, with two probabilities.
-
-    They are of being a person, and of being the person followed; None for that before one was followed.
-    """
-    x, y, yaw = step.truth.robot
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return [
-        [
-            round(x + cos * one.x - sin * one.y, 2),
-            round(y + sin * one.x + cos * one.y, 2),
-            round(one.probability, 2),
-            None if one.same is None else round(one.same, 2),
-        ]
-        for one in step.decision.belief.people
-    ]
 
 
 def _finite(values: Mapping[str, Any]) -> dict[str, Any]:

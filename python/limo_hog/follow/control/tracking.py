@@ -101,13 +101,17 @@ class TrackingController:
             for last in before:
                 believed = self.wheels.learn(believed, state.sent, last, wheels, self.robot)
             state = replace(state, acceleration=believed)
-        decision, person = self._follow(observation, state)
-        return self._give_way(decision, person, observation)
+        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
+        decision, person = self._follow(observation, points, state)
+        return self._give_way(decision, person, observation, points)
 
-    def _follow(self, observation: Observation, state: TrackingState) -> tuple[Decision[TrackingState], Person | None]:
+    def _follow(
+        self, observation: Observation, points: Points, state: TrackingState
+    ) -> tuple[Decision[TrackingState], Person | None]:
         """Bring the tracks up to the frame, choose the person to follow, and steer to where they are now.
 
-        Returns the decision, and the person followed as of the newest stamp.
+        `points` are the scan's returns, base frame. Returns the decision, and the person followed as of the newest
+        stamp.
         """
         tracks, boxes = self.tracker.update(observation, state.tracks)
         before, choice = state.choice.measured, self.selection.choose(tracks, state.choice)
@@ -122,7 +126,6 @@ class TrackingController:
         person, tracks = self.tracker.follow_legs(person, tracks, self.grid, state.ground)
         state = replace(state, tracks=tracks)
         keeps = self._keeps(person, state, observation)
-        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
         aim, state = self._aim(person, keeps, points, state, observation)
         lost_s = min(unseen_s, observation.now - person.felt)
         if lost_s <= self.tracker.scan_period_s:
@@ -176,7 +179,7 @@ class TrackingController:
         return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief), person
 
     def _give_way(
-        self, decision: Decision[TrackingState], person: Person | None, observation: Observation
+        self, decision: Decision[TrackingState], person: Person | None, observation: Observation, points: Points
     ) -> Decision[TrackingState]:
         """Replace a command by a way out of the way of people, where there is need, and by what the wheels can do."""
         state, twist, mode, reason = decision.state, decision.twist, decision.mode, decision.reason
@@ -184,7 +187,6 @@ class TrackingController:
         if wheels is None:
             return decision
         driven, pose = Twist(wheels.linear, wheels.angular), pose_at(state.tracks.poses, observation.now)
-        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
         begun = None
         if state.way_out is not None:
             yaw, speed, since = state.way_out

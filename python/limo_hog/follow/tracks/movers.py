@@ -115,15 +115,15 @@ class Movers:
         """Return the middle of each group of returns that is as wide as legs, float64 (2,) [m], odometry frame."""
         if len(points) == 0:
             return []
-        ends = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) > self.gap) + 1
-        groups = []
-        for group in np.split(points, ends):
-            middle = group.mean(axis=0)
-            far = math.hypot(middle[0] - returns.pose.x, middle[1] - returns.pose.y)
-            wide = np.hypot(*np.ptp(group, axis=0))
-            if len(group) >= self.legs.fewest and far < self.legs.reach and wide < self.legs.widest:
-                groups.append(middle)
-        return groups
+        begins = np.hypot(*np.diff(points, axis=0).T) > self.gap
+        group = np.concatenate([[0], np.cumsum(begins)])
+        first = np.concatenate([[0], np.flatnonzero(begins) + 1])
+        count = np.bincount(group)
+        middle = np.stack([np.bincount(group, weights=column) / count for column in points.T], axis=1)
+        wide = np.hypot(*(np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)).T)
+        far = np.hypot(*(middle - (returns.pose.x, returns.pose.y)).T)
+        legs = (count >= self.legs.fewest) & (far < self.legs.reach) & (wide < self.legs.widest)
+        return list(middle[legs])
 
     def _begin(self, place: Points, returns: Returns, noise: Noise) -> Mover:
         pose = returns.pose

@@ -1,7 +1,8 @@
 """The guided search beside the exact one: for each guide, how many pictures have the same rectangles, and how fast.
 
-`uv run python benches/guided.py [--every 4 ...] [--margin 0.5 ...] [--reach 1 ...]` reads every picture and every tenth
-frame of the videos in `../shared/data`; one thread, both searches in turn, least of two calls each.
+`uv run python benches/guided.py [--every 4 ...] [--margin 0.5 ...] [--reach 1 ...]` reads every picture and every
+tenth frame of the videos in `../shared/data`; one thread, both searches in turn, least of two calls each. With
+`--labels FILE` it evaluates `PeopleDetector` with either search on labelled pictures instead.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import limo_hog
-from limo_hog import _core
+from limo_hog import PeopleDetector, _core
+from limo_hog.learn.evaluation.run import Rival, evaluate
+from limo_hog.learn.formats import read_labels
+from limo_hog.learn.labels import choose
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 Hits = tuple[NDArray[np.int32], NDArray[np.float64]]
@@ -51,6 +55,23 @@ def searched(hog: _core.Hog, image: NDArray[np.uint8], group: float, guide: Guid
     return found, min(times)
 
 
+def miss_rates(labels: Path) -> None:
+    """Print the log-average miss rate, and the recall at .1 and 1 false positive an image, of either search.
+
+    With a threshold of -1.2, as `limo-hog evaluate` has it, and with each model's own.
+    """
+    rivals = [
+        Rival(f"{model} {search}, {least or 'own'}", PeopleDetector(model=model, search=search, threshold=least))
+        for model in ("opencv", "limo")
+        for least in (-1.2, None)
+        for search in ("exact", "guided")
+    ]
+    used, evaluations = evaluate(rivals, choose(read_labels(labels, None), None))
+    print(f"{len(used)} pictures\n| model, search, threshold | LAMR | recall at .1 | recall at 1 |\n|---|---|---|---|")
+    for one in evaluations:
+        print(f"| {one.name} | {one.figures.lamr:.3f} | {one.figures.recall_01:.3f} | {one.figures.recall_1:.3f} |")
+
+
 def main() -> None:
     """Measure every combination and print one line for each."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -58,7 +79,11 @@ def main() -> None:
     parser.add_argument("--margin", type=float, nargs="+", default=[0.25, 0.5, 1.0])
     parser.add_argument("--reach", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--step", type=int, default=1, help="read every so many pictures")
+    parser.add_argument("--labels", type=Path, help="labelled pictures, in a format of `limo-hog evaluate`")
     options = parser.parse_args()
+    if options.labels:
+        miss_rates(options.labels)
+        return
     limo_hog.set_num_threads(1)
     hog = _core.Hog((64, 128), (16, 16), (8, 8), (8, 8), 9, -1.0, 0.2, True, 64, False, _core.default_people_detector())
     guides: list[Guide] = list(itertools.product(options.every, options.margin, options.reach))

@@ -334,3 +334,15 @@ def test_between_two_alike_it_stands_and_looks_and_says_that_it_is_not_sure() ->
     assert decision.target is None
     same = [round(person.same or 0.0, 1) for person in decision.belief.people]
     assert same == [0.5, 0.5] or same == [0.5, 0.4]
+
+
+def test_what_moves_beside_is_kept_in_mind_while_a_person_is_followed() -> None:
+    world, state = World(person=(2.0, 0.0)), CONTROLLER.start()
+    for step in range(20):
+        legs = [(0.4 + dx, -1.8 + 0.06 * step) for dx in (-0.03, 0.0, 0.03)]
+        view = replace(world.observe(), scan=scan_of([(2.0, 0.0), *legs], world.time))
+        decision = CONTROLLER.step(view, state)
+        state = decision.state
+        world.time += world.period
+    assert decision.mode in (Mode.FOLLOW, Mode.HOLD)
+    assert any(math.dist(one.track.mean[:2], legs[1]) < 0.3 for one in state.tracks.movers)

@@ -123,7 +123,7 @@ class TrackingController:
         if person is None:
             return self._search(state, observation), None
         unseen_s = observation.stamp - person.seen
-        person, tracks = self.tracker.follow_legs(person, tracks, self.grid, state.ground)
+        person, tracks = self.tracker.follow_legs(person, state.tracks, self.grid, state.ground)
         state = replace(state, tracks=tracks)
         keeps = self._keeps(person, state, observation)
         aim, state = self._aim(person, keeps, points, state, observation)

@@ -44,6 +44,9 @@ class TrackingController:
         A person who walks fast is kept off by so many seconds of their way, at 1 m/s² of the wheels, and what the image
         is late [s]; share by which a faster frame, and a hundredth of that by which a slower one, moves the speed [1].
         Computed: .2 s to notice a start, .7 s to turn aside, .8 s to drive .3 m; at a walk that is less than 1.5 m.
+    prompt_s
+        By what an image is later than this, its period included, a person who turns and the robot come nearer to each
+        other unseen: the least distance grows by their way in it [s]. The workshop's camera period.
     near_hiding, foresight_s
         Distance to hold to a person who will be out of sight after so long [m, s]. Chosen: the edge of Hall's personal
         zone; the time in which the robot comes up by that much.
@@ -73,6 +76,7 @@ class TrackingController:
     full_every: int = bounded(15, 1, 1000)
     aside_s: float = bounded(1.7, 0, 5)
     brisk_share: float = bounded(0.15, 0, 1)
+    prompt_s: float = bounded(0.1, 0, 5)
     near_hiding: float = bounded(1.2, 0.5, 8)
     foresight_s: float = bounded(1.0, 0, 5)
     steering: Steering = field(default_factory=Steering)
@@ -323,6 +327,7 @@ class TrackingController:
         least = self.tracker.visibility.least_distance(person.window, person.centre, observation.height)
         late_s = observation.now - observation.stamp + state.tracks.period
         notice_s = late_s + self.aside_s / math.sqrt(state.acceleration)
+        least += 2 * state.brisk * max(late_s - self.prompt_s, 0.0)
         keeps = max(self.target_distance, least - self.robot.camera_x, notice_s * state.brisk)
         if keeps > self.near_hiding and state.ground is not None:
             pose = pose_at(state.tracks.poses, observation.now)

@@ -137,7 +137,8 @@ class Tracker:
             known = [self._walked(one, tracks.scans, stamp) for one in known]
         known = [predict(one, stamp, self.noise) for one in known]
         measured = measure(observation, self.robot)
-        pairs = self.association.pair(known, measured, pose, self.noise)
+        flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
+        pairs = self.association.pair(known, measured, pose, self.noise, flat)
         people: list[Person] = []
         recall = tracks.recall
         for who, person in enumerate(known):
@@ -156,7 +157,9 @@ class Tracker:
         boxes = {people[who].number: which for who, which in pairs.items()}
         number = tracks.next_number
         for which, seen in enumerate(measured):
-            if which not in boxes.values() and self.association.is_new(seen, people, pose):
+            if which in boxes.values() or which in flat:
+                continue
+            if self.association.is_new(seen, people, pose):
                 odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
                 people.append(initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds))
                 boxes[number] = which

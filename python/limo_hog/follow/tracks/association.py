@@ -7,7 +7,8 @@ volume of the prediction's uncertainty, and the difference of the clothes.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
 from limo_hog.follow.sense.appearance import Appearance
@@ -59,7 +60,7 @@ class Association:
         measurements: Sequence[Measurement],
         pose: Odometry,
         noise: Noise,
-        flat: Set[int] = frozenset(),
+        flat: AbstractSet[int] = frozenset(),
     ) -> dict[int, int]:
         """Pair people with boxes: confirmed people first, then by cost.
 

@@ -179,12 +179,12 @@ class Grid:
         flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
         return np.asarray(stands.ravel()[flat] & inside)
 
-    def is_free_since(self, ground: Ground, points: Points, stamp: float) -> NDArray[np.bool_]:
-        """Return whether each point was seen to be free after a stamp [s], bool (N,); outside of the square none."""
+    def freed_at(self, ground: Ground, points: Points) -> NDArray[np.float64]:
+        """Return when each point was last seen to be free [s], float64 (N,); outside of the square never, -inf."""
         cells, inside = self.index(ground, points)
-        free = np.zeros(len(points), bool)
-        free[inside] = ground.freed[cells[inside, 0], cells[inside, 1]] > stamp
-        return free
+        freed = np.full(len(points), -np.inf)
+        freed[inside] = ground.freed[cells[inside, 0], cells[inside, 1]]
+        return freed
 
     def is_near_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
         """Return whether an occupied cell is within half a cell of each point, bool (N,)."""

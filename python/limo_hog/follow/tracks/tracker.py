@@ -10,6 +10,7 @@ import numpy as np
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.appearance import Clothes
+from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement, measure
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_hog.follow.sense.visibility import Visibility
@@ -99,6 +100,8 @@ class Tracker:
         How long odometry and scans are kept [s]: a camera image may be as late as this.
     scan_period_s
         A scan may be so much older than the image it is used with [s]: the lidar's period of 0.125 s at 8 Hz.
+    walk
+        How fast people walk who are not measured [m/s]. Chosen: a brisk walk.
     min_period_s, max_period_s
         Limits of the time between two frames as it is used to predict the next [s]. Chosen: 2 to 50 Hz.
     robot
@@ -121,6 +124,7 @@ class Tracker:
     poses_s: float = 2.0
     scans_s: float = 1.0
     scan_period_s: float = 0.13
+    walk: float = 1.0
     min_period_s: float = 0.02
     max_period_s: float = 0.5
     robot: RobotGeometry = LIMO
@@ -249,27 +253,48 @@ class Tracker:
             return tracks
         newest = tracks.scans[-1]
         movers = self.movers.update(tracks.movers, newest, half_view, self.noise, grid, ground)
-        return replace(tracks, movers=movers, moved_at=newest.stamp)
+        movers = self.movers.assign(movers, [one for one in tracks.in_view if one.confirmed], newest.stamp)
+        people = tuple(
+            self.movers.continued(one, movers, newest, self.noise)
+            if one.confirmed and 0 < (tracks.stamp or 0.0) - one.seen < self.legs_only_s
+            else one
+            for one in tracks.people
+        )
+        return replace(tracks, people=people, movers=movers, moved_at=newest.stamp)
 
-    def around(self, tracks: Tracks, followed: Person | None, now: float, lately_s: float) -> tuple[list[Track], bool]:
-        """Return all people, seen by the camera or moving in the scan, as of `now` [s], and whether any is another.
+    def around(
+        self, tracks: Tracks, followed: Person | None, now: float, lately_s: float
+    ) -> tuple[list[Track], Points, Track | None]:
+        """Return all people, seen by the camera or moving in the scan, as of `now` [s].
 
-        `followed` is the person followed, as measured last; people found by the camera count for `lately_s` [s].
+        Also the places of those who are not followed and were measured within `lately_s` [s], float64 (N, 2) [m] in the
+        odometry frame, and which track is the person followed, None for none of them. `followed` is the person
+        followed, as measured last; people found by the camera count for `lately_s`.
         """
-        people, others = [], False
+        people: list[Track] = []
+        others, own = [], None
         for one in tracks.people:
             is_followed = followed is not None and one.number == followed.number
             one = followed if followed is not None and is_followed else one
             if one.confirmed and now - one.measured <= lately_s:
                 people.append(kalman.predict(one.track, now, self.noise))
-                others |= not is_followed
+                if is_followed:
+                    own = people[-1]
+                else:
+                    others.append(people[-1].mean[:2])
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)
             gaps = [math.dist(track.mean[:2], other.mean[:2]) for other in people]
             if min(gaps, default=math.inf) > self.association.same_place:
                 people.append(track)
-                others = True
-        return people, others
+                if now - mover.felt <= lately_s and not (followed and self._may_be(followed, track)):
+                    others.append(track.mean[:2])
+        return people, np.array(others).reshape(-1, 2), own
+
+    def _may_be(self, person: Person, track: Track) -> bool:
+        """Whether what moves in the scan can be a person's legs, where they have not been measured for some time."""
+        reach = self.association.same_place + self.walk * (track.stamp - person.measured)
+        return math.dist(person.track.mean[:2], track.mean[:2]) < reach
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
         poses, odometry = tracks.poses, observation.odometry

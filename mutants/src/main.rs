@@ -108,6 +108,11 @@ impl VisitMut for Mutator<'_> {
         self.visit_expr_mut(&mut repeat.expr);
     }
 
+    // (The block after a let's else must not come to its end, so it stays as it is.)
+    fn visit_local_init_mut(&mut self, init: &mut syn::LocalInit) {
+        self.visit_expr_mut(&mut init.expr);
+    }
+
     fn visit_stmt_mut(&mut self, stmt: &mut Stmt) {
         let line = stmt.span().start().line;
         let lost = match &*stmt {

@@ -41,54 +41,36 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
         [f"{FOLLOW}/control/*.py", f"{FOLLOW}/twist.py", f"{FOLLOW}/zones.py"],
         [
             *(
-                "tests/follow/control/test_steer.py",
-                "tests/follow/control/test_workshop_controllers.py",
-                "tests/follow/sense/test_clearance.py",
+                f"tests/follow/control/test_{name}.py"
+                for name in ("steer", "company", "backing", "workshop_controllers")
             ),
-            *(
-                "tests/follow/control/test_tracking.py",
-                "tests/follow/tracks/test_people.py",
-                "tests/follow/test_pipeline.py",
-            ),
+            *("tests/follow/sense/test_clearance.py", "tests/follow/control/test_tracking.py", "tests/follow/tracks"),
+            "tests/follow/test_pipeline.py",
         ],
     ),
     "tracks": (
         [f"{FOLLOW}/tracks/*.py"],
         [
-            *(
-                "tests/follow/tracks/test_kalman.py",
-                "tests/follow/tracks/test_poses.py",
-                "tests/follow/tracks/test_people.py",
-            ),
-            "tests/follow/control/test_tracking.py",
+            *(f"tests/follow/tracks/test_{name}.py" for name in ("kalman", "poses", "existence", "identity")),
+            *("tests/follow/tracks", "tests/follow/control/test_tracking.py"),
         ],
     ),
     "sense": (
         [f"{FOLLOW}/sense/{name}.py" for name in ("appearance", "measurement", "ranging", "region", "visibility")],
         [
-            *(
-                "tests/follow/sense/test_appearance.py",
-                "tests/follow/sense/test_region.py",
-                "tests/follow/tracks/test_people.py",
-            ),
-            "tests/follow/control/test_workshop_controllers.py",
-            "tests/follow/control/test_tracking.py",
+            *("tests/follow/sense/test_appearance.py", "tests/follow/sense/test_region.py", "tests/follow/tracks"),
+            *(f"tests/follow/control/test_{name}.py" for name in ("workshop_controllers", "tracking")),
             "tests/follow/test_pipeline.py",
         ],
     ),
     "run": (
         [f"{SIM}/run/{name}.py" for name in ("arena", "episode", "detector_faults", "sweep")],
         [
-            "tests/sim/run/test_arena.py",
-            "tests/sim/run/test_episode.py",
-            "tests/sim/run/test_detector_faults.py",
-            "tests/sim/run/test_score_sweep.py",
-            "tests/sim/run/test_score.py",
-            "tests/sim/world/test_robot.py",
-            "tests/sim/run/test_unchanged.py",
+            *(f"tests/sim/run/test_{name}.py" for name in ("detector_faults", "arena", "episode", "score_sweep")),
+            *("tests/sim/run/test_everywhere.py", "tests/sim/world/test_robot.py", "tests/sim/run/test_unchanged.py"),
         ],
     ),
-    "env": ([f"{SIM}/env.py"], ["tests/sim/test_env.py"]),
+    "env": ([f"{SIM}/env/*.py"], ["tests/sim/test_env.py", "tests/sim/test_env_v1.py"]),
     "messages": ([f"{ROS2}/messages.py"], ["tests/ros2/test_messages.py"]),
 }
 #: Libraries that are imported before the forks; ours are imported in each.

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+import gc
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from typing import Any
 
 import aiohttp
 import numpy as np
@@ -97,6 +100,27 @@ def test_a_client_that_does_not_read_is_dropped_and_one_that_does_is_served(
             with suppress(ConnectionResetError):
                 while client.recv(1 << 20):
                     pass
+
+
+def test_clients_that_do_not_read_keep_no_frames_of_the_run(moments: list[Moment]) -> None:
+    images: list[weakref.ref[Any]] = []
+
+    def show(view: View) -> None:
+        for moment in moments:
+            assert moment.frame
+            frame = dataclasses.replace(moment.frame, image=moment.frame.image.copy())
+            images.append(weakref.ref(frame.image))
+            view.watch(dataclasses.replace(moment, frame=frame))
+            time.sleep(0.05)
+
+    with View(WORKSHOP, pace=Pace(0)) as view, ExitStack() as clients:
+        # One after another, so that each stalls at a moment of its own.
+        for _ in range(12):
+            clients.enter_context(stalled(view.url, 1))
+            show(view)
+        gc.collect()
+        # The newest, the one whose pictures were made last, and one that is being encoded.
+        assert sum(image() is not None for image in images) <= 3
 
 
 def test_ten_pages_share_their_pictures(moments: list[Moment], monkeypatch: pytest.MonkeyPatch) -> None:

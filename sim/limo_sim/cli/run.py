@@ -55,11 +55,14 @@ def run(args: argparse.Namespace) -> int:
     if args.words and not args.node.name.endswith(".launch.py"):
         raise UsageError(f"{args.words[0]}: only a launch file has arguments; a node's come after --ros-args")
     from limo_sim.run.catalogue import load
+    from limo_sim.run.score import Scorer
+    from limo_sim.world.variants import of_run
 
     with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
         from limo_sim.ros.apart import run_apart
         from limo_sim.ros.script import score_of
-    scenario = load(args.scenario)
+    scenario = of_run(load(args.scenario), args.seed)
+    scorer = Scorer(scenario)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
             # What the node prints must not mix with the JSON.
@@ -70,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
         def watch(moment: Moment) -> None:
             bar.update(task, completed=round(moment.step.time, 1))
+            scorer.add(moment.step)
             audience.watch(moment)
 
         def log(time: float, level: str, name: str, message: str) -> None:
@@ -85,8 +89,10 @@ def run(args: argparse.Namespace) -> int:
             log=log,
             watch=watch,
             pictures=bool(audience),
+            # (The figure shows all of them.)
+            keep=args.plot is not None,
         )
-        card = score_of(ended)
+        card = score_of(ended, scorer)
         bar.stop()
         audience.end(ended.episode, card)
     if args.json:

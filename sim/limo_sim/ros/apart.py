@@ -76,6 +76,7 @@ def run_apart(
     watch: Callable[[Moment], None] | None = None,
     pictures: bool = True,
     patience: float = 20.0,
+    keep: bool = True,
 ) -> Ended:
     """Run a script as `run_script` does, in a process of its own; its arguments mean the same.
 
@@ -104,7 +105,7 @@ def run_apart(
     child.start()
     theirs.close()
     try:
-        ended = _listen(ours, child, past, job, log, watch)
+        ended = _listen(ours, child, past, job, log, watch, keep)
     finally:
         ours.close()
         child.join(_END_S)
@@ -114,7 +115,9 @@ def run_apart(
             child.join()
     if ended is not None:
         return replace(ended, episode=replace(ended.episode, steps=tuple(past.steps)))
-    world = World(scenario, seed, seconds, script=script, log=log, watch=watch, patience=patience, began=began)
+    world = World(
+        scenario, seed, seconds, script=script, log=log, watch=watch, patience=patience, began=began, keep=keep
+    )
     world.take_over(past, clock.value)
     world.fault = _why(child, silent, patience)
     return finished(world)
@@ -143,6 +146,7 @@ def _listen(
     job: _Job,
     log: Log,
     watch: Callable[[Moment], None] | None,
+    keep: bool,
 ) -> Ended | None:
     """Take what the process tells until the run is over; None where it dies or falls silent before."""
     limit = _START_S
@@ -161,13 +165,14 @@ def _listen(
             return None
         if told == "moment":
             moment, asked, target = content
-            past.steps.append(moment.step)
+            past.add(moment.step, keep)
             past.asked, past.target_distance = asked, target
             if watch is not None:
                 watch(moment)
             connection.send_bytes(b"go on")
         elif told == "commands":
-            past.commands += content
+            for command in content:
+                past.commands.extend((command.time, command.twist.linear, command.twist.angular))
         elif told == "log":
             log(*content)
         elif told == "print":
@@ -216,8 +221,10 @@ class _Link:
             return
         self._clock.value = world.time
         if len(world.commands) > self._commands:
-            commands, self._commands = world.commands[self._commands :], len(world.commands)
-            self.tell("commands", commands)
+            self.tell("commands", world.commands[self._commands :])
+            # The newest is in force; the others are needed in the other process alone.
+            del world.commands[:-1]
+            self._commands = 1
 
     def log(self, *line: Any) -> None:
         """Pass on what the node logs."""
@@ -275,12 +282,12 @@ def _run(connection: Connection, job: _Job) -> None:
             watch=link.watch,
             patience=job.patience,
             made=link.made,
+            # The steps are sent one by one.
+            keep=False,
         )
     except (KeyboardInterrupt, EOFError) as error:
         link.tell("error", KeyboardInterrupt(*error.args))
     except (LimoHogError, OSError, MemoryError) as error:
         link.tell("error", error)
     else:
-        # The steps were sent one by one.
-        episode = replace(outcome.episode, steps=())
-        link.tell("end", Ended(episode, outcome.failure, outcome.traceback, outcome.asked))
+        link.tell("end", Ended(outcome.episode, outcome.failure, outcome.traceback, outcome.asked))

@@ -19,7 +19,7 @@ from limo_sim.ros.lockstep.windows import watched_cv2
 from limo_sim.ros.lockstep.world import World
 from limo_sim.ros.rclpy_stub.context import Context
 from limo_sim.run.episode import Episode, Moment
-from limo_sim.run.score import ScoreCard, score
+from limo_sim.run.score import ScoreCard, Scorer
 from limo_sim.world.scenario import Scenario
 
 #: Simulated time after a script's failure, in which the watchdog stops the robot [s]: 0.5 s and 1 m/s over 1 m/s².
@@ -68,6 +68,7 @@ def run_script(
     watch: Callable[[Moment], None] | None = None,
     patience: float = 20.0,
     made: Callable[[World], None] | None = None,
+    keep: bool = True,
 ) -> Outcome:
     """Run a script as `python SCRIPT ARGUMENTS` would, with the arena behind its topics.
 
@@ -87,6 +88,9 @@ def run_script(
         Wall time that the script may take without letting simulated time pass [s].
     made
         Called with the world before the script runs.
+    keep
+        Whether the log holds the steps, 4 kB each, and when each callback ran. Without them a run's memory does not
+        grow, and a `Scorer` that `watch` feeds measures it.
 
     Raises
     ------
@@ -97,7 +101,7 @@ def run_script(
     """
     if not script.is_file():
         raise StubError(f"{script}: no such file")
-    world = World(scenario, seed, seconds, script=script, log=log, watch=watch, patience=patience)
+    world = World(scenario, seed, seconds, script=script, log=log, watch=watch, patience=patience, keep=keep)
     if made is not None:
         made(world)
     argv, path = sys.argv, list(sys.path)
@@ -140,19 +144,22 @@ def finished(world: World) -> Outcome:
     return Outcome(world.episode(), failure, shown, bool(world.asked), world)
 
 
-def score_of(outcome: Ended) -> ScoreCard:
+def score_of(outcome: Ended, scorer: Scorer | None = None) -> ScoreCard:
     """Measure a run; where the script does not use cv2's HOG detector, figures of detections are None.
 
     Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
+    `scorer` is one that was given every step; without it, the steps are those that the run kept.
     """
-    card = score(outcome.episode)
+    if scorer is None:
+        scorer = Scorer(outcome.episode.scenario)
+        for step in outcome.episode.steps:
+            scorer.add(step)
+    card = scorer.card(outcome.episode)
     if outcome.asked:
         return card
-    twists = [step.decision.twist for step in outcome.episode.steps]
-    driving = sum(bool(twist.linear or twist.angular) for twist in twists) / max(len(twists), 1)
     return replace(
         card,
-        modes={"drive": driving, "stand": 1.0 - driving},
+        modes={"drive": scorer.driving, "stand": 1.0 - scorer.driving},
         first_detection_s=None,
         detected=None,
         best_box_wrong=None,

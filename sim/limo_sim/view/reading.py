@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.sense.ranging import box_centre, person_depth
 from limo_hog.follow.zones import zone_of
 from limo_hog.imaging.drawing import annotate
 from limo_sim.run.episode import Step
 from limo_sim.sensing.camera import WIDTH, Frame
+from limo_sim.sensing.lidar import MOUNT_AHEAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,3 +99,42 @@ def depth_colours(far: float, count: int = 17) -> list[str]:
     """Return the colours of `depth_picture` at evenly spaced depths from 0 to `far` [m], as #rrggbb."""
     scale = depth_picture(np.linspace(0, far, count, dtype=np.float32)[None], far)[0]
     return [f"#{red:02x}{green:02x}{blue:02x}" for blue, green, red in scale.tolist()]
+
+
+def hits(scan: Scan | None, poses: list[tuple[float, float, float, float]]) -> list[list[float]]:
+    """Return every second lidar hit in the arena's frame [m], to the centimetre, by the pose at the scan's time."""
+    if scan is None:
+        return []
+    times, *pose = np.array(poses).T
+    x, y, yaw = (float(np.interp(scan.stamp, times, values)) for values in (*pose[:2], np.unwrap(pose[2])))
+    ranges: NDArray[np.float64] = scan.ranges.astype(np.float64)
+    angles = yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
+    hit = np.isfinite(ranges)
+    hit[1::2] = False
+    points = np.stack(
+        [
+            x + MOUNT_AHEAD * math.cos(yaw) + ranges[hit] * np.cos(angles[hit]),
+            y + MOUNT_AHEAD * math.sin(yaw) + ranges[hit] * np.sin(angles[hit]),
+        ],
+        axis=1,
+    )
+    rounded: list[list[float]] = np.round(points, 2).tolist()
+    return rounded
+
+
+def believed(step: Step) -> list[list[float | None]]:
+    """Return where the follower takes people to be, x, y [m] in the arena's frame, with two probabilities.
+
+    They are of being a person, and of being the person followed; None for that before one was followed.
+    """
+    x, y, yaw = step.truth.robot
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return [
+        [
+            round(x + cos * one.x - sin * one.y, 2),
+            round(y + sin * one.x + cos * one.y, 2),
+            round(one.probability, 2),
+            None if one.same is None else round(one.same, 2),
+        ]
+        for one in step.decision.belief.people
+    ]

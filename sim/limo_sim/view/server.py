@@ -10,32 +10,37 @@ import asyncio
 import itertools
 import json
 import logging
-import math
 import socket
 import threading
 from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from typing import Any
 
-import numpy as np
 from aiohttp import WSMsgType, web
-from numpy.typing import NDArray
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
-from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.zones import ZONE_ENDS
 from limo_hog.imaging.writing import jpeg
-from limo_sim.run.episode import Moment, Step
+from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FIELD
-from limo_sim.sensing.lidar import MOUNT_AHEAD
 from limo_sim.view.access import HEADERS, Access, QuietLogger
 from limo_sim.view.controls import MAX_BYTES, apply
 from limo_sim.view.pace import Pace
-from limo_sim.view.reading import annotated, depth_colours, depth_picture, followed_person, measured_m, reading
+from limo_sim.view.reading import (
+    annotated,
+    believed,
+    depth_colours,
+    depth_picture,
+    followed_person,
+    hits,
+    measured_m,
+    reading,
+)
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.furniture import Disc
 from limo_sim.world.scenario import Scenario
@@ -129,7 +134,8 @@ class View:
         self._host, self._port = host, port
         self.pace = pace or Pace()
         self._newest: Moment | None = None
-        self._pictured: Moment | None = None
+        # The newest moment with a frame, with its number.
+        self._pictured: tuple[int, Moment] | None = None
         self._rows: deque[list[float | None]] = deque(maxlen=_REMEMBERED)
         self._written = 0
         # Index of the person followed last; None before, and during a search.
@@ -139,10 +145,12 @@ class View:
         self._ended: Mapping[str, Any] | None = None
         # Open pages, each with the task that shows it the run; the newest pictures, encoded once for all of them.
         self._pages: dict[_Page, asyncio.Task[None]] = {}
-        self._encoded: tuple[Moment, asyncio.Future[list[bytes]]] | None = None
+        self._encoded: tuple[int, asyncio.Future[list[bytes]]] | None = None
         self._over = asyncio.Event()
         self._access = Access(host, loopback=True)
         self._loop = asyncio.new_event_loop()
+        # One thread encodes: what it makes serves all pages, and each thread more would keep megabytes of its own.
+        self._loop.set_default_executor(ThreadPoolExecutor(1, thread_name_prefix="limo-hog pictures"))
         self._thread = threading.Thread(target=self._loop.run_forever, name="limo-hog view", daemon=True)
         self._runner: web.AppRunner | None = None
 
@@ -155,7 +163,7 @@ class View:
     def watch(self, moment: Moment) -> None:
         """Show a moment, and return when the run may go on."""
         if moment.frame is not None:
-            self._pictured = moment
+            self._pictured = self._written, moment
         now, robot = reading(moment.step), moment.step.truth.robot
         people = [(None, None) if p is None else (p.x, p.y) for p in moment.step.truth.people]
         measured = measured_m(moment.frame, moment.step)
@@ -283,25 +291,29 @@ class View:
         }
 
     async def _show(self, page: _Page) -> None:
-        """Send a page what is new, as fast as it takes it and no faster than `PERIOD`; nothing else sends to it."""
+        """Send a page what is new, as fast as it takes it and no faster than `PERIOD`; nothing else sends to it.
+
+        While a page takes its time, this holds no moment, whose frame is 2 MB: numbers tell what was sent.
+        """
         shown: tuple[Any, ...] = ()
-        pictured, told = None, 0
+        pictured, told = -1, 0
         with suppress(OSError):
             await page.send(self._welcome())
             while not page.client.closed:
                 while page.complaints:
                     await page.send({"complaint": page.complaints.popleft()})
-                newest, frame = self._newest, self._pictured
-                now = (newest, self.pace.paused, self.pace.speed)
-                if newest is not None and now != shown:
+                written = self._written
+                now = (written, self.pace.paused, self.pace.speed)
+                if self._newest is not None and now != shown:
                     shown = now
-                    written = self._written
                     rows = list(self._rows)[-(written - told) :] if written > told else []
                     told = written
-                    await page.send({"state": self._state(newest), "rows": rows})
-                    if frame is not None and frame is not pictured:
-                        pictured = frame
-                        for picture in await self._pictures_of(frame):
+                    encoded = self._newest_pictures()
+                    await page.send({"state": self._state(self._newest), "rows": rows})
+                    if encoded is not None and encoded[0] != pictured:
+                        pictured, pictures = encoded
+                        # A page that leaves does not take the pictures from the others.
+                        for picture in await asyncio.shield(pictures):
                             await page.send(picture)
                 if self._over.is_set():
                     await page.send({"ended": _finite(self._ended or {})})
@@ -311,12 +323,12 @@ class View:
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(self._over.wait(), PERIOD if self.pace.speed else 2 * PERIOD)
 
-    async def _pictures_of(self, moment: Moment) -> list[bytes]:
-        """Encode the pictures of a moment, once for all pages and beside the server's loop."""
-        if self._encoded is None or self._encoded[0] is not moment:
-            self._encoded = moment, self._loop.run_in_executor(None, self._pictures, moment)
-        # A page that leaves does not take the pictures from the others.
-        return await asyncio.shield(self._encoded[1])
+    def _newest_pictures(self) -> tuple[int, asyncio.Future[list[bytes]]] | None:
+        """Encode the newest pictures, once for all pages and beside the server's loop; None without any."""
+        if self._pictured is not None and (self._encoded is None or self._encoded[0] != self._pictured[0]):
+            number, moment = self._pictured
+            self._encoded = number, self._loop.run_in_executor(None, self._pictures, moment)
+        return self._encoded
 
     def _state(self, moment: Moment) -> dict[str, Any]:
         step = moment.step
@@ -327,9 +339,9 @@ class View:
             "robot": step.truth.robot,
             "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
             "followed": self._followed,
-            "believed": _believed(step),
+            "believed": believed(step),
             "measured_m": measured_m(moment.frame, step),
-            "scan": _hits(moment.scan, list(self._poses)),
+            "scan": hits(moment.scan, list(self._poses)),
             "detect_ms": step.frame.detect_ms or None if step.frame else None,
             "boxes": len(step.detections),
             "contacts": asdict(step.truth.contacts),
@@ -361,45 +373,6 @@ def _page(name: str, kind: str) -> Any:
         return web.Response(body=body, content_type=kind, charset="utf-8", headers={"Cache-Control": "no-cache"})
 
     return answer
-
-
-def _hits(scan: Scan | None, poses: list[tuple[float, float, float, float]]) -> list[list[float]]:
-    """Return every second lidar hit in the arena's frame [m], to the centimetre, by the pose at the scan's time."""
-    if scan is None:
-        return []
-    times, *pose = np.array(poses).T
-    x, y, yaw = (float(np.interp(scan.stamp, times, values)) for values in (*pose[:2], np.unwrap(pose[2])))
-    ranges: NDArray[np.float64] = scan.ranges.astype(np.float64)
-    angles = yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
-    hit = np.isfinite(ranges)
-    hit[1::2] = False
-    points = np.stack(
-        [
-            x + MOUNT_AHEAD * math.cos(yaw) + ranges[hit] * np.cos(angles[hit]),
-            y + MOUNT_AHEAD * math.sin(yaw) + ranges[hit] * np.sin(angles[hit]),
-        ],
-        axis=1,
-    )
-    rounded: list[list[float]] = np.round(points, 2).tolist()
-    return rounded
-
-
-def _believed(step: Step) -> list[list[float | None]]:
-    """Return where the follower takes people to be, x, y [m] in the arena's frame, with two probabilities.
-
-    They are of being a person, and of being the person followed; None for that before one was followed.
-    """
-    x, y, yaw = step.truth.robot
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return [
-        [
-            round(x + cos * one.x - sin * one.y, 2),
-            round(y + sin * one.x + cos * one.y, 2),
-            round(one.probability, 2),
-            None if one.same is None else round(one.same, 2),
-        ]
-        for one in step.decision.belief.people
-    ]
 
 
 def _finite(values: Mapping[str, Any]) -> dict[str, Any]:

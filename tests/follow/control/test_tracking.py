@@ -346,3 +346,49 @@ def test_what_moves_beside_is_kept_in_mind_while_a_person_is_followed() -> None:
         world.time += world.period
     assert decision.mode in (Mode.FOLLOW, Mode.HOLD)
     assert any(math.dist(one.track.mean[:2], legs[1]) < 0.3 for one in state.tracks.movers)
+
+
+def walking(world: World, state: TrackingState, legs: list[tuple[float, float]]) -> Decision[TrackingState]:
+    """Let a person's legs be at these places, whom the camera does not show, with a robot that stands."""
+    for x, y in legs:
+        points = [(x - 0.05, y - 0.04), (x - 0.05, y), (x + 0.05, y), (x + 0.05, y + 0.04)]
+        decision = CONTROLLER.step(replace(world.observe(visible=False), scan=scan_of(points, world.time)), state)
+        state = decision.state
+        world.time += world.period
+    return decision
+
+
+def test_before_a_person_is_found_it_turns_to_what_walks_beside_it() -> None:
+    world = World(person=(-3.0, 0.0))
+    walked = [(0.3 + 0.06 * step, -1.8) for step in range(25)]
+    decision = walking(world, CONTROLLER.start(), walked)
+    assert decision.mode is Mode.SEARCH
+    assert decision.reason == "turning to what moves in the scan"
+    assert decision.twist.angular < -0.5
+    assert decision.twist.linear == 0
+    # Nothing moves where legs stand: it searches to the side it began with.
+    standing = walking(World(person=(-3.0, 0.0)), CONTROLLER.start(), [(0.3, -1.8)] * 25)
+    assert standing.twist.angular == CONTROLLER.search.rate
+
+
+def test_a_person_who_leaves_the_view_is_followed_by_the_lidar_as_long_as_they_move() -> None:
+    world, state = World(person=(2.0, 0.0)), CONTROLLER.start()
+    for step in range(30):
+        y = 0.0 if step < 12 else 0.07 * (step - 12)
+        world.person = (2.0, y)
+        legs = [(2.0 + dx, y + dy) for dx, dy in ((-0.05, -0.04), (-0.05, 0.0), (0.05, 0.0), (0.05, 0.04))]
+        state = CONTROLLER.step(replace(world.observe(), scan=scan_of(legs, world.time)), state).state
+        world.time += world.period
+    number = state.choice.number
+    # Beyond the camera's view, for longer than legs alone are followed.
+    at, decision = 1.26, None
+    for step in range(60):
+        at += 0.05 if step < 20 else 0.0
+        x = 2.0 - (0.05 * (step - 20) if step >= 20 else 0.0)
+        decision = walking(world, state, [(x, at)])
+        state = decision.state
+        if decision.mode is Mode.LOST:
+            break
+    assert decision is not None
+    assert step > 45
+    assert decision.belief.followed == number or decision.mode is Mode.LOST

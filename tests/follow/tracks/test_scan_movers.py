@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.legs import Returns
 from limo_hog.follow.tracks.movers import Mover, Movers
 from limo_hog.follow.tracks.person import Person
 
-MOVERS, NOISE, HALF_VIEW, SCAN_S = Movers(), Noise(), 2.0, 0.125
+MOVERS, NOISE, HALF_VIEW, SCAN_S, GRID = Movers(), Noise(), 2.0, 0.125, Grid()
+#: Ground that is free from now on, wherever nothing is.
+FREE = replace(GRID.start(Odometry()), freed=np.full((GRID.cells, GRID.cells), np.inf, np.float32))
 
 
 def legs(x: float, y: float, phase: float) -> list[tuple[float, float]]:
@@ -23,26 +26,17 @@ def legs(x: float, y: float, phase: float) -> list[tuple[float, float]]:
     return [(x + side * swing, y + side * 0.06 + d) for side in (-1, 1) for d in (-0.02, 0.0, 0.02)]
 
 
-def scanned(points: list[tuple[float, float]]) -> Points:
-    """These points and the walls of a room, in the order of the beams; what is behind the points is hidden."""
-    shown = [math.atan2(y, x - LIMO.lidar_x) for x, y in points]
-    walls = []
-    for angle in np.linspace(-HALF_VIEW, HALF_VIEW, 292):
-        if all(abs(angle - other) > 0.04 for other in shown):
-            far = 4.0 / max(abs(math.cos(angle)), abs(math.sin(angle)))
-            walls.append((LIMO.lidar_x + far * math.cos(angle), far * math.sin(angle)))
-    return np.array(sorted(points + walls, key=lambda point: math.atan2(point[1], point[0] - LIMO.lidar_x)))
-
-
 def walk(start: tuple[float, float], velocity: tuple[float, float], scans: int) -> tuple[Mover, ...]:
-    """What moves after so many scans of a robot that stands in a room of 8 x 8 m; it sees ±115°."""
+    """What moves after so many scans of a robot that stands, with a wall 3 m to its left; it sees ±115°."""
     movers: tuple[Mover, ...] = ()
+    wall = [(0.05 * step - 3.0, 3.0) for step in range(120)]
     for index in range(scans):
         time = index * SCAN_S
         x, y = start[0] + velocity[0] * time, start[1] + velocity[1] * time
         shown = abs(math.atan2(y, x - LIMO.lidar_x)) < HALF_VIEW
-        points = scanned(legs(x, y, 9.0 * time) * shown)
-        movers = MOVERS.update(movers, Returns(time, points, Odometry()), HALF_VIEW, NOISE)
+        # In the order of the beams.
+        points = np.array(sorted(legs(x, y, 9.0 * time) * shown + wall, key=lambda one: math.atan2(one[1], one[0])))
+        movers = MOVERS.update(movers, Returns(time, points, Odometry()), HALF_VIEW, NOISE, GRID, FREE)
     return movers
 
 
@@ -71,20 +65,36 @@ def test_a_person_who_is_gone_from_where_the_lidar_looks_is_forgotten_at_once() 
     assert MOVERS.moving(movers)
     nothing = np.empty((0, 2))
     for index in range(10, 16):
-        movers = MOVERS.update(movers, Returns(index * SCAN_S, nothing, Odometry()), HALF_VIEW, NOISE)
+        movers = MOVERS.update(movers, Returns(index * SCAN_S, nothing, Odometry()), HALF_VIEW, NOISE, GRID, FREE)
     assert movers == ()
 
 
-def test_a_piece_of_wall_that_shows_through_a_gap_does_not_move() -> None:
+def test_what_is_seen_of_a_wall_beside_a_nearer_post_does_not_begin_to_move() -> None:
+    wall = [(2.0, 0.05 * step) for step in range(6)]
+    beside_a_post = np.array([(1.0, -0.1), (1.0, -0.05), *wall])
+    alone = np.array([(3.0, -0.9), (3.0, -0.5), *wall])
+    for points, begun in ((beside_a_post, 1), (alone, 1)):
+        movers = MOVERS.update((), Returns(0.0, points, Odometry()), HALF_VIEW, NOISE, GRID, FREE)
+        assert len(movers) == begun
+    assert math.dist(movers[0].began, (2.0, 0.125)) < 1e-6
+
+
+def test_the_end_of_a_wall_that_comes_into_view_does_not_move_for_it_is_still_wall_where_it_began() -> None:
+    wall_stays = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
+    for ground, moving in ((FREE, 1), (wall_stays, 0)):
+        movers: tuple[Mover, ...] = ()
+        for index in range(12):
+            seen = np.array([(2.0, 0.07 * index + 0.05 * step) for step in range(5)])
+            movers = MOVERS.update(movers, Returns(index * SCAN_S, seen, Odometry()), HALF_VIEW, NOISE, GRID, ground)
+        assert len(MOVERS.moving(movers)) == moving
+
+
+def test_what_the_camera_has_shown_for_long_is_counted() -> None:
     movers: tuple[Mover, ...] = ()
-    for index in range(20):
-        # Two wide things go along with the robot, and between them a piece of the wall behind shows.
-        x = 0.1 * index
-        ahead, back = ([(x + 0.02 * step, 1.2) for step in side] for side in (range(45, 10, -1), range(-3, -40, -1)))
-        behind = [(x + 0.02 * step, 2.5) for step in range(20, -4, -1)]
-        points = np.array([*ahead, *behind, *back])
-        movers = MOVERS.update(movers, Returns(index * SCAN_S, points, Odometry(x=x)), HALF_VIEW, NOISE)
-    assert MOVERS.moving(movers) == []
+    for index in range(10):
+        points = np.array(legs(2.0, 0.06 * index - 0.3, 1.0 * index))
+        movers = MOVERS.update(movers, Returns(index * SCAN_S, points, Odometry()), HALF_VIEW, NOISE, GRID, FREE, 0.5)
+    assert movers[0].shown == movers[0].scans - 1
 
 
 def person(number: int, x: float, y: float, stamp: float) -> Person:
@@ -94,12 +104,11 @@ def person(number: int, x: float, y: float, stamp: float) -> Person:
 
 
 def test_the_legs_of_a_person_continue_the_track_that_the_camera_does_not_show() -> None:
-    movers = MOVERS.assign(walk((1.5, -0.4), (0.0, 0.5), 8), [person(7, 1.55, 0.05, 0.875)], 0.875)
-    assert [one.number for one in movers] == [7]
-    points = scanned(legs(1.5, 0.1, 9.0))
-    returns = Returns(1.0, points, Odometry())
-    movers = MOVERS.update(movers, returns, HALF_VIEW, NOISE)
     known = person(7, 1.55, 0.05, 0.875)
+    movers = MOVERS.assign(walk((1.5, -0.4), (0.0, 0.5), 8), [known], 0.875)
+    assert [one.number for one in movers] == [7]
+    returns = Returns(1.0, np.array(legs(1.5, 0.1, 9.0)), Odometry())
+    movers = MOVERS.update(movers, returns, HALF_VIEW, NOISE, GRID, FREE)
     continued = MOVERS.continued(known, movers, returns, NOISE)
     assert continued.felt == 1.0
     assert math.dist(continued.track.mean[:2], (1.5, 0.1)) < math.dist(known.track.mean[:2], (1.5, 0.1))
@@ -109,7 +118,7 @@ def test_the_legs_of_a_person_continue_the_track_that_the_camera_does_not_show()
 
 
 def test_two_people_side_by_side_have_one_pair_of_legs_each() -> None:
-    movers = tuple(Mover(person(0, 1.5, y, 1.0).track, (1.5, y), 1.0, 5) for y in (0.0, 0.3))
+    movers = tuple(Mover(person(0, 1.5, y, 1.0).track, (1.5, y), 0.0, 1.0) for y in (0.0, 0.3))
     people = [person(1, 1.6, 0.2, 1.0), person(2, 1.5, 0.35, 1.0)]
     assert [one.number for one in MOVERS.assign(movers, people, 1.0)] == [1, 2]
     # The number goes along with the person, and is given once.

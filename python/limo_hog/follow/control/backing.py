@@ -140,7 +140,7 @@ class Backing:
         y = poses[..., 1, None] + behind[:, 0] * sin + behind[:, 1] * cos
         places = to_odometry(np.stack([x.ravel(), y.ravel()], axis=1), pose)
         within = np.where(self.can_hold_other(others, places, ground.stamp), self.lately_s, self.remembers_s)
-        known = grid.freed_at(ground, places) > ground.stamp - within
+        known = grid.is_free_since(ground, places, ground.stamp - within)
         return np.asarray(known.reshape(x.shape).all(axis=-1))
 
     def is_blocked(self, pose: Odometry, grid: Grid, ground: Ground | None, robot: RobotGeometry) -> bool:

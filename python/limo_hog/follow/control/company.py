@@ -113,8 +113,8 @@ class Company:
         much [m]. Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by
         .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
     away
-        What a way costs on which the person followed is out of the image all the time [m]. Chosen: less than the
-        clearance wanted.
+        What a way costs on which the person followed is out of the image all the time [m], unless it is they who come.
+        Chosen: less than the clearance wanted.
     half_view, unseen
         How far to either side the lidar looks [rad], and what a way costs on which nobody who comes is in its sight
         [m]. Chosen: the Limo's; the error of a place that is not measured for a second.
@@ -209,7 +209,8 @@ class Company:
         effort = self.ease * (np.abs(speeds - now.linear) + 0.4 * np.abs([way.turn for way in ways]))
         worth = np.minimum(gaps[1:], self.wanted) @ self.weights - effort
         worth -= self.unseen * self._unseen(poses[1:], places[:, 0])
-        worth -= self.away * self._away(poses[1:], goal, robot)
+        if not is_followed.any():
+            worth -= self.away * self._away(poses[1:], goal, robot)
         worth[self._room(poses[1:], near, robot) < self.walls] -= self.never
         if may_back is not None:
             blind = (backs[1:] & ~may_back(poses[1:])).any(axis=1)

@@ -166,9 +166,11 @@ class TrackingController:
         if twist.linear < 0 and not self.backing.is_free_behind(
             facing, pose, self.grid, state.ground, others, self.robot
         ):
-            stands = self.backing.is_blocked(pose, self.grid, state.ground, self.robot)
-            limit = 0.0 if stands else self.backing.blind_limit(others, pose, self.robot, observation.now)
-            twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
+            if self.backing.is_blocked(pose, self.grid, state.ground, self.robot):
+                twist = Twist(0.0, twist.angular)
+            else:
+                limit = self.backing.blind_limit(others, pose, self.robot, observation.now)
+                twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(
             state,
@@ -224,7 +226,7 @@ class TrackingController:
         if scan is None or observation.odometry is None:
             return state
         half_view = min(-scan.angle_min, scan.angle_max)
-        tracks = self.tracker.follow_movers(tracks, half_view, self.grid, state.ground)
+        tracks = self.tracker.follow_movers(tracks, half_view, self.lookout.half_view, self.grid, state.ground)
         state = replace(state, tracks=tracks)
         if state.ground is not None and scan.stamp < state.ground.stamp + self.grid.period_s:
             return state
@@ -243,6 +245,9 @@ class TrackingController:
         other = any(self.selection.is_stranger(one, choice) for one in tracks.in_view)
         lost = choice.measured is not None
         known, ground, scan = state.known, state.ground, observation.scan
+        if (off := self._off_unknown(state, observation)) is not None:
+            twist, mode, reason = self.search.towards(off, lost=lost)
+            return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
         if (
             lost
             and known is not None
@@ -254,6 +259,19 @@ class TrackingController:
             return replace(decision, reason=f"{decision.reason}: another is in view") if other else decision
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
         return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
+
+    def _off_unknown(self, state: TrackingState, observation: Observation) -> float | None:
+        """Return the bearing [rad] of what moves in the scan and may be the person; None where there is none.
+
+        A lost person cannot be further off than they walk.
+        """
+        now, known = observation.now, state.known
+        pose = pose_at(state.tracks.poses, now)
+        tracks = self.tracker.may_be(state.choice.number, state.tracks, now)
+        if known is not None:
+            reach = self.tracker.association.same_place + self.lookout.wandering.walk * (now - known.stamp)
+            tracks = [one for one in tracks if math.dist(one.mean[:2], known.mean[:2]) < reach]
+        return min((bearing_range(one, pose)[0] for one in tracks), key=abs, default=None)
 
     def _look_at(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
         """Stand and keep those in view of whom one is the person followed, until it shows which."""

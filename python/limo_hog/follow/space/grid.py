@@ -179,12 +179,12 @@ class Grid:
         flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
         return np.asarray(stands.ravel()[flat] & inside)
 
-    def freed_at(self, ground: Ground, points: Points) -> NDArray[np.float64]:
-        """Return when each point was last seen to be free [s], float64 (N,); outside of the square never, -inf."""
+    def is_free_since(self, ground: Ground, points: Points, stamps: float | NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether each point was seen to be free after its stamp [s], bool (N,); outside of the square none."""
         cells, inside = self.index(ground, points)
-        freed = np.full(len(points), -np.inf)
-        freed[inside] = ground.freed[cells[inside, 0], cells[inside, 1]]
-        return freed
+        free = np.zeros(len(points), bool)
+        free[inside] = ground.freed[cells[inside, 0], cells[inside, 1]] > np.broadcast_to(stamps, len(points))[inside]
+        return free
 
     def is_near_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
         """Return whether an occupied cell is within half a cell of each point, bool (N,)."""

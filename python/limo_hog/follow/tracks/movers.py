@@ -30,26 +30,34 @@ class Mover:
     ----------
     track
         Position and velocity.
-    began
-        Where it was first, x and y in the odometry frame [m].
+    began, since
+        Where it was first, x and y in the odometry frame [m], and when [s].
+    left
+        Whether that place was seen to be empty since.
     felt
         Stamp of the last scan that showed it [s].
-    scans
-        How many did [1].
+    scans, shown
+        How many did, and for how many of these the camera looked there and showed no person [1].
     number
-        Of the person whose legs they are; None while that is not known.
+        Of the person whom the camera showed there last; None if it showed none.
     """
 
     track: Track
     began: tuple[float, float]
+    since: float
     felt: float
+    left: bool = False
     scans: int = 1
+    shown: int = 0
     number: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Movers:
     """Follows what moves in the scan.
+
+    The end of what is seen of a wall, where a corner or a person hides the rest, moves as well; what it has moved from
+    is still wall. So a group moves only when the place where it began is empty.
 
     Attributes
     ----------
@@ -58,8 +66,6 @@ class Movers:
         shins are two beams.
     gap
         Returns further apart than this are of two groups [m]. Chosen: in mid-stride the shins of a .9 m person.
-    open
-        Beams that return nothing over so much show no wall [rad]. Chosen: seven beams of the Limo's lidar.
     fewest_scans, least_way
         It counts as moving after so many scans, so far from where it began [1, m]. Chosen: half a second; more than the
         middle of the legs of a person who shifts from one to the other moves.
@@ -67,6 +73,9 @@ class Movers:
         It is given up when a scan should have shown it for so long [s]. Chosen: four scans; one leg hides the other.
     unseen_s
         Where the lidar does not look, it is predicted for so long [s]. Chosen: at a walk, past the blind angle behind.
+    looks
+        After so many scans for which the camera looked there, it is no more turned to [1]. Chosen: a second and a half;
+        of people who are found in three frames of ten one in two hundred is not found in it.
     beside
         A person is this far from their legs at most [m]. Chosen: as `Legs.radius`, and the error of the depth.
     robot
@@ -75,11 +84,11 @@ class Movers:
 
     legs: Legs = field(default_factory=lambda: Legs(reach=3.5))
     gap: float = 0.3
-    open: float = 0.1
     fewest_scans: int = 4
     least_way: float = 0.25
     forget_s: float = 0.5
     unseen_s: float = 3.0
+    looks: int = 12
     beside: float = 0.4
     robot: RobotGeometry = LIMO
 
@@ -89,31 +98,51 @@ class Movers:
         returns: Returns,
         half_view: float,
         noise: Noise,
-        grid: Grid | None = None,
-        ground: Ground | None = None,
+        grid: Grid,
+        ground: Ground | None,
+        camera: float = 0.0,
     ) -> tuple[Mover, ...]:
-        """Return what may move after a scan, whose lidar looks `half_view` [rad] to either side.
+        """Return what may move after a scan; lidar and camera look `half_view` and `camera` [rad] to either side.
 
-        `grid` and `ground` tell what has stood for long: its returns are not looked at.
+        `grid` and `ground` tell what has stood for long, whose returns are not looked at, and what is empty; before the
+        first map nothing moves.
         """
         points = returns.points
-        free = np.ones(len(points), bool)
-        if grid is not None and ground is not None:
-            free = ~grid.is_blocked(ground, points, lasting=True)
+        if ground is not None:
+            points = points[~grid.is_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
         for mover in movers:
-            track = self.legs.update(mover.track, replace(returns, points=points[free]), noise)
+            track = self.legs.update(mover.track, replace(returns, points=points), noise)
             if track is not None:
-                kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1))
-                free &= np.hypot(*(points - track.mean[:2]).T) > self.legs.radius
+                shown = mover.shown + is_in_view(track, returns, camera, self.robot)
+                kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1, shown=shown))
+                points = points[np.hypot(*(points - track.mean[:2]).T) > self.legs.radius]
             elif returns.stamp - mover.felt < self._patience(mover, returns, half_view):
                 kept.append(mover)
-        begun = [
-            self._begin(points[legs].mean(axis=0), returns, noise)
-            for legs in self._groups(returns, half_view)
-            if free[legs].all()
-        ]
+        if ground is not None:
+            began, since = np.array([one.began for one in kept]).reshape(-1, 2), np.array([one.since for one in kept])
+            left = grid.is_free_since(ground, began, since)
+            kept = [replace(one, left=one.left or gone) for one, gone in zip(kept, left.tolist(), strict=True)]
+        known = np.array([one.track.mean[:2] for one in kept]).reshape(-1, 2)
+        places = self._groups(returns)
+        if ground is not None and len(places):
+            places = places[~grid.is_blocked(ground, places, lasting=True)]
+        new = np.hypot(*(places[:, None] - known).transpose(2, 0, 1)).min(axis=1, initial=np.inf) > self.legs.radius
+        begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)
+
+    def moving(self, movers: tuple[Mover, ...]) -> list[Mover]:
+        """Return those that have moved."""
+        return [
+            one
+            for one in movers
+            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
+        ]
+
+    def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
+        """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
+        places = [one.track.mean[:2] for one in movers if now - one.felt < self.forget_s]
+        return np.array(places).reshape(-1, 2)
 
     def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
         """Note whose legs they are: one mover to one person found by the camera, the nearest first."""
@@ -128,7 +157,7 @@ class Movers:
             if which not in numbers and seen[who].number not in numbers.values():
                 numbers[which] = seen[who].number
         return tuple(
-            replace(mover, number=numbers[which])
+            replace(mover, number=numbers[which], shown=0)
             if which in numbers
             else replace(mover, number=None)
             if mover.number in numbers.values()
@@ -148,45 +177,28 @@ class Movers:
         fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
-    def moving(self, movers: tuple[Mover, ...]) -> list[Mover]:
-        """Return those that have moved."""
-        return [
-            one
-            for one in movers
-            if one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
-        ]
-
-    def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
-        """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
-        places = [one.track.mean[:2] for one in movers if now - one.felt < self.forget_s]
-        return np.array(places).reshape(-1, 2)
-
     def _patience(self, mover: Mover, returns: Returns, half_view: float) -> float:
         if is_in_view(kalman.predict(mover.track, returns.stamp, Noise()), returns, half_view, self.robot):
             return self.forget_s
         return self.unseen_s
 
-    def _groups(self, returns: Returns, half_view: float) -> list[slice]:
-        """Return the groups of returns that are as wide as legs and stand before what is beside them."""
-        points, pose = returns.points, returns.pose
-        if len(points) == 0:
-            return []
-        dx, dy = (points - (pose.x, pose.y)).T
+    def _groups(self, returns: Returns) -> Points:
+        """Return the middle of each group of returns that is as wide as legs, float64 (N, 2) [m], odometry frame.
+
+        A group beside which something nearer ends may be what that leaves to be seen of a wall.
+        """
+        points = returns.points
+        far = np.hypot(points[:, 0] - returns.pose.x, points[:, 1] - returns.pose.y)
         ends = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) > self.gap) + 1
-        # A piece of wall that shows past something nearer, or at a grazing angle, moves along as the robot does. Where
-        # many beams return nothing there is nothing nearer; beyond the lidar's view there may be.
-        far = np.concatenate([[0.0], np.hypot(dx, dy), [0.0]])
-        turn = np.array([kalman.wrap(off) for off in np.arctan2(dy, dx) - pose.yaw])
-        open_from = np.abs(np.diff(turn, prepend=-half_view, append=half_view)) > self.open
-        before = open_from | (far[:-1] > far[1:])
-        after = open_from | (far[1:] > far[:-1])
-        groups = []
-        for first, end in itertools.pairwise([0, *ends, len(points)]):
-            is_near = end - first >= self.legs.fewest and far[first + 1] < self.legs.reach
-            wide = np.hypot(*np.ptp(points[first:end], axis=0))
-            if is_near and wide < self.legs.widest and before[first] and after[end]:
-                groups.append(slice(first, end))
-        return groups
+        middles = []
+        for begin, end in itertools.pairwise([0, *ends.tolist(), len(points)]):
+            hidden = (begin > 0 and far[begin - 1] < far[begin]) or (end < len(points) and far[end] < far[end - 1])
+            if hidden or end - begin < self.legs.fewest or far[begin:end].mean() >= self.legs.reach:
+                continue
+            group = points[begin:end]
+            if np.hypot(*np.ptp(group, axis=0)) < self.legs.widest:
+                middles.append(group.mean(axis=0))
+        return np.array(middles).reshape(-1, 2)
 
     def _begin(self, place: Points, returns: Returns, noise: Noise) -> Mover:
         pose = returns.pose
@@ -197,7 +209,7 @@ class Movers:
         sigma = self.legs.sigma
         legs_noise = replace(noise, bearing=sigma / max(far, 0.3), range=sigma)
         track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, legs_noise)
-        return Mover(track, (float(place[0]), float(place[1])), returns.stamp)
+        return Mover(track, (float(place[0]), float(place[1])), returns.stamp, returns.stamp)
 
 
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry) -> bool:

@@ -227,7 +227,7 @@ class Tracker:
         if tracks.stamp is None:
             return person, tracks
         unseen = tracks.stamp - person.seen
-        if not person.confirmed or unseen > self.legs_only_s:
+        if not person.confirmed:
             return person, tracks
         height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
         if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
@@ -237,22 +237,28 @@ class Tracker:
         now = person
         for returns in tracks.scans:
             # The track of an unseen person already contains the scans up to `felt`: each may count only once.
-            if returns.stamp - now.measured > self.restart_s:
+            if returns.stamp - now.measured > self.restart_s or unseen > self.legs_only_s:
                 # Legs continue a track; after a gap, whatever stands there could be taken for them.
                 break
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
                 track = self.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
+        for mover in self.movers.moving(tracks.movers):
+            # What stands could be a chair; what moved on from where the person was is the person.
+            if unseen > 0 and mover.number == person.number and mover.felt > now.measured:
+                now = replace(now, track=mover.track, felt=mover.felt)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = tuple(kept if one.number == person.number else one for one in tracks.people)
         return now, replace(tracks, people=people)
 
-    def follow_movers(self, tracks: Tracks, half_view: float, grid: Grid, ground: Ground | None) -> Tracks:
-        """Enter the newest scan, whose lidar looks `half_view` [rad] to either side, into what moves."""
+    def follow_movers(
+        self, tracks: Tracks, half_view: float, camera: float, grid: Grid, ground: Ground | None
+    ) -> Tracks:
+        """Enter the newest scan into what moves; see `Movers.update`."""
         if not tracks.scans or tracks.scans[-1].stamp <= tracks.moved_at:
             return tracks
         newest = tracks.scans[-1]
-        movers = self.movers.update(tracks.movers, newest, half_view, self.noise, grid, ground)
+        movers = self.movers.update(tracks.movers, newest, half_view, self.noise, grid, ground, camera)
         movers = self.movers.assign(movers, [one for one in tracks.in_view if one.confirmed], newest.stamp)
         people = tuple(
             self.movers.continued(one, movers, newest, self.noise)
@@ -271,30 +277,39 @@ class Tracker:
         odometry frame, and which track is the person followed, None for none of them. `followed` is the person
         followed, as measured last; people found by the camera count for `lately_s`.
         """
-        people: list[Track] = []
-        others, own = [], None
+        people: dict[int, Track] = {}
         for one in tracks.people:
-            is_followed = followed is not None and one.number == followed.number
-            one = followed if followed is not None and is_followed else one
+            one = followed if followed is not None and one.number == followed.number else one
             if one.confirmed and now - one.measured <= lately_s:
-                people.append(kalman.predict(one.track, now, self.noise))
-                if is_followed:
-                    own = people[-1]
-                else:
-                    others.append(people[-1].mean[:2])
+                people[one.number] = kalman.predict(one.track, now, self.noise)
+        own = None if followed is None else people.get(followed.number)
+        others = [track.mean[:2] for track in people.values() if track is not own]
+        places, nameless = [track.mean[:2] for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)
-            gaps = [math.dist(track.mean[:2], other.mean[:2]) for other in people]
-            if min(gaps, default=math.inf) > self.association.same_place:
-                people.append(track)
-                if now - mover.felt <= lately_s and not (followed and self._may_be(followed, track)):
-                    others.append(track.mean[:2])
-        return people, np.array(others).reshape(-1, 2), own
+            if mover.number in people or any(
+                math.dist(track.mean[:2], place) <= self.association.same_place for place in places
+            ):
+                continue
+            nameless.append(track)
+            may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))
+            if now - mover.felt <= lately_s and not may_be_own:
+                others.append(track.mean[:2])
+        return [*people.values(), *nameless], np.array(others).reshape(-1, 2), own
 
-    def _may_be(self, person: Person, track: Track) -> bool:
+    def _is_near(self, person: Person, track: Track) -> bool:
         """Whether what moves in the scan can be a person's legs, where they have not been measured for some time."""
         reach = self.association.same_place + self.walk * (track.stamp - person.measured)
         return math.dist(person.track.mean[:2], track.mean[:2]) < reach
+
+    def may_be(self, number: int | None, tracks: Tracks, now: float) -> list[Track]:
+        """Return what moves in the scan and may be the person of a number, or one not shown yet, as of `now` [s]."""
+        moving = [
+            one
+            for one in self.movers.moving(tracks.movers)
+            if one.number in (number, None) and one.shown < self.movers.looks
+        ]
+        return [kalman.predict(one.track, now, self.noise) for one in moving]
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
         poses, odometry = tracks.poses, observation.odometry

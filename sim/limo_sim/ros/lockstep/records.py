@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -75,13 +77,31 @@ class Past:
 
     Attributes
     ----------
-    steps, commands
-        Every control period, and every command.
+    commands
+        Time [s], linear [m/s] and angular speed [rad/s] of every command, one after another.
+    steps
+        Every control period, where they are kept.
+    logged, logged_frame
+        Time of the last control period, and stamp of the last frame in one [s].
+    found
+        Whether a control period had a target.
     asked, target_distance
         As `World` has them.
     """
 
+    commands: array[float] = field(default_factory=lambda: array("d"))
     steps: list[Step] = field(default_factory=list)
-    commands: list[Command] = field(default_factory=list)
+    logged: float = -math.inf
+    logged_frame: float = -math.inf
+    found: bool = False
     asked: list[str] = field(default_factory=list)
     target_distance: float | None = None
+
+    def add(self, step: Step, keep: bool) -> None:
+        """Take the next control period, and keep it if asked to."""
+        self.logged = step.time
+        if step.frame is not None:
+            self.logged_frame = step.frame.truth.stamp
+        self.found |= step.decision.target is not None
+        if keep:
+            self.steps.append(step)

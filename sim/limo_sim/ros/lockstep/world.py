@@ -87,6 +87,7 @@ class World:
         watch: Callable[[Moment], None] | None = None,
         patience: float = 20.0,
         began: float | None = None,
+        keep: bool = True,
     ) -> None:
         scenario.check_detector_is_plain("a node brings its own detector")
         self.arena = Arena(scenario, seed)
@@ -117,6 +118,7 @@ class World:
         self._render_ms = 0.0
         self._logged = self._logged_frame = -math.inf
         self._seen_before = False
+        self._keep = keep
         self._began = time.perf_counter() if began is None else began
         self._collected = False
         self.advances = 0
@@ -181,7 +183,8 @@ class World:
             self.fault = self.fault or error
             raise
         finally:
-            self.callbacks.append(Callback(since, self.time - since, time.perf_counter() - began))
+            if self._keep:
+                self.callbacks.append(Callback(since, self.time - since, time.perf_counter() - began))
 
     def show(self, window: str, picture: NDArray[np.uint8]) -> None:
         """Keep the newest picture of a window."""
@@ -243,18 +246,16 @@ class World:
     def take_over(self, past: Past, until: float) -> None:
         """Bring a new world to the time `until` [s] at which another process left its own, by the same commands."""
         arena = self.arena
-        for command in past.commands:
-            while arena.time < command.time - 1e-9:
+        for at, linear, angular in zip(*[iter(past.commands)] * 3, strict=True):
+            while arena.time < at - 1e-9:
                 arena.step()
-            arena.command(command.twist)
+            arena.command(Twist(linear, angular))
+            self.commands = [Command(at, Twist(linear, angular))]
         while arena.time < until - 1e-9:
             arena.step()
-        self._steps, self.commands = list(past.steps), list(past.commands)
+        self._steps = list(past.steps)
         self.asked, self.parameters = list(past.asked), {"target_distance": past.target_distance}
-        self._logged = max((step.time for step in past.steps), default=-math.inf)
-        frames = (step.frame.truth.stamp for step in past.steps if step.frame is not None)
-        self._logged_frame = max(frames, default=-math.inf)
-        self._seen_before = any(step.decision.target is not None for step in past.steps)
+        self._logged, self._logged_frame, self._seen_before = past.logged, past.logged_frame, past.found
 
     def episode(self) -> Episode:
         """Return the log."""
@@ -329,7 +330,8 @@ class World:
         self._seen_before |= target is not None
         decision = Decision(twist, None, mode, f"as {self.script.name} says", target)
         step = Step(self.time, self.arena.truth(), decision, record)
-        self._steps.append(step)
+        if self._keep:
+            self._steps.append(step)
         if self.watch is not None:
             with self.patience.suspended():
                 self.watch(

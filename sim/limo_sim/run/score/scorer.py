@@ -53,6 +53,7 @@ class Scorer:
         # Everybody, until one of them is the target: then that one.
         self._subjects = [Subject(index, criteria) for index in range(max(len(scenario.people), 1))]
         self._steps = self._frames = self._boxed = self._wrong = self._targets = self._switches = 0
+        self._driven = 0
         self._followed: int | None = None
         self._detect_ms, self._render_ms = array("f"), array("f")
         self._anybody = False
@@ -81,6 +82,7 @@ class Scorer:
             self._boxed += 1
             self._wrong += hits[0] == NO_PERSON
         self._steps += 1
+        self._driven += bool(step.decision.twist.linear or step.decision.twist.angular)
         self._modes[step.decision.mode.value] += 1
         self._reasons[step.decision.reason] += 1
         self._motion.add(step, target)
@@ -98,6 +100,11 @@ class Scorer:
             self._subjects = [self._subjects[target]]
         self._switches += self._followed not in (None, target)
         self._followed = target
+
+    @property
+    def driving(self) -> float:
+        """Share of the steps whose command moves the robot."""
+        return self._driven / max(self._steps, 1)
 
     def card(self, episode: Episode) -> ScoreCard:
         """Return the card of the run whose steps were added; those that the episode holds are not looked at."""

@@ -1,13 +1,13 @@
-"""Backing off: only onto ground that was seen to be free lately."""
+"""Backing off: only onto ground that was seen to be free, and that nobody can have come to since."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from limo_hog.follow.control.company import Backing
+from limo_hog.follow.control.backing import Backing, Other
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.clearance import NO_POINTS
+from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.twist import Twist
@@ -27,17 +27,61 @@ def looked(yaws: tuple[float, ...], *, until: float) -> Ground:
     return ground
 
 
+HERE, AHEAD = Odometry(), np.zeros(3)
+BESIDE = Other(0.0, 2.0, at=0.0)
+
+
+def is_free_behind(ground: Ground, *others: Other) -> bool:
+    return bool(BACKING.is_free_behind(AHEAD, HERE, GRID, ground, others, LIMO))
+
+
+def places(*points: tuple[float, float]) -> Points:
+    return np.array(points).reshape(-1, 2)
+
+
 def test_ground_behind_is_known_for_a_while_after_the_robot_looked_round() -> None:
-    here = Odometry()
-    for others_at, known in ((0.0, [True, False, False]), (-np.inf, [True, True, False])):
-        assert not BACKING.is_known_behind(0.0, here, GRID, looked((), until=0.0), others_at, LIMO)
-        grounds = [looked((1.5, -1.5), until=until) for until in (2.0, 8.0, 40.0)]
-        # After half a minute the other has not been seen for as long, and counts no more.
-        assert [BACKING.is_known_behind(0.0, here, GRID, one, others_at, LIMO) for one in grounds] == known
+    assert not is_free_behind(looked((), until=0.0))
+    assert [is_free_behind(looked((1.5, -1.5), until=until)) for until in (2.0, 8.0, 40.0)] == [True, True, False]
 
 
-def test_with_others_about_it_looks_behind_before_it_backs() -> None:
-    limit = BACKING.blind_limit(others_at=3.0, now=10.0)
+def test_where_a_person_out_of_sight_can_be_ground_is_known_for_a_shorter_time() -> None:
+    grounds = [looked((1.5, -1.5), until=until) for until in (2.0, 8.0)]
+    assert [is_free_behind(one, BESIDE) for one in grounds] == [True, False]
+    # One who was 20 m away cannot have come so soon; one who is in sight is given way to.
+    assert is_free_behind(grounds[1], Other(0.0, 20.0, at=0.0))
+    assert is_free_behind(grounds[1], Other(0.0, 2.0, at=7.5))
+
+
+def test_each_pose_has_its_own_ground_behind_it() -> None:
+    poses = np.array([(0.0, 0.0, 0.0), (-2.0, 0.0, 0.0), (0.0, 0.0, np.pi)])
+    free = BACKING.is_free_behind(poses, HERE, GRID, looked((), until=0.0), (), LIMO)
+    assert free.tolist() == [False, False, True]
+
+
+def test_a_person_who_goes_out_of_sight_is_remembered_until_measured_again() -> None:
+    nobody, one = places(), places((1.0, 1.0))
+    others = BACKING.remember((), one, nobody, nobody, 0.0)
+    others = BACKING.remember(others, nobody, nobody, nobody, 3.0)
+    assert others == (Other(1.0, 1.0, 0.0),)
+    behind = places((-0.4, 0.0))
+    assert BACKING.can_hold_other(others, behind, 3.0).all()
+    # The same person, as far away as they can have walked.
+    others = BACKING.remember(others, places((3.0, 1.0)), nobody, nobody, 3.0)
+    assert others == (Other(3.0, 1.0, 3.0),)
+    assert not BACKING.can_hold_other(others, behind, 3.0).any()
+    assert BACKING.remember(others, nobody, nobody, nobody, 60.0) == ()
+
+
+def test_legs_in_the_scan_continue_another_person_and_begin_none() -> None:
+    nobody, here = places(), places((1.1, 1.0))
+    assert BACKING.remember((), nobody, here, nobody, 1.0) == ()
+    assert BACKING.remember((Other(1.0, 1.0, 0.0),), nobody, here, nobody, 1.0) == (Other(1.1, 1.0, 1.0),)
+    # The person followed is no other.
+    assert BACKING.remember((Other(1.0, 1.0, 0.0),), nobody, here, here, 1.0) == ()
+
+
+def test_where_a_person_out_of_sight_can_be_it_looks_behind_before_it_backs() -> None:
+    limit = BACKING.blind_limit((BESIDE,), HERE, LIMO, 10.0)
     assert limit == 0
     command, reason = BACKING.blindly(Twist(-0.4, 0.1), limit, NEAR, -0.5, 0.3, "following a person")
     assert command.linear == 0
@@ -53,7 +97,7 @@ def test_it_does_not_turn_away_from_a_person_who_walks() -> None:
 
 
 def test_with_nobody_else_about_it_backs_slowly() -> None:
-    limit = BACKING.blind_limit(others_at=-np.inf, now=10.0)
+    limit = BACKING.blind_limit((), HERE, LIMO, 10.0)
     command, reason = BACKING.blindly(Twist(-0.4, 0.1), limit, NEAR, -0.5, 0.3, "following a person")
     assert command == Twist(-0.2, 0.1)
     assert reason == "following a person"

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from limo_hog.follow.control.backing import Poses
 from limo_hog.follow.control.company import Company, Walker, Way
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.clearance import NO_POINTS, Points
+from limo_hog.follow.sense.clearance import NO_POINTS
 from limo_hog.follow.twist import Twist
 from limo_hog.follow.wheels import Wheels
 
@@ -17,9 +20,9 @@ COMPANY, WHEELS, STANDING = Company(), Wheels(), Twist()
 PERIOD, STEP = 0.1, 0.02
 
 
-def nothing_behind(places: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Nothing was seen but the ground under the robot."""
-    return np.asarray(np.hypot(*places.T) < 0.2)
+def never(poses: Poses) -> NDArray[np.bool_]:
+    """Nothing is known of the ground behind."""
+    return np.zeros(poses.shape[:-1], bool)
 
 
 def clearance(walker: Walker, seconds: float = 4.0, *, gives_way: bool = True, sway: float = 0.0) -> float:
@@ -35,10 +38,12 @@ def clearance(walker: Walker, seconds: float = 4.0, *, gives_way: bool = True, s
         cos, sin = math.cos(yaw), math.sin(yaw)
         dx, dy = walker.x + walker.vx * time - x, walker.y + walker.vy * time - y
         vx, vy = walker.vx + random.normal(0, 1) * sway, walker.vy + random.normal(0, 1) * sway
-        seen = Walker(cos * dx + sin * dy, cos * dy - sin * dx, cos * vx + sin * vy, cos * vy - sin * vx)
+        seen = Walker(
+            cos * dx + sin * dy, cos * dy - sin * dx, cos * vx + sin * vy, cos * vy - sin * vx, walker.followed
+        )
         now = Twist((left + right) / 2, (right - left) / (2 * half))
         begun = None if heading is None else Way(heading[0] - yaw, heading[1], time - heading[2])
-        way = COMPANY.way_out(STANDING, now, [seen], NO_POINTS, LIMO, begun, 1.0, nothing_behind)
+        way = COMPANY.way_out(STANDING, now, [seen], NO_POINTS, LIMO, begun, 1.0, never)
         way = way if gives_way else None
         heading = None if way is None else (yaw + way.turn, way.speed, time - way.age)
         wanted = STANDING if way is None else COMPANY.command(way, 1.0, LIMO)
@@ -58,10 +63,10 @@ def clearance(walker: Walker, seconds: float = 4.0, *, gives_way: bool = True, s
     return least
 
 
-def at_the_robot(distance: float, speed: float, bearing: float = 0.0) -> Walker:
+def at_the_robot(distance: float, speed: float, bearing: float = 0.0, *, followed: bool = False) -> Walker:
     """A person who walks straight at the robot."""
     cos, sin = math.cos(bearing), math.sin(bearing)
-    return Walker(distance * cos, distance * sin, -speed * cos, -speed * sin)
+    return Walker(distance * cos, distance * sin, -speed * cos, -speed * sin, followed)
 
 
 def test_nobody_who_stands_or_leaves_is_given_way_to() -> None:
@@ -81,38 +86,53 @@ def test_a_person_who_walks_at_the_robot_passes_at_three_decimetres(distance: fl
     assert clearance(walker) >= 0.3
 
 
+def test_another_person_may_pass_nearer_than_the_one_followed() -> None:
+    passes = Walker(1.2, -0.6, -0.7, 0.0)
+    assert COMPANY.way_out(STANDING, STANDING, [passes], NO_POINTS, LIMO) is None
+    assert COMPANY.way_out(STANDING, STANDING, [replace(passes, followed=True)], NO_POINTS, LIMO) is not None
+
+
+def test_of_two_ways_out_it_takes_the_one_that_keeps_the_person_followed_in_the_image() -> None:
+    comes = Walker(0.0, -1.2, 0.0, 0.8)
+    for side in (-1.0, 1.0):
+        ahead = Walker(2.0, side * 1.2, 0.0, 0.0, followed=True)
+        way = COMPANY.way_out(STANDING, STANDING, [comes, ahead], NO_POINTS, LIMO)
+        assert way is not None
+        assert abs(way.turn - math.atan2(ahead.y, ahead.x)) < LIMO.field_of_view / 2
+
+
 def test_a_fast_person_who_walks_at_the_robot_passes_clear_of_it() -> None:
     assert clearance(at_the_robot(3.0, 1.5)) >= 0.15
 
 
 def test_it_does_not_dither_between_the_sides_when_the_velocity_is_uncertain() -> None:
-    assert clearance(at_the_robot(2.2, 0.8), sway=0.3) >= 0.3
+    assert clearance(at_the_robot(2.2, 0.8, followed=True), sway=0.3) >= 0.3
 
 
 def test_it_backs_only_onto_ground_that_was_seen_to_be_free() -> None:
-    walker = Walker(1.3, 0.0, -0.35, 0.0)
+    walker = Walker(1.3, 0.0, -0.35, 0.0, followed=True)
     known = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO)
-    unknown = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, is_known=nothing_behind)
+    unknown = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, may_back=never)
     assert known is not None and known.speed < 0
     assert unknown is not None and unknown.speed >= 0
 
 
 def test_it_does_not_get_out_of_the_way_into_a_wall() -> None:
-    walker = Walker(1.8, 0.0, -0.8, 0.0)
+    walker = Walker(1.8, 0.0, -0.8, 0.0, followed=True)
     along = np.arange(-1.5, 1.5, 0.03)
     for side in (-1.0, 1.0):
         wall = np.stack([along, np.full(len(along), side * 0.35)], axis=1)
-        way = COMPANY.way_out(STANDING, STANDING, [walker], wall, LIMO, is_known=nothing_behind)
+        way = COMPANY.way_out(STANDING, STANDING, [walker], wall, LIMO, may_back=never)
         assert way is not None
         assert way.turn * side * way.speed < 0
 
 
 def test_it_stays_with_a_way_while_it_turns_to_it() -> None:
     walker = Walker(1.6, 0.0, -0.8, 0.1)
-    fresh = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, is_known=nothing_behind)
+    fresh = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, may_back=never)
     assert fresh is not None
     begun = Way(-fresh.turn, fresh.speed, 0.3)
-    kept = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, begun, is_known=nothing_behind)
+    kept = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, begun, may_back=never)
     assert kept is begun
 
 

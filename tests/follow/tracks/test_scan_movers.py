@@ -10,9 +10,10 @@ import numpy as np
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid
-from limo_hog.follow.tracks.kalman import Noise
+from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.legs import Returns
 from limo_hog.follow.tracks.movers import Mover, Movers
+from limo_hog.follow.tracks.person import Person
 
 MOVERS, NOISE, HALF_VIEW, SCAN_S, GRID = Movers(), Noise(), 2.0, 0.125, Grid()
 #: Ground that is free from now on, wherever nothing is.
@@ -94,3 +95,32 @@ def test_what_the_camera_has_shown_for_long_is_counted() -> None:
         points = np.array(legs(2.0, 0.06 * index - 0.3, 1.0 * index))
         movers = MOVERS.update(movers, Returns(index * SCAN_S, points, Odometry()), HALF_VIEW, NOISE, GRID, FREE, 0.5)
     assert movers[0].shown == movers[0].scans - 1
+
+
+def person(number: int, x: float, y: float, stamp: float) -> Person:
+    """Someone found by the camera at a stamp."""
+    track = Track(stamp, np.array([x, y, 0.0, 0.0]), np.diag([0.04, 0.04, 0.5, 0.5]))
+    return Person(number, track, stamp, 5.0, 400.0, 0.0, confirmed=True)
+
+
+def test_the_legs_of_a_person_continue_the_track_that_the_camera_does_not_show() -> None:
+    known = person(7, 1.55, 0.05, 0.875)
+    movers = MOVERS.assign(walk((1.5, -0.4), (0.0, 0.5), 8), [known], 0.875)
+    assert [one.number for one in movers] == [7]
+    returns = Returns(1.0, np.array(legs(1.5, 0.1, 9.0)), Odometry())
+    movers = MOVERS.update(movers, returns, HALF_VIEW, NOISE, GRID, FREE)
+    continued = MOVERS.continued(known, movers, returns, NOISE)
+    assert continued.felt == 1.0
+    assert math.dist(continued.track.mean[:2], (1.5, 0.1)) < math.dist(known.track.mean[:2], (1.5, 0.1))
+    # Not one whose legs they are not, and each scan counts once.
+    assert MOVERS.continued(person(8, 1.5, 0.1, 0.9), movers, returns, NOISE).felt < 0
+    assert MOVERS.continued(continued, movers, returns, NOISE) is continued
+
+
+def test_two_people_side_by_side_have_one_pair_of_legs_each() -> None:
+    movers = tuple(Mover(person(0, 1.5, y, 1.0).track, (1.5, y), 0.0, 1.0) for y in (0.0, 0.3))
+    people = [person(1, 1.6, 0.2, 1.0), person(2, 1.5, 0.35, 1.0)]
+    assert [one.number for one in MOVERS.assign(movers, people, 1.0)] == [1, 2]
+    # The number goes along with the person, and is given once.
+    later = MOVERS.assign(MOVERS.assign(movers, people, 1.0), [person(1, 1.5, 0.3, 1.0)], 1.0)
+    assert [one.number for one in later] == [None, 1]

@@ -1,25 +1,23 @@
 """Giving way: people are predicted, and of the ways out the robot can drive, one that stays clear of them is taken.
 
 The dynamic window approach (Fox, Burgard and Thrun 1997), with obstacles that move, and with directions in place of
-turn rates: a robot that cannot drive sideways turns first. It backs onto ground that was seen lately to be free, since
-nothing looks behind it.
+turn rates: a robot that cannot drive sideways turns first.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.control.steer import Aim
+from limo_hog.follow.control.backing import Poses
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.clearance import Points, to_odometry
+from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks.kalman import Track
 from limo_hog.follow.twist import Twist
 from limo_hog.follow.wheels import advanced, stoppable_turn
@@ -33,19 +31,22 @@ class Walker:
     ----------
     x, y, vx, vy
         Place and velocity in the base frame as it is now, which is taken to stand still [m, m/s].
+    followed
+        Whether this is the person followed.
     """
 
     x: float
     y: float
     vx: float
     vy: float
+    followed: bool = False
 
 
-def walker_of(track: Track, pose: Odometry) -> Walker:
+def walker_of(track: Track, pose: Odometry, *, followed: bool = False) -> Walker:
     """Return a track in the odometry frame as a walker in the base frame of a robot at `pose`."""
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
     x, y, vx, vy = (track.mean - (pose.x, pose.y, 0.0, 0.0)).tolist()
-    return Walker(cos * x + sin * y, cos * y - sin * x, cos * vx + sin * vy, cos * vy - sin * vx)
+    return Walker(cos * x + sin * y, cos * y - sin * x, cos * vx + sin * vy, cos * vy - sin * vx, followed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +88,9 @@ class Company:
     clear
         Distance wanted between the robot's outline and a person's axis [m]. Chosen: the .3 m of clearance asked for,
         half a trunk of .15 m, and .1 m for the prediction.
+    notice_other_s, clear_other
+        The same of people who are not followed, who pass close by as people do [s, m]. Chosen: the time to stop or to
+        turn aside; .2 m of clearance.
     wanted
         Of more distance than this nothing is gained [m]. Chosen: the edge of Hall's intimate zone, and half a trunk.
     walls
@@ -108,11 +112,12 @@ class Company:
         A way is left for another only after so long [s], unless it costs `never`, and if the other is worth more by so
         much [m]. Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by
         .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
+    away
+        What a way costs on which the person followed is out of the image all the time [m], unless it is they who come.
+        Chosen: less than the clearance wanted.
     half_view, unseen
         How far to either side the lidar looks [rad], and what a way costs on which nobody who comes is in its sight
         [m]. Chosen: the Limo's; the error of a place that is not measured for a second.
-    look_back
-        The ground must be known so far behind the outline to back onto it [m]. Chosen: from .4 m/s it stops within .26.
     """
 
     notice_s: float = bounded(2.8, 0, 10)
@@ -122,6 +127,8 @@ class Company:
     sway: float = bounded(0.2, 0, 1)
     weights: tuple[float, float, float] = (0.7, 0.15, 0.15)
     clear: float = bounded(0.55, 0, 3)
+    notice_other_s: float = bounded(1.5, 0, 10)
+    clear_other: float = bounded(0.35, 0, 3)
     wanted: float = 0.7
     walls: float = 0.1
     near: float = 1.5
@@ -134,9 +141,9 @@ class Company:
     ease: float = 0.06
     settle_s: float = 0.8
     stay: float = 0.35
+    away: float = 0.2
     half_view: float = 2.0
     unseen: float = 0.1
-    look_back: float = 0.3
 
     def way_out(
         self,
@@ -147,7 +154,7 @@ class Company:
         robot: RobotGeometry,
         begun: Way | None = None,
         acceleration: float = 1.0,
-        is_known: Callable[[Points], NDArray[np.bool_]] | None = None,
+        may_back: Callable[[Poses], NDArray[np.bool_]] | None = None,
         blind_speed: float = 0.0,
     ) -> Way | None:
         """Return the way to give way by; None where the wanted command stays clear of everybody.
@@ -166,29 +173,35 @@ class Company:
             The way it is on already.
         acceleration
             Of each wheel [m/s²].
-        is_known
-            Whether the ground at float64 (N, 2) points [m], base frame, was seen to be free lately, bool (N,); None
-            where all of it counts as free.
+        may_back
+            Whether the ground behind the robot at poses in the base frame is known to be free; None where all of it
+            counts as free.
         blind_speed
             At most so fast it backs onto other ground [m/s].
         """
         people = np.array([(one.x, one.y, one.vx, one.vy) for one in walkers]).reshape(-1, 4)
+        is_followed = np.array([one.followed for one in walkers], bool)
         coming = np.hypot(people[:, 2], people[:, 3]) > self.slowest
         # Those who come no nearer than they are, whatever the robot does, need no way.
         coming &= (people[:, :2] * people[:, 2:]).sum(axis=1) < 0
         if not coming.any():
             return None
-        people = people[coming]
+        goal = people[is_followed]
+        people, is_followed = people[coming], is_followed[coming]
         ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]
         if begun is not None:
             ways.append(begun)
         poses, backs = self._driven(ways, wanted, now, acceleration, robot)
         places = self._places(people)
-        gaps = _outline_gap(poses[:, :, None, None], places[None], robot).min(axis=3)
-        soon = gaps[0, : round(self.notice_s / self.step_s)].min(axis=0)
-        if (soon[0] if begun is None else soon.min()) > self.clear:
+        gaps = _outline_gap(poses[:, :, None, None], places[None], robot)
+        clear = np.where(is_followed, self.clear, self.clear_other)
+        late = np.arange(gaps.shape[1])[:, None] * self.step_s >= np.where(
+            is_followed, self.notice_s, self.notice_other_s
+        )
+        room = np.where(late[:, None], np.inf, gaps[0]).min(axis=0) - clear
+        if (room[0] if begun is None else room).min() > 0:
             return None
-        gaps = gaps.min(axis=1)
+        gaps = gaps.min(axis=(1, 3))
         near = points[np.hypot(*points.T) < self.near][::2]
         gap = np.hypot(*(near[:, None] - people[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
         near = near[gap > self.person_radius]
@@ -196,9 +209,12 @@ class Company:
         effort = self.ease * (np.abs(speeds - now.linear) + 0.4 * np.abs([way.turn for way in ways]))
         worth = np.minimum(gaps[1:], self.wanted) @ self.weights - effort
         worth -= self.unseen * self._unseen(poses[1:], places[:, 0])
+        if not is_followed.any():
+            worth -= self.away * self._away(poses[1:], goal, robot)
         worth[self._room(poses[1:], near, robot) < self.walls] -= self.never
-        if is_known is not None:
-            worth[(speeds < -blind_speed) & self._backs_blindly(poses[1:], backs[1:], is_known, robot)] -= self.never
+        if may_back is not None:
+            blind = (backs[1:] & ~may_back(poses[1:])).any(axis=1)
+            worth[(speeds < -blind_speed) & blind] -= self.never
         if begun is not None:
             worth[-1] += self.stay if begun.age > self.settle_s else 1.0
         return ways[int(np.argmax(worth))]
@@ -257,123 +273,20 @@ class Company:
         off = np.arctan2(to[..., 1], to[..., 0]) - poses[:, :, None, 2]
         return np.asarray((np.cos(off) < math.cos(self.half_view)).mean(axis=(1, 2)))
 
+    def _away(self, poses: NDArray[np.float64], goal: NDArray[np.float64], robot: RobotGeometry) -> NDArray[np.float64]:
+        """Return for each of K ways the share of time the person followed is out of the image, float64 (K,)."""
+        if len(goal) == 0:
+            return np.zeros(len(poses))
+        times = np.arange(1, poses.shape[1] + 1)[:, None] * self.step_s
+        to = goal[0, :2] + times * goal[0, 2:] - poses[:, :, :2]
+        off = np.arctan2(to[..., 1], to[..., 0]) - poses[:, :, 2]
+        return np.asarray((np.cos(off) < math.cos(robot.field_of_view / 2)).mean(axis=1))
+
     def _room(self, poses: NDArray[np.float64], points: Points, robot: RobotGeometry) -> NDArray[np.float64]:
         """Return for each of K ways the least distance from the outline to a point [m], float64 (K,)."""
         if len(points) == 0:
             return np.full(len(poses), np.inf)
         return np.asarray(_outline_gap(poses[:, ::2, None], points[None, None], robot).min(axis=(1, 2)))
-
-    def _backs_blindly(
-        self,
-        poses: NDArray[np.float64],
-        backs: NDArray[np.bool_],
-        is_known: Callable[[Points], NDArray[np.bool_]],
-        robot: RobotGeometry,
-    ) -> NDArray[np.bool_]:
-        """Return for each of K ways whether it backs onto ground that was not seen to be free lately, bool (K,)."""
-        cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-        blind = np.zeros(poses.shape[:2], bool)
-        for far in (self.look_back / 2, self.look_back):
-            for side in (-robot.half_width, 0.0, robot.half_width):
-                x, y = -robot.half_length - far, side
-                rear = np.stack([poses[..., 0] + x * cos - y * sin, poses[..., 1] + x * sin + y * cos], axis=-1)
-                blind |= ~is_known(rear.reshape(-1, 2)).reshape(blind.shape)
-        return np.asarray((blind & backs).any(axis=1))
-
-
-@dataclass(frozen=True, slots=True)
-class Backing:
-    """Decides whether to back, to look behind first, or to stand.
-
-    Attributes
-    ----------
-    lately_s
-        With others about, ground that was not seen to be free within this is unknown [s]. Chosen: at .75 m/s a person
-        comes up from 3.5 m, the reach of the legs in the scan.
-    blind_speed, alone_s
-        If nobody but the person followed was measured for so long [s], ground seen within that is known, and it backs
-        onto other ground at this speed at most [m/s]; else not at all. Chosen: what `Guard` remembers, and its limit.
-    glance_turn, glance_from
-        Turn rate to look behind before backing, and how much too near a person must be for that [rad/s, m]. Chosen:
-        82°, which shows the ground behind, in .7 s; nearer, HOG would miss the head. Until then it stands.
-    depths
-        So far behind the outline the ground must be known [m]. Chosen: from .4 m/s the robot stops within .26 m.
-    """
-
-    lately_s: float = bounded(5.0, 0, 600)
-    blind_speed: float = bounded(0.2, 0, 1)
-    alone_s: float = bounded(29.0, 0, 3600)
-    glance_turn: float = bounded(3.0, 0, 6)
-    glance_from: float = bounded(0.25, 0, 2)
-    depths: tuple[float, ...] = (0.1, 0.2, 0.3)
-
-    def is_known(
-        self, places: Points, pose: Odometry, grid: Grid, ground: Ground | None, others_at: float
-    ) -> NDArray[np.bool_]:
-        """Return whether the ground at places, float64 (N, 2) [m] in the base frame, was seen to be free, bool (N,).
-
-        `others_at` is when another person than the one followed was measured [s].
-        """
-        if ground is None:
-            return np.ones(len(places), bool)
-        lately_s = self.lately_s if ground.stamp - others_at < self.alone_s else self.alone_s
-        return grid.is_free_since(ground, to_odometry(places, pose), ground.stamp - lately_s)
-
-    def is_known_behind(
-        self,
-        bearing: float,
-        pose: Odometry,
-        grid: Grid,
-        ground: Ground | None,
-        others_at: float,
-        robot: RobotGeometry,
-    ) -> bool:
-        """Whether the ground is known that is behind the robot when it faces a bearing [rad]."""
-        facing = replace(pose, yaw=pose.yaw + bearing)
-        return bool(self.is_known(self._behind(robot), facing, grid, ground, others_at).all())
-
-    def is_blocked(self, pose: Odometry, grid: Grid, ground: Ground | None, robot: RobotGeometry) -> bool:
-        """Whether the map shows something that lasts close behind: `Guard` remembers for a shorter time."""
-        if ground is None:
-            return False
-        return bool(grid.is_blocked(ground, to_odometry(self._behind(robot), pose), lasting=True).any())
-
-    def _behind(self, robot: RobotGeometry) -> Points:
-        """Return places behind the robot's outline, float64 (N, 2) [m] in the base frame."""
-        far, side = np.meshgrid(self.depths, (-robot.half_width, 0.0, robot.half_width))
-        return np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
-
-    def blind_limit(self, others_at: float, now: float) -> float:
-        """Return how fast to back onto unknown ground [m/s]; `others_at` is when another person was measured [s]."""
-        return 0.0 if now - others_at < self.alone_s else self.blind_speed
-
-    def blindly(
-        self, twist: Twist, limit: float, aim: Aim, too_far: float, walking: float, reason: str
-    ) -> tuple[Twist, str]:
-        """Return the command, and the reason, in place of one that backs onto unknown ground.
-
-        Nobody who walks is turned away from: they may pass by, and `Company` gives way to them.
-
-        Parameters
-        ----------
-        twist, reason
-            The command, and why.
-        limit
-            By `blind_limit`.
-        aim
-            Where the person is.
-        too_far
-            How much further off the person is than they should be, negative for nearer [m].
-        walking
-            People faster than this walk [m/s].
-        """
-        if limit > 0:
-            return replace(twist, linear=max(twist.linear, -limit)), reason
-        walks = max(abs(aim.range_rate), abs(aim.bearing_rate) * aim.distance) > walking
-        if walks or too_far > -self.glance_from:
-            return Twist(0.0, twist.angular), reason
-        side = -1.0 if aim.bearing > 0 else 1.0
-        return Twist(0.0, side * self.glance_turn), "looking behind before backing"
 
 
 def _outline_gap(poses: NDArray[np.float64], places: NDArray[np.float64], robot: RobotGeometry) -> NDArray[np.float64]:

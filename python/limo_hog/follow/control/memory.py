@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from limo_hog.follow.control.backing import Other
 from limo_hog.follow.control.lookout import Hunt
 from limo_hog.follow.control.selection import Choice
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
@@ -47,8 +48,8 @@ class TrackingState:
         Of the wheels, as learnt [m/s²].
     sent
         The last command.
-    others_at
-        When another person than the followed one was last measured [s].
+    others
+        Other people than the followed one, measured lately.
     brisk
         How fast the followed person walks at most, as far as known [m/s].
     """
@@ -67,5 +68,5 @@ class TrackingState:
     gave_way_at: float = -math.inf
     acceleration: float = 1.0
     sent: Twist = field(default_factory=Twist)
-    others_at: float = -math.inf
+    others: tuple[Other, ...] = ()
     brisk: float = 0.0

@@ -6,8 +6,10 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from limo_hog.follow.control.company import Backing, Company, Way, walker_of
+from limo_hog.follow.control.backing import Backing, Poses
+from limo_hog.follow.control.company import Company, Way, walker_of
 from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.lookout import Lookout
 from limo_hog.follow.control.memory import TrackingState
@@ -167,13 +169,14 @@ class TrackingController:
         most = stoppable_turn(off, state.acceleration, self.robot) + abs(aim.bearing_rate)
         twist = replace(twist, angular=float(np.clip(twist.angular, -most, most)))
         pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
-        if twist.linear < 0 and not self.backing.is_known_behind(
-            aim.bearing, pose, self.grid, state.ground, state.others_at, self.robot
+        facing, others = np.array([0.0, 0.0, aim.bearing]), state.others
+        if twist.linear < 0 and not self.backing.is_free_behind(
+            facing, pose, self.grid, state.ground, others, self.robot
         ):
             if self.backing.is_blocked(pose, self.grid, state.ground, self.robot):
                 twist = Twist(0.0, twist.angular)
             else:
-                limit = self.backing.blind_limit(state.others_at, observation.now)
+                limit = self.backing.blind_limit(others, pose, self.robot, observation.now)
                 twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(
@@ -198,17 +201,20 @@ class TrackingController:
             yaw, speed, since = state.way_out
             begun = Way(wrap(yaw - pose.yaw), speed, observation.now - since)
 
-        others_at = state.others_at
+        tracks, seen, own = self.tracker.around(state.tracks, person, observation.now, self.steering.coast_s)
+        felt = self.tracker.movers.felt(state.tracks.movers, observation.now)
+        is_measured = person is not None and observation.now - person.measured < self.backing.unseen_s
+        followed = person.track.mean[None, :2] if person is not None and is_measured else NO_POINTS
+        others = self.backing.remember(state.others, seen, felt, followed, observation.now)
+        state = replace(state, others=others)
 
-        def is_known(places: Points) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-            return self.backing.is_known(places, pose, self.grid, state.ground, others_at)
+        def may_back(poses: Poses) -> NDArray[np.bool_]:
+            return self.backing.is_free_behind(poses, pose, self.grid, state.ground, others, self.robot)
 
-        tracks, others = self.tracker.around(state.tracks, person, observation.now, self.steering.coast_s)
-        walkers = [walker_of(track, pose) for track in tracks]
-        state = replace(state, others_at=observation.now if others else state.others_at)
-        blind_speed = self.backing.blind_limit(state.others_at, observation.now)
+        walkers = [walker_of(track, pose, followed=track is own) for track in tracks]
+        blind_speed = self.backing.blind_limit(others, pose, self.robot, observation.now)
         way = self.company.way_out(
-            twist, driven, walkers, points, self.robot, begun, acceleration, is_known, blind_speed
+            twist, driven, walkers, points, self.robot, begun, acceleration, may_back, blind_speed
         )
         if way is not None:
             state = replace(state, gave_way_at=observation.now)

@@ -7,6 +7,7 @@ people who stand are nothing to be predicted.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.legs import Legs, Returns
+from limo_hog.follow.tracks.person import Person
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,8 @@ class Movers:
     looks
         After so many scans for which the camera looked there, it is no more turned to [1]. Chosen: a second and a half;
         of people who are found in three frames of ten one in two hundred is not found in it.
+    beside
+        A person is this far from their legs at most [m]. Chosen: as `Legs.radius`, and the error of the depth.
     robot
         Where the lidar sits.
     """
@@ -84,6 +88,7 @@ class Movers:
     forget_s: float = 0.5
     unseen_s: float = 3.0
     looks: int = 12
+    beside: float = 0.4
     robot: RobotGeometry = LIMO
 
     def update(
@@ -132,6 +137,44 @@ class Movers:
             for one in movers
             if one.left and one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
         ]
+
+    def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
+        """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
+        places = [one.track.mean[:2] for one in movers if now - one.felt < self.forget_s]
+        return np.array(places).reshape(-1, 2)
+
+    def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
+        """Note whose legs they are: one mover to one person found by the camera, the nearest first."""
+        pairs = []
+        for who, person in enumerate(seen):
+            for which, mover in enumerate(movers):
+                gap = math.dist(person.track.mean[:2], mover.track.mean[:2])
+                if mover.felt == stamp and gap < self.beside:
+                    pairs.append((gap, who, which))
+        numbers: dict[int, int] = {}
+        for _, who, which in sorted(pairs):
+            if which not in numbers and seen[who].number not in numbers.values():
+                numbers[which] = seen[who].number
+        return tuple(
+            replace(mover, number=numbers[which], shown=0)
+            if which in numbers
+            else replace(mover, number=None)
+            if mover.number in numbers.values()
+            else mover
+            for which, mover in enumerate(movers)
+        )
+
+    def continued(self, person: Person, movers: tuple[Mover, ...], returns: Returns, noise: Noise) -> Person:
+        """Return a person whom the camera does not show, brought up to a scan that shows their legs."""
+        legs = [one for one in movers if one.number == person.number and one.felt == returns.stamp]
+        if not legs or returns.stamp <= person.felt:
+            return person
+        track, pose = kalman.predict(person.track, returns.stamp, noise), returns.pose
+        dx, dy = (legs[0].track.mean[:2] - (pose.x, pose.y)).tolist()
+        distance, sigma = math.hypot(dx, dy), self.legs.sigma
+        noise = replace(noise, bearing=sigma / max(distance, 0.3), range=sigma)
+        fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
+        return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
     def _patience(self, mover: Mover, returns: Returns, half_view: float) -> float:
         if is_in_view(kalman.predict(mover.track, returns.stamp, Noise()), returns, half_view, self.robot):

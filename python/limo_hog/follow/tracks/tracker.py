@@ -10,6 +10,7 @@ import numpy as np
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.appearance import Clothes
+from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement, measure
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_hog.follow.sense.visibility import Visibility
@@ -99,6 +100,8 @@ class Tracker:
         How long odometry and scans are kept [s]: a camera image may be as late as this.
     scan_period_s
         A scan may be so much older than the image it is used with [s]: the lidar's period of 0.125 s at 8 Hz.
+    walk
+        How fast people walk who are not measured [m/s]. Chosen: a brisk walk.
     min_period_s, max_period_s
         Limits of the time between two frames as it is used to predict the next [s]. Chosen: 2 to 50 Hz.
     robot
@@ -121,6 +124,7 @@ class Tracker:
     poses_s: float = 2.0
     scans_s: float = 1.0
     scan_period_s: float = 0.13
+    walk: float = 1.0
     min_period_s: float = 0.02
     max_period_s: float = 0.5
     robot: RobotGeometry = LIMO
@@ -271,39 +275,51 @@ class Tracker:
         movers, new = tracks.movers, [one for one in tracks.scans if one.stamp > tracks.moved_at]
         if not new:
             return tracks
+        people, seen = tracks.people, [one for one in tracks.in_view if one.confirmed]
         for returns in new:
             movers = self.movers.update(movers, returns, half_view, self.noise, grid, ground, camera)
-        found = [one for one in tracks.in_view if one.confirmed]
-        movers = tuple(self._named(mover, found) for mover in movers)
-        return replace(tracks, movers=movers, moved_at=new[-1].stamp)
+            movers = self.movers.assign(movers, seen, returns.stamp)
+            people = tuple(
+                self.movers.continued(one, movers, returns, self.noise)
+                if one.confirmed and 0 < (tracks.stamp or 0.0) - one.seen < self.legs_only_s
+                else one
+                for one in people
+            )
+        return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
 
-    def _named(self, mover: Mover, found: list[Person]) -> Mover:
-        """Return a mover with the number of the person of those found who is there."""
-        near = min(found, key=lambda one: math.dist(one.track.mean[:2], mover.track.mean[:2]), default=None)
-        if near is None or math.dist(near.track.mean[:2], mover.track.mean[:2]) > self.association.same_place:
-            return mover
-        return replace(mover, number=near.number, shown=0)
+    def around(
+        self, tracks: Tracks, followed: Person | None, now: float, lately_s: float
+    ) -> tuple[list[Track], Points, Track | None]:
+        """Return all people, seen by the camera or moving in the scan, as of `now` [s].
 
-    def around(self, tracks: Tracks, followed: Person | None, now: float, lately_s: float) -> tuple[list[Track], bool]:
-        """Return all people, seen by the camera or moving in the scan, as of `now` [s], and whether any is another.
-
-        `followed` is the person followed, as measured last; people found by the camera count for `lately_s` [s].
+        Also the places of those who are not followed and were measured within `lately_s` [s], float64 (N, 2) [m] in the
+        odometry frame, and which track is the person followed, None for none of them. `followed` is the person
+        followed, as measured last; people found by the camera count for `lately_s`.
         """
         people: dict[int, Track] = {}
         for one in tracks.people:
             one = followed if followed is not None and one.number == followed.number else one
             if one.confirmed and now - one.measured <= lately_s:
                 people[one.number] = kalman.predict(one.track, now, self.noise)
-        places = [track.mean[:2] for track in people.values()]
-        nameless = [
-            track
-            for mover in self.movers.moving(tracks.movers)
-            if mover.number not in people
-            for track in [kalman.predict(mover.track, now, self.noise)]
-            if all(math.dist(track.mean[:2], place) > self.association.same_place for place in places)
-        ]
-        others = set(people) - {None if followed is None else followed.number}
-        return [*people.values(), *nameless], bool(others or nameless)
+        own = None if followed is None else people.get(followed.number)
+        others = [track.mean[:2] for track in people.values() if track is not own]
+        places, nameless = [track.mean[:2] for track in people.values()], []
+        for mover in self.movers.moving(tracks.movers):
+            track = kalman.predict(mover.track, now, self.noise)
+            if mover.number in people or any(
+                math.dist(track.mean[:2], place) <= self.association.same_place for place in places
+            ):
+                continue
+            nameless.append(track)
+            may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))
+            if now - mover.felt <= lately_s and not may_be_own:
+                others.append(track.mean[:2])
+        return [*people.values(), *nameless], np.array(others).reshape(-1, 2), own
+
+    def _is_near(self, person: Person, track: Track) -> bool:
+        """Whether what moves in the scan can be a person's legs, where they have not been measured for some time."""
+        reach = self.association.same_place + self.walk * (track.stamp - person.measured)
+        return math.dist(person.track.mean[:2], track.mean[:2]) < reach
 
     def may_be(self, number: int | None, tracks: Tracks, now: float) -> list[Track]:
         """Return what moves in the scan and may be the person of a number, or one not shown yet, as of `now` [s]."""

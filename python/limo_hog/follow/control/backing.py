@@ -1,0 +1,195 @@
+"""Backing off: onto ground that was seen to be free and that nobody can have come to since; nothing looks behind.
+
+A person who is measured is given way to (`company`). One who was about and is not measured any more may have walked on:
+where they can have come to by now, ground counts as free for a shorter time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.control.steer import Aim
+from limo_hog.follow.parameters import bounded
+from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.sense.clearance import Points, to_odometry
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.space.grid import Grid, Ground
+from limo_hog.follow.twist import Twist
+
+Poses: TypeAlias = NDArray[np.float64]
+"""(..., 3): x, y [m], yaw [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Other:
+    """Another person than the one followed.
+
+    Attributes
+    ----------
+    x, y, at
+        Where they were last measured, odometry frame [m], and when [s].
+    """
+
+    x: float
+    y: float
+    at: float
+
+
+@dataclass(frozen=True, slots=True)
+class Backing:
+    """Decides whether to back, to look behind first, or to stand.
+
+    Attributes
+    ----------
+    remembers_s
+        Ground seen to be free within this is known, and another person is remembered for so long [s]. Chosen: what
+        `Guard` remembers.
+    lately_s
+        Where a person out of sight can be, it must have been seen within this [s]. Chosen: at .75 m/s a person comes
+        up from 3.5 m, the reach of the legs in the scan.
+    unseen_s, same, walk
+        A person not measured for longer than this is out of sight [s], and can be that far from where they were, and so
+        much further for each second since [m, m/s]. Chosen: as long as one is predicted; a body's width; a walk.
+    blind_speed
+        Onto ground that is not known, but where no person out of sight can be, it backs at this speed at most [m/s];
+        else not at all. Chosen: `Guard`'s limit.
+    glance_turn, glance_from
+        Turn rate to look behind before backing, and how much too near a person must be for that [rad/s, m]. Chosen:
+        82°, which shows the ground behind, in .7 s; nearer, HOG would miss the head. Until then it stands.
+    depths
+        So far behind the outline the ground must be known [m]. Chosen: from .4 m/s the robot stops within .26 m.
+    """
+
+    remembers_s: float = bounded(29.0, 0, 3600)
+    lately_s: float = bounded(5.0, 0, 600)
+    unseen_s: float = bounded(0.8, 0, 60)
+    same: float = bounded(0.5, 0, 5)
+    walk: float = bounded(1.0, 0, 5)
+    blind_speed: float = bounded(0.2, 0, 1)
+    glance_turn: float = bounded(3.0, 0, 6)
+    glance_from: float = bounded(0.25, 0, 2)
+    depths: tuple[float, ...] = (0.1, 0.2, 0.3)
+
+    def remember(
+        self, others: tuple[Other, ...], seen: Points, felt: Points, followed: Points, now: float
+    ) -> tuple[Other, ...]:
+        """Bring the other people up to `now` [s].
+
+        Parameters
+        ----------
+        others
+            Those remembered.
+        seen
+            float64 (N, 2) [m], odometry frame: where others are measured now.
+        felt
+            float64 (M, 2) [m]: what the scan shows now that may be legs: of those remembered, not of more.
+        followed
+            float64 (1, 2) [m]: where the person followed is, who may have been taken for another; (0, 2) if unknown.
+        """
+        left = [
+            one
+            for one in others
+            if now - one.at < self.remembers_s and (np.hypot(*(followed - (one.x, one.y)).T) > self.same).all()
+        ]
+        kept: list[Other] = []
+        for x, y in seen.tolist():
+            near = min(left, key=lambda one: self._gap(one, x, y, now), default=None)
+            if near is not None and self._gap(near, x, y, now) <= 0:
+                left.remove(near)
+            kept.append(Other(x, y, now))
+        for one in left:
+            gaps = np.hypot(*(felt - (one.x, one.y)).T)
+            if len(gaps) and gaps.min() < self.same:
+                x, y = felt[int(np.argmin(gaps))].tolist()
+                kept.append(Other(x, y, now))
+            else:
+                kept.append(one)
+        return tuple(kept)
+
+    def can_hold_other(self, others: tuple[Other, ...], places: Points, now: float) -> NDArray[np.bool_]:
+        """Return whether a person out of sight can be at each of (N, 2) places [m] in the odometry frame, bool (N,)."""
+        can = np.zeros(len(places), bool)
+        for one in others:
+            if now - one.at > self.unseen_s:
+                can |= np.hypot(*(places - (one.x, one.y)).T) < self._reach(one, now)
+        return can
+
+    def is_free_behind(
+        self,
+        poses: Poses,
+        pose: Odometry,
+        grid: Grid,
+        ground: Ground | None,
+        others: tuple[Other, ...],
+        robot: RobotGeometry,
+    ) -> NDArray[np.bool_]:
+        """Return whether the ground behind the robot is known to be free when it is at poses in the base frame.
+
+        `pose` is where the base frame is. Returns bool (...), as many as poses.
+        """
+        if ground is None:
+            return np.ones(poses.shape[:-1], bool)
+        behind = self._behind(robot)
+        cos, sin = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
+        x = poses[..., 0, None] + behind[:, 0] * cos - behind[:, 1] * sin
+        y = poses[..., 1, None] + behind[:, 0] * sin + behind[:, 1] * cos
+        places = to_odometry(np.stack([x.ravel(), y.ravel()], axis=1), pose)
+        within = np.where(self.can_hold_other(others, places, ground.stamp), self.lately_s, self.remembers_s)
+        known = grid.is_free_since(ground, places, ground.stamp - within)
+        return np.asarray(known.reshape(x.shape).all(axis=-1))
+
+    def is_blocked(self, pose: Odometry, grid: Grid, ground: Ground | None, robot: RobotGeometry) -> bool:
+        """Whether the map shows something that lasts close behind: `Guard` remembers for a shorter time."""
+        if ground is None:
+            return False
+        return bool(grid.is_blocked(ground, to_odometry(self._behind(robot), pose), lasting=True).any())
+
+    def blind_limit(self, others: tuple[Other, ...], pose: Odometry, robot: RobotGeometry, now: float) -> float:
+        """Return how fast to back onto unknown ground [m/s]."""
+        behind = to_odometry(self._behind(robot), pose)
+        return 0.0 if self.can_hold_other(others, behind, now).any() else self.blind_speed
+
+    def blindly(
+        self, twist: Twist, limit: float, aim: Aim, too_far: float, walking: float, reason: str
+    ) -> tuple[Twist, str]:
+        """Return the command, and the reason, in place of one that backs onto unknown ground.
+
+        Nobody who walks is turned away from: they may pass by, and `Company` gives way to them.
+
+        Parameters
+        ----------
+        twist, reason
+            The command, and why.
+        limit
+            By `blind_limit`.
+        aim
+            Where the person is.
+        too_far
+            How much further off the person is than they should be, negative for nearer [m].
+        walking
+            People faster than this walk [m/s].
+        """
+        if limit > 0:
+            return replace(twist, linear=max(twist.linear, -limit)), reason
+        walks = max(abs(aim.range_rate), abs(aim.bearing_rate) * aim.distance) > walking
+        if walks or too_far > -self.glance_from:
+            return Twist(0.0, twist.angular), reason
+        side = -1.0 if aim.bearing > 0 else 1.0
+        return Twist(0.0, side * self.glance_turn), "looking behind before backing"
+
+    def _behind(self, robot: RobotGeometry) -> Points:
+        """Return places behind the robot's outline, float64 (N, 2) [m] in the base frame."""
+        far, side = np.meshgrid(self.depths, (-robot.half_width, 0.0, robot.half_width))
+        return np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
+
+    def _reach(self, one: Other, now: float) -> float:
+        return self.same + self.walk * (now - one.at)
+
+    def _gap(self, one: Other, x: float, y: float, now: float) -> float:
+        """Return how much further off a place is than a person can have walked [m]."""
+        return math.hypot(x - one.x, y - one.y) - self._reach(one, now)

@@ -116,3 +116,15 @@ def test_before_the_first_image_the_robot_stands() -> None:
 
 def test_the_time_of_detection_is_told() -> None:
     assert Follower(Driver(), Detector()).see(0.0, IMAGE, SENSORS).detect_ms > 0
+
+
+def test_the_scans_between_two_slow_images_come_with_the_second() -> None:
+    driver = Driver()
+    follower = Follower(driver, Detector())
+    follower.see(0.0, IMAGE, SENSORS)
+    for stamp in (0.1, 0.2):
+        follower.recheck(stamp, scan(stamp=stamp), Odometry(stamp, x=stamp))
+    follower.see(0.3, IMAGE, SENSORS)
+    follower.see(0.4, IMAGE, SENSORS)
+    between = [[(seen.stamp, pose.x) for seen, pose in one.between] for one in driver.told]
+    assert between == [[], [(0.1, 0.1), (0.2, 0.2)], []]

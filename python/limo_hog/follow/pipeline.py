@@ -21,6 +21,9 @@ S = TypeVar("S")
 #: A command is sent at least this often [s]: the period of the workshop's camera, a fifth of the robot's watchdog.
 CONTROL_PERIOD = 0.1
 
+#: So many scans between two camera images are kept at most [1]. Chosen: a second of the Limo's lidar.
+_SCANS_BETWEEN = 8
+
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
@@ -88,6 +91,7 @@ class Follower(Generic[S]):
         self._detector = detector
         self._state = self._guard.start()
         self._region: Region | None = None
+        self._between: tuple[tuple[Scan, Odometry], ...] = ()
 
     def see(self, stamp: float, image: NDArray[np.uint8], sensors: Sensors) -> Sighting:
         """Detect people in a camera image and decide what to do.
@@ -118,7 +122,9 @@ class Follower(Generic[S]):
             sensors.scan,
             sensors.odometry,
             failure,
+            self._between,
         )
+        self._between = ()
         decision = self._guard.step(observation, self._state)
         self._state, self._region = decision.state, decision.region
         return Sighting(replace(decision, state=None), detections, region, failure, detect_ms)  # type: ignore[arg-type]
@@ -133,6 +139,8 @@ class Follower(Generic[S]):
         scan, odometry
             The newest readings.
         """
+        if scan is not None and odometry is not None:
+            self._between = (*self._between[1 - _SCANS_BETWEEN :], (scan, odometry))
         decision = self._guard.recheck(now, scan, odometry, self._state)
         self._state = decision.state
         return replace(decision, state=None)  # type: ignore[arg-type, return-value]

@@ -311,12 +311,15 @@ def test_between_two_alike_it_stands_and_looks_and_says_that_it_is_not_sure() ->
     state = run(world, 4.0).state
     other = World(person=(2.5, 0.9), robot=world.robot, time=world.time)
     for _ in range(8):
-        view, second = world.observe(), other.observe().detections
+        view, second = world.observe(), other.observe()
         together = Detections(
-            np.concatenate([view.detections.boxes, second.boxes]),
-            np.concatenate([view.detections.scores, second.scores]),
+            np.concatenate([view.detections.boxes, second.detections.boxes]),
+            np.concatenate([view.detections.scores, second.detections.scores]),
         )
-        state = CONTROLLER.step(replace(view, detections=together), state).state
+        assert view.depth is not None
+        assert second.depth is not None
+        both = replace(view, detections=together, depth=np.minimum(view.depth, second.depth))
+        state = CONTROLLER.step(both, state).state
         world.time, other.time = world.time + 0.1, other.time + 0.1
     one, two = (person.number for person in state.tracks.people)
     likeness = state.choice.likeness
@@ -392,3 +395,30 @@ def test_a_person_who_leaves_the_view_is_followed_by_the_lidar_as_long_as_they_m
     assert decision is not None
     assert step > 45
     assert decision.belief.followed == number or decision.mode is Mode.LOST
+
+
+def test_a_box_on_the_wall_beside_a_missed_person_does_not_take_their_track() -> None:
+    world = World(person=(2.5, 0.0))
+    state = run(world, 4.0).state
+    seen = world.observe()
+    beside = seen.detections.boxes + np.array([60, 0, 0, 0], np.int32)
+    for _ in range(5):
+        view = world.observe(visible=False)
+        # The wall is as far as the person: by its place and size the box would fit.
+        wall = replace(view, detections=Detections(beside, seen.detections.scores), depth=flat(world.distance - 0.084))
+        state = CONTROLLER.step(wall, state).state
+        world.time += 0.1
+    person = next(one for one in state.tracks.people if one.confirmed)
+    assert person.track.mean[:2] == pytest.approx(world.person, abs=0.1)
+
+
+def test_it_keeps_further_off_somebody_who_walks_where_the_images_come_late() -> None:
+    kept = []
+    for period in (0.1, 0.4):
+        world = World(person=(2.5, -1.0), velocity=(0.0, 0.5), period=period)
+        belief = run(world, 4.0).belief
+        assert belief is not None
+        kept.append(belief.keeps)
+    assert kept[0] == pytest.approx(CONTROLLER.target_distance)
+    assert kept[1] is not None
+    assert kept[1] > CONTROLLER.target_distance + 0.1

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.follow.views import boxes, flat, look
+from tests.follow.views import boxes, flat, look, scan_of
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import Measurement, measure
@@ -18,7 +18,7 @@ from limo_hog.follow.sense.visibility import Visibility
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to, initiate, predict
-from limo_hog.follow.tracks.tracker import Tracker
+from limo_hog.follow.tracks.tracker import Tracker, Tracks
 
 NOISE, POSE, TRACKER = Noise(), Odometry(), Tracker()
 APPEARANCE = TRACKER.association.appearance
@@ -209,3 +209,16 @@ def test_clothes_of_which_one_number_is_missing_are_unknown() -> None:
     first, second = measure(view, LIMO)
     assert first.clothes is None
     np.testing.assert_array_equal(second.clothes, IN_GREEN)
+
+
+def test_the_legs_in_the_scans_between_two_slow_frames_show_that_a_person_has_turned() -> None:
+    # The person walked to the left at .6 m/s; after the frame at 0 s they turn and walk to the right as fast.
+    track = replace(kalman.initiate(0.0, 0.0, 2.0, POSE, NOISE), mean=np.array([2.0, 0.0, 0.0, 0.6]))
+    tracks = Tracks(people=(replace(somebody(1, 2.0), track=track),), stamp=0.0, poses=(POSE,))
+    between = tuple((scan_of([(2.0, -0.6 * t)], stamp=t), Odometry(t)) for t in (0.1, 0.2, 0.3))
+    seen = replace(look(stamp=0.33), odometry=Odometry(0.33), between=between)
+    without, _ = TRACKER.update(replace(seen, between=()), tracks)
+    with_legs, _ = TRACKER.update(seen, tracks)
+    assert without.people[0].track.mean[1] == pytest.approx(0.19, abs=0.02)
+    assert with_legs.people[0].track.mean[1] == pytest.approx(-0.6 * 0.33, abs=0.1)
+    assert with_legs.people[0].felt == 0.3

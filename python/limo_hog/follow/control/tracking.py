@@ -46,6 +46,9 @@ class TrackingController:
         A person who walks fast is kept off by so many seconds of their way, at 1 m/s² of the wheels, and what the image
         is late [s]; share by which a faster frame, and a hundredth of that by which a slower one, moves the speed [1].
         Computed: .2 s to notice a start, .7 s to turn aside, .8 s to drive .3 m; at a walk that is less than 1.5 m.
+    prompt_s
+        By what an image is later than this, its period included, a person who turns and the robot come nearer to each
+        other unseen: the least distance grows by their way in it [s]. The workshop's camera period.
     near_hiding, foresight_s
         Distance to hold to a person who will be out of sight after so long [m, s]. Chosen: the edge of Hall's personal
         zone; the time in which the robot comes up by that much.
@@ -75,6 +78,7 @@ class TrackingController:
     full_every: int = bounded(15, 1, 1000)
     aside_s: float = bounded(1.7, 0, 5)
     brisk_share: float = bounded(0.15, 0, 1)
+    prompt_s: float = bounded(0.1, 0, 5)
     near_hiding: float = bounded(1.2, 0.5, 8)
     foresight_s: float = bounded(1.0, 0, 5)
     steering: Steering = field(default_factory=Steering)
@@ -103,13 +107,17 @@ class TrackingController:
             for last in before:
                 believed = self.wheels.learn(believed, state.sent, last, wheels, self.robot)
             state = replace(state, acceleration=believed)
-        decision, person = self._follow(observation, state)
-        return self._give_way(decision, person, observation)
+        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
+        decision, person = self._follow(observation, points, state)
+        return self._give_way(decision, person, observation, points)
 
-    def _follow(self, observation: Observation, state: TrackingState) -> tuple[Decision[TrackingState], Person | None]:
+    def _follow(
+        self, observation: Observation, points: Points, state: TrackingState
+    ) -> tuple[Decision[TrackingState], Person | None]:
         """Bring the tracks up to the frame, choose the person to follow, and steer to where they are now.
 
-        Returns the decision, and the person followed as of the newest stamp.
+        `points` are the scan's returns, base frame. Returns the decision, and the person followed as of the newest
+        stamp.
         """
         tracks, boxes = self.tracker.update(observation, state.tracks)
         before, choice = state.choice.measured, self.selection.choose(tracks, state.choice)
@@ -124,7 +132,6 @@ class TrackingController:
         person, tracks = self.tracker.follow_legs(person, state.tracks, self.grid, state.ground)
         state = replace(state, tracks=tracks)
         keeps = self._keeps(person, state, observation)
-        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
         aim, state = self._aim(person, keeps, points, state, observation)
         lost_s = min(unseen_s, observation.now - person.felt)
         if lost_s <= self.tracker.scan_period_s:
@@ -181,7 +188,7 @@ class TrackingController:
         return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief), person
 
     def _give_way(
-        self, decision: Decision[TrackingState], person: Person | None, observation: Observation
+        self, decision: Decision[TrackingState], person: Person | None, observation: Observation, points: Points
     ) -> Decision[TrackingState]:
         """Replace a command by a way out of the way of people, where there is need, and by what the wheels can do."""
         state, twist, mode, reason = decision.state, decision.twist, decision.mode, decision.reason
@@ -189,7 +196,6 @@ class TrackingController:
         if wheels is None:
             return decision
         driven, pose = Twist(wheels.linear, wheels.angular), pose_at(state.tracks.poses, observation.now)
-        points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
         begun = None
         if state.way_out is not None:
             yaw, speed, since = state.way_out
@@ -345,6 +351,7 @@ class TrackingController:
         least = self.tracker.visibility.least_distance(person.window, person.centre, observation.height)
         late_s = observation.now - observation.stamp + state.tracks.period
         notice_s = late_s + self.aside_s / math.sqrt(state.acceleration)
+        least += 2 * state.brisk * max(late_s - self.prompt_s, 0.0)
         keeps = max(self.target_distance, least - self.robot.camera_x, notice_s * state.brisk)
         if keeps > self.near_hiding and state.ground is not None:
             pose = pose_at(state.tracks.poses, observation.now)

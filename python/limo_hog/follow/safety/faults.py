@@ -33,18 +33,16 @@ def _boxes(observation: Observation) -> str:
     boxes, scores = observation.detections.boxes, observation.detections.scores
     if boxes.ndim != 2 or boxes.shape[1] != 4 or len(boxes) != len(scores):
         return f"boxes {boxes.shape} and scores {scores.shape} do not belong together"
-    if not np.all(np.isfinite(scores)):
+    if not all(map(math.isfinite, scores.tolist())):
         return "a box has a score that is not a number"
     clothes = observation.clothes
     if clothes is not None and clothes.shape != (len(boxes), 2, 3):
         return f"clothes {clothes.shape} and boxes {boxes.shape} do not belong together"
-    centre = boxes[:, :2] + boxes[:, 2:] / 2
-    inside = (centre >= 0).all(axis=1) & (centre < (observation.width, observation.height)).all(axis=1)
-    sane = inside & (boxes[:, 2:] > 0).all(axis=1)
-    if sane.all():
-        return ""
-    box = ", ".join(str(value) for value in boxes[~sane][0])
-    return f"box ({box}) lies outside the {observation.width}x{observation.height} image"
+    for x, y, w, h in boxes.tolist():
+        inside = 0 <= x + w / 2 < observation.width and 0 <= y + h / 2 < observation.height
+        if not inside or w <= 0 or h <= 0:
+            return f"box ({x}, {y}, {w}, {h}) lies outside the {observation.width}x{observation.height} image"
+    return ""
 
 
 #: One in so many rows and columns of the depth image is looked at first [px].

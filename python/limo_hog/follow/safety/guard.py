@@ -226,7 +226,12 @@ class Guard(Generic[S]):
         )
 
     def _looked(self, looks: tuple[Look, ...], scan: Scan, pose: Odometry) -> tuple[Look, ...]:
-        young = tuple(look for look in looks if 0 <= scan.stamp - look.scan.stamp < self.look_memory_s)
+        young = looks
+        if (
+            looks
+            and not 0 <= scan.stamp - looks[-1].scan.stamp <= scan.stamp - looks[0].scan.stamp < self.look_memory_s
+        ):
+            young = tuple(look for look in looks if 0 <= scan.stamp - look.scan.stamp < self.look_memory_s)
         if young and scan.stamp - young[-1].scan.stamp < self.look_every_s:
             return young
         return (*young, Look(scan, pose))

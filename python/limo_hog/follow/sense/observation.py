@@ -77,6 +77,9 @@ class Observation:
         Why the frame cannot be used, "" where it can; with a fault the robot stands still.
     clothes
         float64 (N, 2, 3): what the person in each detection wears, by `clothes_in`; None without a colour image.
+    between
+        Scans that came since the frame before, and where the robot was, oldest first: of a camera slower than the
+        lidar.
     """
 
     stamp: float
@@ -90,6 +93,7 @@ class Observation:
     odometry: Odometry | None = None
     fault: str = ""
     clothes: Clothes | None = None
+    between: tuple[tuple[Scan, Odometry], ...] = ()
 
     @property
     def now(self) -> float:
@@ -112,8 +116,11 @@ def observed(
     scan: Scan | None,
     odometry: Odometry | None,
     fault: str = "",
+    between: tuple[tuple[Scan, Odometry], ...] = (),
 ) -> Observation:
     """Return the observation of one camera image, uint8 (H, W, 3) BGR or (H, W): its size and clothes are filled in."""
     height, width = image.shape[:2]
     clothes = clothes_in(image, detections.boxes)
-    return Observation(stamp, width, height, focal_px, detections, region, depth, scan, odometry, fault, clothes)
+    return Observation(
+        stamp, width, height, focal_px, detections, region, depth, scan, odometry, fault, clothes, between
+    )

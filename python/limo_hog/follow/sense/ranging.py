@@ -156,9 +156,9 @@ def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, o
     column, row = box_centre(box)
     half = max(round(outline.half_width * int(box[2])), outline.least_half_px)
     strip = depth[: max(row, 1), max(column - half, 0) : max(column + half, 1)]
-    known = (np.isfinite(strip) & (strip > 0)).sum(axis=1)
+    known = np.count_nonzero(np.isfinite(strip) & (strip > 0), axis=1)
     with np.errstate(invalid="ignore"):
-        near = (np.abs(strip - person) < outline.tolerance).sum(axis=1)
+        near = np.count_nonzero(np.abs(strip - person) < outline.tolerance, axis=1)
     empty = near[::-1] < np.maximum(outline.share * known[::-1], 1)
     # The first row, from the box's middle upwards, that begins a gap.
     runs = np.convolve(empty, np.ones(outline.gap_px), "valid") >= outline.gap_px

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
 from limo_hog.follow.sense.appearance import Appearance
@@ -54,16 +55,22 @@ class Association:
     unknown: UnknownRange = field(default_factory=UnknownRange)
 
     def pair(
-        self, people: Sequence[Person], measurements: Sequence[Measurement], pose: Odometry, noise: Noise
+        self,
+        people: Sequence[Person],
+        measurements: Sequence[Measurement],
+        pose: Odometry,
+        noise: Noise,
+        flat: AbstractSet[int] = frozenset(),
     ) -> dict[int, int]:
         """Pair people with boxes: confirmed people first, then by cost.
 
-        Returns index of the person -> index of the measurement. Every track must be at the frame's stamp.
+        `flat` are the indices of boxes that do not stand out from what is behind them: no confirmed person's. Returns
+        index of the person -> index of the measurement. Every track must be at the frame's stamp.
         """
         matches = []
         for who, person in enumerate(people):
             for which, seen in enumerate(measurements):
-                if self._is_behind(person, seen, pose):
+                if self._is_behind(person, seen, pose) or (person.confirmed and which in flat):
                     continue
                 clothes_cost = self.appearance_cost(person, seen)
                 ranged = self.without_bad_range(person, seen)

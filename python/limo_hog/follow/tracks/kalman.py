@@ -7,6 +7,7 @@ Li and Kirubarajan, Estimation with Applications to Tracking and Navigation (200
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -89,8 +90,8 @@ def initiate(stamp: float, bearing: float, distance: float, pose: Odometry, nois
         ]
     )
     covariance = np.zeros((4, 4))
-    covariance[:2, :2] = turn @ np.diag([noise.range**2, noise.bearing**2]) @ turn.T
-    covariance[2:, 2:] = noise.velocity**2 * np.eye(2)
+    covariance[:2, :2] = (turn * (noise.range**2, noise.bearing**2)) @ turn.T
+    covariance[2, 2] = covariance[3, 3] = noise.velocity**2
     return Track(stamp, np.array([x, y, 0.0, 0.0]), covariance)
 
 
@@ -103,11 +104,23 @@ def predict(track: Track, stamp: float, noise: Noise) -> Track:
     if dt <= 0:
         x, y, vx, vy = track.mean
         return Track(stamp, np.array([x + dt * vx, y + dt * vy, vx, vy]), track.covariance)
+    move, spread = _motion(dt, noise)
+    return Track(stamp, move @ track.mean, move @ track.covariance @ move.T + spread)
+
+
+@functools.lru_cache(maxsize=64)
+def _motion(dt: float, noise: Noise) -> tuple[Array, Array]:
+    """Return the transition of the state over `dt` [s] and the covariance it adds, float64 (4, 4) each, read only.
+
+    All tracks of a frame are predicted for the same few stamps.
+    """
     kept = math.exp(-dt / noise.persistence)
     move = _POSITION + (noise.persistence * (1 - kept)) * _BOTH + kept * _VELOCITY
     q = noise.acceleration**2
     spread = (q * dt**3 / 3) * _POSITION + (q * dt**2 / 2) * _CROSS + (q * dt) * _VELOCITY
-    return Track(stamp, move @ track.mean, move @ track.covariance @ move.T + spread)
+    for matrix in (move, spread):
+        matrix.flags.writeable = False
+    return move, spread
 
 
 def bearing_range(track: Track, pose: Odometry) -> tuple[float, float]:
@@ -178,7 +191,9 @@ def innovation(track: Track, bearing: float, distance: float | None, pose: Odome
     difference = np.array([wrap(bearing - expected_bearing), (distance or 0.0) - expected_range])
     if distance is None:
         jacobian, variances, difference = jacobian[:1], variances[:1], difference[:1]
-    return Innovation(difference, jacobian @ track.covariance @ jacobian.T + np.diag(variances), jacobian, variances)
+    covariance = jacobian @ track.covariance @ jacobian.T
+    covariance.flat[:: len(variances) + 1] += variances
+    return Innovation(difference, covariance, jacobian, variances)
 
 
 def update(track: Track, measured: Innovation) -> Track:

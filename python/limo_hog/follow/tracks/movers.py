@@ -6,7 +6,6 @@ people who stand are nothing to be predicted.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -188,17 +187,21 @@ class Movers:
         A group beside which something nearer ends may be what that leaves to be seen of a wall.
         """
         points = returns.points
-        far = np.hypot(points[:, 0] - returns.pose.x, points[:, 1] - returns.pose.y)
-        ends = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) > self.gap) + 1
-        middles = []
-        for begin, end in itertools.pairwise([0, *ends.tolist(), len(points)]):
-            hidden = (begin > 0 and far[begin - 1] < far[begin]) or (end < len(points) and far[end] < far[end - 1])
-            if hidden or end - begin < self.legs.fewest or far[begin:end].mean() >= self.legs.reach:
-                continue
-            group = points[begin:end]
-            if np.hypot(*np.ptp(group, axis=0)) < self.legs.widest:
-                middles.append(group.mean(axis=0))
-        return np.array(middles).reshape(-1, 2)
+        if len(points) == 0:
+            return points
+        begins = np.hypot(*np.diff(points, axis=0).T) > self.gap
+        group = np.concatenate([[0], np.cumsum(begins)])
+        first = np.concatenate([[0], np.flatnonzero(begins) + 1])
+        count = np.bincount(group)
+        middle = np.stack([np.bincount(group, weights=column) / count for column in points.T], axis=1)
+        wide = np.hypot(*(np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)).T)
+        far = np.hypot(*(points - (returns.pose.x, returns.pose.y)).T)
+        last = first + count - 1
+        hidden = np.zeros(len(first), bool)
+        hidden[1:] = far[last[:-1]] < far[first[1:]]
+        hidden[:-1] |= far[first[1:]] < far[last[:-1]]
+        near = np.hypot(*(middle - (returns.pose.x, returns.pose.y)).T) < self.legs.reach
+        return np.asarray(middle[~hidden & near & (count >= self.legs.fewest) & (wide < self.legs.widest)])
 
     def _begin(self, place: Points, returns: Returns, noise: Noise) -> Mover:
         pose = returns.pose

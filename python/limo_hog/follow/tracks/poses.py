@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import replace
 
 from limo_hog.follow.sense.observation import Odometry
 
@@ -18,18 +17,20 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
     if not poses:
         return Odometry(stamp)
     last = poses[-1]
-    if stamp >= last.stamp:
+    if stamp == last.stamp:
+        return last
+    if stamp > last.stamp:
         ahead = stamp - last.stamp
         yaw = last.yaw + last.angular * ahead
         x = last.x + last.linear * ahead * math.cos(last.yaw)
         y = last.y + last.linear * ahead * math.sin(last.yaw)
-        return replace(last, stamp=stamp, x=x, y=y, yaw=yaw)
+        return Odometry(stamp, x, y, yaw, last.linear, last.angular)
     after = bisect.bisect_left(poses, stamp, key=lambda pose: pose.stamp)
     if after == 0:
         first = poses[0]
-        return replace(last, stamp=stamp, x=first.x, y=first.y, yaw=first.yaw)
+        return Odometry(stamp, first.x, first.y, first.yaw, last.linear, last.angular)
     one, other = poses[after - 1], poses[after]
     share = (stamp - one.stamp) / (other.stamp - one.stamp)
     yaw = one.yaw + share * math.remainder(other.yaw - one.yaw, math.tau)
     x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
-    return replace(last, stamp=stamp, x=x, y=y, yaw=yaw)
+    return Odometry(stamp, x, y, yaw, last.linear, last.angular)

@@ -136,9 +136,13 @@ class Tracker:
         """
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
-        known = [predict(one, stamp, self.noise) for one in tracks.people if stamp - one.measured < self.forget_s]
+        known = [one for one in tracks.people if stamp - one.measured < self.forget_s]
+        if observation.between:
+            known = [self._walked(one, tracks.scans, stamp) for one in known]
+        known = [predict(one, stamp, self.noise) for one in known]
         measured = measure(observation, self.robot)
-        pairs = self.association.pair(known, measured, pose, self.noise)
+        flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
+        pairs = self.association.pair(known, measured, pose, self.noise, flat)
         people: list[Person] = []
         recall = tracks.recall
         for who, person in enumerate(known):
@@ -157,7 +161,9 @@ class Tracker:
         boxes = {people[who].number: which for who, which in pairs.items()}
         number = tracks.next_number
         for which, seen in enumerate(measured):
-            if which not in boxes.values() and self.association.is_new(seen, people, pose):
+            if which in boxes.values() or which in flat:
+                continue
+            if self.association.is_new(seen, people, pose):
                 odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
                 people.append(initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds))
                 boxes[number] = which
@@ -251,22 +257,35 @@ class Tracker:
         people = tuple(kept if one.number == person.number else one for one in tracks.people)
         return now, replace(tracks, people=people)
 
+    def _walked(self, person: Person, scans: tuple[Returns, ...], stamp: float) -> Person:
+        """Bring a person up to the last scan before a frame of `stamp` [s] that shows their legs.
+
+        Between slow frames a person turns and walks further than the next frame's gate.
+        """
+        for returns in scans:
+            if person.confirmed and person.track.stamp < returns.stamp <= stamp and returns.stamp > person.felt:
+                track = self.legs.update(person.track, returns, self.noise)
+                person = person if track is None else replace(person, track=track, felt=returns.stamp)
+        return person
+
     def follow_movers(
         self, tracks: Tracks, half_view: float, camera: float, grid: Grid, ground: Ground | None
     ) -> Tracks:
-        """Enter the newest scan into what moves; see `Movers.update`."""
-        if not tracks.scans or tracks.scans[-1].stamp <= tracks.moved_at:
+        """Enter the new scans into what moves; see `Movers.update`."""
+        movers, new = tracks.movers, [one for one in tracks.scans if one.stamp > tracks.moved_at]
+        if not new:
             return tracks
-        newest = tracks.scans[-1]
-        movers = self.movers.update(tracks.movers, newest, half_view, self.noise, grid, ground, camera)
-        movers = self.movers.assign(movers, [one for one in tracks.in_view if one.confirmed], newest.stamp)
-        people = tuple(
-            self.movers.continued(one, movers, newest, self.noise)
-            if one.confirmed and 0 < (tracks.stamp or 0.0) - one.seen < self.legs_only_s
-            else one
-            for one in tracks.people
-        )
-        return replace(tracks, people=people, movers=movers, moved_at=newest.stamp)
+        people, seen = tracks.people, [one for one in tracks.in_view if one.confirmed]
+        for returns in new:
+            movers = self.movers.update(movers, returns, half_view, self.noise, grid, ground, camera)
+            movers = self.movers.assign(movers, seen, returns.stamp)
+            people = tuple(
+                self.movers.continued(one, movers, returns, self.noise)
+                if one.confirmed and 0 < (tracks.stamp or 0.0) - one.seen < self.legs_only_s
+                else one
+                for one in people
+            )
+        return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
 
     def around(
         self, tracks: Tracks, followed: Person | None, now: float, lately_s: float
@@ -312,13 +331,13 @@ class Tracker:
         return [kalman.predict(one.track, now, self.noise) for one in moving]
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
-        poses, odometry = tracks.poses, observation.odometry
-        if odometry is not None:
-            poses = (*(pose for pose in poses if odometry.stamp - pose.stamp < self.poses_s), odometry)
-        scans, scan = tracks.scans, observation.scan
-        if scan is not None and (not scans or scan.stamp > scans[-1].stamp):
-            young = (one for one in scans if scan.stamp - one.stamp < self.scans_s)
-            scans = (*young, returns_of(scan, pose_at(poses, scan.stamp), self.robot))
+        poses, scans = tracks.poses, tracks.scans
+        for scan, odometry in (*observation.between, (observation.scan, observation.odometry)):
+            if odometry is not None:
+                poses = (*(pose for pose in poses if odometry.stamp - pose.stamp < self.poses_s), odometry)
+            if scan is not None and (not scans or scan.stamp > scans[-1].stamp):
+                young = (one for one in scans if scan.stamp - one.stamp < self.scans_s)
+                scans = (*young, returns_of(scan, pose_at(poses, scan.stamp), self.robot))
         period = tracks.period if tracks.stamp is None else observation.stamp - tracks.stamp
         period = min(max(period, self.min_period_s), self.max_period_s)
         return replace(tracks, poses=poses, scans=scans, stamp=observation.stamp, period=period)

@@ -124,3 +124,18 @@ def test_two_people_side_by_side_have_one_pair_of_legs_each() -> None:
     # The number goes along with the person, and is given once.
     later = MOVERS.assign(MOVERS.assign(movers, people, 1.0), [person(1, 1.5, 0.3, 1.0)], 1.0)
     assert [one.number for one in later] == [None, 1]
+
+
+def test_a_place_is_empty_as_soon_as_a_beam_ends_behind_it_and_not_where_something_nearer_is() -> None:
+    never = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
+    wall = [(3.5, 0.05 * step - 3.0) for step in range(120)]
+    post = [(0.8, 0.0), (0.8, 0.05)]
+    for nearer, moving in (([], 1), (post, 0)):
+        movers: tuple[Mover, ...] = ()
+        for index in range(10):
+            y = 0.1 * index
+            hidden = [one for one in wall if abs(one[1] - y * 3.5 / 2.0) > 0.3]
+            after = nearer if index > 1 else []
+            points = np.array(sorted([(2.0, y - 0.03), (2.0, y + 0.03), *hidden, *after], key=lambda p: p[1] / p[0]))
+            movers = MOVERS.update(movers, Returns(index * SCAN_S, points, Odometry()), HALF_VIEW, NOISE, GRID, never)
+        assert len(MOVERS.moving(movers)) == moving

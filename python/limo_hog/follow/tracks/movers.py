@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points
@@ -65,6 +66,8 @@ class Movers:
         shins are two beams.
     gap
         Returns further apart than this are of two groups [m]. Chosen: in mid-stride the shins of a .9 m person.
+    beams
+        A beam within this passes a place [rad]. Chosen: two of the Limo's beams to either side.
     fewest_scans, least_way
         It counts as moving after so many scans, so far from where it began [1, m]. Chosen: half a second; more than the
         middle of the legs of a person who shifts from one to the other moves.
@@ -83,6 +86,7 @@ class Movers:
 
     legs: Legs = field(default_factory=lambda: Legs(reach=3.5))
     gap: float = 0.3
+    beams: float = 0.03
     fewest_scans: int = 4
     least_way: float = 0.25
     forget_s: float = 0.5
@@ -120,7 +124,8 @@ class Movers:
                 kept.append(mover)
         if ground is not None:
             began, since = np.array([one.began for one in kept]).reshape(-1, 2), np.array([one.since for one in kept])
-            left = grid.is_free_since(ground, began, since)
+            # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
+            left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
             kept = [replace(one, left=one.left or gone) for one, gone in zip(kept, left.tolist(), strict=True)]
         known = np.array([one.track.mean[:2] for one in kept]).reshape(-1, 2)
         places = self._groups(returns)
@@ -180,6 +185,17 @@ class Movers:
         if is_in_view(kalman.predict(mover.track, returns.stamp, Noise()), returns, half_view, self.robot):
             return self.forget_s
         return self.unseen_s
+
+    def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
+        """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
+        pose, points = returns.pose, returns.points
+        x, y = pose.x + self.robot.lidar_x * math.cos(pose.yaw), pose.y + self.robot.lidar_x * math.sin(pose.yaw)
+        (ends, far), (to, near) = (
+            (np.arctan2(at[:, 1] - y, at[:, 0] - x), np.hypot(at[:, 0] - x, at[:, 1] - y)) for at in (points, places)
+        )
+        beside = np.abs(np.angle(np.exp(1j * (ends[None, :] - to[:, None])))) < self.beams
+        shortest = np.where(beside, far[None, :], np.inf).min(axis=1, initial=np.inf)
+        return np.asarray(beside.any(axis=1) & (shortest > near + self.gap))
 
     def _groups(self, returns: Returns) -> Points:
         """Return the middle of each group of returns that is as wide as legs, float64 (N, 2) [m], odometry frame.

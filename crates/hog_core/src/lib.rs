@@ -30,6 +30,7 @@ mod guided;
 mod interrupt;
 mod memory;
 mod rescore;
+mod separable;
 mod threads;
 
 #[cfg(feature = "python")]

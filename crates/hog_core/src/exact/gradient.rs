@@ -60,11 +60,11 @@ pub fn gradient(
     let Size { width, height } = padding.size;
     let pixels = width.saturating_mul(height);
     let mut out = Gradient { shares: memory::with_room(pixels)?, bins: memory::with_room(pixels)? };
-    let put = |row: &Row| {
+    let mut put = |_, row: &RowVotes| {
         out.shares.extend_from_slice(&row.shares);
         out.bins.extend_from_slice(&row.bins);
     };
-    rows(image, padding, Region { x: 0, y: 0, width, height }, spec, interrupt, put)?;
+    each_row(image, padding, Region { x: 0, y: 0, width, height }, spec, interrupt, &mut put)?;
     Ok(out)
 }
 
@@ -77,37 +77,39 @@ pub(super) fn votes(
     interrupt: &Interrupt,
 ) -> Result<Votes> {
     let mut pixels = memory::with_room(region.width.saturating_mul(region.height))?;
-    let put = |row: &Row| {
+    let mut put = |_, row: &RowVotes| {
         let votes = row.shares.iter().zip(&row.bins);
         pixels.extend(votes.map(|(&shares, &bins)| Vote { shares, bins }));
     };
-    rows(image, padding, region, spec, interrupt, put)?;
+    each_row(image, padding, region, spec, interrupt, &mut put)?;
     Ok(Votes { width: region.width, pixels })
 }
 
 /// The votes of a row of pixels.
-struct Row {
+pub(crate) struct RowVotes {
     /// What the two bins get.
-    shares: Vec<[f32; 2]>,
+    pub shares: Vec<[f32; 2]>,
     /// Which bins these are.
-    bins: Vec<[u8; 2]>,
+    pub bins: Vec<[u8; 2]>,
 }
 
-/// Hands the votes of a region to `put`, row by row.
-fn rows(
+/// Hands the votes of a region to `put`, row by row, with the number of each.
+pub(crate) fn each_row(
     image: ImageView,
     padding: Padding,
     region: Region,
     spec: &HogSpec,
     interrupt: &Interrupt,
-    put: impl FnMut(&Row),
+    put: &mut dyn FnMut(usize, &RowVotes),
 ) -> Result<()> {
     if region.width == 0 {
         return Ok(());
     }
     let row = || memory::filled(region.width, 0.0f32);
-    let votes =
-        Row { shares: memory::filled(region.width, [0.0; 2])?, bins: memory::filled(region.width, [0; 2])? };
+    let votes = RowVotes {
+        shares: memory::filled(region.width, [0.0; 2])?,
+        bins: memory::filled(region.width, [0; 2])?,
+    };
     let padded_row = || memory::filled((region.width + 2) * image.channels(), 0.0f32);
     run(Rows {
         image,
@@ -123,29 +125,28 @@ fn rows(
     })
 }
 
-/// The work of [`rows`], and its memory.
-struct Rows<'a, P> {
+/// The work of [`each_row`], and its memory.
+struct Rows<'a> {
     image: ImageView<'a>,
     padding: Padding,
     region: Region,
     spec: &'a HogSpec,
     interrupt: &'a Interrupt<'a>,
-    put: P,
+    put: &'a mut dyn FnMut(usize, &RowVotes),
     source: Source<'a>,
     /// Of one row: derivatives along x and y, magnitude, angle.
     lines: [Vec<f32>; 4],
-    votes: Row,
+    votes: RowVotes,
     /// Three neighbouring rows of the padded image.
     padded: [Vec<f32>; 3],
 }
 
-impl<P: FnMut(&Row)> Work for Rows<'_, P> {
+impl Work for Rows<'_> {
     type Output = Result<()>;
 
     #[inline(always)]
     fn run<M: MulAdd>(self) -> Result<()> {
-        let Self { image, padding, region, spec, interrupt, mut put, source, lines, mut votes, padded } =
-            self;
+        let Self { image, padding, region, spec, interrupt, put, source, lines, mut votes, padded } = self;
         let ([mut dx, mut dy, mut magnitude, mut angle], mut rows) = (lines, padded);
         source.fill(0, &mut rows[0]);
         source.fill(1, &mut rows[1]);
@@ -164,7 +165,7 @@ impl<P: FnMut(&Row)> Work for Rows<'_, P> {
             }
             polar_row::<M>(region.x, padding.size.width, [&dx, &dy], [&mut magnitude, &mut angle]);
             vote(spec, &magnitude, &angle, &mut votes);
-            put(&votes);
+            put(y, &votes);
         }
         Ok(())
     }
@@ -302,7 +303,7 @@ fn polar_row<M: MulAdd>(
 
 /// Splits each gradient between the two bins whose centres are nearest.
 #[inline(always)]
-fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut Row) {
+fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut RowVotes) {
     let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
     let bins_per_radian = (spec.nbins as f64 / range) as f32;
     let nbins = spec.nbins as f32;

@@ -13,7 +13,8 @@ pub(super) const CHUNK: usize = 16;
 const LANES_MAX: usize = 16;
 
 /// How far a score may be from the exact path's, as a share of Σ‖w‖ over the SVM's blocks; see `fast/plan.rs`, whose
-/// value this is: votes are the exact path's here, so that errors are smaller.
+/// value this is: votes are the exact path's here, so that errors are smaller (2e-8 over the windows of a street in six
+/// geometries).
 const SCORE_ERROR: f64 = 4e-7;
 
 /// The constants of one detector.

@@ -155,6 +155,9 @@ def corners() -> None:
         for module in (limo_hog, cv2):
             hog = module.HOGDescriptor((64, 128), block, stride, cell, bins, 1, -1, 0, 0.2, True, 64, signed)
             weights = np.random.default_rng(0).normal(size=hog.getDescriptorSize() + 1).astype(np.float32)
+            # As loud as the people model, whose blocks' weights have norms of 50 together.
+            cells = block[0] * block[1] // (cell[0] * cell[1])
+            weights *= 50 / np.linalg.norm(weights[:-1].reshape(-1, cells * bins), axis=1).sum()
             weights[-1] = -3.0 * np.linalg.norm(weights) / 8
             hog.setSVMDetector(weights)
             pair.append(hog)

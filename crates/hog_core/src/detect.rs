@@ -14,6 +14,7 @@ use crate::memory::{self, Pool};
 use crate::params::{HogParams, HogSpec};
 use crate::pyramid::{Grid, Level, Pyramid, Steps, check, levels, resize, to_image};
 use crate::rescore::{Hit, LevelWindows, Scorer};
+use crate::separable;
 use crate::threads::in_order;
 
 /// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
@@ -32,6 +33,8 @@ pub(crate) struct Exact {
     spec: HogSpec,
     pub tables: Tables,
     svm: Option<Svm>,
+    /// How its levels are searched where there is no fast path, if their sums separate.
+    separable: Option<separable::Plan>,
 }
 
 /// The image in planes for the fast path, shared by all levels of a call.
@@ -76,7 +79,8 @@ impl Hog {
         let geometry = fast::geometry(backend, &spec);
         let plan = geometry.as_ref().zip(svm.as_ref());
         let plan = plan.and_then(|(geometry, svm)| fast::plan(backend, geometry, svm));
-        let exact = Exact { tables: Tables::new(&spec)?, spec, svm };
+        let separable = svm.as_ref().map(|svm| separable::Plan::new(&spec, svm)).transpose()?.flatten();
+        let exact = Exact { tables: Tables::new(&spec)?, spec, svm, separable };
         Ok(Self { exact: Arc::new(exact), geometry, plan: plan.map(Arc::new), backend })
     }
 
@@ -169,7 +173,7 @@ impl Hog {
         locations: Option<&[(i64, i64)]>,
         interrupt: &Interrupt,
     ) -> Result<Vec<Hit>> {
-        let Exact { spec, tables, svm } = &*self.exact;
+        let Exact { spec, tables, svm, .. } = &*self.exact;
         let steps = self.steps(search, spec.cell)?;
         let grid = steps.grid(image.size(), spec);
         let Some(svm) = svm else { return Ok(Vec::new()) };
@@ -258,13 +262,13 @@ impl Hog {
             memory::collect(levels.iter().map(|level| (level.size, steps.grid(level.size, self.spec()))))?;
         let mut windows =
             memory::collect(grids.iter().map(|&(size, grid)| LevelWindows { size, grid, found: None }))?;
-        let mut margin = f64::INFINITY;
         let fast = self.plan.as_ref().filter(|_| grids.iter().all(|(_, grid)| fast::serves(grid)));
+        let separable = self.exact.separable.as_ref();
+        let error = fast.map(|plan| plan.score_error_bound());
+        let error = error.or(separable.map(separable::Plan::score_error_bound));
+        let error = error.filter(|&error| !exact_weights && error <= SCORE_ERROR_MAX);
+        let margin = error.unwrap_or(f64::INFINITY);
         if let Some(plan) = fast {
-            let error = plan.score_error_bound();
-            if !exact_weights && error <= SCORE_ERROR_MAX {
-                margin = error;
-            }
             let mut planes = PLANES.take();
             fast::fill_planes(self.backend, &mut planes, image)?;
             if first != image.size() {
@@ -284,7 +288,7 @@ impl Hog {
             }
         }
         let Exact { spec, tables, .. } = &*self.exact;
-        let scorer = Scorer { spec, tables, svm, hit_threshold, margin };
+        let scorer = Scorer { spec, tables, svm, separable, hit_threshold, margin };
         let is_needed = windows.iter().any(|level| scorer.is_needed(level));
         let resized = if is_needed && first != image.size() {
             Some(Image { data: resize(image, first)?, size: first, channels: image.channels() })
@@ -303,9 +307,9 @@ impl Hog {
         // Other threads may not borrow what is the caller's.
         let (exact, image) = (Arc::clone(&self.exact), Image::new(image)?);
         in_order(windows, threads, interrupt, move |level, interrupt| {
-            let Exact { spec, tables, svm } = &*exact;
+            let Exact { spec, tables, svm, separable } = &*exact;
             let Some(svm) = svm else { return Ok(Vec::new()) };
-            let scorer = Scorer { spec, tables, svm, hit_threshold, margin };
+            let scorer = Scorer { spec, tables, svm, separable: separable.as_ref(), hit_threshold, margin };
             scorer.hits(image.view()?, level, interrupt)
         })
     }

@@ -4,8 +4,9 @@
 //! 2. [`pyramid`] shrinks the image to levels, and lists the windows of each level.
 //! 3. [`exact`] computes the gradients, blocks and scores of a level, in OpenCV's order of sums: the specification.
 //! 4. `fast` does the same in vector kernels, with scores up to a few millionths off.
-//! 5. `rescore` takes the hits from `fast`, and lets `exact` decide those that are too close to the threshold.
-//! 6. [`group`] makes one rectangle of many overlapping ones.
+//! 5. `separable` does the same for geometries that have no kernels.
+//! 6. `rescore` takes the hits from either, and lets `exact` decide those that are too close to the threshold.
+//! 7. [`group`] makes one rectangle of many overlapping ones.
 //!
 //! `canvas` draws solids for the arena's camera, and is no part of the detector.
 //!
@@ -30,6 +31,7 @@ mod guided;
 mod interrupt;
 mod memory;
 mod rescore;
+mod separable;
 mod threads;
 
 #[cfg(feature = "python")]

@@ -9,6 +9,7 @@ use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::params::HogSpec;
 use crate::pyramid::{Grid, resize};
+use crate::separable;
 
 /// A window that scored at least the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,9 +35,11 @@ pub(crate) struct Scorer<'a> {
     pub spec: &'a HogSpec,
     pub tables: &'a Tables,
     pub svm: &'a Svm,
+    /// How levels that the fast path has not searched are, where the geometry allows it.
+    pub separable: Option<&'a separable::Plan>,
     /// A window whose score is at least this is a hit.
     pub hit_threshold: f64,
-    /// Windows whose fast score is no further than this from the threshold are scored again by the exact path.
+    /// Windows whose fast score, or that by sums that separate, is no further than this from the threshold are scored again by the exact path.
     pub margin: f64,
 }
 
@@ -67,6 +70,13 @@ impl Scorer<'_> {
         let is_hit = |&&(_, _, score): &&Found| score >= self.hit_threshold;
         let Some(found) = found else {
             let level = LevelImage::new(image, *size)?;
+            if let Some(plan) = self.separable {
+                let least = self.hit_threshold - plan.score_error_bound();
+                let found = separable::search(level.view()?, grid, self.spec, plan, least, interrupt)?;
+                return memory::collect(
+                    self.rescored(level.view()?, grid, found, interrupt)?.iter().filter(is_hit).map(hit),
+                );
+            }
             let scores = exact::scores(level.view()?, grid, self.spec, self.tables, self.svm, interrupt)?;
             let place = |index: usize, score: f64| {
                 let (column, row) = (index % grid.windows.width, index / grid.windows.width);
@@ -78,7 +88,9 @@ impl Scorer<'_> {
         if !found.iter().any(|found| self.is_close(found)) {
             return memory::collect(found.iter().filter(is_hit).map(hit));
         }
-        let rescored = self.rescored(image, *size, grid, found, interrupt)?;
+        let level = LevelImage::new(image, *size)?;
+        let found = memory::collect(found.iter().copied())?;
+        let rescored = self.rescored(level.view()?, grid, found, interrupt)?;
         memory::collect(rescored.iter().filter(is_hit).map(hit))
     }
 
@@ -91,22 +103,18 @@ impl Scorer<'_> {
     /// `found` with the exact score of every close call.
     fn rescored(
         &self,
-        image: ImageView,
-        size: Size,
+        level: ImageView,
         grid: &Grid,
-        found: &[Found],
+        mut found: Vec<Found>,
         interrupt: &Interrupt,
     ) -> Result<Vec<Found>> {
         let close = found.iter().filter(|found| self.is_close(found)).count();
-        let level = LevelImage::new(image, size)?;
-        let level = level.view()?;
         let Self { spec, tables, svm, .. } = *self;
         // Neighbouring windows share pixels and blocks: scoring all at once is cheaper than scoring many one by one.
         let at_once = close * spec.win.area() > grid.padded.area();
         let all =
             if at_once { exact::scores(level, grid, spec, tables, svm, interrupt)? } else { Vec::new() };
-        let mut rescored = memory::collect(found.iter().copied())?;
-        for found in rescored.iter_mut().filter(|found| self.is_close(found)) {
+        for found in found.iter_mut().filter(|found| self.is_close(found)) {
             let (x, y, _) = *found;
             let index = y / grid.stride.height * grid.windows.width + x / grid.stride.width;
             found.2 = match all.get(index) {
@@ -114,7 +122,7 @@ impl Scorer<'_> {
                 None => exact::window_score(level, grid, (x, y), spec, tables, svm, interrupt)?,
             };
         }
-        Ok(rescored)
+        Ok(found)
     }
 }
 

@@ -242,46 +242,91 @@ fn many_hits_of_a_loud_detector_weigh_what_each_weighs_exactly() {
     }
 }
 
+/// A detector of this geometry with weights of either sign, as loud as a trained one.
+fn of_geometry(params: HogParams) -> Detector {
+    let len = hog_core::HogSpec::new(&params).unwrap().descriptor_len();
+    let coefficients = (0..=len).map(|i| ((i * i % 511) as f32 - 255.0) / 4e3).collect();
+    Detector { params, coefficients }
+}
+
+/// Window, block, block stride and cell, all square [px].
+fn square(win: i64, block: i64, stride: i64, cell: i64) -> HogParams {
+    let [win_size, block_size, block_stride, cell_size] = [win, block, stride, cell].map(|side| (side, side));
+    HogParams { win_size, block_size, block_stride, cell_size, ..HogParams::default() }
+}
+
+proptest! {
+    #![proptest_config(cases(48))]
+
+    #[test]
+    fn geometries_without_kernels_find_what_the_exact_path_finds(
+        cell in (1i64..12, 1i64..12),
+        cells in (1i64..5, 1i64..5),
+        block_stride in (1i64..20, 1i64..20),
+        blocks in (1i64..5, 1i64..5),
+        nbins in 1i64..20,
+        (signed_gradient, gamma_correction) in any::<(bool, bool)>(),
+        win_stride in (1i64..12, 1i64..12),
+        padding in (0i64..20, 0i64..20),
+        (width, height) in (1usize..260, 1usize..120),
+        colour in any::<bool>(),
+        seed in any::<u32>(),
+    ) {
+        let block_size = (cell.0 * cells.0, cell.1 * cells.1);
+        let win_size =
+            (block_size.0 + (blocks.0 - 1) * block_stride.0, block_size.1 + (blocks.1 - 1) * block_stride.1);
+        let params = HogParams {
+            win_size,
+            block_size,
+            block_stride,
+            cell_size: cell,
+            nbins,
+            signed_gradient,
+            gamma_correction,
+            ..HogParams::default()
+        };
+        let search = Search { hit_threshold: 0.0, win_stride, padding };
+        compare(&of_geometry(params), (width, height), if colour { 3 } else { 1 }, search, seed);
+    }
+}
+
 #[test]
-fn geometries_without_kernels_and_odd_strides_find_what_the_exact_path_finds() {
-    let geometry = |win_size, block_size, block_stride, cell_size, nbins| HogParams {
-        win_size,
-        block_size,
-        block_stride,
-        cell_size,
-        nbins,
-        ..HogParams::default()
-    };
-    let cases = [
-        (HogParams::default(), (5, 3)),
-        (HogParams::default(), (6, 8)),
-        (geometry((36, 60), (12, 12), (6, 6), (6, 6), 9), (6, 6)),
-        (geometry((40, 40), (8, 8), (8, 8), (8, 8), 7), (8, 8)),
-    ];
+fn a_window_asked_for_by_its_place_weighs_what_the_exact_path_says() {
     let picture = Picture::new(131, 170, 3, 6);
-    let image = picture.view();
-    for (params, win_stride) in cases {
-        let len = hog_core::HogSpec::new(&params).unwrap().descriptor_len();
-        let coefficients = (0..=len).map(|i| ((i * i % 511) as f32 - 255.0) / 4e3).collect();
-        let detector = Detector { params, coefficients };
-        let search = Search { win_stride, ..STEPS };
-        let wanted = detector.every_window(image, &search);
-        let hit_threshold = reached_by(&wanted, 0.3);
-        let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
+    for (params, win_stride) in [(HogParams::default(), (5, 3)), (square(36, 12, 6, 6), (6, 6))] {
+        let detector = of_geometry(params);
+        let search = Search { hit_threshold: ALL_WINDOWS, win_stride, padding: (4, 4) };
+        let wanted = detector.every_window(picture.view(), &search);
+        let places: Vec<_> = wanted.iter().map(|hit| (hit.x, hit.y)).collect();
         for backend in available() {
             let hog = hog(&detector, backend);
-            let found =
-                hog.detect(image, &Search { hit_threshold, ..search }, None, &Interrupt::NEVER).unwrap();
-            assert_same(&found, &hits, 0.0, backend.name());
-            // The same windows, each asked for by its place.
-            let places: Vec<_> = wanted.iter().map(|hit| (hit.x, hit.y)).collect();
-            let all = Search { hit_threshold: ALL_WINDOWS, ..search };
-            assert_same(
-                &hog.detect(image, &all, Some(&places), &Interrupt::NEVER).unwrap(),
-                &wanted,
-                0.0,
-                backend.name(),
-            );
+            let found = hog.detect(picture.view(), &search, Some(&places), &Interrupt::NEVER).unwrap();
+            assert_same(&found, &wanted, 0.0, backend.name());
+        }
+    }
+}
+
+#[test]
+fn common_geometries_without_kernels_find_what_the_exact_path_finds() {
+    let people = Detector::people();
+    compare(&people, (131, 170), 3, Search { win_stride: (5, 3), ..STEPS }, 6);
+    compare(&people, (131, 170), 1, Search { win_stride: (6, 8), ..STEPS }, 6);
+    let bins = |nbins, signed_gradient| HogParams { nbins, signed_gradient, ..HogParams::default() };
+    for params in [
+        square(48, 8, 4, 4),
+        square(64, 32, 16, 16),
+        square(64, 32, 8, 8),
+        square(40, 8, 8, 8),
+        square(48, 18, 5, 6),  // a block ends within a stride
+        square(60, 12, 16, 4), // blocks with gaps between them
+        square(60, 30, 6, 6),  // too many sums for lanes: the exact path
+        bins(12, false),
+        bins(18, true),
+        bins(1, false),
+    ] {
+        for channels in [1, 3] {
+            let search = Search { win_stride: (8, 4), ..STEPS };
+            compare(&of_geometry(params.clone()), (150, 140), channels, search, 7);
         }
     }
 }

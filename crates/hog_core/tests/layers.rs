@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 12] = [
     &["params", "group"],
     &["pyramid"],
     &["exact"],
-    &["fast", "canvas"],
+    &["fast", "separable", "canvas"],
     &["rescore", "guided"],
     &["detect"],
     &["describe"],

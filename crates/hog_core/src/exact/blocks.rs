@@ -113,7 +113,7 @@ impl<const LANES: usize> Work for CellsAbreast<'_, LANES> {
 
 /// L2-Hys: scale to unit length, clip at `threshold`, scale again. A block without gradient stays zero.
 #[inline(always)]
-fn normalise(block: &mut [f32], threshold: f32) {
+pub(crate) fn normalise(block: &mut [f32], threshold: f32) {
     let scale = 1.0 / (sum_of_squares(block).sqrt() + block.len() as f32 * 0.1);
     for value in block.iter_mut() {
         *value = (*value * scale).min(threshold);

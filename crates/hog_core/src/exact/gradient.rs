@@ -47,6 +47,9 @@ const POLAR_RUN: usize = 1024;
 /// ... and a run shorter than this (two vectors) with a differently rounded last step.
 const POLAR_VECTOR_MIN: usize = 16;
 
+/// Pixels whose channels are split at a time.
+const SPLIT: usize = 128;
+
 /// How many rows are made between two looks at the interrupt: a look takes as long as ten pixels.
 const CHECK_EVERY: usize = 16;
 
@@ -60,11 +63,11 @@ pub fn gradient(
     let Size { width, height } = padding.size;
     let pixels = width.saturating_mul(height);
     let mut out = Gradient { shares: memory::with_room(pixels)?, bins: memory::with_room(pixels)? };
-    let put = |row: &Row| {
+    let mut put = |_, row: &RowVotes| {
         out.shares.extend_from_slice(&row.shares);
         out.bins.extend_from_slice(&row.bins);
     };
-    rows(image, padding, Region { x: 0, y: 0, width, height }, spec, interrupt, put)?;
+    each_row(image, padding, Region { x: 0, y: 0, width, height }, spec, interrupt, &mut put)?;
     Ok(out)
 }
 
@@ -77,37 +80,39 @@ pub(super) fn votes(
     interrupt: &Interrupt,
 ) -> Result<Votes> {
     let mut pixels = memory::with_room(region.width.saturating_mul(region.height))?;
-    let put = |row: &Row| {
+    let mut put = |_, row: &RowVotes| {
         let votes = row.shares.iter().zip(&row.bins);
         pixels.extend(votes.map(|(&shares, &bins)| Vote { shares, bins }));
     };
-    rows(image, padding, region, spec, interrupt, put)?;
+    each_row(image, padding, region, spec, interrupt, &mut put)?;
     Ok(Votes { width: region.width, pixels })
 }
 
 /// The votes of a row of pixels.
-struct Row {
+pub(crate) struct RowVotes {
     /// What the two bins get.
-    shares: Vec<[f32; 2]>,
+    pub shares: Vec<[f32; 2]>,
     /// Which bins these are.
-    bins: Vec<[u8; 2]>,
+    pub bins: Vec<[u8; 2]>,
 }
 
-/// Hands the votes of a region to `put`, row by row.
-fn rows(
+/// Hands the votes of a region to `put`, row by row, with the number of each.
+pub(crate) fn each_row(
     image: ImageView,
     padding: Padding,
     region: Region,
     spec: &HogSpec,
     interrupt: &Interrupt,
-    put: impl FnMut(&Row),
+    put: &mut dyn FnMut(usize, &RowVotes),
 ) -> Result<()> {
     if region.width == 0 {
         return Ok(());
     }
     let row = || memory::filled(region.width, 0.0f32);
-    let votes =
-        Row { shares: memory::filled(region.width, [0.0; 2])?, bins: memory::filled(region.width, [0; 2])? };
+    let votes = RowVotes {
+        shares: memory::filled(region.width, [0.0; 2])?,
+        bins: memory::filled(region.width, [0; 2])?,
+    };
     let padded_row = || memory::filled((region.width + 2) * image.channels(), 0.0f32);
     run(Rows {
         image,
@@ -117,36 +122,35 @@ fn rows(
         interrupt,
         put,
         source: Source::new(image, padding, region, spec)?,
-        lines: [row()?, row()?, row()?, row()?],
+        lines: [row()?, row()?],
         votes,
         padded: [padded_row()?, padded_row()?, padded_row()?],
     })
 }
 
-/// The work of [`rows`], and its memory.
-struct Rows<'a, P> {
+/// The work of [`each_row`], and its memory.
+struct Rows<'a> {
     image: ImageView<'a>,
     padding: Padding,
     region: Region,
     spec: &'a HogSpec,
     interrupt: &'a Interrupt<'a>,
-    put: P,
+    put: &'a mut dyn FnMut(usize, &RowVotes),
     source: Source<'a>,
-    /// Of one row: derivatives along x and y, magnitude, angle.
-    lines: [Vec<f32>; 4],
-    votes: Row,
+    /// Of one row: derivatives along x and y, then magnitude and angle.
+    lines: [Vec<f32>; 2],
+    votes: RowVotes,
     /// Three neighbouring rows of the padded image.
     padded: [Vec<f32>; 3],
 }
 
-impl<P: FnMut(&Row)> Work for Rows<'_, P> {
+impl Work for Rows<'_> {
     type Output = Result<()>;
 
     #[inline(always)]
     fn run<M: MulAdd>(self) -> Result<()> {
-        let Self { image, padding, region, spec, interrupt, mut put, source, lines, mut votes, padded } =
-            self;
-        let ([mut dx, mut dy, mut magnitude, mut angle], mut rows) = (lines, padded);
+        let Self { image, padding, region, spec, interrupt, put, source, lines, mut votes, padded } = self;
+        let ([mut dx, mut dy], mut rows) = (lines, padded);
         source.fill(0, &mut rows[0]);
         source.fill(1, &mut rows[1]);
         for y in 0..region.height {
@@ -162,9 +166,9 @@ impl<P: FnMut(&Row)> Work for Rows<'_, P> {
                 derive_colour::<false>(neighbours, 0..first_of_tail, &mut dx, &mut dy);
                 derive_colour::<true>(neighbours, first_of_tail..region.width, &mut dx, &mut dy);
             }
-            polar_row::<M>(region.x, padding.size.width, [&dx, &dy], [&mut magnitude, &mut angle]);
-            vote(spec, &magnitude, &angle, &mut votes);
-            put(&votes);
+            polar_row::<M>(region.x, padding.size.width, &mut dx, &mut dy);
+            vote(spec, &dx, &dy, &mut votes);
+            put(y, &votes);
         }
         Ok(())
     }
@@ -217,15 +221,25 @@ impl<'a> Source<'a> {
         let row = image.row(reflect_101(self.top + y as i64, image.height()));
         // (A region may lie beyond the image altogether.)
         let first = (self.left + self.inside.start as i64).clamp(0, image.width() as i64) as usize;
-        for (c, plane) in out.chunks_exact_mut(*width).enumerate() {
-            let inside = plane[self.inside.clone()].iter_mut();
-            // A pass for each channel, which the compiler vectorises.
-            if image.channels() == 1 {
-                inside.zip(&row[first..]).for_each(|(to, &pixel)| *to = value(pixel));
-            } else {
-                let pixels = &row.as_chunks::<3>().0[first..];
-                inside.zip(pixels).for_each(|(to, pixel)| *to = value(pixel[c]));
+        if image.channels() == 3 {
+            let pixels = &row.as_chunks::<3>().0[first..];
+            for (part, pixels) in pixels[..self.inside.len()].chunks(SPLIT).enumerate() {
+                // Split as bytes, then converted: only so does the compiler vectorise both.
+                let mut split = [[0u8; SPLIT]; 3];
+                let [blue, green, red] = &mut split;
+                for (((b, g), r), pixel) in blue.iter_mut().zip(green).zip(red).zip(pixels) {
+                    [*b, *g, *r] = *pixel;
+                }
+                for (plane, split) in out.chunks_exact_mut(*width).zip(&split) {
+                    let plane = &mut plane[self.inside.start + part * SPLIT..][..pixels.len()];
+                    plane.iter_mut().zip(split).for_each(|(to, &pixel)| *to = value(pixel));
+                }
             }
+        } else {
+            let inside = out[self.inside.clone()].iter_mut();
+            inside.zip(&row[first..]).for_each(|(to, &pixel)| *to = value(pixel));
+        }
+        for (c, plane) in out.chunks_exact_mut(*width).enumerate() {
             for &(to, from) in &self.mirrored {
                 plane[to] = value(row[from * image.channels() + c]);
             }
@@ -275,34 +289,23 @@ fn derive_colour<const HIGHEST_WINS: bool>(
     }
 }
 
-/// Magnitude and angle of a row, run by run as the whole padded row would be split.
+/// Makes magnitude and angle of a row's gradients, run by run as the whole padded row would be split.
 #[inline(always)]
-fn polar_row<M: MulAdd>(
-    first_column: usize,
-    padded_width: usize,
-    [dx, dy]: [&[f32]; 2],
-    [magnitude, angle]: [&mut [f32]; 2],
-) {
+fn polar_row<M: MulAdd>(first_column: usize, padded_width: usize, dx: &mut [f32], dy: &mut [f32]) {
     let end = first_column + dx.len();
     let mut x = first_column;
     while x < end {
         let run_start = x / POLAR_RUN * POLAR_RUN;
         let run_end = (run_start + POLAR_RUN).min(padded_width);
         let part = x - first_column..run_end.min(end) - first_column;
-        polar::<M>(
-            &dx[part.clone()],
-            &dy[part.clone()],
-            run_end - run_start >= POLAR_VECTOR_MIN,
-            &mut magnitude[part.clone()],
-            &mut angle[part],
-        );
+        polar::<M>(&mut dx[part.clone()], &mut dy[part], run_end - run_start >= POLAR_VECTOR_MIN);
         x = run_end;
     }
 }
 
 /// Splits each gradient between the two bins whose centres are nearest.
 #[inline(always)]
-fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut Row) {
+fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut RowVotes) {
     let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
     let bins_per_radian = (spec.nbins as f64 / range) as f32;
     let nbins = spec.nbins as f32;

@@ -13,7 +13,10 @@ mod svm;
 mod tables;
 mod windows;
 
+pub(crate) use blocks::normalise;
 pub use gradient::{Gradient, gradient};
+pub(crate) use gradient::{RowVotes, each_row};
 pub use svm::Svm;
+pub(crate) use tables::cells_along;
 pub use tables::{Tables, gamma_table};
 pub use windows::{Windows, descriptors, scores, window_score};

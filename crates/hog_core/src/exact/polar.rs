@@ -12,27 +12,16 @@ const P5: f32 = 0.1555786518463281_f64 as f32 * DEGREES;
 const P7: f32 = -0.04432655554792128_f64 as f32 * DEGREES;
 const RADIANS: f32 = (std::f64::consts::PI / 180.0) as f32;
 
-/// `magnitude` and `angle` [0, 2π] of (`dx`, `dy`); all four of one length.
+/// Turns gradients (`dx`, `dy`) into magnitude and angle [0, 2π], in their places; both of one length.
 ///
 /// `vector_rule` says how angles beyond 45° are rounded: as OpenCV's vector code does, or as its scalar code does.
 #[inline(always)]
-pub(super) fn polar<M: MulAdd>(
-    dx: &[f32],
-    dy: &[f32],
-    vector_rule: bool,
-    magnitude: &mut [f32],
-    angle: &mut [f32],
-) {
-    let gradients = dx.iter().zip(dy);
-    let polar = magnitude.iter_mut().zip(angle);
+pub(super) fn polar<M: MulAdd>(dx: &mut [f32], dy: &mut [f32], vector_rule: bool) {
+    let gradients = dx.iter_mut().zip(dy);
     if vector_rule {
-        for ((&dx, &dy), (magnitude, angle)) in gradients.zip(polar) {
-            (*magnitude, *angle) = polar_of::<M, true>(dx, dy);
-        }
+        gradients.for_each(|(dx, dy)| (*dx, *dy) = polar_of::<M, true>(*dx, *dy));
     } else {
-        for ((&dx, &dy), (magnitude, angle)) in gradients.zip(polar) {
-            (*magnitude, *angle) = polar_of::<M, false>(dx, dy);
-        }
+        gradients.for_each(|(dx, dy)| (*dx, *dy) = polar_of::<M, false>(*dx, *dy));
     }
 }
 
@@ -64,8 +53,8 @@ mod tests {
         let dx: Vec<f32> = turn.iter().map(|a| (7.0 * a.cos()) as f32).collect();
         let dy: Vec<f32> = turn.iter().map(|a| (7.0 * a.sin()) as f32).collect();
         for vector_rule in [true, false] {
-            let (mut magnitude, mut angle) = (vec![0.0; 720], vec![0.0; 720]);
-            polar::<Fused>(&dx, &dy, vector_rule, &mut magnitude, &mut angle);
+            let (mut magnitude, mut angle) = (dx.clone(), dy.clone());
+            polar::<Fused>(&mut magnitude, &mut angle, vector_rule);
             for (i, &expected) in turn.iter().enumerate() {
                 let off = (f64::from(angle[i]) - expected).abs();
                 let off = off.min(2.0 * std::f64::consts::PI - off);
@@ -77,8 +66,8 @@ mod tests {
 
     #[test]
     fn no_gradient_has_angle_and_magnitude_zero() {
-        let (mut magnitude, mut angle) = ([9.0], [9.0]);
-        polar::<Separate>(&[0.0], &[0.0], true, &mut magnitude, &mut angle);
+        let (mut magnitude, mut angle) = ([0.0], [0.0]);
+        polar::<Separate>(&mut magnitude, &mut angle, true);
         assert_eq!((magnitude, angle), ([0.0], [0.0]));
     }
 }

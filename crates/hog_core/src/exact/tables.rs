@@ -71,7 +71,7 @@ fn reach_along(cell: usize, cells: usize) -> [usize; 2] {
 }
 
 /// Up to two cells (index and share) that a pixel reaches along one axis.
-fn cells_along(pixel: usize, cell: usize, cells: usize) -> Vec<(usize, f32)> {
+pub(crate) fn cells_along(pixel: usize, cell: usize, cells: usize) -> Vec<(usize, f32)> {
     let position = (pixel as f32 + 0.5) / cell as f32 - 0.5;
     let first = position.floor();
     let share = position - first;

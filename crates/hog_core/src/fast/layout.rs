@@ -34,3 +34,6 @@ pub(super) enum Gamma {
     /// By the square root instruction.
     Exact,
 }
+
+/// Rows of windows that the prefilter scores at a time.
+pub(super) const ROWS: usize = 8;

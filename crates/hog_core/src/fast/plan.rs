@@ -4,7 +4,7 @@ use crate::exact::{Svm, gamma_table};
 use crate::geometry::Size;
 use crate::params::HogSpec;
 
-use super::layout::{ACROSS, BLOCK, Gamma, WORDS};
+use super::layout::{ACROSS, BLOCK, Gamma, ROWS, WORDS};
 
 /// Most blocks of a window. A block adds less than 2 · 2¹⁵ · [`MULTIPLE_MAX`] to the prefilter's 32-bit sum, so that
 /// 2³¹ / (2 · 2¹⁵ · 64) = 512 blocks cannot overflow it; no more than 400 were ever tested.
@@ -72,9 +72,9 @@ pub(crate) struct Plan {
 /// blocks of ‖w − step·q‖ (the weights' rounding, as ‖x‖ ≤ 1 in a block).
 #[derive(Debug, Clone)]
 pub(super) struct Prefilter {
-    /// `[block column][word][block row]`: four weights each.
+    /// `[block column][word][block row]`: four weights each; [`ROWS`] rows of zeros lie before and after a column's.
     pub words: Vec<u32>,
-    /// `[block column][block row]`: what the block's sum is multiplied by.
+    /// `[block column][block row]`, with as many rows around: what the block's sum is multiplied by.
     pub multiples: Vec<i32>,
     /// The score that a unit of the weighted sum of bytes stands for.
     pub unit: f64,
@@ -201,9 +201,10 @@ impl Prefilter {
             .collect();
         let most = steps.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let unit = if wide_sums { most } else { most / MULTIPLE_MAX };
+        let padded = ROWS + blocks.height + ROWS;
         let mut prefilter = Self {
-            words: vec![0; WORDS * list.len()],
-            multiples: vec![1; list.len()],
+            words: vec![0; WORDS * blocks.width * padded],
+            multiples: vec![1; blocks.width * padded],
             unit: unit / 255.0,
             bound: 0.0,
         };
@@ -211,7 +212,7 @@ impl Prefilter {
             let (x, y) = (index / blocks.height, index % blocks.height);
             let multiple = (steps[index] / unit).ceil().max(1.0);
             let step = unit * multiple;
-            prefilter.multiples[index] = multiple as i32;
+            prefilter.multiples[x * padded + ROWS + y] = multiple as i32;
             let quantised = block.map(|w| (f64::from(w) / step).round());
             let rest: f64 =
                 block.iter().zip(quantised).map(|(&w, q)| (f64::from(w) - step * q).powi(2)).sum();
@@ -219,7 +220,7 @@ impl Prefilter {
                 rest.sqrt() + quantised.iter().map(|q| q.abs() * step * BYTE_ERROR / 255.0).sum::<f64>();
             for (word, q) in quantised.as_chunks::<4>().0.iter().enumerate() {
                 let bytes = q.map(|q| (q as i8).cast_unsigned());
-                prefilter.words[(x * WORDS + word) * blocks.height + y] = u32::from_le_bytes(bytes);
+                prefilter.words[(x * WORDS + word) * padded + ROWS + y] = u32::from_le_bytes(bytes);
             }
         }
         prefilter

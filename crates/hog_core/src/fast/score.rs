@@ -7,11 +7,8 @@ use crate::interrupt::Interrupt;
 use crate::memory;
 
 use super::lane::{Kernel, Lane};
-use super::layout::{ACROSS, BLOCK, WORDS};
+use super::layout::{ACROSS, BLOCK, ROWS, WORDS};
 use super::plan::Plan;
-
-/// Rows of windows that the prefilter scores at a time.
-const ROWS: usize = 8;
 
 /// The windows of a band and the blocks they are made of.
 pub(super) struct WindowGrid<'a> {
@@ -183,8 +180,10 @@ unsafe fn prefilter<L: Lane, const V: usize>(
     let mut totals = [[l.no_sum(); V]; ROWS];
     let height = windows.plan.blocks.height;
     for y in 0..rows + height - 1 {
-        // Row y of blocks takes part in window rows from..to, as their block row y - window row.
-        let (from, to) = ((y + 1).saturating_sub(height), (y + 1).min(rows));
+        // Row y of blocks takes part in window rows from..to, as their block row y - window row. Pairs of rows are as
+        // cheap, for most of the time all eight are needed; other rows than those meet weights of 0 or are not asked for.
+        let from = (y + 1).saturating_sub(height) & !1;
+        let to = if from > 0 { ROWS } else { (y + 1).min(rows).next_multiple_of(2) };
         // SAFETY: promised by the caller of `score`.
         let bytes = unsafe { windows.row(windows.bytes, top + y, WORDS).add(group * L::LANES) };
         macro_rules! step {
@@ -197,9 +196,8 @@ unsafe fn prefilter<L: Lane, const V: usize>(
             };
         }
         step!(
-            0 1, 0 2, 0 3, 0 4, 0 5, 0 6, 0 7, 0 8, 1 2, 1 3, 1 4, 1 5, 1 6, 1 7, 1 8, 2 3, 2 4, 2 5, 2 6, 2 7, 2 8,
-            3 4, 3 5, 3 6, 3 7, 3 8, 4 5, 4 6, 4 7, 4 8, 5 6, 5 7, 5 8, 6 7, 6 8, 7 8
-        );
+        0 2, 0 4, 0 6, 0 8, 2 8, 4 8, 6 8
+                );
     }
     for (row, totals) in totals[..rows].iter().enumerate() {
         for (v, &total) in totals.iter().enumerate() {
@@ -219,6 +217,7 @@ unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>
 ) {
     let size = windows.plan.blocks;
     let prefilter = &windows.plan.prefilter;
+    let padded = ROWS + size.height + ROWS;
     let mut total = *totals;
     for block_x in 0..size.width {
         let mut sum = total;
@@ -233,18 +232,18 @@ unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>
                 // SAFETY: promised by the caller of `score`.
                 *value = unsafe { l.load_words(bytes.add(word * windows.lanes + block_x + v * L::LANES)) };
             }
-            let weights = &prefilter.words[(block_x * WORDS + word) * size.height..][..size.height];
+            let weights = &prefilter.words[(block_x * WORDS + word) * padded..][..padded];
             for row in FROM..TO {
-                // SAFETY: y - row is a block row of the window: the caller chose FROM and TO so. A check for each of
-                // these would cost as much as the sum.
-                let weight = l.splat_word(unsafe { *weights.get_unchecked(y - row) });
+                // SAFETY: row < ROWS, and y < ROWS + size.height - 1, as the caller has no more rows of blocks. A check
+                // for each of these would cost as much as the sum.
+                let weight = l.splat_word(unsafe { *weights.get_unchecked(ROWS + y - row) });
                 for v in 0..V {
                     sum[row][v] = l.dot_bytes(sum[row][v], values[v], weight);
                 }
             }
         }
         for row in FROM..TO {
-            let multiple = prefilter.multiples[block_x * size.height + y - row];
+            let multiple = prefilter.multiples[block_x * padded + ROWS + y - row];
             for v in 0..V {
                 total[row][v] = l.end_block(total[row][v], sum[row][v], multiple);
             }

@@ -4,6 +4,7 @@ mod grid;
 mod levels;
 mod resize;
 
+pub(crate) use grid::gcd;
 pub use grid::{Grid, Steps};
 pub use levels::{Level, Pyramid, levels, to_image};
 pub(crate) use resize::check;

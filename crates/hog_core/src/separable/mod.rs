@@ -1,0 +1,56 @@
+//! The scores of any geometry by sums that are taken first down the rows, then across the columns.
+//!
+//! A pixel's weight in a cell, Gaussian times bilinear share, is a product of a function of x and one of y. So the votes
+//! of the exact path need not be summed for each block that holds them: a row of strides (`lattice`) is summed down once,
+//! for all the blocks and cells it lies in, and the sums across then cost little. Scores differ from the exact path's
+//! by the order of sums alone, and `rescore` treats them as it treats those of `fast`, whose kernels serve the people
+//! models' geometry. The loops are left to the compiler to vectorise.
+
+mod lattice;
+mod plan;
+
+pub(crate) use plan::Plan;
+
+use crate::error::Result;
+use crate::exact;
+use crate::image::ImageView;
+use crate::interrupt::Interrupt;
+use crate::memory;
+use crate::params::HogSpec;
+use crate::pyramid::Grid;
+
+use lattice::Lattice;
+
+/// The windows of `image` that score at least `least`, row by row: their padded x and y, and their scores.
+pub(crate) fn search(
+    image: ImageView,
+    grid: &Grid,
+    spec: &HogSpec,
+    plan: &Plan,
+    least: f64,
+    interrupt: &Interrupt,
+) -> Result<Vec<(usize, usize, f64)>> {
+    let mut found = Vec::new();
+    if grid.is_empty() {
+        return Ok(found);
+    }
+    let mut scores = memory::filled(grid.len(), plan.bias)?;
+    let mut lattices = Vec::new();
+    for first in Lattice::firsts(spec, grid) {
+        memory::push(&mut lattices, Lattice::new(plan, spec, grid, first)?)?;
+    }
+    let mut add = |y, votes: &exact::RowVotes| {
+        for lattice in &mut lattices {
+            lattice.add_row(y, votes, &mut scores);
+        }
+    };
+    exact::each_row(image, grid.padding(), grid.whole(), spec, interrupt, &mut add)?;
+    for lattice in &mut lattices {
+        lattice.end(&mut scores);
+    }
+    for (index, score) in scores.into_iter().enumerate().filter(|&(_, score)| score >= least) {
+        let (column, row) = (index % grid.windows.width, index / grid.windows.width);
+        memory::push(&mut found, (column * grid.stride.width, row * grid.stride.height, score))?;
+    }
+    Ok(found)
+}

@@ -34,6 +34,7 @@ TESTS: list[tuple[str, list[str], int]] = [
     ("hog_core", [], 8),
     ("opencv", [], 8),
     ("calls", [], 8),
+    ("threads", [], 8),
     ("backends", ["--skip", PYRAMIDS], 8),
     ("backends", [PYRAMIDS], 2),
 ]

@@ -120,8 +120,9 @@ fn cost(region: &Region, win: Size) -> usize {
 #[allow(clippy::unwrap_used, reason = "a test may fail")]
 mod tests {
     use super::*;
+    use crate::interrupt::Interrupt;
     use crate::params::HogParams;
-    use crate::pyramid::Steps;
+    use crate::pyramid::{Steps, levels};
 
     const WIN: Size = Size { width: 64, height: 128 };
 
@@ -159,5 +160,37 @@ mod tests {
         let regions = guide.between(&levels, &grids, &found, -0.25, &spec).unwrap();
         assert_eq!(regions.len(), 1);
         assert!(regions[0].level == 1 && regions[0].x.contains(&384));
+    }
+
+    #[test]
+    fn the_level_between_is_searched_where_its_window_is_nearest_to_the_one_found() {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let steps = Steps::new((8, 8), (16, 24), spec.cell, &spec).unwrap();
+        let guide = Guide { every: 2, margin: 0.0, reach: 0 };
+        for step in [1.1, 1.6, 2.0] {
+            let levels = levels(Size::new(640, 480), step, &spec, &Interrupt::NEVER).unwrap();
+            let grids: Vec<_> =
+                levels.iter().map(|level| (level.size, steps.grid(level.size, &spec))).collect();
+            let grid = &grids[1].1;
+            // How far a window's centre is from that of the window found [px of the image].
+            let off = |at: usize, corner: usize, pad: usize, win: usize| {
+                let centre = |corner: usize| corner as f64 - pad as f64 + win as f64 / 2.0;
+                (centre(corner) * levels[1].scale - centre(at)).abs()
+            };
+            for (x, y) in [(0, 0), (304, 200), (600, 8), (160, 392)] {
+                let mut found = vec![Vec::new(); levels.len()];
+                found[0].push((x, y, 1.0));
+                let regions = guide.between(&levels, &grids, &found, 0.5, &spec).unwrap();
+                assert_eq!(regions.len(), 1);
+                let Region { level, x: across, y: down } = &regions[0];
+                assert_eq!((*level, across.len(), down.len()), (1, 1, 1));
+                let least = |at: usize, pad: usize, win: usize, windows: usize| {
+                    (0..windows).map(|k| off(at, 8 * k, pad, win)).fold(f64::INFINITY, f64::min)
+                };
+                let (dx, dy) = (off(x, across.start, 16, 64), off(y, down.start, 24, 128));
+                assert!(dx <= least(x, 16, 64, grid.windows.width) + 1e-9, "{step} {x}: {dx}");
+                assert!(dy <= least(y, 24, 128, grid.windows.height) + 1e-9, "{step} {y}: {dy}");
+            }
+        }
     }
 }

@@ -332,19 +332,21 @@ fn common_geometries_without_kernels_find_what_the_exact_path_finds() {
 }
 
 #[test]
-fn a_detector_with_a_weight_that_is_no_number_has_no_hits() {
-    let mut detector = Detector::people();
-    detector.coefficients[7] = f32::NAN;
-    let picture = Picture::new(64, 128, 1, 3);
+fn a_detector_with_a_weight_that_is_no_number_has_no_hits_and_with_an_infinite_one_the_exact_paths() {
+    let picture = Picture::new(90, 140, 1, 3);
     let search = Search { hit_threshold: ALL_WINDOWS, win_stride: (8, 8), padding: (0, 0) };
-    assert!(detector.every_window(picture.view(), &search)[0].weight.is_nan());
-    for backend in available() {
-        assert!(
-            hog(&detector, backend)
-                .detect(picture.view(), &search, None, &Interrupt::NEVER)
-                .unwrap()
-                .is_empty()
-        );
+    for weight in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut detector = Detector::people();
+        detector.coefficients[7] = weight;
+        let places = |hits: Vec<Hit>| hits.iter().map(|hit| (hit.x, hit.y)).collect::<Vec<_>>();
+        let mut wanted = detector.every_window(picture.view(), &search);
+        wanted.retain(|hit| hit.weight >= ALL_WINDOWS);
+        assert_eq!(wanted.is_empty(), weight != f32::INFINITY);
+        let wanted = places(wanted);
+        for backend in available() {
+            let found = hog(&detector, backend).detect(picture.view(), &search, None, &Interrupt::NEVER);
+            assert_eq!(places(found.unwrap()), wanted, "{} {weight}", backend.name());
+        }
     }
 }
 

@@ -164,6 +164,48 @@ fn padding_wider_than_the_image_is_mirrored_as_the_exact_path_mirrors_it() {
 }
 
 #[test]
+fn rows_of_very_many_windows_and_every_distance_between_windows_are_served() {
+    let mut loud = Detector::people();
+    loud.coefficients[11] = 1e7;
+    let people = Detector::people();
+    // 280 windows abreast; distances that are multiples of 4, of 8 or of neither's double.
+    for (detector, size, win_stride) in [
+        (&people, (2_296, 129), (8, 8)),
+        (&people, (300, 300), (36, 44)),
+        (&people, (300, 300), (12, 72)),
+        (&people, (300, 300), (20, 28)),
+        (&loud, (90, 140), (8, 8)),
+    ] {
+        let picture = Picture::new(size.0, size.1, 1, 5);
+        let search = Search { hit_threshold: -1e9, win_stride, ..STEPS };
+        let wanted = detector.every_window(picture.view(), &search);
+        assert!(wanted.len() > 7);
+        for backend in available() {
+            let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
+            let found = hog.detect(picture.view(), &search, None, &Interrupt::NEVER).unwrap();
+            let what = format!("{} {size:?} {win_stride:?}", backend.name());
+            assert_same(&found, &wanted, detector.rounding(), &what);
+        }
+    }
+}
+
+#[test]
+fn a_search_at_a_size_that_no_image_can_have_is_refused() {
+    let (detector, picture) = (Detector::people(), Picture::new(64, 128, 1, 1));
+    let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
+    let at = |first: Size| {
+        let pyramid = Pyramid { first: Some(first), scale: 1e9 };
+        let never = Interrupt::NEVER;
+        hog.detect_multi_scale(picture.view(), &STEPS, &pyramid, Grouping::Similar(0), None, 1, &never)
+    };
+    for (width, height) in [(1 << 29, 128), (64, 1 << 29), (1 << 40, 1 << 40), (0, 128), (64, 0)] {
+        let error = at(Size::new(width, height)).unwrap_err().to_string();
+        assert!(error.contains(&format!("{width}")) && error.contains(&format!("{height}")), "{error}");
+    }
+    assert!(at(Size::new(64, 128)).is_ok());
+}
+
+#[test]
 fn a_caller_who_wants_no_answer_any_more_gets_none() {
     let (detector, picture) = (Detector::people(), Picture::new(150, 190, 3, 2));
     let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
@@ -183,12 +225,20 @@ fn a_caller_who_wants_no_answer_any_more_gets_none() {
 }
 
 fn guided(detector: &Detector, picture: &Picture, guide: Option<Guide>, threshold: f64) -> Vec<(Rect, f64)> {
+    guided_by(detector, picture, guide, &Search { hit_threshold: threshold, ..STEPS })
+}
+
+fn guided_by(
+    detector: &Detector,
+    picture: &Picture,
+    guide: Option<Guide>,
+    search: &Search,
+) -> Vec<(Rect, f64)> {
     let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
-    let search = Search { hit_threshold: threshold, ..STEPS };
     let pyramid = Pyramid { first: None, scale: 1.1 };
     hog.detect_multi_scale(
         picture.view(),
-        &search,
+        search,
         &pyramid,
         Grouping::Similar(0),
         guide,
@@ -216,6 +266,22 @@ fn a_guided_search_finds_nothing_new_and_misses_nothing_where_it_looks_everywher
     // The levels between are searched around what was found on the others alone: where that is nothing, nowhere.
     let nowhere = guided(&detector, &picture, Some(Guide { every: 2, margin: -1e9, reach: 50 }), -1.2);
     assert!(nowhere.is_empty());
+}
+
+#[test]
+fn a_guided_search_in_wide_padding_finds_nothing_new() {
+    let (detector, picture) = (Detector::people(), Picture::new(330, 200, 3, 8));
+    for padding in [(256, 40), (320, 16), (32, 160)] {
+        let search = Search { hit_threshold: -1.4, padding, ..STEPS };
+        let all = guided_by(&detector, &picture, None, &search);
+        // (Rectangles are cut to the image, so that a weight tells which window is meant.)
+        assert!(all.len() > 20);
+        for (every, margin, reach) in [(2, 0.0, 0), (2, 0.1, 1), (3, 0.3, 0)] {
+            let found = guided_by(&detector, &picture, Some(Guide { every, margin, reach }), &search);
+            assert!(found.iter().all(|hit| all.contains(hit)), "{padding:?} {every} {margin} {reach}");
+            assert!(4 * found.len() > all.len(), "{} of {}", found.len(), all.len());
+        }
+    }
 }
 
 #[test]

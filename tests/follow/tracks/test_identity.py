@@ -143,3 +143,16 @@ def test_a_person_followed_all_the_time_is_not_lost_though_their_boxes_show_litt
     assert likeness is not None
     tracks = at(late, replace(person(1, late, clothes=None), tall=None))
     assert SELECTION.choose(tracks, replace(doubtful, likeness=replace(likeness, chances=((1, 0.8),)))).measured == late
+
+
+def test_one_who_may_be_the_lost_person_is_looked_at_for_some_seconds_and_then_left() -> None:
+    def looked(stamp: float, unsure_at: float | None) -> Choice:
+        likeness = replace(followed(), chances=((2, 0.3),), at=stamp)
+        back = replace(person(2, stamp, clothes=None), tall=None)
+        return SELECTION.choose(at(stamp, back), Choice(None, likeness, 1.0, unsure_at=unsure_at))
+
+    assert looked(3.0, None).candidates == (2,)
+    later = looked(3.1 + SELECTION.decide_s, 3.0)
+    assert later.candidates == ()
+    # They are not looked at anew as long as they are in view.
+    assert later.unsure_at == 3.0

@@ -105,13 +105,17 @@ class Selection:
                 # A track that was followed all the time is not lost, however little its boxes show.
                 is_kept = chance >= self.identity.sure or best.number == choice.number
                 return Choice(best.number, likeness, best.measured if is_kept else choice.measured)
+            since = now if choice.unsure_at is None else choice.unsure_at
+            choice = replace(choice, unsure_at=since)
             if rest and sum(likeness.of(one.number) for one in about) >= self.likely:
-                since = now if choice.unsure_at is None else choice.unsure_at
                 if now - since > self.decide_s:
                     likeness = replace(likeness, chances=((best.number, self.likely),))
                     return Choice(best.number, likeness, choice.measured)
-                return replace(choice, candidates=tuple(one.number for one in about), unsure_at=since)
-        choice = replace(choice, candidates=(), unsure_at=None)
+                return replace(choice, candidates=tuple(one.number for one in about))
+            if best.number != choice.number and now - since <= self.decide_s:
+                # The person may have come back: they are looked at, not turned away from.
+                return replace(choice, candidates=(best.number,))
+        choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)
         if followed is not None and followed in self.measured(tracks) and likeness.of(followed.number) < self.possible:
             # The track went over to another person.
             return replace(choice, number=None)

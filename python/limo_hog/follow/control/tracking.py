@@ -290,6 +290,8 @@ class TrackingController:
         limit = self.steering.max_angular
         twist = Twist(0.0, min(max(self.steering.angular_gain * off, -limit), limit))
         reason = f"not sure which of {len(people)} is the person followed"
+        if len(people) == 1:
+            reason = "not sure whether this is the person followed"
         belief = Belief(None, self._believed(state, observation))
         return Decision(twist, replace(state, since_full=0), Mode.HOLD, reason, belief=belief)
 

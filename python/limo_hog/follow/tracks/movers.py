@@ -160,13 +160,11 @@ class Movers:
         for _, who, which in sorted(pairs):
             if which not in numbers and seen[who].number not in numbers.values():
                 numbers[which] = seen[who].number
+        # What was taken for the person's legs until now, and is no more, was a piece of them, or begins again.
         return tuple(
-            replace(mover, number=numbers[which], shown=0)
-            if which in numbers
-            else replace(mover, number=None)
-            if mover.number in numbers.values()
-            else mover
+            replace(mover, number=numbers[which], shown=0) if which in numbers else mover
             for which, mover in enumerate(movers)
+            if which in numbers or mover.number not in numbers.values()
         )
 
     def continued(self, person: Person, movers: tuple[Mover, ...], returns: Returns, noise: Noise) -> Person:

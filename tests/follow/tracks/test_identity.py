@@ -135,16 +135,6 @@ def test_before_one_is_followed_the_one_straight_ahead_and_near_is_meant() -> No
     assert SELECTION.choose(at(0.0, aside, behind, ahead), Choice()).number == 1
 
 
-def test_a_person_followed_all_the_time_is_not_lost_though_their_boxes_show_little() -> None:
-    doubtful = chosen(((1, 0.8), (2, 0.01)), 2.0)
-    late = 2.0 + SELECTION.reidentify_s - 0.1
-    assert doubtful.measured == 2.0
-    likeness = doubtful.likeness
-    assert likeness is not None
-    tracks = at(late, replace(person(1, late, clothes=None), tall=None))
-    assert SELECTION.choose(tracks, replace(doubtful, likeness=replace(likeness, chances=((1, 0.8),)))).measured == late
-
-
 def test_one_who_may_be_the_lost_person_is_looked_at_for_some_seconds_and_then_left() -> None:
     def looked(stamp: float, unsure_at: float | None) -> Choice:
         likeness = replace(followed(), chances=((2, 0.3),), at=stamp)

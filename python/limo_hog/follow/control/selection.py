@@ -102,9 +102,8 @@ class Selection:
             chance = likeness.of(best.number)
             next_best = likeness.of(rest[0].number) if rest else 0.0
             if chance >= self.likely and chance >= self.odds * next_best:
-                # A track that was followed all the time is not lost, however little its boxes show.
-                is_kept = chance >= self.identity.sure or best.number == choice.number
-                return Choice(best.number, likeness, best.measured if is_kept else choice.measured)
+                measured = best.measured if chance >= self.identity.sure else choice.measured
+                return Choice(best.number, likeness, measured)
             since = now if choice.unsure_at is None else choice.unsure_at
             choice = replace(choice, unsure_at=since)
             if rest and sum(likeness.of(one.number) for one in about) >= self.likely:

@@ -122,11 +122,14 @@ class Movers:
                 points = points[np.hypot(*(points - track.mean[:2]).T) > self.legs.radius]
             elif returns.stamp - mover.felt < self._patience(mover, returns, half_view):
                 kept.append(mover)
-        if ground is not None:
-            began, since = np.array([one.began for one in kept]).reshape(-1, 2), np.array([one.since for one in kept])
+        still = [index for index, one in enumerate(kept) if not one.left]
+        if ground is not None and still:
+            began = np.array([kept[index].began for index in still])
+            since = np.array([kept[index].since for index in still])
             # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
-            kept = [replace(one, left=one.left or gone) for one, gone in zip(kept, left.tolist(), strict=True)]
+            for index in np.array(still)[left].tolist():
+                kept[index] = replace(kept[index], left=True)
         known = np.array([one.track.mean[:2] for one in kept]).reshape(-1, 2)
         places = self._groups(returns)
         if ground is not None and len(places):

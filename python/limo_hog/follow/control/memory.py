@@ -1,4 +1,4 @@
-"""What the tracking controller remembers from frame to frame."""
+"""What the tracking controller remembers from frame to frame, and what it believes by that of the people around."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from limo_hog.follow.control.backing import Other
 from limo_hog.follow.control.lookout import Hunt
 from limo_hog.follow.control.selection import Choice
+from limo_hog.follow.decision import Believed
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.space.grid import Ground
-from limo_hog.follow.tracks.kalman import Track
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, predict
+from limo_hog.follow.tracks.poses import pose_at
 from limo_hog.follow.tracks.tracker import Tracks
 from limo_hog.follow.twist import Twist
 
@@ -70,3 +72,27 @@ class TrackingState:
     sent: Twist = field(default_factory=Twist)
     others: tuple[Other, ...] = ()
     brisk: float = 0.0
+
+
+def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:
+    """Return everyone tracked, in the base frame, as of the newest stamp `now` [s]."""
+    boxes, likeness = dict(state.tracks.boxes), state.choice.likeness
+    pose = pose_at(state.tracks.poses, now)
+    people = []
+    for one in state.tracks.people:
+        track = predict(one.track, now, noise)
+        bearing, distance = bearing_range(track, pose)
+        speed, heading = math.hypot(*track.mean[2:]), math.atan2(track.mean[3], track.mean[2]) - pose.yaw
+        people.append(
+            Believed(
+                distance * math.cos(bearing),
+                distance * math.sin(bearing),
+                one.existence,
+                one.number,
+                speed * math.cos(heading),
+                speed * math.sin(heading),
+                boxes.get(one.number),
+                None if likeness is None else likeness.of(one.number),
+            )
+        )
+    return tuple(people)

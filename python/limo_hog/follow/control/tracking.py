@@ -12,11 +12,11 @@ from limo_hog.follow.control.backing import Backing, Poses
 from limo_hog.follow.control.company import Company, Way, walker_of
 from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.lookout import Lookout
-from limo_hog.follow.control.memory import TrackingState
+from limo_hog.follow.control.memory import TrackingState, believed
 from limo_hog.follow.control.search import Search
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.control.steer import Aim, Steering
-from limo_hog.follow.decision import Belief, Believed, Decision, Mode
+from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, Points, scan_points, to_odometry
@@ -184,7 +184,7 @@ class TrackingController:
             since_full=0 if region is None else state.since_full + 1,
             detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
         )
-        belief = Belief(keeps, self._believed(state, observation), followed=person.number)
+        belief = Belief(keeps, believed(state, observation.now, self.tracker.noise), followed=person.number)
         return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief), person
 
     def _give_way(
@@ -253,7 +253,9 @@ class TrackingController:
         known, ground, scan = state.known, state.ground, observation.scan
         if (off := self._off_unknown(state, observation)) is not None:
             twist, mode, reason = self.search.towards(off, lost=lost)
-            return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
+            return Decision(
+                twist, state, mode, reason, belief=Belief(None, believed(state, observation.now, self.tracker.noise))
+            )
         if (
             lost
             and known is not None
@@ -264,7 +266,9 @@ class TrackingController:
             decision = self._look_round(state, known, ground, scan, observation)
             return replace(decision, reason=f"{decision.reason}: another is in view") if other else decision
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
-        return Decision(twist, state, mode, reason, belief=Belief(None, self._believed(state, observation)))
+        return Decision(
+            twist, state, mode, reason, belief=Belief(None, believed(state, observation.now, self.tracker.noise))
+        )
 
     def _off_unknown(self, state: TrackingState, observation: Observation) -> float | None:
         """Return the bearing [rad] of what moves in the scan and may be the person; None where there is none.
@@ -292,7 +296,7 @@ class TrackingController:
         reason = f"not sure which of {len(people)} is the person followed"
         if len(people) == 1:
             reason = "not sure whether this is the person followed"
-        belief = Belief(None, self._believed(state, observation))
+        belief = Belief(None, believed(state, observation.now, self.tracker.noise))
         return Decision(twist, replace(state, since_full=0), Mode.HOLD, reason, belief=belief)
 
     def _is_sure(self, person: Person, choice: Choice) -> bool:
@@ -309,7 +313,7 @@ class TrackingController:
         points, turn = scan_points(scan, self.robot), Twist(0.0, state.side * self.search.rate)
         twist, reason = self.lookout.command(hunt, pose, points, self.detour, self.robot, turn)
         places, way = self.lookout.ways(hunt, pose)
-        belief = Belief(None, self._believed(state, observation), places, way)
+        belief = Belief(None, believed(state, observation.now, self.tracker.noise), places, way)
         return Decision(twist, replace(state, hunt=hunt), Mode.LOST, reason, belief=belief)
 
     def _aim(
@@ -361,29 +365,6 @@ class TrackingController:
             if self._hides(state.ground, pose, soon):
                 return self.near_hiding
         return keeps
-
-    def _believed(self, state: TrackingState, observation: Observation) -> tuple[Believed, ...]:
-        """Return everyone tracked, in the base frame, as of the newest stamp."""
-        now, boxes, likeness = observation.now, dict(state.tracks.boxes), state.choice.likeness
-        pose = pose_at(state.tracks.poses, now)
-        people = []
-        for one in state.tracks.people:
-            track = predict(one.track, now, self.tracker.noise)
-            bearing, distance = bearing_range(track, pose)
-            speed, heading = math.hypot(*track.mean[2:]), math.atan2(track.mean[3], track.mean[2]) - pose.yaw
-            people.append(
-                Believed(
-                    distance * math.cos(bearing),
-                    distance * math.sin(bearing),
-                    one.existence,
-                    one.number,
-                    speed * math.cos(heading),
-                    speed * math.sin(heading),
-                    boxes.get(one.number),
-                    None if likeness is None else likeness.of(one.number),
-                )
-            )
-        return tuple(people)
 
     def _along(self, way: Points, obstacles: Points, pose: Odometry) -> float:
         """Return the direction along a way [rad], or one near it that is free."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import inspect
 import re
 from collections.abc import Iterator
@@ -111,7 +112,8 @@ class Tunable(Generic[S]):
         """
         parameters = self.parameters
         if name not in parameters:
-            raise ParameterError(f"no parameter {_short(name)}; there are {', '.join(parameters)}")
+            near = difflib.get_close_matches(name, parameters, n=5, cutoff=0.3) or [*parameters][:5]
+            raise ParameterError(f"no parameter {_short(name)} among {len(parameters)}; {', '.join(near)} come nearest")
         self._controller = _replaced(self._controller, name.split("."), parameters[name].checked(value))
 
 

@@ -155,14 +155,15 @@ class Lookout:
             off = self._off(point_ahead(hunt.way, pose, self.ahead), pose)
             heading = detour.near(points, off, robot) if abs(off) < self.aside else None
             speed = 0.0 if heading is None else self.speed * max(math.cos(heading), 0.0) ** 2
-            angular = self.turn_gain * (off if heading is None else heading)
-            angular = min(max(angular, -self.max_turn), self.max_turn)
-            return Twist(speed, angular), "looking round for the lost person"
+            return Twist(speed, self.turn(off if heading is None else heading)), "looking round for the lost person"
         if hunt.facing is not None:
             off = self._off(np.array(hunt.facing), pose)
-            angular = min(max(self.turn_gain * off, -self.max_turn), self.max_turn)
-            return Twist(0.0, angular), "turning to where the lost person may be"
+            return Twist(0.0, self.turn(off)), "turning to where the lost person may be"
         return turn, "searching for the lost person"
+
+    def turn(self, off: float) -> float:
+        """Return the turn rate to face what is `off` straight ahead [rad/s, rad]."""
+        return min(max(self.turn_gain * off, -self.max_turn), self.max_turn)
 
     def ways(self, hunt: Hunt, pose: Odometry) -> tuple[tuple[tuple[float, float], ...], ...]:
         """Return the places and the way in the base frame [m], for those who watch."""

@@ -21,14 +21,10 @@ class Search:
     after_s
         How long to face the predicted position of an unmeasured person before searching [s]. Chosen: a person passes
         behind a pillar within 2 s. Behind something wider than that, `Detour.hides` extends the wait.
-    gain, max_rate
-        Turn rate for each radian to what moves [1/s], and its limit [rad/s]. Chosen: `Lookout`'s.
     """
 
     rate: float = bounded(0.7, 0, 3)
     after_s: float = bounded(2.0, 0, 30)
-    gain: float = bounded(2.0, 0, 10)
-    max_rate: float = bounded(1.2, 0, 3)
 
     def command(self, side: float, *, lost: bool, other_in_view: bool) -> tuple[Twist, Mode, str]:
         """Return the command, the mode and the reason.
@@ -48,8 +44,3 @@ class Search:
         if lost:
             return turn, Mode.LOST, "searching for the lost person"
         return turn, Mode.SEARCH, "searching for a person"
-
-    def towards(self, bearing: float, *, lost: bool) -> tuple[Twist, Mode, str]:
-        """Return the command, the mode and the reason, where something moves in the scan at a bearing [rad]."""
-        turn = Twist(0.0, min(max(self.gain * bearing, -self.max_rate), self.max_rate))
-        return turn, Mode.LOST if lost else Mode.SEARCH, "turning to what moves in the scan"

@@ -252,7 +252,8 @@ class TrackingController:
         lost = choice.measured is not None
         known, ground, scan = state.known, state.ground, observation.scan
         if (off := self._off_unknown(state, observation)) is not None:
-            twist, mode, reason = self.search.towards(off, lost=lost)
+            twist, mode = Twist(0.0, self.lookout.turn(off)), Mode.LOST if lost else Mode.SEARCH
+            reason = "turning to what moves in the scan"
             return Decision(
                 twist, state, mode, reason, belief=Belief(None, believed(state, observation.now, self.tracker.noise))
             )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +91,9 @@ class Legs:
         if len(legs) < self.fewest or np.hypot(*np.ptp(legs, axis=0)) > self.widest:
             return None
         dx, dy = legs.mean(axis=0) - (pose.x, pose.y)
-        legs_noise = Noise(bearing=self.sigma / max(distance, 0.3), range=self.sigma)
         bearing = math.atan2(dy, dx) - pose.yaw
-        return update(track, innovation(track, bearing, math.hypot(dx, dy), pose, legs_noise))
+        return update(track, innovation(track, bearing, math.hypot(dx, dy), pose, self.noise_at(distance, noise)))
+
+    def noise_at(self, distance: float, noise: Noise) -> Noise:
+        """Return the noise with that of legs measured at a distance [m]."""
+        return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma)

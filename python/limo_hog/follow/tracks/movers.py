@@ -177,8 +177,8 @@ class Movers:
             return person
         track, pose = kalman.predict(person.track, returns.stamp, noise), returns.pose
         dx, dy = (legs[0].track.mean[:2] - (pose.x, pose.y)).tolist()
-        distance, sigma = math.hypot(dx, dy), self.legs.sigma
-        noise = replace(noise, bearing=sigma / max(distance, 0.3), range=sigma)
+        distance = math.hypot(dx, dy)
+        noise = self.legs.noise_at(distance, noise)
         fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
@@ -226,9 +226,7 @@ class Movers:
             math.hypot(place[0] - pose.x, place[1] - pose.y),
             math.atan2(place[1] - pose.y, place[0] - pose.x),
         )
-        sigma = self.legs.sigma
-        legs_noise = replace(noise, bearing=sigma / max(far, 0.3), range=sigma)
-        track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, legs_noise)
+        track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, self.legs.noise_at(far, noise))
         return Mover(track, (float(place[0]), float(place[1])), returns.stamp, returns.stamp)
 
 

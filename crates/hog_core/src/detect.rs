@@ -151,7 +151,7 @@ impl Hog {
         let places = memory::collect(locations.iter().map(|&at| grid.to_padded(at, self.spec())))?;
         let inside = memory::collect(places.iter().flatten().copied())?;
         let mut windows =
-            exact::Windows::new(image, &grid, &inside, self.spec(), &self.exact.tables, interrupt)?;
+            exact::Windows::new(image, grid.padding(), &inside, self.spec(), &self.exact.tables, interrupt)?;
         for (place, out) in places.into_iter().zip(out.chunks_exact_mut(self.spec().descriptor_len().max(1)))
         {
             interrupt.check()?;
@@ -184,7 +184,7 @@ impl Hog {
             return Ok(hits.pop().unwrap_or_default());
         };
         let inside = memory::collect(locations.iter().filter_map(|&at| grid.to_padded(at, spec)))?;
-        let mut windows = exact::Windows::new(image, &grid, &inside, spec, tables, interrupt)?;
+        let mut windows = exact::Windows::new(image, grid.padding(), &inside, spec, tables, interrupt)?;
         let mut hits = Vec::new();
         for at in inside {
             interrupt.check()?;

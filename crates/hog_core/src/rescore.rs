@@ -1,5 +1,7 @@
 //! The hits of one level: found by the fast path, close calls decided by the exact path.
 
+use std::ops::Range;
+
 use crate::error::Result;
 use crate::exact::{self, Svm, Tables};
 use crate::fast::Found;
@@ -8,7 +10,7 @@ use crate::image::{Image, ImageView};
 use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::params::HogSpec;
-use crate::pyramid::{Grid, resize};
+use crate::pyramid::{Grid, resize, resize_part};
 use crate::separable;
 
 /// A window that scored at least the threshold.
@@ -74,7 +76,10 @@ impl Scorer<'_> {
                 let least = self.hit_threshold - plan.score_error_bound();
                 let found = separable::search(level.view()?, grid, self.spec, plan, least, interrupt)?;
                 return memory::collect(
-                    self.rescored(level.view()?, grid, found, interrupt)?.iter().filter(is_hit).map(hit),
+                    self.rescored(level.view()?, *size, grid, found, interrupt)?
+                        .iter()
+                        .filter(is_hit)
+                        .map(hit),
                 );
             }
             let scores = exact::scores(level.view()?, grid, self.spec, self.tables, self.svm, interrupt)?;
@@ -88,9 +93,8 @@ impl Scorer<'_> {
         if !found.iter().any(|found| self.is_close(found)) {
             return memory::collect(found.iter().filter(is_hit).map(hit));
         }
-        let level = LevelImage::new(image, *size)?;
         let found = memory::collect(found.iter().copied())?;
-        let rescored = self.rescored(level.view()?, grid, found, interrupt)?;
+        let rescored = self.rescored(image, *size, grid, found, interrupt)?;
         memory::collect(rescored.iter().filter(is_hit).map(hit))
     }
 
@@ -100,10 +104,11 @@ impl Scorer<'_> {
         !is_sure
     }
 
-    /// `found` with the exact score of every close call.
+    /// What was found on the level of `size` pixels, with the exact score of every close call.
     fn rescored(
         &self,
-        level: ImageView,
+        image: ImageView,
+        size: Size,
         grid: &Grid,
         mut found: Vec<Found>,
         interrupt: &Interrupt,
@@ -112,17 +117,55 @@ impl Scorer<'_> {
         let Self { spec, tables, svm, .. } = *self;
         // Neighbouring windows share pixels and blocks: scoring all at once is cheaper than scoring many one by one.
         let at_once = close * spec.win.area() > grid.padded.area();
-        let all =
-            if at_once { exact::scores(level, grid, spec, tables, svm, interrupt)? } else { Vec::new() };
+        let all = if at_once {
+            let level = LevelImage::new(image, size)?;
+            exact::scores(level.view()?, grid, spec, tables, svm, interrupt)?
+        } else {
+            Vec::new()
+        };
         for found in found.iter_mut().filter(|found| self.is_close(found)) {
             let (x, y, _) = *found;
             let index = y / grid.stride.height * grid.windows.width + x / grid.stride.width;
             found.2 = match all.get(index) {
                 Some(&score) => score,
-                None => exact::window_score(level, grid, (x, y), spec, tables, svm, interrupt)?,
+                None => self.exact_score(image, size, grid, (x, y), interrupt)?,
             };
         }
         Ok(found)
+    }
+
+    /// The exact score of one window of the level of `size` pixels; no others than its own are made.
+    fn exact_score(
+        &self,
+        image: ImageView,
+        size: Size,
+        grid: &Grid,
+        at: (usize, usize),
+        interrupt: &Interrupt,
+    ) -> Result<f64> {
+        let Self { spec, tables, svm, .. } = *self;
+        let mut padding = grid.padding();
+        if size == image.size() {
+            return exact::window_score(image, padding, at, spec, tables, svm, interrupt);
+        }
+        let columns = seen(at.0, grid.pad.width, spec.win.width, size.width);
+        let rows = seen(at.1, grid.pad.height, spec.win.height, size.height);
+        padding.left += columns.start as i64;
+        padding.top += rows.start as i64;
+        let part = Size::new(columns.len(), rows.len());
+        let data = resize_part(image, size, columns, rows)?;
+        let part = Image { data, size: part, channels: image.channels() };
+        exact::window_score(part.view()?, padding, at, spec, tables, svm, interrupt)
+    }
+}
+
+/// The pixels that a window at padded `at` sees along one axis of a level: its own and a neighbour on both sides; where some
+/// of these are mirrored, all there are.
+fn seen(at: usize, pad: usize, win: usize, length: usize) -> Range<usize> {
+    let end = (at + win + 1).saturating_sub(pad);
+    match at.checked_sub(pad + 1) {
+        Some(start) if end <= length => start..end,
+        _ => 0..length,
     }
 }
 
@@ -145,5 +188,50 @@ impl<'a> LevelImage<'a> {
             Self::Same(view) => Ok(*view),
             Self::Shrunk(image) => image.view(),
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail")]
+mod tests {
+    use super::*;
+    use crate::model;
+    use crate::params::HogParams;
+    use crate::pyramid::Steps;
+
+    /// Every window of a level, alone and with all others, also where it sees mirrored pixels.
+    fn assert_alone_as_together(image: Size, level: Size, channels: usize, padding: (i64, i64)) {
+        let data: Vec<u8> = (0..image.area() * channels).map(|i| (i * i / 11 + 5 * i) as u8).collect();
+        let image =
+            ImageView::new(&data, image.width, image.height, channels, image.width * channels).unwrap();
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let (tables, svm) = (Tables::new(&spec).unwrap(), Svm::new(model::default_people(), &spec).unwrap());
+        let scorer = Scorer {
+            spec: &spec,
+            tables: &tables,
+            svm: &svm,
+            separable: None,
+            hit_threshold: 0.0,
+            margin: 0.0,
+        };
+        let grid = Steps::new((8, 8), padding, spec.cell, &spec).unwrap().grid(level, &spec);
+        assert!(!grid.is_empty());
+        let shrunk = LevelImage::new(image, level).unwrap();
+        let all =
+            exact::scores(shrunk.view().unwrap(), &grid, &spec, &tables, &svm, &Interrupt::NEVER).unwrap();
+        for (index, score) in all.into_iter().enumerate() {
+            let at = (8 * (index % grid.windows.width), 8 * (index / grid.windows.width));
+            let alone = scorer.exact_score(image, level, &grid, at, &Interrupt::NEVER).unwrap();
+            assert_eq!(alone, score, "{channels} channels, {level:?}, {at:?}");
+        }
+    }
+
+    #[test]
+    fn a_window_alone_scores_as_among_all_of_its_level() {
+        assert_alone_as_together(Size::new(190, 290), Size::new(131, 203), 1, (4, 4));
+        assert_alone_as_together(Size::new(190, 290), Size::new(130, 200), 3, (0, 0));
+        assert_alone_as_together(Size::new(190, 290), Size::new(99, 150), 3, (40, 24));
+        assert_alone_as_together(Size::new(40, 60), Size::new(20, 30), 1, (80, 96));
+        assert_alone_as_together(Size::new(90, 150), Size::new(90, 150), 3, (8, 8));
     }
 }

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use crate::error::Result;
-use crate::geometry::{Region, Size};
+use crate::geometry::{Padding, Region, Size};
 use crate::image::ImageView;
 use crate::interrupt::Interrupt;
 use crate::memory;
@@ -150,7 +150,7 @@ impl<'a> Windows<'a> {
     /// Prepares the windows that begin at `places` of the padded image.
     pub fn new(
         image: ImageView,
-        grid: &Grid,
+        padding: Padding,
         places: &[(usize, usize)],
         spec: &'a HogSpec,
         tables: &'a Tables,
@@ -163,7 +163,7 @@ impl<'a> Windows<'a> {
         let (x, width) = along(|place| place.0, spec.win.width);
         let (y, height) = along(|place| place.1, spec.win.height);
         let region = Region { x, y, width, height };
-        let votes = votes(image, grid.padding(), region, spec, interrupt)?;
+        let votes = votes(image, padding, region, spec, interrupt)?;
         let firsts = memory::with_room(spec.blocks.area())?;
         let descriptor = memory::filled(spec.descriptor_len(), 0.0)?;
         Ok(Self { spec, tables, region, votes, firsts, descriptor })
@@ -192,12 +192,12 @@ impl<'a> Windows<'a> {
 /// The score of the one window at padded (`x`, `y`).
 pub fn window_score(
     image: ImageView,
-    grid: &Grid,
+    padding: Padding,
     at: (usize, usize),
     spec: &HogSpec,
     tables: &Tables,
     svm: &Svm,
     interrupt: &Interrupt,
 ) -> Result<f64> {
-    Ok(Windows::new(image, grid, &[at], spec, tables, interrupt)?.score(at, svm))
+    Ok(Windows::new(image, padding, &[at], spec, tables, interrupt)?.score(at, svm))
 }

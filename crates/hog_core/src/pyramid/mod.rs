@@ -7,5 +7,5 @@ mod resize;
 pub(crate) use grid::gcd;
 pub use grid::{Grid, Steps};
 pub use levels::{Level, Pyramid, levels, to_image};
-pub(crate) use resize::check;
 pub use resize::{Tap, resize, taps};
+pub(crate) use resize::{check, resize_part};

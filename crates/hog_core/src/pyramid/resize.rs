@@ -1,5 +1,7 @@
 //! The exact linear resize, bit for bit OpenCV's INTER_LINEAR_EXACT.
 
+use std::ops::Range;
+
 use crate::error::{ImageError, Result};
 use crate::geometry::Size;
 use crate::image::{ImageView, SIDE_MAX};
@@ -48,10 +50,21 @@ pub(crate) fn check(size: Size) -> Result<()> {
 
 /// `image` at `size`, bit for bit as OpenCV's INTER_LINEAR_EXACT; rows without gaps, channels interleaved.
 pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
+    resize_part(image, size, 0..size.width, 0..size.height)
+}
+
+/// Some columns and rows of `image` at `size`.
+pub(crate) fn resize_part(
+    image: ImageView,
+    size: Size,
+    columns: Range<usize>,
+    rows: Range<usize>,
+) -> Result<Vec<u8>> {
     let channels = image.channels();
     check(size)?;
-    let across = memory::collect(taps(image.width(), size.width))?;
-    let down = taps(image.height(), size.height);
+    let part = Size::new(columns.len(), rows.len());
+    let across = memory::collect(taps(image.width(), size.width).skip(columns.start).take(part.width))?;
+    let down = taps(image.height(), size.height).skip(rows.start).take(part.height);
     let shrink_row = |y: usize, out: &mut Vec<u32>| {
         let row = image.row(y);
         out.clear();
@@ -62,8 +75,8 @@ pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
             }
         }
     };
-    let mut out = memory::with_room(size.area().saturating_mul(channels))?;
-    let row = || memory::with_room(size.width.saturating_mul(channels));
+    let mut out = memory::with_room(part.area().saturating_mul(channels))?;
+    let row = || memory::with_room(part.width.saturating_mul(channels));
     let (mut upper, mut lower) = (row()?, row()?);
     let (mut upper_row, mut lower_row) = (usize::MAX, usize::MAX);
     for tap in down {
@@ -95,6 +108,18 @@ mod tests {
         let data = [1, 2, 10, 10, 3, 4, 10, 11];
         let image = ImageView::new(&data, 4, 2, 1, 4).unwrap();
         assert_eq!(resize(image, Size::new(2, 1)).unwrap(), [(1 + 2 + 3 + 4 + 2) / 4, (41 + 2) / 4]);
+    }
+
+    #[test]
+    fn a_part_is_cut_from_the_whole() {
+        let data: Vec<u8> = (0..30 * 20 * 3).map(|i| (i * i / 7) as u8).collect();
+        let image = ImageView::new(&data, 30, 20, 3, 90).unwrap();
+        let size = Size::new(23, 11);
+        let whole = resize(image, size).unwrap();
+        let part = resize_part(image, size, 4..17, 3..9).unwrap();
+        for (y, row) in (3..9).zip(part.chunks_exact(13 * 3)) {
+            assert_eq!(row, &whole[(y * 23 + 4) * 3..][..13 * 3]);
+        }
     }
 
     #[test]

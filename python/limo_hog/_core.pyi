@@ -392,7 +392,8 @@ def daimler_people_detector() -> NDArray[np.float32]:
 def set_num_threads(count: int) -> None:
     """Let pyramids be searched by this many threads; 0 for one per core.
 
-    More than 256 are never used, and threads that the system does not give are done without.
+    No call uses more than the process has cores (as counted when they are first needed) or more than 256, and threads
+    that the system does not give are done without.
 
     Raises
     ------
@@ -403,7 +404,7 @@ def set_num_threads(count: int) -> None:
     """
 
 def get_num_threads() -> int:
-    """How many threads search a pyramid."""
+    """How many threads were chosen; a call uses no more than there are cores."""
 
 def backend() -> str:
     """Instruction set that new detectors use."""

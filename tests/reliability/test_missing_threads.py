@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import pytest
 from tests.reliability.child import run
@@ -25,6 +26,21 @@ def test_a_search_finds_the_same_when_no_more_threads_can_be_had() -> None:
     done = run(program, 120)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[1:] == ["True"], done.stdout + done.stderr
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="counts a process's threads as Linux lists them")
+def test_a_search_works_on_no_more_threads_than_there_are_cores() -> None:
+    program = """
+    from pathlib import Path
+
+    limo_hog.set_num_threads(64)
+    armed().detectMultiScale(people(320, 240), -0.5)
+    names = [task.joinpath("comm").read_text().strip() for task in Path("/proc/self/task").iterdir()]
+    print(names.count("limo-hog") + 1 <= len(os.sched_getaffinity(0)))
+    """
+    done = run(program, 120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["True"], done.stdout + done.stderr
 
 
 def test_the_number_of_threads_is_bounded() -> None:

@@ -30,15 +30,37 @@ type Array3<'py, T> = Bound<'py, PyArray3<T>>;
 /// Threads of a pyramid search; 0 stands for all cores.
 static THREADS: AtomicUsize = AtomicUsize::new(0);
 
+/// The cores that this process may use; 0 until they are asked for.
+static CORES: AtomicUsize = AtomicUsize::new(0);
+
 /// More threads are never used: levels are shared among them, and a pyramid has 64 levels unless asked for more.
 const THREADS_MAX: usize = 256;
 
+/// How many threads were chosen.
 fn threads() -> usize {
     let threads = match THREADS.load(Ordering::Relaxed) {
-        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        0 => cores(),
         chosen => chosen,
     };
     threads.min(THREADS_MAX)
+}
+
+/// The cores that this process may use, asked for once: the answer takes longer (28 µs) than the descriptor of a crop.
+fn cores() -> usize {
+    match CORES.load(Ordering::Relaxed) {
+        0 => {
+            let cores = std::thread::available_parallelism().map_or(1, usize::from);
+            CORES.store(cores, Ordering::Relaxed);
+            cores
+        }
+        known => known,
+    }
+}
+
+/// How many threads a call uses that asks for so many: no more than there are cores, as others would only cut the work into
+/// smaller parts, and each of them needs scratch memory.
+fn at_work(asked: usize) -> usize {
+    asked.clamp(1, cores())
 }
 
 /// How often a long call looks for signals: a tenth of the second within which Ctrl-C is to end it, and so rarely that
@@ -237,7 +259,7 @@ impl Hog {
         let descriptors = zeros(py, count.saturating_mul(elements))?;
         let mut out = descriptors.readwrite();
         let out = out.as_slice_mut()?;
-        detached(py, |interrupt| self.inner.describe(&data, channels, threads(), interrupt, out))?;
+        detached(py, |interrupt| self.inner.describe(&data, channels, at_work(threads()), interrupt, out))?;
         descriptors.reshape([count, elements])
     }
 
@@ -282,7 +304,7 @@ impl Hog {
             Grouping::Similar(group_threshold as i32)
         };
         let guide = guide.map(|(every, margin, reach)| Guide { every, margin, reach });
-        let threads = threads.map_or_else(self::threads, |threads| threads.clamp(1, THREADS_MAX));
+        let threads = at_work(threads.unwrap_or_else(self::threads));
         let find = |hog: &crate::Hog, view: ImageView, interrupt: &Interrupt| {
             hog.detect_multi_scale(view, &search, &pyramid, grouping, guide, threads, interrupt)
         };

@@ -126,6 +126,32 @@ def test_two_people_side_by_side_have_one_pair_of_legs_each() -> None:
     assert [one.number for one in later] == [1]
 
 
+def test_the_legs_of_two_who_walk_side_by_side_stay_apart() -> None:
+    people = [person(1, 1.5, 0.0, 0.0), person(2, 1.6, 0.4, 0.0)]
+    movers = tuple(
+        Mover(one.track, (1.0, 0.0), 0.0, 0.0, left=True, number=one.number, named=0.0) for one in reversed(people)
+    )
+    for index in range(1, 40):
+        y = 0.03 * index
+        # Three scans of eight show only the first person, who hides the second.
+        shown = legs(1.5, y, 1.0 * index) + (legs(1.6, y + 0.4, 1.3 * index) if index % 8 < 5 else [])
+        movers = MOVERS.update(
+            movers, Returns(index * SCAN_S, np.array(shown), Odometry()), HALF_VIEW, NOISE, GRID, FREE
+        )
+    places = {one.number: one.track.mean[:2] for one in movers if one.number is not None}
+    assert math.dist(places[1], (1.5, y)) < 0.2
+    assert math.dist(places[2], (1.6, y + 0.4)) < 0.2
+
+
+def test_legs_are_a_persons_since_the_camera_first_showed_that() -> None:
+    movers = MOVERS.assign(
+        (Mover(person(0, 1.5, 0.0, 1.0).track, (1.5, 0.0), 0.0, 1.0),), [person(1, 1.5, 0.0, 1.0)], 1.0
+    )
+    later = MOVERS.assign(tuple(replace(one, felt=2.0) for one in movers), [person(1, 1.5, 0.1, 2.0)], 2.0)
+    other = MOVERS.assign(tuple(replace(one, felt=3.0) for one in later), [person(2, 1.5, 0.1, 3.0)], 3.0)
+    assert [one.named for one in (*movers, *later, *other)] == [1.0, 1.0, 3.0]
+
+
 def test_a_place_is_empty_as_soon_as_a_beam_ends_behind_it_and_not_where_something_nearer_is() -> None:
     never = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
     wall = [(3.5, 0.05 * step - 3.0) for step in range(120)]

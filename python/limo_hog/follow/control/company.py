@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,15 @@ class Walker:
     vx: float
     vy: float
     followed: bool = False
+
+    def at_least(self, speed: float, slowest: float) -> Walker:
+        """Return one who has set out, faster than `slowest`, at the speed at which they are known to walk [m/s].
+
+        The estimate takes half a second to show it.
+        """
+        now = math.hypot(self.vx, self.vy)
+        share = max(speed / now, 1.0) if now > slowest else 1.0
+        return replace(self, vx=share * self.vx, vy=share * self.vy)
 
 
 def walker_of(track: Track, pose: Odometry, *, followed: bool = False) -> Walker:
@@ -110,8 +119,8 @@ class Company:
         to within the error of their places, the easiest.
     settle_s, stay
         A way is left for another only after so long [s], unless it costs `never`, and if the other is worth more by so
-        much [m]. Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by
-        .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
+        much [m]; standing is left at once. Measured: while the robot turns, which takes .8 s, a person's velocity
+        across their way strays by .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
     away
         What a way costs on which the person followed is out of the image all the time [m], unless it is they who come.
         Chosen: less than the clearance wanted.
@@ -215,7 +224,7 @@ class Company:
         if may_back is not None:
             blind = (backs[1:] & ~may_back(poses[1:])).any(axis=1)
             worth[(speeds < -blind_speed) & blind] -= self.never
-        if begun is not None:
+        if begun is not None and begun.speed:
             worth[-1] += self.stay if begun.age > self.settle_s else 1.0
         return ways[int(np.argmax(worth))]
 

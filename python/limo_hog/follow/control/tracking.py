@@ -211,7 +211,12 @@ class TrackingController:
         def may_back(poses: Poses) -> NDArray[np.bool_]:
             return self.backing.is_free_behind(poses, pose, self.grid, state.ground, others, self.robot)
 
-        walkers = [walker_of(track, pose, followed=track is own) for track in tracks]
+        walkers = [
+            walker_of(track, pose, followed=True).at_least(state.brisk, self.company.slowest)
+            if track is own
+            else walker_of(track, pose)
+            for track in tracks
+        ]
         blind_speed = self.backing.blind_limit(others, pose, self.robot, observation.now)
         way = self.company.way_out(
             twist, driven, walkers, points, self.robot, begun, acceleration, may_back, blind_speed

@@ -85,6 +85,14 @@ def test_a_person_whose_legs_have_been_the_same_stays_the_person() -> None:
         assert low <= known.of(1) <= high
 
 
+def test_one_who_is_hardly_likely_is_known_again_while_their_legs_go_on() -> None:
+    known = replace(followed(), chances=((1, 0.1),))
+    for frame in range(11, 21):
+        one = person(1, 0.1 * frame)
+        known = IDENTITY.update(known, replace(at(0.1 * frame, one), movers=(legs(one, one.seen),)))
+    assert known.of(1) > 0.8
+
+
 def test_two_alike_side_by_side_do_not_change_places_while_each_has_legs_that_go_on() -> None:
     for apart, low, high in ((0.45, 0.95, 1.0), (0.35, 0.4, 0.8)):
         known = followed()

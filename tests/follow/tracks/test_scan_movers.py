@@ -14,6 +14,7 @@ from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.legs import Returns
 from limo_hog.follow.tracks.movers import Mover, Movers
 from limo_hog.follow.tracks.person import Person
+from limo_hog.follow.tracks.tracker import Tracker, Tracks
 
 MOVERS, NOISE, HALF_VIEW, SCAN_S, GRID = Movers(), Noise(), 2.0, 0.125, Grid()
 #: Ground that is free from now on, wherever nothing is.
@@ -150,6 +151,17 @@ def test_legs_are_a_persons_since_the_camera_first_showed_that() -> None:
     later = MOVERS.assign(tuple(replace(one, felt=2.0) for one in movers), [person(1, 1.5, 0.1, 2.0)], 2.0)
     other = MOVERS.assign(tuple(replace(one, felt=3.0) for one in later), [person(2, 1.5, 0.1, 3.0)], 3.0)
     assert [one.named for one in (*movers, *later, *other)] == [1.0, 1.0, 3.0]
+
+
+def test_legs_that_begin_to_walk_where_a_lost_person_can_be_are_theirs_unless_another_was_lost_too() -> None:
+    lost, another = person(7, 1.5, -0.4, -0.2), person(8, 1.5, 0.4, -0.2)
+    seen_together = person(7, 1.5, -0.4, 0.1)
+    far_off = person(7, -1.5, -0.4, -0.2)
+    for people, found in (((lost,), True), ((lost, another), False), ((seen_together,), False), ((far_off,), False)):
+        scan = Returns(1.0, np.array(legs(1.5, 0.1, 9.0)), Odometry())
+        tracks = Tracks(people, scans=(scan,), stamp=1.0, movers=walk((1.5, -0.4), (0.0, 0.5), 8), moved_at=0.875)
+        after = Tracker().follow_movers(tracks, HALF_VIEW, 0.5, GRID, FREE)
+        assert (after.people[0].felt == 1.0) == found
 
 
 def test_a_place_is_empty_as_soon_as_a_beam_ends_behind_it_and_not_where_something_nearer_is() -> None:

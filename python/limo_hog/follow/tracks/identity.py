@@ -89,9 +89,11 @@ class Identity:
         Share of its own evidence that a box counts for after a track's first [1]. Chosen: neighbouring frames show
         nearly the same, as in `Existence`.
     steady
-        The same for the stature, whose error lasts as long as the distance, and for all of a track whose legs have been
-        the same (`legs_s`): an arm before the shirt stays there while a person stands [1]. Chosen: a second is worth
-        one box.
+        The same for the stature, whose error lasts as long as the distance, and for all that the person followed shows
+        while their legs are the same (`legs_s`): an arm before the shirt stays there while a person stands [1]. Chosen:
+        a second is worth one box.
+    stays
+        Probability from which a track counts as the person for that [1]. Chosen: more likely than not.
     most
         The most that a box can tell either way [log-odds]. Chosen: a factor of twelve.
     passes, strained
@@ -132,6 +134,7 @@ class Identity:
     odd_stature: float = 0.3
     again: float = 0.5
     steady: float = 0.1
+    stays: float = 0.5
     most: float = 2.5
     passes: float = 0.002
     strained: float = 0.1
@@ -159,8 +162,9 @@ class Identity:
         chances = self._passed(known, people, tracks)
         odds = dict(chances)
         for one in tracks.in_view:
-            counts = self.steady if one.age > 1 and self._walks_on(one, tracks) else 1.0
-            odds[one.number] *= math.exp(counts * self._evidence(known, one, first=one.age <= 1))
+            stays = known.of(one.number) >= self.stays and self._walks_on(one, tracks)
+            evidence = self._evidence(known, one, first=one.age <= 1)
+            odds[one.number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
         chances = {number: value / total for number, value in odds.items()}
         known = replace(known, chances=tuple(chances.items()))

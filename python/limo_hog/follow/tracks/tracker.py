@@ -20,7 +20,7 @@ from limo_hog.follow.tracks.association import Association
 from limo_hog.follow.tracks.existence import Existence, Recall
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
 from limo_hog.follow.tracks.legs import Legs, Returns, returns_of
-from limo_hog.follow.tracks.movers import Mover, Movers
+from limo_hog.follow.tracks.movers import Mover, Movers, named
 from limo_hog.follow.tracks.person import Person, initiate, predict
 from limo_hog.follow.tracks.poses import pose_at
 
@@ -282,6 +282,7 @@ class Tracker:
         for returns in new:
             movers = self.movers.update(movers, returns, half_view, self.noise, grid, ground, camera)
             movers = self.movers.assign(movers, seen, returns.stamp)
+            movers = self._come_back(movers, people, returns.stamp)
             walking = {one.number for one in self.movers.moving(movers)}
             people = tuple(
                 self.movers.continued(one, movers, returns, self.noise)
@@ -292,6 +293,24 @@ class Tracker:
                 for one in people
             )
         return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
+
+    def _come_back(self, movers: tuple[Mover, ...], people: tuple[Person, ...], stamp: float) -> tuple[Mover, ...]:
+        """Take legs that began to walk since a person was lost, where that person can be, for theirs.
+
+        Only where they can be one person's alone, and that person has no others to choose from.
+        """
+        lost = [one for one in people if one.confirmed and self.scan_period_s < stamp - one.measured < self.legs_only_s]
+        walking = [one for one in self.movers.moving(movers) if one.number is None and one.felt == stamp]
+        pairs = [
+            (one.number, mover)
+            for one in lost
+            for mover in walking
+            if mover.since > one.measured and self._is_near(one, mover.track)
+        ]
+        if len(pairs) != 1:
+            return movers
+        number, legs = pairs[0]
+        return tuple(named(mover, number, stamp) if mover is legs else mover for mover in movers)
 
     def around(
         self, tracks: Tracks, followed: Person | None, now: float, lately_s: float

@@ -20,7 +20,7 @@ from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Track
 from limo_hog.follow.twist import Twist
-from limo_hog.follow.wheels import advanced, stoppable_turn
+from limo_hog.follow.wheels import advanced, all_advanced, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,12 +197,9 @@ class Company:
             return None
         goal = people[is_followed]
         people, is_followed = people[coming], is_followed[coming]
-        ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]
-        if begun is not None:
-            ways.append(begun)
-        poses, backs = self._driven(ways, wanted, now, acceleration, robot)
+        straight = self._driven_on(wanted, now, acceleration, robot)
         places = self._places(people)
-        gaps = _outline_gap(poses[:, :, None, None], places[None], robot)
+        gaps = _outline_gap(straight[:, :, None, None], places[None], robot)
         clear = np.where(is_followed, self.clear, self.clear_other)
         late = np.arange(gaps.shape[1])[:, None] * self.step_s >= np.where(
             is_followed, self.notice_s, self.notice_other_s
@@ -210,19 +207,23 @@ class Company:
         room = np.where(late[:, None], np.inf, gaps[0]).min(axis=0) - clear
         if (room[0] if begun is None else room).min() > 0:
             return None
-        gaps = gaps.min(axis=(1, 3))
+        ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]
+        if begun is not None:
+            ways.append(begun)
+        poses, backs = self._driven(ways, now, acceleration, robot)
+        gaps = _outline_gap(poses[:, :, None, None], places[None], robot).min(axis=(1, 3))
         near = points[np.hypot(*points.T) < self.near][::2]
         gap = np.hypot(*(near[:, None] - people[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
         near = near[gap > self.person_radius]
         speeds = np.array([way.speed for way in ways])
         effort = self.ease * (np.abs(speeds - now.linear) + 0.4 * np.abs([way.turn for way in ways]))
-        worth = np.minimum(gaps[1:], self.wanted) @ self.weights - effort
-        worth -= self.unseen * self._unseen(poses[1:], places[:, 0])
+        worth = np.minimum(gaps, self.wanted) @ self.weights - effort
+        worth -= self.unseen * self._unseen(poses, places[:, 0])
         if not is_followed.any():
-            worth -= self.away * self._away(poses[1:], goal, robot)
-        worth[self._room(poses[1:], near, robot) < self.walls] -= self.never
+            worth -= self.away * self._away(poses, goal, robot)
+        worth[self._room(poses, near, robot) < self.walls] -= self.never
         if may_back is not None:
-            blind = (backs[1:] & ~may_back(poses[1:])).any(axis=1)
+            blind = (backs & ~may_back(poses)).any(axis=1)
             worth[(speeds < -blind_speed) & blind] -= self.never
         if begun is not None and begun.speed:
             worth[-1] += self.stay if begun.age > self.settle_s else 1.0
@@ -239,34 +240,49 @@ class Company:
         """Return the speeds with which ways are driven that are `turn` [rad] off: the turn first."""
         most = np.minimum(stoppable_turn(turn, acceleration, robot), self.max_turn)
         linear = speed * np.maximum(np.cos(turn), 0.0) ** 2
-        return np.asarray(linear), np.asarray(np.clip(self.turn_gain * turn, -most, most))
+        return np.asarray(linear), np.minimum(np.maximum(self.turn_gain * turn, -most), most)
 
-    def _driven(
-        self, ways: Sequence[Way], wanted: Twist, now: Twist, acceleration: float, robot: RobotGeometry
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return where the wanted command, then each of K ways, leads in T steps, and in which of these it backs.
+    def _driven_on(self, wanted: Twist, now: Twist, acceleration: float, robot: RobotGeometry) -> Poses:
+        """Return where the wanted command leads in T steps, float64 (1, T, 3): x, y [m], yaw [rad].
 
-        float64 (1 + K, T, 3): x, y [m], yaw [rad]; bool (1 + K, T). What is wanted is taken to turn for half of
-        the time.
+        It is taken to turn for half of the time.
         """
-        turns = np.array([0.0, *(way.turn for way in ways)])
-        speeds = np.array([0.0, *(way.speed for way in ways)])
-        count, steps = len(turns), round(self.horizon_s / self.step_s)
-        linear, angular = np.full(count, now.linear), np.full(count, now.angular)
-        x, y, yaw = np.zeros((3, count))
-        poses, backs = np.empty((count, steps, 3)), np.empty((count, steps), bool)
+        steps, most = round(self.horizon_s / self.step_s), acceleration * self.step_s
+        linear, angular, x, y, yaw = now.linear, now.angular, 0.0, 0.0, 0.0
+        poses = []
         for step in range(steps):
-            for_linear, for_angular = self._wanted(turns - yaw, speeds, acceleration, robot)
-            for_linear[0], for_angular[0] = wanted.linear, wanted.angular if step < steps / 2 else 0.0
             begun = linear, angular
-            linear, angular = advanced(for_linear, for_angular, linear, angular, acceleration * self.step_s, robot)
+            turn_to = wanted.angular if step < steps / 2 else 0.0
+            linear, angular = advanced(wanted.linear, turn_to, linear, angular, most, robot)
             turn = (begun[1] + angular) / 2 * self.step_s
             far = (begun[0] + linear) / 2 * self.step_s
-            x, y = x + far * np.cos(yaw + turn / 2), y + far * np.sin(yaw + turn / 2)
-            yaw = yaw + turn
-            poses[:, step] = np.stack([x, y, yaw], axis=1)
-            backs[:, step] = far < 0
-        return poses, backs
+            x, y = x + far * math.cos(yaw + turn / 2), y + far * math.sin(yaw + turn / 2)
+            yaw += turn
+            poses.append((x, y, yaw))
+        return np.array([poses])
+
+    def _driven(
+        self, ways: Sequence[Way], now: Twist, acceleration: float, robot: RobotGeometry
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return where each of K ways leads in T steps, and in which of these it backs.
+
+        float64 (K, T, 3): x, y [m], yaw [rad]; bool (K, T).
+        """
+        turns, speeds = np.array([way.turn for way in ways]), np.array([way.speed for way in ways])
+        count, steps = len(ways), round(self.horizon_s / self.step_s)
+        # The speeds and the yaw at the beginning and after each step.
+        linear, angular = np.full((steps + 1, count), now.linear), np.full((steps + 1, count), now.angular)
+        yaw = np.zeros((steps + 1, count))
+        for step in range(steps):
+            for_linear, for_angular = self._wanted(turns - yaw[step], speeds, acceleration, robot)
+            linear[step + 1], angular[step + 1] = all_advanced(
+                for_linear, for_angular, linear[step], angular[step], acceleration * self.step_s, robot
+            )
+            yaw[step + 1] = yaw[step] + (angular[step] + angular[step + 1]) / 2 * self.step_s
+        far = (linear[:-1] + linear[1:]) / 2 * self.step_s
+        along = yaw[:-1] + (angular[:-1] + angular[1:]) / 4 * self.step_s
+        x, y = np.cumsum(far * np.cos(along), axis=0), np.cumsum(far * np.sin(along), axis=0)
+        return np.stack([x.T, y.T, yaw[1:].T], axis=2), far.T < 0
 
     def _places(self, people: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where N people are in T steps, float64 (T, 3, N, 2) [m]: as predicted, and to either side of that."""

@@ -166,8 +166,8 @@ class TrackingController:
         elif keeps > self.target_distance + self.steering.distance_tolerance and mode in (Mode.HOLD, Mode.FOLLOW):
             reason += ", further off than asked: nearer the camera would not show all of them"
         off = aim.bearing if aim.heading is None else max(aim.bearing, aim.heading, key=abs)
-        most = stoppable_turn(off, state.acceleration, self.robot) + abs(aim.bearing_rate)
-        twist = replace(twist, angular=float(np.clip(twist.angular, -most, most)))
+        most = float(stoppable_turn(off, state.acceleration, self.robot)) + abs(aim.bearing_rate)
+        twist = Twist(twist.linear, min(max(twist.angular, -most), most))
         pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
         facing, others = np.array([0.0, 0.0, aim.bearing]), state.others
         if twist.linear < 0 and not self.backing.is_free_behind(

@@ -214,8 +214,9 @@ class Company:
             worth -= self.away * self._away(poses, goal, robot)
         worth[self._room(poses, near, robot) < self.walls] -= self.never
         if may_back is not None:
-            blind = (backs & ~may_back(poses)).any(axis=1)
-            worth[(speeds < -blind_speed) & blind] -= self.never
+            backward = np.flatnonzero(speeds < -blind_speed)
+            blind = (backs[backward] & ~may_back(poses[backward])).any(axis=1)
+            worth[backward[blind]] -= self.never
         if begun is not None:
             worth[-1] += self.stay if begun.age > self.settle_s else 1.0
         return ways[int(np.argmax(worth))]

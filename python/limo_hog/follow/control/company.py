@@ -96,8 +96,8 @@ class Company:
         Of the distances without, with and against this error [1]. Chosen: the prediction counts most.
     clear
         Distance wanted between the robot's outline and a person's axis [m]. Chosen: the .3 m of clearance asked for,
-        half a trunk of .15 m, and .2 m for the prediction: with .1 m the nearest of four who walked at the robot came to
-        .28 m, with .2 m to .29 m, the others .06 to .16 m less near.
+        half a trunk of .15 m, and .2 m for the prediction: with .1 m, people who walked at the robot came up to .16 m
+        nearer.
     notice_other_s, clear_other
         The same of people who are not followed, who pass close by as people do [s, m]. Chosen: the time to stop or to
         turn aside; .2 m of clearance.
@@ -224,8 +224,9 @@ class Company:
             worth -= self.away * self._away(poses, goal, robot)
         worth[self._room(poses, near, robot) < self.walls] -= self.never
         if may_back is not None:
-            blind = (backs & ~may_back(poses)).any(axis=1)
-            worth[(speeds < -blind_speed) & blind] -= self.never
+            backward = np.flatnonzero(speeds < -blind_speed)
+            blind = (backs[backward] & ~may_back(poses[backward])).any(axis=1)
+            worth[backward[blind]] -= self.never
         if begun is not None and begun.speed:
             worth[-1] += self.stay if begun.age > self.settle_s else 1.0
         return ways[int(np.argmax(worth))]

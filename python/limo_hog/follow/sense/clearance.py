@@ -99,13 +99,13 @@ def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
 
     Negative where a point ahead is too near already, inf where nothing is in the way.
     """
-    points = points[points[:, 0] > 0]
-    beside = np.maximum(np.abs(points[:, 1]) - robot.half_width, 0) / margin.beside
-    in_the_way = beside < 1
-    if not in_the_way.any():
+    ahead, aside = points.T
+    beside = np.maximum(np.abs(aside) - robot.half_width, 0) / margin.beside
+    in_the_way = np.flatnonzero((ahead > 0) & (beside < 1))
+    if len(in_the_way) == 0:
         return math.inf
-    gap = points[in_the_way, 0] - robot.half_length
-    return float(np.min(gap - margin.ahead * np.sqrt(1 - beside[in_the_way] ** 2)))
+    gap = ahead[in_the_way] - robot.half_length
+    return float((gap - margin.ahead * np.sqrt(1 - beside[in_the_way] ** 2)).min())
 
 
 def room_behind(points: Points, margin: Margin, robot: RobotGeometry) -> float:

@@ -62,7 +62,7 @@ class Likeness:
 
     def of(self, number: int) -> float:
         """Return the probability that a track is the person followed."""
-        return dict(self.chances).get(number, 0.0)
+        return next((chance for track, chance in self.chances if track == number), 0.0)
 
 
 @dataclass(frozen=True, slots=True)

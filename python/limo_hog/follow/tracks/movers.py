@@ -208,7 +208,8 @@ class Movers:
         (ends, far), (to, near) = (
             (np.arctan2(at[:, 1] - y, at[:, 0] - x), np.hypot(at[:, 0] - x, at[:, 1] - y)) for at in (points, places)
         )
-        beside = np.abs(np.angle(np.exp(1j * (ends[None, :] - to[:, None])))) < self.beams
+        off = ends[None, :] - to[:, None]
+        beside = np.abs(off - math.tau * np.rint(off / math.tau)) < self.beams
         shortest = np.where(beside, far[None, :], np.inf).min(axis=1, initial=np.inf)
         return np.asarray(beside.any(axis=1) & (shortest > near + self.gap))
 

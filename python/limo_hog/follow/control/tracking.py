@@ -104,12 +104,14 @@ class TrackingController:
         """Follow a person, give way to all, and ask of the wheels what they can do."""
         wheels, before = observation.odometry, state.tracks.poses[-1:]
         if wheels is not None:
-            believed = state.acceleration
+            acceleration = state.acceleration
             for last in before:
-                believed = self.wheels.learn(believed, state.sent, last, wheels, self.robot)
-            state = replace(state, acceleration=believed)
+                acceleration = self.wheels.learn(acceleration, state.sent, last, wheels, self.robot)
+            state = replace(state, acceleration=acceleration)
         points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
         decision, person = self._follow(observation, points, state)
+        people = believed(decision.state, observation.now, self.tracker.noise)
+        decision = replace(decision, belief=replace(decision.belief, people=people))
         return self._give_way(decision, person, observation, points)
 
     def _follow(
@@ -185,7 +187,7 @@ class TrackingController:
             since_full=0 if region is None else state.since_full + 1,
             detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
         )
-        belief = Belief(keeps, believed(state, observation.now, self.tracker.noise), followed=person.number)
+        belief = Belief(keeps, followed=person.number)
         return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief), person
 
     def _give_way(
@@ -260,9 +262,7 @@ class TrackingController:
         if (off := self._off_unknown(state, observation)) is not None:
             twist, mode = Twist(0.0, self.lookout.turn(off)), Mode.LOST if lost else Mode.SEARCH
             reason = "turning to what moves in the scan"
-            return Decision(
-                twist, state, mode, reason, belief=Belief(None, believed(state, observation.now, self.tracker.noise))
-            )
+            return Decision(twist, state, mode, reason)
         if (
             lost
             and known is not None
@@ -273,9 +273,7 @@ class TrackingController:
             decision = self._look_round(state, known, ground, scan, observation)
             return replace(decision, reason=f"{decision.reason}: another is in view") if other else decision
         twist, mode, reason = self.search.command(state.side, lost=lost, other_in_view=other)
-        return Decision(
-            twist, state, mode, reason, belief=Belief(None, believed(state, observation.now, self.tracker.noise))
-        )
+        return Decision(twist, state, mode, reason)
 
     def _off_unknown(self, state: TrackingState, observation: Observation) -> float | None:
         """Return the bearing [rad] of what moves in the scan and may be the person; None where there is none.
@@ -303,8 +301,7 @@ class TrackingController:
         reason = f"not sure which of {len(people)} is the person followed"
         if len(people) == 1:
             reason = "not sure whether this is the person followed"
-        belief = Belief(None, believed(state, observation.now, self.tracker.noise))
-        return Decision(twist, replace(state, since_full=0), Mode.HOLD, reason, belief=belief)
+        return Decision(twist, replace(state, since_full=0), Mode.HOLD, reason)
 
     def _is_sure(self, person: Person, choice: Choice) -> bool:
         """Whether a track is the person followed, and not only the likeliest of those in view."""
@@ -320,7 +317,7 @@ class TrackingController:
         points, turn = scan_points(scan, self.robot), Twist(0.0, state.side * self.search.rate)
         twist, reason = self.lookout.command(hunt, pose, points, self.detour, self.robot, turn)
         places, way = self.lookout.ways(hunt, pose)
-        belief = Belief(None, believed(state, observation.now, self.tracker.noise), places, way)
+        belief = Belief(places=places, way=way)
         return Decision(twist, replace(state, hunt=hunt), Mode.LOST, reason, belief=belief)
 
     def _aim(

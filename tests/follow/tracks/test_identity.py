@@ -93,6 +93,15 @@ def test_one_who_is_hardly_likely_is_known_again_while_their_legs_go_on() -> Non
     assert known.of(1) > 0.8
 
 
+def test_a_box_beside_another_person_tells_nothing_for_it_may_show_either() -> None:
+    for apart, low, high in ((0.4, 0.6, 1.0), (0.8, 0.0, 0.2)):
+        known = followed()
+        for frame in range(11, 26):
+            stamp = 0.1 * frame
+            known = IDENTITY.update(known, at(stamp, person(1, stamp, clothes=IN_GREEN), person(2, stamp, apart)))
+        assert low <= known.of(1) <= high
+
+
 def test_two_alike_side_by_side_do_not_change_places_while_each_has_legs_that_go_on() -> None:
     for apart, low, high in ((0.45, 0.95, 1.0), (0.35, 0.4, 0.8)):
         known = followed()

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.kalman import Noise, Track
@@ -162,6 +163,36 @@ def test_legs_that_begin_to_walk_where_a_lost_person_can_be_are_theirs_unless_an
         tracks = Tracks(people, scans=(scan,), stamp=1.0, movers=walk((1.5, -0.4), (0.0, 0.5), 8), moved_at=0.875)
         after = Tracker().follow_movers(tracks, HALF_VIEW, 0.5, GRID, FREE)
         assert (after.people[0].felt == 1.0) == found
+
+
+def walker(number: int | None, x: float, y: float) -> Mover:
+    """Legs that walk, of the person of a number."""
+    track = Track(1.0, np.array([x, y, 0.0, 0.0]), np.diag([0.01, 0.01, 0.1, 0.1]))
+    return Mover(track, (x - 1.0, y), 0.0, 1.0, left=True, scans=9, number=number, named=0.0)
+
+
+def test_a_person_keeps_their_own_legs_where_one_box_lies_between_two_who_pass_each_other() -> None:
+    movers = (walker(1, 1.5, 0.0), walker(2, 1.75, 0.25))
+    between = [person(2, 1.6, 0.1, 1.0)]
+    assert [(one.number, one.track) for one in MOVERS.assign(movers, between, 1.0)] == [
+        (one.number, one.track) for one in movers
+    ]
+    on_the_first = [person(2, 1.5, 0.0, 1.0)]
+    assert [one.number for one in MOVERS.assign(movers, on_the_first, 1.0)] == [2]
+
+
+def test_a_box_on_other_legs_that_walk_is_not_the_persons_whose_own_walk_elsewhere() -> None:
+    known = [person(1, 1.5, 0.0, 1.0)]
+    box = Measurement(0.15, 1.8, 300, 0.0, 1.0)
+    beside = (1.8 * math.cos(0.15), 1.8 * math.sin(0.15))
+    for number in (2, None):
+        moving = (walker(1, 1.5, 0.0), walker(number, *beside))
+        assert MOVERS.others(moving, known, [box], Odometry(), NOISE) == {(0, 0)}
+    # Not where nothing walks there, where the person's own legs are not seen, or where the box is as near to them.
+    for others in ([walker(1, 1.5, 0.0)], [walker(2, *beside), walker(3, 0.0, 2.0)]):
+        assert MOVERS.others(others, known, [box], Odometry(), NOISE) == set()
+    near = (walker(1, 1.7, 0.2), walker(2, *beside))
+    assert MOVERS.others(near, known, [box, replace(box, range=None)], Odometry(), NOISE) == set()
 
 
 def test_a_place_is_empty_as_soon_as_a_beam_ends_behind_it_and_not_where_something_nearer_is() -> None:

@@ -162,6 +162,8 @@ class Identity:
         chances = self._passed(known, people, tracks)
         odds = dict(chances)
         for one in tracks.in_view:
+            if not self._is_alone(one, tracks):
+                continue
             stays = known.of(one.number) >= self.stays and self._walks_on(one, tracks)
             evidence = self._evidence(known, one, first=one.age <= 1)
             odds[one.number] *= math.exp(self.steady * evidence if stays else evidence)
@@ -221,6 +223,12 @@ class Identity:
             for own in legs
         )
 
+    def _is_alone(self, person: Person, tracks: Tracks) -> bool:
+        """Whether nobody is so near that a person's box may show both or the other."""
+        lately = (tracks.stamp or 0.0) - self.unseen_s
+        others = [one for one in tracks.people if one is not person and one.measured >= lately]
+        return all(separation(one, person) > self.meets for one in others)
+
     def _evidence(self, known: Likeness, person: Person, *, first: bool) -> float:
         """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""
         # A track that was another person before is compared with that one, any other with all who are about.
@@ -256,9 +264,7 @@ class Identity:
         if chance >= self.sure:
             x, y = person.track.mean[:2].tolist()
             known = replace(known, place=(x, y), at=person.measured)
-            # Beside another person the box may show that one.
-            alone = all(separation(one, person) > self.meets for one in tracks.people if one is not person)
-            return replace(known, traits=self._moved(known.traits, person)) if alone else known
+            return replace(known, traits=self._moved(known.traits, person)) if self._is_alone(person, tracks) else known
         if not person.confirmed or chance > 1.0 - self.sure:
             return known
         rest = [traits for traits in known.others if traits.number != person.number]

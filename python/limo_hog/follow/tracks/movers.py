@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.measurement import Measurement
+from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise, Track
@@ -79,8 +81,12 @@ class Movers:
     looks
         After so many scans for which the camera looked there, it is no more turned to [1]. Chosen: a second and a half;
         of people who are found in three frames of ten one in two hundred is not found in it.
-    beside
-        A person is this far from their legs at most [m]. Chosen: as `Legs.radius`, and the error of the depth.
+    beside, taken
+        A person is this far from their legs at most, and so much nearer to legs that were another's than to their own
+        [m]. Chosen: as `Legs.radius`, and the error of the depth; of two who pass close by each other, HOG finds one,
+        half a metre or less between the two.
+    nearer
+        A box is on other legs than a person's own if it is nearer to them by this [m]. Chosen: the error of its range.
     robot
         Where the lidar sits.
     """
@@ -94,6 +100,8 @@ class Movers:
     unseen_s: float = 3.0
     looks: int = 12
     beside: float = 0.4
+    taken: float = 0.25
+    nearer: float = 0.15
     robot: RobotGeometry = LIMO
 
     def update(
@@ -162,7 +170,8 @@ class Movers:
             for which, mover in enumerate(movers):
                 gap = math.dist(person.track.mean[:2], mover.track.mean[:2])
                 if mover.felt == stamp and gap < self.beside:
-                    pairs.append((gap, who, which))
+                    taken = self.taken if mover.number not in (None, person.number) else 0.0
+                    pairs.append((gap + taken, who, which))
         numbers: dict[int, int] = {}
         for _, who, which in sorted(pairs):
             if which not in numbers and seen[who].number not in numbers.values():
@@ -173,6 +182,34 @@ class Movers:
             for which, mover in enumerate(movers)
             if which in numbers or mover.number not in numbers.values()
         )
+
+    def others(
+        self,
+        moving: Sequence[Mover],
+        people: Sequence[Person],
+        boxes: Sequence[Measurement],
+        pose: Odometry,
+        noise: Noise,
+    ) -> set[tuple[int, int]]:
+        """Return the pairs, person and box, of people whose own legs walk while the box is on other legs that walk.
+
+        People must be at the frame's stamp, the robot at `pose`.
+        """
+        pairs: set[tuple[int, int]] = set()
+        if len(moving) < 2 or not people:
+            return pairs
+        places = [kalman.predict(one.track, people[0].track.stamp, noise).mean[:2] for one in moving]
+        for which, seen in enumerate(boxes):
+            if seen.range is None:
+                continue
+            angle = pose.yaw + seen.bearing
+            place = pose.x + seen.range * math.cos(angle), pose.y + seen.range * math.sin(angle)
+            gaps = [(math.dist(place, at), one.number) for at, one in zip(places, moving, strict=True)]
+            for who, person in enumerate(people):
+                own = min((gap for gap, number in gaps if number == person.number), default=0.0)
+                if min((gap for gap, number in gaps if number != person.number), default=math.inf) + self.nearer < own:
+                    pairs.add((who, which))
+        return pairs
 
     def continued(self, person: Person, movers: tuple[Mover, ...], returns: Returns, noise: Noise) -> Person:
         """Return a person whom the camera does not show, brought up to a scan that shows their legs."""

@@ -142,10 +142,12 @@ class Tracker:
         known = [predict(one, stamp, self.noise) for one in known]
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
-        pairs = self.association.pair(known, measured, pose, self.noise, flat)
+        moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
+        walking = {one.number for one in moving}
+        others = self.movers.others(moving, known, measured, pose, self.noise)
+        pairs = self.association.pair(known, measured, pose, self.noise, flat, others)
         people: list[Person] = []
         recall = tracks.recall
-        walking = {one.number for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s}
         for who, person in enumerate(known):
             expected = self._expected(person, pose, observation)
             height = person.window / max(bearing_range(person.track, pose)[1], 0.3)

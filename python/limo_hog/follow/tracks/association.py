@@ -61,16 +61,22 @@ class Association:
         pose: Odometry,
         noise: Noise,
         flat: AbstractSet[int] = frozenset(),
+        others: AbstractSet[tuple[int, int]] = frozenset(),
     ) -> dict[int, int]:
         """Pair people with boxes: confirmed people first, then by cost.
 
-        `flat` are the indices of boxes that do not stand out from what is behind them: no confirmed person's. Returns
-        index of the person -> index of the measurement. Every track must be at the frame's stamp.
+        `flat` are the indices of boxes that do not stand out from what is behind them: no confirmed person's; `others`
+        are pairs, person and box, of which the scan shows that the box is another's. Returns index of the person ->
+        index of the measurement. Every track must be at the frame's stamp.
         """
         matches = []
         for who, person in enumerate(people):
             for which, seen in enumerate(measurements):
-                if self._is_behind(person, seen, pose) or (person.confirmed and which in flat):
+                if (
+                    (who, which) in others
+                    or self._is_behind(person, seen, pose)
+                    or (person.confirmed and which in flat)
+                ):
                     continue
                 clothes_cost = self.appearance_cost(person, seen)
                 ranged = self.without_bad_range(person, seen)

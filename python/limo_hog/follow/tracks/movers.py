@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.measurement import Measurement
+from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise, Track
@@ -38,8 +40,8 @@ class Mover:
         Stamp of the last scan that showed it [s].
     scans, shown
         How many did, and for how many of these the camera looked there and showed no person [1].
-    number
-        Of the person whom the camera showed there last; None if it showed none.
+    number, named
+        Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
     """
 
     track: Track
@@ -50,6 +52,7 @@ class Mover:
     scans: int = 1
     shown: int = 0
     number: int | None = None
+    named: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +81,12 @@ class Movers:
     looks
         After so many scans for which the camera looked there, it is no more turned to [1]. Chosen: a second and a half;
         of people who are found in three frames of ten one in two hundred is not found in it.
-    beside
-        A person is this far from their legs at most [m]. Chosen: as `Legs.radius`, and the error of the depth.
+    beside, taken
+        A person is this far from their legs at most, and so much nearer to legs that were another's than to their own
+        [m]. Chosen: as `Legs.radius`, and the error of the depth; of two who pass close by each other, HOG finds one,
+        half a metre or less between the two.
+    nearer
+        A box is on other legs than a person's own if it is nearer to them by this [m]. Chosen: the error of its range.
     robot
         Where the lidar sits.
     """
@@ -93,6 +100,8 @@ class Movers:
     unseen_s: float = 3.0
     looks: int = 12
     beside: float = 0.4
+    taken: float = 0.25
+    nearer: float = 0.15
     robot: RobotGeometry = LIMO
 
     def update(
@@ -114,12 +123,15 @@ class Movers:
         if ground is not None:
             points = points[~grid.is_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
-        for mover in movers:
-            track = self.legs.update(mover.track, replace(returns, points=points), noise)
+        whose = self._whose(movers, points, returns.stamp, noise)
+        for mover in sorted(movers, key=lambda one: one.number is None):
+            own = np.full(len(points), True) if mover.number is None else whose == mover.number
+            track = self.legs.update(mover.track, replace(returns, points=points[own]), noise)
             if track is not None:
                 shown = mover.shown + is_in_view(track, returns, camera, self.robot)
                 kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1, shown=shown))
-                points = points[np.hypot(*(points - track.mean[:2]).T) > self.legs.radius]
+                rest = ~own | (np.hypot(*(points - track.mean[:2]).T) > self.legs.radius)
+                points, whose = points[rest], whose[rest]
             elif returns.stamp - mover.felt < self._patience(mover, returns, half_view):
                 kept.append(mover)
         still = [index for index, one in enumerate(kept) if not one.left]
@@ -158,17 +170,46 @@ class Movers:
             for which, mover in enumerate(movers):
                 gap = math.dist(person.track.mean[:2], mover.track.mean[:2])
                 if mover.felt == stamp and gap < self.beside:
-                    pairs.append((gap, who, which))
+                    taken = self.taken if mover.number not in (None, person.number) else 0.0
+                    pairs.append((gap + taken, who, which))
         numbers: dict[int, int] = {}
         for _, who, which in sorted(pairs):
             if which not in numbers and seen[who].number not in numbers.values():
                 numbers[which] = seen[who].number
         # What was taken for the person's legs until now, and is no more, was a piece of them, or begins again.
         return tuple(
-            replace(mover, number=numbers[which], shown=0) if which in numbers else mover
+            named(mover, numbers[which], stamp) if which in numbers else mover
             for which, mover in enumerate(movers)
             if which in numbers or mover.number not in numbers.values()
         )
+
+    def others(
+        self,
+        moving: Sequence[Mover],
+        people: Sequence[Person],
+        boxes: Sequence[Measurement],
+        pose: Odometry,
+        noise: Noise,
+    ) -> set[tuple[int, int]]:
+        """Return the pairs, person and box, of people whose own legs walk while the box is on other legs that walk.
+
+        People must be at the frame's stamp, the robot at `pose`.
+        """
+        pairs: set[tuple[int, int]] = set()
+        if len(moving) < 2 or not people:
+            return pairs
+        places = [kalman.predict(one.track, people[0].track.stamp, noise).mean[:2] for one in moving]
+        for which, seen in enumerate(boxes):
+            if seen.range is None:
+                continue
+            angle = pose.yaw + seen.bearing
+            place = pose.x + seen.range * math.cos(angle), pose.y + seen.range * math.sin(angle)
+            gaps = [(math.dist(place, at), one.number) for at, one in zip(places, moving, strict=True)]
+            for who, person in enumerate(people):
+                own = min((gap for gap, number in gaps if number == person.number), default=0.0)
+                if min((gap for gap, number in gaps if number != person.number), default=math.inf) + self.nearer < own:
+                    pairs.add((who, which))
+        return pairs
 
     def continued(self, person: Person, movers: tuple[Mover, ...], returns: Returns, noise: Noise) -> Person:
         """Return a person whom the camera does not show, brought up to a scan that shows their legs."""
@@ -182,6 +223,16 @@ class Movers:
         fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
+    def _whose(self, movers: tuple[Mover, ...], points: Points, stamp: float, noise: Noise) -> NDArray[np.int64]:
+        """Return for each of (N, 2) returns the number of the person whose legs it may be, the nearest; 0 for none."""
+        known = [one for one in movers if one.number is not None]
+        if not known:
+            return np.zeros(len(points), np.int64)
+        places = np.array([kalman.predict(one.track, stamp, noise).mean[:2] for one in known])
+        gaps = np.hypot(*(points[:, None] - places).transpose(2, 0, 1))
+        numbers = np.array([one.number for one in known])[gaps.argmin(axis=1)]
+        return np.where(gaps.min(axis=1) < self.legs.radius, numbers, 0)
+
     def _patience(self, mover: Mover, returns: Returns, half_view: float) -> float:
         if is_in_view(kalman.predict(mover.track, returns.stamp, Noise()), returns, half_view, self.robot):
             return self.forget_s
@@ -194,7 +245,8 @@ class Movers:
         (ends, far), (to, near) = (
             (np.arctan2(at[:, 1] - y, at[:, 0] - x), np.hypot(at[:, 0] - x, at[:, 1] - y)) for at in (points, places)
         )
-        beside = np.abs(np.angle(np.exp(1j * (ends[None, :] - to[:, None])))) < self.beams
+        off = ends[None, :] - to[:, None]
+        beside = np.abs(off - math.tau * np.rint(off / math.tau)) < self.beams
         shortest = np.where(beside, far[None, :], np.inf).min(axis=1, initial=np.inf)
         return np.asarray(beside.any(axis=1) & (shortest > near + self.gap))
 
@@ -228,6 +280,11 @@ class Movers:
         )
         track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, self.legs.noise_at(far, noise))
         return Mover(track, (float(place[0]), float(place[1])), returns.stamp, returns.stamp)
+
+
+def named(mover: Mover, number: int, stamp: float) -> Mover:
+    """Return what the camera shows to be the legs of the person of a number."""
+    return replace(mover, number=number, shown=0, named=mover.named if mover.number == number else stamp)
 
 
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry) -> bool:

@@ -47,14 +47,10 @@ fn threads() -> usize {
 
 /// The cores that this process may use, asked for once: the answer takes longer (28 µs) than the descriptor of a crop.
 fn cores() -> usize {
-    match CORES.load(Ordering::Relaxed) {
-        0 => {
-            let cores = std::thread::available_parallelism().map_or(1, usize::from);
-            CORES.store(cores, Ordering::Relaxed);
-            cores
-        }
-        known => known,
+    if CORES.load(Ordering::Relaxed) == 0 {
+        CORES.store(std::thread::available_parallelism().map_or(1, usize::from), Ordering::Relaxed);
     }
+    CORES.load(Ordering::Relaxed)
 }
 
 /// How many threads a call uses that asks for so many: no more than there are cores, as others would only cut the work into

@@ -139,6 +139,33 @@ mod tests {
     }
 
     #[test]
+    fn the_order_in_which_regions_are_found_does_not_matter() {
+        let places = [(0, 0), (600, 0), (24, 8), (8, 0), (8, 300), (40, 310), (90, 24), (130, 16)];
+        let merged = |places: &[(usize, usize)]| {
+            let mut regions: Vec<_> = places.iter().map(|&(x, y)| region(x, y)).collect();
+            merge(&mut regions, 0, WIN);
+            let corners = |region: &Region| (region.x.start, region.x.end, region.y.start, region.y.end);
+            let mut corners: Vec<_> = regions.iter().map(corners).collect();
+            corners.sort_unstable();
+            corners
+        };
+        let wanted = merged(&places);
+        let mut places = places;
+        for turn in 0..places.len() {
+            places.rotate_left(1);
+            places.swap(turn, 3);
+            assert_eq!(merged(&places), wanted);
+        }
+    }
+
+    #[test]
+    fn a_region_costs_the_pixels_of_its_windows_in_vectors_of_128_and_16_rows_more() {
+        let wide = Region { level: 1, x: 8..8 + 65, y: 0..9 };
+        assert_eq!(cost(&region(24, 40), WIN), 128 * (17 + 128 + 16));
+        assert_eq!(cost(&wide, WIN), 256 * (9 + 128 + 16));
+    }
+
+    #[test]
     fn windows_around_a_place_stay_on_the_level() {
         assert_eq!(around(3.0, 1, 10, 8), 16..33);
         assert_eq!(around(-5.0, 1, 10, 8), 0..1);

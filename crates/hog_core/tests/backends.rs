@@ -220,6 +220,28 @@ fn a_search_at_another_size_is_that_of_the_resized_image_on_every_backend() {
 }
 
 #[test]
+fn a_window_at_the_threshold_is_decided_on_the_resized_image() {
+    let (picture, size, detector) = (Picture::new(257, 200, 3, 6), Size::new(150, 170), Detector::people());
+    let resized = resize(picture.view(), size).unwrap();
+    let resized = ImageView::new(&resized, size.width, size.height, 3, size.width * 3).unwrap();
+    let every = detector.every_window(resized, &STEPS);
+    // One level alone, where most windows are far from the threshold.
+    let pyramid = Pyramid { first: Some(size), scale: 100.0, ..PYRAMID };
+    for backend in available() {
+        let hog = hog(&detector, backend);
+        for &Hit { weight: hit_threshold, .. } in every.iter().step_by(every.len() / 8) {
+            let search = Search { hit_threshold, ..STEPS };
+            let all = Grouping::Similar(0);
+            let found = hog
+                .detect_multi_scale(picture.view(), &search, &pyramid, all, None, 1, &Interrupt::NEVER)
+                .unwrap();
+            let wanted = every.iter().filter(|hit| hit.weight >= hit_threshold).count();
+            assert_eq!(found.len(), wanted, "{} {hit_threshold}", backend.name());
+        }
+    }
+}
+
+#[test]
 fn many_hits_of_a_loud_detector_weigh_what_each_weighs_exactly() {
     // Weights of hundreds: the kernels' sums are too coarse, and every hit is weighed exactly.
     let mut detector = Detector::people();

@@ -3,7 +3,10 @@
 
 mod common;
 
+use std::cell::Cell;
+
 use common::{Detector, Picture, assert_same, available, reached_by};
+use hog_core::exact::{Svm, Tables, scores};
 use hog_core::group::{Candidate, group_candidates, group_rectangles, mean_shift};
 use hog_core::pyramid::{Pyramid, Tap, resize, taps};
 use hog_core::{Grouping, Guide, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
@@ -222,6 +225,26 @@ fn a_caller_who_wants_no_answer_any_more_gets_none() {
     assert!(hog.compute(picture.view(), &STEPS, None, &interrupt, &mut out).is_err());
     assert!(hog.compute(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt, &mut out).is_err());
     assert!(hog.describe(&[0; 64 * 128], 1, 1, &interrupt, &mut out[..3780]).is_err());
+}
+
+#[test]
+fn the_exact_path_asks_its_caller_again_for_every_row_of_windows() {
+    let (detector, picture) = (Detector::people(), Picture::new(64, 128 + 64, 1, 2));
+    let spec = detector.spec();
+    let tables = Tables::new(&spec).unwrap();
+    let svm = Svm::new(&detector.coefficients, &spec).unwrap();
+    // The gradient is the same; the windows are nine rows of one, then two.
+    let [nine, two] = [8, 64].map(|stride| {
+        let asked = Cell::new(0);
+        let ask = || {
+            asked.set(asked.get() + 1);
+            false
+        };
+        let grid = detector.grid(picture.view(), &Search { win_stride: (stride, stride), ..STEPS });
+        scores(picture.view(), &grid, &spec, &tables, &svm, &Interrupt::when(&ask)).unwrap();
+        asked.get()
+    });
+    assert_eq!(nine - two, 9 - 2);
 }
 
 fn guided(detector: &Detector, picture: &Picture, guide: Option<Guide>, threshold: f64) -> Vec<(Rect, f64)> {

@@ -211,6 +211,23 @@ fn equal_channels_tie_for_the_lowest_but_in_the_last_columns_for_the_highest() {
 }
 
 #[test]
+fn angles_of_sixteen_columns_are_rounded_as_those_of_more() {
+    // OpenCV's vector code takes runs of 16 pixels and more; with fused multiply-add its scalar code rounds otherwise.
+    let inner = |width: usize| {
+        let pixel = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            (7 * x * x + 13 * y * y + 5 * x * y) as u8
+        };
+        let data: Vec<u8> = (0..width * 64).map(pixel).collect();
+        let image = ImageView::new(&data, width, 64, 1, width).unwrap();
+        let hog = Hog::new(&HogParams::default(), None).unwrap();
+        let (found, _) = hog.gradient(image, [0; 4], &Interrupt::NEVER).unwrap();
+        found.shares.chunks_exact(width).flat_map(|row| row[1..15].to_vec()).collect::<Vec<_>>()
+    };
+    assert_eq!(inner(16), inner(40));
+}
+
+#[test]
 fn the_gaussian_is_an_eighth_of_the_block_sides_unless_one_is_given() {
     let sigma = |win_sigma, block_size| {
         HogParams { win_sigma, block_size, ..HogParams::default() }.effective_win_sigma()

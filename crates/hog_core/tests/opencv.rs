@@ -211,6 +211,44 @@ fn equal_channels_tie_for_the_lowest_but_in_the_last_columns_for_the_highest() {
 }
 
 #[test]
+fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
+    let (width, height) = (23, 11);
+    let picture = Picture::new(width, height, 1, 5);
+    let params = HogParams { gamma_correction: false, ..HogParams::default() };
+    let hog = Hog::new(&params, None).unwrap();
+    let mirrored = |at: i64, len: i64| {
+        (if at < 0 {
+            -at
+        } else if at >= len {
+            2 * len - 2 - at
+        } else {
+            at
+        }) as usize
+    };
+    let pixel = |x: i64, y: i64| {
+        let (x, y) = (mirrored(x, width as i64), mirrored(y, height as i64));
+        f32::from(picture.data[y * width + x])
+    };
+    for [left, top, right, bottom] in [[0, 0, 0, 0], [3, 2, 5, 4]] {
+        let (found, size) =
+            hog.gradient(picture.view(), [left, top, right, bottom], &Interrupt::NEVER).unwrap();
+        assert_eq!((size.width as i64, size.height as i64), (23 + left + right, 11 + top + bottom));
+        for (at, (shares, bins)) in found.shares.iter().zip(&found.bins).enumerate() {
+            let (x, y) = ((at % size.width) as i64 - left, (at / size.width) as i64 - top);
+            // The image's own border is that of the padding: one mirrored pixel more.
+            let (dx, dy) = (pixel(x + 1, y) - pixel(x - 1, y), pixel(x, y + 1) - pixel(x, y - 1));
+            let magnitude = dx.hypot(dy);
+            assert!((shares[0] + shares[1] - magnitude).abs() < 1e-3 * magnitude + 1e-3, "{x} {y}");
+            // Bins are 20° wide, their centres at 10°, 30°, ...; the share is the distance from the other centre.
+            let place = (dy.atan2(dx).to_degrees().rem_euclid(180.0) / 20.0 - 0.5).rem_euclid(9.0);
+            let from_first = (place - f32::from(bins[0])).rem_euclid(9.0);
+            assert_eq!(bins[1], (bins[0] + 1) % 9);
+            assert!(magnitude == 0.0 || (shares[1] / magnitude - from_first).abs() < 2e-3, "{x} {y}");
+        }
+    }
+}
+
+#[test]
 fn angles_of_sixteen_columns_are_rounded_as_those_of_more() {
     // OpenCV's vector code takes runs of 16 pixels and more; with fused multiply-add its scalar code rounds otherwise.
     let inner = |width: usize| {

@@ -277,6 +277,24 @@ fn the_gaussian_is_an_eighth_of_the_block_sides_unless_one_is_given() {
 }
 
 #[test]
+fn one_level_is_enough_and_none_is_refused() {
+    let of = |nlevels| HogSpec::new(&HogParams { nlevels, ..HogParams::default() });
+    assert_eq!(of(1).unwrap().nlevels, 1);
+    assert!(of(0).is_err() && of(-1).is_err());
+}
+
+#[test]
+fn cells_of_one_pixel_are_served_and_sides_of_none_refused() {
+    let of = |side: (i64, i64)| {
+        let sizes =
+            HogParams { win_size: (8, 8), block_size: side, block_stride: side, ..HogParams::default() };
+        HogSpec::new(&HogParams { cell_size: side, ..sizes })
+    };
+    assert_eq!(of((1, 1)).unwrap().descriptor_len(), 8 * 8 * 9);
+    assert!(of((0, 1)).is_err() && of((1, 0)).is_err());
+}
+
+#[test]
 fn the_score_counts_every_element_also_of_blocks_whose_length_is_no_multiple_of_four() {
     for nbins in [1, 2, 3, 5, 7, 9] {
         let params = HogParams { win_size: (16, 8), block_size: (8, 8), nbins, ..HogParams::default() };

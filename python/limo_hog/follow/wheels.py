@@ -17,7 +17,8 @@ from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.twist import Twist
 
-Speeds = TypeVar("Speeds", float, NDArray[np.float64])
+Array = NDArray[np.float64]
+Speeds = TypeVar("Speeds", float, Array)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +78,8 @@ class Wheels:
         self, wanted: Twist, now: Twist, acceleration: float, period: float, robot: RobotGeometry
     ) -> Twist:
         """Return the command that comes nearest to the wanted one within a period [s], the turn first."""
-        linear, angular = advanced(
-            wanted.linear, wanted.angular, now.linear, now.angular, acceleration * self.reserve * period, robot
-        )
-        return Twist(float(linear), float(angular))
+        most = acceleration * self.reserve * period
+        return Twist(*advanced(wanted.linear, wanted.angular, now.linear, now.angular, most, robot))
 
 
 def stoppable_turn(off: Speeds, acceleration: float, robot: RobotGeometry) -> Speeds:
@@ -89,13 +88,23 @@ def stoppable_turn(off: Speeds, acceleration: float, robot: RobotGeometry) -> Sp
 
 
 def advanced(
-    linear: Speeds, angular: Speeds, now_linear: Speeds, now_angular: Speeds, most: float, robot: RobotGeometry
-) -> tuple[Speeds, Speeds]:
+    linear: float, angular: float, now_linear: float, now_angular: float, most: float, robot: RobotGeometry
+) -> tuple[float, float]:
     """Return the speeds after each wheel has changed its own by `most` [m/s] at most: the turn first, then the drive.
 
-    `linear`, `angular` are wanted, `now_linear`, `now_angular` the present ones [m/s, rad/s]; floats or arrays.
+    `linear`, `angular` are wanted, `now_linear`, `now_angular` the present ones [m/s, rad/s].
     """
     half = robot.wheel_separation / 2
-    turn = np.clip(angular - now_angular, -most / half, most / half)
+    turn = min(max(angular - now_angular, -most / half), most / half)
+    left = most - half * abs(turn)
+    return now_linear + min(max(linear - now_linear, -left), left), now_angular + turn
+
+
+def all_advanced(
+    linear: Array, angular: Array, now_linear: Array, now_angular: Array, most: float, robot: RobotGeometry
+) -> tuple[Array, Array]:
+    """Return what `advanced` does, for many commands at once: float64 (N,) each."""
+    half = robot.wheel_separation / 2
+    turn = np.minimum(np.maximum(angular - now_angular, -most / half), most / half)
     left = most - half * np.abs(turn)
-    return now_linear + np.clip(linear - now_linear, -left, left), now_angular + turn
+    return now_linear + np.minimum(np.maximum(linear - now_linear, -left), left), now_angular + turn

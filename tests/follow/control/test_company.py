@@ -139,3 +139,18 @@ def test_it_stays_with_a_way_while_it_turns_to_it() -> None:
 def test_a_command_that_backs_off_fast_enough_is_left_alone() -> None:
     walker = Walker(2.2, 0.0, -0.35, 0.0)
     assert COMPANY.way_out(Twist(-0.4, 0.0), Twist(-0.4, 0.0), [walker], NO_POINTS, LIMO) is None
+
+
+def test_a_person_who_has_set_out_is_taken_to_walk_as_fast_as_they_are_known_to() -> None:
+    starting, standing = Walker(2.0, 0.0, -0.4, 0.3, followed=True), Walker(2.0, 0.0, -0.1, 0.0, followed=True)
+    brisk = starting.at_least(1.5, 0.3)
+    assert (brisk.vx, brisk.vy) == pytest.approx((-1.2, 0.9))
+    assert starting.at_least(0.2, 0.3) == starting
+    assert standing.at_least(1.5, 0.3) == standing
+
+
+def test_it_does_not_stay_standing_once_another_way_is_better() -> None:
+    walker, standing = at_the_robot(1.4, 0.8, 0.1, followed=True), Way(0.0, 0.0, 0.3)
+    way = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, standing, may_back=never)
+    assert way is not None
+    assert way.speed != 0.0

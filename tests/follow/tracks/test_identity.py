@@ -13,6 +13,7 @@ from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.identity import Identity, Likeness, Traits
 from limo_hog.follow.tracks.kalman import Noise
+from limo_hog.follow.tracks.movers import Mover
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.tracker import Tracks
 
@@ -66,6 +67,49 @@ def test_a_track_that_goes_over_to_another_shirt_is_not_the_person_any_more() ->
 def test_one_box_of_odd_colours_does_not_lose_the_person() -> None:
     known = IDENTITY.update(followed(), at(1.1, person(1, 1.1, clothes=IN_GREEN)))
     assert known.of(1) > 0.9
+
+
+def legs(one: Person, stamp: float, *, since: float = 0.0) -> Mover:
+    """Return what walks where a person is and has been shown to be their legs since then [s]."""
+    return Mover(one.track, (0.0, 0.0), 0.0, stamp, left=True, number=one.number, named=since)
+
+
+def test_a_person_whose_legs_have_been_the_same_stays_the_person() -> None:
+    for with_legs, low, high in ((True, 0.9, 1.0), (False, 0.0, 0.1)):
+        known = followed()
+        for frame in range(11, 26):
+            # Something before the shirt, for a second and a half.
+            one = person(1, 0.1 * frame, clothes=IN_GREEN)
+            walking = (legs(one, one.seen),) if with_legs else ()
+            known = IDENTITY.update(known, replace(at(0.1 * frame, one), movers=walking))
+        assert low <= known.of(1) <= high
+
+
+def test_one_who_is_hardly_likely_is_known_again_while_their_legs_go_on() -> None:
+    known = replace(followed(), chances=((1, 0.1),))
+    for frame in range(11, 21):
+        one = person(1, 0.1 * frame)
+        known = IDENTITY.update(known, replace(at(0.1 * frame, one), movers=(legs(one, one.seen),)))
+    assert known.of(1) > 0.8
+
+
+def test_two_alike_side_by_side_do_not_change_places_while_each_has_legs_that_go_on() -> None:
+    for apart, low, high in ((0.45, 0.95, 1.0), (0.35, 0.4, 0.8)):
+        known = followed()
+        for frame in range(11, 111):
+            stamp = 0.1 * frame
+            one, other = person(1, stamp, clothes=None), person(2, stamp, apart, None)
+            both = replace(at(stamp, one, other), movers=(legs(one, stamp), legs(other, stamp)))
+            known = IDENTITY.update(known, both)
+        assert low <= known.of(1) <= high
+
+
+def test_legs_that_were_just_taken_for_the_persons_tell_nothing() -> None:
+    known = followed()
+    for frame in range(11, 19):
+        one = replace(person(1, 0.1 * frame, clothes=IN_GREEN), strained=frame == 11)
+        known = IDENTITY.update(known, replace(at(0.1 * frame, one), movers=(legs(one, one.seen, since=1.0),)))
+    assert known.of(1) < 0.5
 
 
 def test_a_lost_person_is_known_again_by_the_clothes_and_another_is_not() -> None:

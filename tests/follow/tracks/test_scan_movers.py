@@ -14,6 +14,7 @@ from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.legs import Returns
 from limo_hog.follow.tracks.movers import Mover, Movers
 from limo_hog.follow.tracks.person import Person
+from limo_hog.follow.tracks.tracker import Tracker, Tracks
 
 MOVERS, NOISE, HALF_VIEW, SCAN_S, GRID = Movers(), Noise(), 2.0, 0.125, Grid()
 #: Ground that is free from now on, wherever nothing is.
@@ -124,6 +125,43 @@ def test_two_people_side_by_side_have_one_pair_of_legs_each() -> None:
     # The number goes along with the person, and is given once.
     later = MOVERS.assign(MOVERS.assign(movers, people, 1.0), [person(1, 1.5, 0.3, 1.0)], 1.0)
     assert [one.number for one in later] == [1]
+
+
+def test_the_legs_of_two_who_walk_side_by_side_stay_apart() -> None:
+    people = [person(1, 1.5, 0.0, 0.0), person(2, 1.6, 0.4, 0.0)]
+    movers = tuple(
+        Mover(one.track, (1.0, 0.0), 0.0, 0.0, left=True, number=one.number, named=0.0) for one in reversed(people)
+    )
+    for index in range(1, 40):
+        y = 0.03 * index
+        # Three scans of eight show only the first person, who hides the second.
+        shown = legs(1.5, y, 1.0 * index) + (legs(1.6, y + 0.4, 1.3 * index) if index % 8 < 5 else [])
+        movers = MOVERS.update(
+            movers, Returns(index * SCAN_S, np.array(shown), Odometry()), HALF_VIEW, NOISE, GRID, FREE
+        )
+    places = {one.number: one.track.mean[:2] for one in movers if one.number is not None}
+    assert math.dist(places[1], (1.5, y)) < 0.2
+    assert math.dist(places[2], (1.6, y + 0.4)) < 0.2
+
+
+def test_legs_are_a_persons_since_the_camera_first_showed_that() -> None:
+    movers = MOVERS.assign(
+        (Mover(person(0, 1.5, 0.0, 1.0).track, (1.5, 0.0), 0.0, 1.0),), [person(1, 1.5, 0.0, 1.0)], 1.0
+    )
+    later = MOVERS.assign(tuple(replace(one, felt=2.0) for one in movers), [person(1, 1.5, 0.1, 2.0)], 2.0)
+    other = MOVERS.assign(tuple(replace(one, felt=3.0) for one in later), [person(2, 1.5, 0.1, 3.0)], 3.0)
+    assert [one.named for one in (*movers, *later, *other)] == [1.0, 1.0, 3.0]
+
+
+def test_legs_that_begin_to_walk_where_a_lost_person_can_be_are_theirs_unless_another_was_lost_too() -> None:
+    lost, another = person(7, 1.5, -0.4, -0.2), person(8, 1.5, 0.4, -0.2)
+    seen_together = person(7, 1.5, -0.4, 0.1)
+    far_off = person(7, -1.5, -0.4, -0.2)
+    for people, found in (((lost,), True), ((lost, another), False), ((seen_together,), False), ((far_off,), False)):
+        scan = Returns(1.0, np.array(legs(1.5, 0.1, 9.0)), Odometry())
+        tracks = Tracks(people, scans=(scan,), stamp=1.0, movers=walk((1.5, -0.4), (0.0, 0.5), 8), moved_at=0.875)
+        after = Tracker().follow_movers(tracks, HALF_VIEW, 0.5, GRID, FREE)
+        assert (after.people[0].felt == 1.0) == found
 
 
 def test_a_place_is_empty_as_soon_as_a_beam_ends_behind_it_and_not_where_something_nearer_is() -> None:

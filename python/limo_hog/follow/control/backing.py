@@ -6,6 +6,7 @@ where they can have come to by now, ground counts as free for a shorter time.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -134,7 +135,7 @@ class Backing:
         """
         if ground is None:
             return np.ones(poses.shape[:-1], bool)
-        behind = self._behind(robot)
+        behind = _places_behind(self.depths, robot)
         cos, sin = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
         x = poses[..., 0, None] + behind[:, 0] * cos - behind[:, 1] * sin
         y = poses[..., 1, None] + behind[:, 0] * sin + behind[:, 1] * cos
@@ -147,11 +148,11 @@ class Backing:
         """Whether the map shows something that lasts close behind: `Guard` remembers for a shorter time."""
         if ground is None:
             return False
-        return bool(grid.is_blocked(ground, to_odometry(self._behind(robot), pose), lasting=True).any())
+        return bool(grid.is_blocked(ground, to_odometry(_places_behind(self.depths, robot), pose), lasting=True).any())
 
     def blind_limit(self, others: tuple[Other, ...], pose: Odometry, robot: RobotGeometry, now: float) -> float:
         """Return how fast to back onto unknown ground [m/s]."""
-        behind = to_odometry(self._behind(robot), pose)
+        behind = to_odometry(_places_behind(self.depths, robot), pose)
         return 0.0 if self.can_hold_other(others, behind, now).any() else self.blind_speed
 
     def blindly(
@@ -182,14 +183,18 @@ class Backing:
         side = -1.0 if aim.bearing > 0 else 1.0
         return Twist(0.0, side * self.glance_turn), "looking behind before backing"
 
-    def _behind(self, robot: RobotGeometry) -> Points:
-        """Return places behind the robot's outline, float64 (N, 2) [m] in the base frame."""
-        far, side = np.meshgrid(self.depths, (-robot.half_width, 0.0, robot.half_width))
-        return np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
-
     def _reach(self, one: Other, now: float) -> float:
         return self.same + self.walk * (now - one.at)
 
     def _gap(self, one: Other, x: float, y: float, now: float) -> float:
         """Return how much further off a place is than a person can have walked [m]."""
         return math.hypot(x - one.x, y - one.y) - self._reach(one, now)
+
+
+@functools.lru_cache(maxsize=4)
+def _places_behind(depths: tuple[float, ...], robot: RobotGeometry) -> Points:
+    """Return places so far behind the robot's outline, float64 (N, 2) [m] in the base frame, read only."""
+    far, side = np.meshgrid(depths, (-robot.half_width, 0.0, robot.half_width))
+    places: Points = np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
+    places.flags.writeable = False
+    return places

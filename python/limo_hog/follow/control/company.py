@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Track
 from limo_hog.follow.twist import Twist
-from limo_hog.follow.wheels import advanced, stoppable_turn
+from limo_hog.follow.wheels import advanced, all_advanced, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +40,15 @@ class Walker:
     vx: float
     vy: float
     followed: bool = False
+
+    def at_least(self, speed: float, slowest: float) -> Walker:
+        """Return one who has set out, faster than `slowest`, at the speed at which they are known to walk [m/s].
+
+        The estimate takes half a second to show it.
+        """
+        now = math.hypot(self.vx, self.vy)
+        share = max(speed / now, 1.0) if now > slowest else 1.0
+        return replace(self, vx=share * self.vx, vy=share * self.vy)
 
 
 def walker_of(track: Track, pose: Odometry, *, followed: bool = False) -> Walker:
@@ -87,7 +96,8 @@ class Company:
         Of the distances without, with and against this error [1]. Chosen: the prediction counts most.
     clear
         Distance wanted between the robot's outline and a person's axis [m]. Chosen: the .3 m of clearance asked for,
-        half a trunk of .15 m, and .1 m for the prediction.
+        half a trunk of .15 m, and .2 m for the prediction: with .1 m, people who walked at the robot came up to .16 m
+        nearer.
     notice_other_s, clear_other
         The same of people who are not followed, who pass close by as people do [s, m]. Chosen: the time to stop or to
         turn aside; .2 m of clearance.
@@ -110,8 +120,8 @@ class Company:
         to within the error of their places, the easiest.
     settle_s, stay
         A way is left for another only after so long [s], unless it costs `never`, and if the other is worth more by so
-        much [m]. Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by
-        .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
+        much [m]; standing is left at once. Measured: while the robot turns, which takes .8 s, a person's velocity
+        across their way strays by .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
     away
         What a way costs on which the person followed is out of the image all the time [m], unless it is they who come.
         Chosen: less than the clearance wanted.
@@ -126,10 +136,10 @@ class Company:
     slowest: float = bounded(0.3, 0, 2)
     sway: float = bounded(0.2, 0, 1)
     weights: tuple[float, float, float] = (0.7, 0.15, 0.15)
-    clear: float = bounded(0.55, 0, 3)
+    clear: float = bounded(0.65, 0, 3)
     notice_other_s: float = bounded(1.5, 0, 10)
     clear_other: float = bounded(0.35, 0, 3)
-    wanted: float = 0.7
+    wanted: float = 0.8
     walls: float = 0.1
     near: float = 1.5
     person_radius: float = 0.45
@@ -188,12 +198,9 @@ class Company:
             return None
         goal = people[is_followed]
         people, is_followed = people[coming], is_followed[coming]
-        ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]
-        if begun is not None:
-            ways.append(begun)
-        poses, backs = self._driven(ways, wanted, now, acceleration, robot)
+        straight = self._driven_on(wanted, now, acceleration, robot)
         places = self._places(people)
-        gaps = _outline_gap(poses[:, :, None, None], places[None], robot)
+        gaps = _outline_gap(straight[:, :, None, None], places[None], robot)
         clear = np.where(is_followed, self.clear, self.clear_other)
         late = np.arange(gaps.shape[1])[:, None] * self.step_s >= np.where(
             is_followed, self.notice_s, self.notice_other_s
@@ -201,21 +208,26 @@ class Company:
         room = np.where(late[:, None], np.inf, gaps[0]).min(axis=0) - clear
         if (room[0] if begun is None else room).min() > 0:
             return None
-        gaps = gaps.min(axis=(1, 3))
+        ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]
+        if begun is not None:
+            ways.append(begun)
+        poses, backs = self._driven(ways, now, acceleration, robot)
+        gaps = _outline_gap(poses[:, :, None, None], places[None], robot).min(axis=(1, 3))
         near = points[np.hypot(*points.T) < self.near][::2]
         gap = np.hypot(*(near[:, None] - people[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
         near = near[gap > self.person_radius]
         speeds = np.array([way.speed for way in ways])
         effort = self.ease * (np.abs(speeds - now.linear) + 0.4 * np.abs([way.turn for way in ways]))
-        worth = np.minimum(gaps[1:], self.wanted) @ self.weights - effort
-        worth -= self.unseen * self._unseen(poses[1:], places[:, 0])
+        worth = np.minimum(gaps, self.wanted) @ self.weights - effort
+        worth -= self.unseen * self._unseen(poses, places[:, 0])
         if not is_followed.any():
-            worth -= self.away * self._away(poses[1:], goal, robot)
-        worth[self._room(poses[1:], near, robot) < self.walls] -= self.never
+            worth -= self.away * self._away(poses, goal, robot)
+        worth[self._room(poses, near, robot) < self.walls] -= self.never
         if may_back is not None:
-            blind = (backs[1:] & ~may_back(poses[1:])).any(axis=1)
-            worth[(speeds < -blind_speed) & blind] -= self.never
-        if begun is not None:
+            backward = np.flatnonzero(speeds < -blind_speed)
+            blind = (backs[backward] & ~may_back(poses[backward])).any(axis=1)
+            worth[backward[blind]] -= self.never
+        if begun is not None and begun.speed:
             worth[-1] += self.stay if begun.age > self.settle_s else 1.0
         return ways[int(np.argmax(worth))]
 
@@ -230,34 +242,49 @@ class Company:
         """Return the speeds with which ways are driven that are `turn` [rad] off: the turn first."""
         most = np.minimum(stoppable_turn(turn, acceleration, robot), self.max_turn)
         linear = speed * np.maximum(np.cos(turn), 0.0) ** 2
-        return np.asarray(linear), np.asarray(np.clip(self.turn_gain * turn, -most, most))
+        return np.asarray(linear), np.minimum(np.maximum(self.turn_gain * turn, -most), most)
 
-    def _driven(
-        self, ways: Sequence[Way], wanted: Twist, now: Twist, acceleration: float, robot: RobotGeometry
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return where the wanted command, then each of K ways, leads in T steps, and in which of these it backs.
+    def _driven_on(self, wanted: Twist, now: Twist, acceleration: float, robot: RobotGeometry) -> Poses:
+        """Return where the wanted command leads in T steps, float64 (1, T, 3): x, y [m], yaw [rad].
 
-        float64 (1 + K, T, 3): x, y [m], yaw [rad]; bool (1 + K, T). What is wanted is taken to turn for half of
-        the time.
+        It is taken to turn for half of the time, and to back no faster than `Guard` lets it.
         """
-        turns = np.array([0.0, *(way.turn for way in ways)])
-        speeds = np.array([0.0, *(way.speed for way in ways)])
-        count, steps = len(turns), round(self.horizon_s / self.step_s)
-        linear, angular = np.full(count, now.linear), np.full(count, now.angular)
-        x, y, yaw = np.zeros((3, count))
-        poses, backs = np.empty((count, steps, 3)), np.empty((count, steps), bool)
+        steps, most = round(self.horizon_s / self.step_s), acceleration * self.step_s
+        linear, angular, x, y, yaw = now.linear, now.angular, 0.0, 0.0, 0.0
+        poses = []
         for step in range(steps):
-            for_linear, for_angular = self._wanted(turns - yaw, speeds, acceleration, robot)
-            for_linear[0], for_angular[0] = wanted.linear, wanted.angular if step < steps / 2 else 0.0
             begun = linear, angular
-            linear, angular = advanced(for_linear, for_angular, linear, angular, acceleration * self.step_s, robot)
+            turn_to = wanted.angular if step < steps / 2 else 0.0
+            linear, angular = advanced(max(wanted.linear, min(self.speeds)), turn_to, linear, angular, most, robot)
             turn = (begun[1] + angular) / 2 * self.step_s
             far = (begun[0] + linear) / 2 * self.step_s
-            x, y = x + far * np.cos(yaw + turn / 2), y + far * np.sin(yaw + turn / 2)
-            yaw = yaw + turn
-            poses[:, step] = np.stack([x, y, yaw], axis=1)
-            backs[:, step] = far < 0
-        return poses, backs
+            x, y = x + far * math.cos(yaw + turn / 2), y + far * math.sin(yaw + turn / 2)
+            yaw += turn
+            poses.append((x, y, yaw))
+        return np.array([poses])
+
+    def _driven(
+        self, ways: Sequence[Way], now: Twist, acceleration: float, robot: RobotGeometry
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return where each of K ways leads in T steps, and in which of these it backs.
+
+        float64 (K, T, 3): x, y [m], yaw [rad]; bool (K, T).
+        """
+        turns, speeds = np.array([way.turn for way in ways]), np.array([way.speed for way in ways])
+        count, steps = len(ways), round(self.horizon_s / self.step_s)
+        # The speeds and the yaw at the beginning and after each step.
+        linear, angular = np.full((steps + 1, count), now.linear), np.full((steps + 1, count), now.angular)
+        yaw = np.zeros((steps + 1, count))
+        for step in range(steps):
+            for_linear, for_angular = self._wanted(turns - yaw[step], speeds, acceleration, robot)
+            linear[step + 1], angular[step + 1] = all_advanced(
+                for_linear, for_angular, linear[step], angular[step], acceleration * self.step_s, robot
+            )
+            yaw[step + 1] = yaw[step] + (angular[step] + angular[step + 1]) / 2 * self.step_s
+        far = (linear[:-1] + linear[1:]) / 2 * self.step_s
+        along = yaw[:-1] + (angular[:-1] + angular[1:]) / 4 * self.step_s
+        x, y = np.cumsum(far * np.cos(along), axis=0), np.cumsum(far * np.sin(along), axis=0)
+        return np.stack([x.T, y.T, yaw[1:].T], axis=2), far.T < 0
 
     def _places(self, people: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where N people are in T steps, float64 (T, 3, N, 2) [m]: as predicted, and to either side of that."""

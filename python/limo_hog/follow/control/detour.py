@@ -52,7 +52,7 @@ class Detour:
     def obstacles(self, points: Points, bearing: float, distance: float) -> Points:
         """Return the points, float64 (N, 2) [m], that are not the person at a bearing [rad] and a distance [m]."""
         here = distance * np.array([math.cos(bearing), math.sin(bearing)])
-        others: Points = points[np.hypot(*(points - here).T) > self.person_radius]
+        others: Points = points.compress(np.hypot(*(points - here).T) > self.person_radius, axis=0)
         return others
 
     def hides(self, obstacles: Points, bearing: float, distance: float) -> bool:
@@ -100,7 +100,7 @@ class Detour:
         """Return the best direction in which the robot can drive at least `reach` [m]."""
         most = self.steps if steps is None else steps
         # What is further off is in no direction's way.
-        near = obstacles[np.hypot(*obstacles.T) < reach + robot.half_length + self.margin.ahead]
+        near = obstacles.compress(np.hypot(*obstacles.T) < reach + robot.half_length + self.margin.ahead, axis=0)
         detours = [self.step * index for index in range(-most, most + 1)]
         for detour in sorted(detours, key=lambda detour: abs(detour) + self.preference * abs(detour - preferred)):
             cos, sin = math.cos(bearing + detour), math.sin(bearing + detour)

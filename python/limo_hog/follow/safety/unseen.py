@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, to_odometry
@@ -39,33 +41,50 @@ def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry
     robot
         Its outline and mounts.
     """
-    depths = np.arange(STEP, FARTHEST + 1e-9, STEP)
-    across = np.array([-robot.half_width, 0.0, robot.half_width])
-    x, y = np.meshgrid(-robot.half_length - depths, across, indexing="ij")
-    ground = to_odometry(np.stack([x.ravel(), y.ravel()], axis=1), pose)
-    seen = np.zeros(len(ground), bool)
-    for look in reversed(looks):
-        seen[~seen] = _was_free(ground[~seen], look, robot)
-        if seen.all():
-            return FARTHEST
-    unseen = ~seen.reshape(x.shape).all(axis=1)
+    if not looks:
+        return 0.0
+    depths, places = _places_behind(robot)
+    seen = _were_free(to_odometry(places, pose), looks, robot).any(axis=0)
+    unseen = ~seen.reshape(len(depths), -1).all(axis=1)
     return float(depths[int(np.argmax(unseen))] - STEP) if unseen.any() else FARTHEST
 
 
-def _was_free(points: Points, look: Look, robot: RobotGeometry) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return for each point, odometry frame, whether a beam passed over it or the robot stood on it, bool (N,)."""
-    scan, pose = look.scan, look.pose
-    dx, dy = points[:, 0] - pose.x, points[:, 1] - pose.y
-    ahead = math.cos(pose.yaw) * dx + math.sin(pose.yaw) * dy
-    aside = math.cos(pose.yaw) * dy - math.sin(pose.yaw) * dx
+@functools.lru_cache(maxsize=4)
+def _places_behind(robot: RobotGeometry) -> tuple[NDArray[np.float64], Points]:
+    """Return the depths behind the outline, float64 (D,) [m], and places at each, (D · 3, 2), in the base frame."""
+    depths = np.arange(STEP, FARTHEST + 1e-9, STEP)
+    across = np.array([-robot.half_width, 0.0, robot.half_width])
+    x, y = np.meshgrid(-robot.half_length - depths, across, indexing="ij")
+    return depths, np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> NDArray[np.bool_]:
+    """Return for each of L looks and N points, odometry frame, whether a beam passed over it or the robot stood there.
+
+    bool (L, N). All looks at once: one by one they took a millisecond.
+    """
+    numbers = [
+        (
+            *(look.pose.x, look.pose.y, math.cos(look.pose.yaw), math.sin(look.pose.yaw)),
+            *(look.scan.angle_min, look.scan.angle_max, look.scan.range_min, look.scan.range_max),
+            len(look.scan.ranges),
+        )
+        for look in looks
+    ]
+    x, y, cos, sin, angle_min, angle_max, range_min, range_max, count = np.array(numbers).T[:, :, None]
+    dx, dy = points[:, 0] - x, points[:, 1] - y
+    ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
     # Half a step of grace: the ground just behind the outline was under it a moment ago.
     covered = (np.abs(ahead) < robot.half_length + STEP / 2) & (np.abs(aside) < robot.half_width + STEP / 2)
     distance = np.hypot(ahead - robot.lidar_x, aside)
     angle = np.arctan2(aside, ahead - robot.lidar_x)
-    step = (scan.angle_max - scan.angle_min) / max(len(scan.ranges) - 1, 1)
-    beam = np.rint((angle - scan.angle_min) / step).astype(np.int64)
-    inside = (beam >= 0) & (beam < len(scan.ranges))
-    ranges = scan.ranges[np.clip(beam, 0, len(scan.ranges) - 1)]
+    beam = np.rint((angle - angle_min) / ((angle_max - angle_min) / np.maximum(count - 1, 1)))
+    inside = (beam >= 0) & (beam < count)
+    # The scans one after the other, and where each begins.
+    begins = np.cumsum(count, axis=0) - count
+    ranges = np.concatenate([look.scan.ranges for look in looks])[
+        (begins + np.minimum(np.maximum(beam, 0), count - 1)).astype(np.int64)
+    ]
     # A beam that is no number, or shorter than the lidar can measure, shows nothing.
-    passed = inside & (ranges >= scan.range_min) & (np.minimum(ranges, scan.range_max) > distance + BEYOND)
+    passed = inside & (ranges >= range_min) & (np.minimum(ranges, range_max) > distance + BEYOND)
     return np.asarray(covered | passed)

@@ -105,8 +105,13 @@ class Appearance:
         """
         if known is None or seen is None:
             return 0.0
-        readings = (known, known[[1, 1]]) if slips else (known,)
-        return min(float(np.minimum(_chi_squared(reading, seen), self._most()).sum()) for reading in readings)
+        shirt, trousers = known.tolist()
+        seen_shirt, seen_trousers = seen.tolist()
+        of_trousers = min(_chi_squared(trousers, seen_trousers), self.max_trousers)
+        cost = min(_chi_squared(shirt, seen_shirt), self.max_shirt) + of_trousers
+        if slips:
+            cost = min(cost, min(_chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers)
+        return cost
 
     def is_other(self, known: Clothes | None, seen: Clothes | None) -> bool:
         """Whether clothes are clearly not the known ones."""
@@ -114,15 +119,14 @@ class Appearance:
 
     def learn(self, known: Clothes, seen: Clothes) -> Clothes:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""
-        same = _chi_squared(known, seen) < self._most()
+        most = self.max_shirt, self.max_trousers
+        parts = zip(known.tolist(), seen.tolist(), most, strict=True)
+        same = np.array([_chi_squared(old, new) < limit for old, new, limit in parts])
         moved: Clothes = known + self.rate * same[:, None] * (seen - known)
         return moved
 
-    def _most(self) -> NDArray[np.float64]:
-        return np.array([self.max_shirt, self.max_trousers])
 
-
-def _chi_squared(known: Clothes, seen: Clothes) -> NDArray[np.float64]:
-    """Return float64 (2,): chi-squared of shirt and of trousers."""
-    gaps: NDArray[np.float64] = ((seen - known) ** 2).sum(axis=1)
-    return gaps
+def _chi_squared(known: list[float], seen: list[float]) -> float:
+    """Return chi-squared of the three numbers of a shirt or of trousers."""
+    (a, b, c), (x, y, z) = known, seen
+    return (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2

@@ -29,14 +29,26 @@ def beam_directions(angle_min: float, angle_max: float, count: int) -> Points:
     return directions
 
 
+@functools.lru_cache(maxsize=8)
 def scan_points(scan: Scan, robot: RobotGeometry) -> Points:
-    """Return the valid returns of a scan."""
+    """Return the valid returns of a scan, read only: controller, tracker and `Guard` all ask for them."""
     ranges = scan.ranges.astype(np.float64)
     # False for a range that is no number.
-    hit = (ranges >= scan.range_min) & (ranges <= scan.range_max) & (ranges < np.inf)
+    hit = np.flatnonzero((ranges >= scan.range_min) & (ranges <= scan.range_max) & (ranges < np.inf))
     points: Points = ranges[hit, None] * beam_directions(scan.angle_min, scan.angle_max, len(ranges))[hit]
     points[:, 0] += robot.lidar_x
+    points.flags.writeable = False
     return points
+
+
+@functools.lru_cache(maxsize=8)
+def _pixel_slopes(
+    height: int, width: int, step: int, focal_px: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how far down, (R, 1), and left, (C,), every so many rows and columns look [m/m]; the same for a camera."""
+    rows, columns = (np.arange(step // 2, size, step) for size in (height, width))
+    down, left = (rows[:, None] + 0.5 - height / 2) / focal_px, (width / 2 - columns - 0.5) / focal_px
+    return np.asarray(down, np.float64), np.asarray(left, np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,15 +69,13 @@ class DepthGrid:
 
     def points(self, depth: NDArray[np.float32], focal_px: float, reach: float, robot: RobotGeometry) -> Points:
         """Return what the depth camera sees above the floor and nearer than `reach` [m] to the camera."""
-        height, width = depth.shape
-        rows = np.arange(self.step // 2, height, self.step)
-        columns = np.arange(self.step // 2, width, self.step)
+        down, left = _pixel_slopes(*depth.shape, self.step, focal_px)
         z = depth[self.step // 2 :: self.step, self.step // 2 :: self.step].astype(np.float64)
         with np.errstate(invalid="ignore"):
-            above_floor = robot.camera_z - (rows[:, None] + 0.5 - height / 2) / focal_px * z
-            row, column = np.nonzero((z > 0) & (z < reach) & (above_floor > self.floor))
-        z = z[row, column]
-        return np.stack([robot.camera_x + z, (width / 2 - columns[column] - 0.5) / focal_px * z], axis=1)
+            above_floor = robot.camera_z - down * z
+            seen = np.flatnonzero((z > 0) & (z < reach) & (above_floor > self.floor))
+        ahead = z.ravel()[seen]
+        return np.stack([robot.camera_x + ahead, left[seen % z.shape[1]] * ahead], axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,13 +99,13 @@ def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
 
     Negative where a point ahead is too near already, inf where nothing is in the way.
     """
-    points = points[points[:, 0] > 0]
-    beside = np.maximum(np.abs(points[:, 1]) - robot.half_width, 0) / margin.beside
-    in_the_way = beside < 1
-    if not in_the_way.any():
+    ahead, aside = points.T
+    beside = np.maximum(np.abs(aside) - robot.half_width, 0) / margin.beside
+    in_the_way = np.flatnonzero((ahead > 0) & (beside < 1))
+    if len(in_the_way) == 0:
         return math.inf
-    gap = points[in_the_way, 0] - robot.half_length
-    return float(np.min(gap - margin.ahead * np.sqrt(1 - beside[in_the_way] ** 2)))
+    gap = ahead[in_the_way] - robot.half_length
+    return float((gap - margin.ahead * np.sqrt(1 - beside[in_the_way] ** 2)).min())
 
 
 def room_behind(points: Points, margin: Margin, robot: RobotGeometry) -> float:

@@ -12,9 +12,9 @@ from limo_hog.follow.sense.appearance import Clothes, clothes_in
 from limo_hog.follow.sense.region import Region
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Scan:
-    """One turn of a planar lidar.
+    """One turn of a planar lidar. Two scans are equal only if they are the same object.
 
     Attributes
     ----------

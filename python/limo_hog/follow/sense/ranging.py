@@ -32,7 +32,7 @@ def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int =
     x, y = box_centre(box)
     half = side // 2
     patch = depth[max(y - half, 0) : max(y + half, 0), max(x - half, 0) : max(x + half, 0)]
-    valid = patch[np.isfinite(patch) & (patch > 0)]
+    valid = patch[(patch > 0) & (patch < np.inf)]
     return median(valid) if valid.size else None
 
 
@@ -100,7 +100,7 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
         strip = band[:, max(round(centre + left * w), 0) : max(round(centre + right * w), 0)]
         if strip.size == 0:
             return None
-        valid = strip[np.isfinite(strip) & (strip > 0)]
+        valid = strip[(strip > 0) & (strip < np.inf)]
         return median(valid) if valid.size > strips.known * strip.size else strips.beyond
 
     middle = depth_of(-strips.chest, strips.chest)
@@ -155,13 +155,14 @@ def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, o
     """
     column, row = box_centre(box)
     half = max(round(outline.half_width * int(box[2])), outline.least_half_px)
-    strip = depth[: max(row, 1), max(column - half, 0) : max(column + half, 1)]
-    known = np.count_nonzero(np.isfinite(strip) & (strip > 0), axis=1)
+    # A copy by columns: the sums over a row's few pixels are sums of long vectors.
+    strip = np.ascontiguousarray(depth[: max(row, 1), max(column - half, 0) : max(column + half, 1)].T)
     with np.errstate(invalid="ignore"):
-        near = np.count_nonzero(np.abs(strip - person) < outline.tolerance, axis=1)
-    empty = near[::-1] < np.maximum(outline.share * known[::-1], 1)
-    # The first row, from the box's middle upwards, that begins a gap.
-    runs = np.convolve(empty, np.ones(outline.gap_px), "valid") >= outline.gap_px
-    if not runs.any():
-        return 0
-    return max(len(empty) - int(np.argmax(runs)), 0)
+        near = (np.abs(strip - person) < outline.tolerance).sum(axis=0, dtype=np.int16)
+    known = ((strip > 0) & (strip < np.inf)).sum(axis=0, dtype=np.int16)
+    gap = 0
+    for at, empty in enumerate((near < np.maximum(outline.share * known, 1))[::-1].tolist(), 1):
+        gap = gap + 1 if empty else 0
+        if gap == outline.gap_px:
+            return len(near) - at + gap
+    return 0

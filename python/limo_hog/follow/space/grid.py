@@ -6,6 +6,7 @@ square that moves along with the robot in whole cells.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -126,23 +127,17 @@ class Grid:
         returned = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
         # A beam that hits nothing is free as far as it reaches; one that is no number says nothing.
         clear = np.where(np.isnan(ranges) | (ranges < scan.range_min), 0.0, np.minimum(ranges, scan.range_max))
-        steps = np.arange(0.5, self.reach / self.cell) * self.cell
-        beams = slice(None, None, self.every)
-        # So far before the end that it is in another cell.
-        free = steps[None, :] < clear[beams, None] - 1.5 * self.cell
         turn = replace(pose, x=0.0, y=0.0)
         directions = to_odometry(beam_directions(scan.angle_min, scan.angle_max, len(ranges)), turn)
-        beam, step = np.nonzero(free)
-        points = at + steps[step, None] * directions[beams][beam]
         near = returned & (ranges < self.reach)
         ends = at + ranges[near, None] * directions[near]
         ends = np.concatenate([ends, depth_points])
         if len(people) and len(ends):
             gaps = np.hypot(ends[:, None, 0] - people[None, :, 0], ends[:, None, 1] - people[None, :, 1])
             ends = ends[gaps.min(axis=1) > self.person_radius]
-        own = np.arange(-self.own_radius, self.own_radius + 1e-9, self.cell)
-        under = np.array([pose.x, pose.y]) + np.stack(np.meshgrid(own, own), axis=-1).reshape(-1, 2)
-        cleared, filled = self._mask(ground, np.concatenate([points, under])), self._mask(ground, ends)
+        under = np.array([pose.x, pose.y]) + _square(self.own_radius, self.cell)
+        passed = self._passed(ground, at, directions[:: self.every], clear[:: self.every])
+        cleared, filled = self._mask(passed, self.flat(ground, under)), self._mask(self.flat(ground, ends))
         before, stamp = ground.occupied, np.float32(scan.stamp)
         lower = np.maximum(before - np.float32(self.free), np.float32(self.lowest))
         higher = np.minimum(before + np.float32(self.hit), np.float32(self.highest))
@@ -154,7 +149,9 @@ class Grid:
     def index(self, ground: Ground, points: Points) -> tuple[Cells, NDArray[np.bool_]]:
         """Return the cell of each point, int64 (N, 2), and whether it is in the square, bool (N,)."""
         cells: Cells = np.floor(points / self.cell).astype(np.int64) - ground.corner
-        inside: NDArray[np.bool_] = self._inside(cells[:, 0]) & self._inside(cells[:, 1])
+        # As unsigned numbers, what is below 0 is large.
+        within = cells.view(np.uint64) < self.cells
+        inside: NDArray[np.bool_] = within[:, 0] & within[:, 1]
         return cells, inside
 
     def flat(self, ground: Ground, points: Points) -> NDArray[np.int64]:
@@ -173,11 +170,11 @@ class Grid:
         With `lasting`, only cells count that were not free within `lasts_s`: what came in since can go away as well.
         """
         cells, inside = self.index(ground, points)
-        stands = ground.occupied > 0
-        if lasting:
-            stands &= ground.freed < ground.stamp - self.lasts_s
         flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
-        return np.asarray(stands.ravel()[flat] & inside)
+        blocked = inside & (ground.occupied.ravel()[flat] > 0)
+        if lasting:
+            blocked &= ground.freed.ravel()[flat] < ground.stamp - self.lasts_s
+        return np.asarray(blocked)
 
     def is_free_since(self, ground: Ground, points: Points, stamps: float | NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return whether each point was seen to be free after its stamp [s], bool (N,); outside of the square none."""
@@ -208,13 +205,26 @@ class Grid:
         )
         return np.asarray(~blocked.any(axis=2))
 
-    def _inside(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        return (cells >= 0) & (cells < self.cells)
+    def _passed(
+        self, ground: Ground, at: NDArray[np.float64], directions: Points, clear: NDArray[np.float64]
+    ) -> NDArray[np.int64]:
+        """Return the flat indices of the cells that beams from a place (2,) pass, each as far as it is clear [m]."""
+        steps = np.arange(0.5, self.reach / self.cell) * self.cell
+        # So far before the end that it is in another cell.
+        free = steps < clear[:, None] - 1.5 * self.cell
+        row, column = (
+            np.floor((start + steps * along[:, None]) / self.cell).astype(np.int64) - corner
+            for start, along, corner in zip(at, directions.T, ground.corner, strict=True)
+        )
+        inside = (row.view(np.uint64) < self.cells) & (column.view(np.uint64) < self.cells)
+        passed: NDArray[np.int64] = (row * self.cells + column)[free & inside]
+        return passed
 
-    def _mask(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
-        """Return which cells hold a point, bool (N, N)."""
+    def _mask(self, *flat: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which cells are among those of flat indices, bool (N, N)."""
         mask = np.zeros(self.cells**2, bool)
-        mask[self.flat(ground, points)] = True
+        for cells in flat:
+            mask[cells] = True
         return mask.reshape(self.cells, self.cells)
 
     def _corner(self, pose: Odometry) -> tuple[int, int]:
@@ -233,6 +243,15 @@ class Grid:
         fresh.seen[to_x, to_y] = ground.seen[from_x, from_y]
         fresh.freed[to_x, to_y] = ground.freed[from_x, from_y]
         return replace(ground, corner=corner, occupied=fresh.occupied, seen=fresh.seen, freed=fresh.freed)
+
+
+@functools.lru_cache(maxsize=4)
+def _square(radius: float, step: float) -> Points:
+    """Return points all over a square around 0, so far apart [m], float64 (N, 2), read only."""
+    along = np.arange(-radius, radius + 1e-9, step)
+    points = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    points.flags.writeable = False
+    return points
 
 
 def _overlap(step: int, cells: int) -> tuple[slice, slice]:

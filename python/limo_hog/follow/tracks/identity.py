@@ -62,7 +62,7 @@ class Likeness:
 
     def of(self, number: int) -> float:
         """Return the probability that a track is the person followed."""
-        return dict(self.chances).get(number, 0.0)
+        return next((chance for track, chance in self.chances if track == number), 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +89,20 @@ class Identity:
         Share of its own evidence that a box counts for after a track's first [1]. Chosen: neighbouring frames show
         nearly the same, as in `Existence`.
     steady
-        The same for the stature, whose error lasts as long as the distance [1]. Chosen: a second is worth one box.
+        The same for the stature, whose error lasts as long as the distance, and for all that the person followed shows
+        while their legs are the same (`legs_s`): an arm before the shirt stays there while a person stands [1]. Chosen:
+        a second is worth one box.
+    stays
+        Probability from which a track counts as the person for that [1]. Chosen: more likely than not.
     most
         The most that a box can tell either way [log-odds]. Chosen: a factor of twelve.
     passes, strained
         Chance that a track's next box is another person's, who is not tracked: where the box fits, and where its place
         or size contradicts the track [1]. Chosen: once in a minute; once in a second.
+    legs_s, legs_apart
+        A track whose legs in the scan have been the same for so long, with no others nearer than this, is no other
+        person's [s, m]. Chosen: people pass each other in a second; more than `Legs.radius`, within which returns
+        count as one person's.
     fades_s
         Time constant with which a track that is not measured stops to be where the person is [s]. Chosen: people turn
         within a second.
@@ -126,9 +134,12 @@ class Identity:
     odd_stature: float = 0.3
     again: float = 0.5
     steady: float = 0.1
+    stays: float = 0.5
     most: float = 2.5
     passes: float = 0.002
     strained: float = 0.1
+    legs_s: float = 1.0
+    legs_apart: float = 0.4
     fades_s: float = 2.0
     meets: float = 0.5
     swaps: float = 0.02
@@ -151,7 +162,9 @@ class Identity:
         chances = self._passed(known, people, tracks)
         odds = dict(chances)
         for one in tracks.in_view:
-            odds[one.number] *= math.exp(self._evidence(known, one, first=one.age <= 1))
+            stays = known.of(one.number) >= self.stays and self._walks_on(one, tracks)
+            evidence = self._evidence(known, one, first=one.age <= 1)
+            odds[one.number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
         chances = {number: value / total for number, value in odds.items()}
         known = replace(known, chances=tuple(chances.items()))
@@ -167,6 +180,8 @@ class Identity:
             one = people[number]
             if stamp - one.measured > self.unseen_s:
                 leaves = 1.0 - math.exp(-tracks.period / self.fades_s)
+            elif self._walks_on(one, tracks):
+                leaves = 0.0
             else:
                 leaves = self.strained if one.strained and one.seen == stamp else self.passes
             chances[number] *= 1.0 - leaves
@@ -189,12 +204,22 @@ class Identity:
         if own in chances and people[own] in measured:
             # What was taken for another person's box may have been none.
             chances[own] += self.passes * absent
+        walking = {one.number for one in measured if self._walks_on(one, tracks)}
         for left, right in itertools.combinations(measured, 2):
-            if separation(left, right) < self.meets:
+            if separation(left, right) < self.meets and not {left.number, right.number} <= walking:
                 swapped = self.swaps * (chances[right.number] - chances[left.number])
                 chances[left.number] += swapped
                 chances[right.number] -= swapped
         return chances
+
+    def _walks_on(self, person: Person, tracks: Tracks) -> bool:
+        """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""
+        legs = [one for one in tracks.movers if one.number == person.number and one.felt - one.named >= self.legs_s]
+        others = [one for one in tracks.movers if one.left and one.number != person.number]
+        return any(
+            all(math.dist(own.track.mean[:2], other.track.mean[:2]) > self.legs_apart for other in others)
+            for own in legs
+        )
 
     def _evidence(self, known: Likeness, person: Person, *, first: bool) -> float:
         """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""

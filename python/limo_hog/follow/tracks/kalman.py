@@ -7,9 +7,8 @@ Li and Kirubarajan, Estimation with Applications to Tracking and Navigation (200
 
 from __future__ import annotations
 
-import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +16,6 @@ from numpy.typing import NDArray
 from limo_hog.follow.sense.observation import Odometry
 
 Array = NDArray[np.float64]
-
-#: Where position, position and velocity, and velocity stand in a 4 x 4 matrix of the state.
-_POSITION, _BOTH, _VELOCITY = (
-    np.kron(np.array(part, float), np.eye(2))
-    for part in (
-        [[1, 0], [0, 0]],
-        [[0, 1], [0, 0]],
-        [[0, 0], [0, 1]],
-    )
-)
-_CROSS = _BOTH + _BOTH.T
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,71 +89,82 @@ def predict(track: Track, stamp: float, noise: Noise) -> Track:
     For an earlier stamp the mean moves back along the velocity and the covariance stays as it is.
     """
     dt = stamp - track.stamp
+    x, y, vx, vy = track.mean.tolist()
     if dt <= 0:
-        x, y, vx, vy = track.mean
-        return Track(stamp, np.array([x + dt * vx, y + dt * vy, vx, vy]), track.covariance)
-    move, spread = _motion(dt, noise)
-    return Track(stamp, move @ track.mean, move @ track.covariance @ move.T + spread)
-
-
-@functools.lru_cache(maxsize=64)
-def _motion(dt: float, noise: Noise) -> tuple[Array, Array]:
-    """Return the transition of the state over `dt` [s] and the covariance it adds, float64 (4, 4) each, read only.
-
-    All tracks of a frame are predicted for the same few stamps.
-    """
+        return Track(stamp, np.array((x + dt * vx, y + dt * vy, vx, vy)), track.covariance)
     kept = math.exp(-dt / noise.persistence)
-    move = _POSITION + (noise.persistence * (1 - kept)) * _BOTH + kept * _VELOCITY
+    far = noise.persistence * (1 - kept)
     q = noise.acceleration**2
-    spread = (q * dt**3 / 3) * _POSITION + (q * dt**2 / 2) * _CROSS + (q * dt) * _VELOCITY
-    for matrix in (move, spread):
-        matrix.flags.writeable = False
-    return move, spread
+    place, cross, speed = q * dt**3 / 3, q * dt**2 / 2, q * dt
+    # The products of 4 x 4 matrices, written out: in numpy their overhead was a sixth of the follower's time.
+    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = track.covariance.tolist()
+    covariance = _symmetric(
+        xx + 2 * far * xu + far * far * uu + place,
+        xy + far * (xv + yu) + far * far * uv,
+        kept * (xu + far * uu) + cross,
+        kept * (xv + far * uv),
+        yy + 2 * far * yv + far * far * vv + place,
+        kept * (yu + far * uv),
+        kept * (yv + far * vv) + cross,
+        kept * kept * uu + speed,
+        kept * kept * uv,
+        kept * kept * vv + speed,
+    )
+    return Track(stamp, np.array((x + far * vx, y + far * vy, kept * vx, kept * vy)), covariance)
+
+
+def _symmetric(
+    xx: float, xy: float, xu: float, xv: float, yy: float, yu: float, yv: float, uu: float, uv: float, vv: float
+) -> Array:
+    """Return the covariance of x, y and the velocities u, v along them, float64 (4, 4)."""
+    return np.array((xx, xy, xu, xv, xy, yy, yu, yv, xu, yu, uu, uv, xv, yv, uv, vv)).reshape(4, 4)
 
 
 def bearing_range(track: Track, pose: Odometry) -> tuple[float, float]:
     """Return bearing and distance of the track from the robot [rad, m]."""
-    dx, dy = track.mean[0] - pose.x, track.mean[1] - pose.y
+    x, y, _, _ = track.mean.tolist()
+    dx, dy = x - pose.x, y - pose.y
     return wrap(math.atan2(dy, dx) - pose.yaw), math.hypot(dx, dy)
 
 
 def rates(track: Track, pose: Odometry) -> tuple[float, float]:
     """Return the rates of bearing and range due to the person's velocity alone [rad/s, m/s]."""
-    dx, dy, vx, vy = track.mean - (pose.x, pose.y, 0.0, 0.0)
+    x, y, vx, vy = track.mean.tolist()
+    dx, dy = x - pose.x, y - pose.y
     distance = max(math.hypot(dx, dy), 1e-3)
-    return float(dx * vy - dy * vx) / distance**2, float(dx * vx + dy * vy) / distance
+    return (dx * vy - dy * vx) / distance**2, (dx * vx + dy * vy) / distance
 
 
 @dataclass(frozen=True, slots=True)
 class Innovation:
-    """A measurement compared with the prediction, of m = 1 (bearing) or 2 numbers (bearing, range).
+    """A measurement of bearing and range compared with the prediction.
 
     Attributes
     ----------
-    difference
-        float64 (m,): measured less predicted [rad, m].
+    bearing, range
+        Measured less predicted [rad, m]; range None where only the bearing is measured.
+    by_bearing, by_range
+        How bearing and range change with x and y [rad/m, 1]; with the velocity they do not.
     covariance
-        float64 (m, m) of `difference`.
-    jacobian
-        float64 (m, 4): of the measurement by the state.
+        Of the two differences: bearing, both, range [rad², rad m, m²].
     variances
-        float64 (m,): of the measurement alone.
+        Of the measurement alone: bearing, range [rad², m²].
     """
 
-    difference: Array
-    covariance: Array
-    jacobian: Array
-    variances: Array
+    bearing: float
+    range: float | None
+    by_bearing: tuple[float, float]
+    by_range: tuple[float, float]
+    covariance: tuple[float, float, float]
+    variances: tuple[float, float]
 
     @property
     def distance2(self) -> float:
         """Squared Mahalanobis distance: chi-squared with one degree of freedom for each measured number."""
-        if len(self.difference) == 1:
-            return float(self.difference[0] ** 2 / self.covariance[0, 0])
-        # A 2 x 2 system by Cramer's rule: numpy's solver takes ten times as long.
-        (a, b), (_, d) = self.covariance.tolist()
-        x, y = self.difference.tolist()
-        return float((d * x * x - 2.0 * b * x * y + a * y * y) / (a * d - b * b))
+        (a, b, d), x, y = self.covariance, self.bearing, self.range
+        if y is None:
+            return x * x / a
+        return (d * x * x - 2.0 * b * x * y + a * y * y) / (a * d - b * b)
 
     @property
     def log_volume_ratio(self) -> float:
@@ -174,34 +173,54 @@ class Innovation:
         A track that has not been measured for long has a large gate and would match any measurement; this is the
         term of the log-likelihood that penalises it.
         """
-        if len(self.variances) == 1:
-            return math.log(self.covariance[0, 0] / self.variances[0])
-        (a, b), (_, d) = self.covariance.tolist()
-        return math.log((a * d - b * b) / (self.variances[0] * self.variances[1]))
+        (a, b, d), (of_bearing, of_range) = self.covariance, self.variances
+        if self.range is None:
+            return math.log(a / of_bearing)
+        return math.log((a * d - b * b) / (of_bearing * of_range))
 
 
 def innovation(track: Track, bearing: float, distance: float | None, pose: Odometry, noise: Noise) -> Innovation:
     """Compare a measurement with the track at the same stamp; `distance` None measures the bearing alone."""
-    expected_bearing, expected_range = bearing_range(track, pose)
-    dx, dy = track.mean[0] - pose.x, track.mean[1] - pose.y
-    r2 = max(expected_range**2, 1e-6)
+    x, y, _, _ = track.mean.tolist()
+    dx, dy = x - pose.x, y - pose.y
+    expected = math.hypot(dx, dy)
+    r2 = max(expected**2, 1e-6)
     r = math.sqrt(r2)
-    jacobian = np.array([[-dy / r2, dx / r2, 0.0, 0.0], [dx / r, dy / r, 0.0, 0.0]])
-    variances = np.array([noise.bearing**2, noise.range**2])
-    difference = np.array([wrap(bearing - expected_bearing), (distance or 0.0) - expected_range])
-    if distance is None:
-        jacobian, variances, difference = jacobian[:1], variances[:1], difference[:1]
-    covariance = jacobian @ track.covariance @ jacobian.T
-    covariance.flat[:: len(variances) + 1] += variances
-    return Innovation(difference, covariance, jacobian, variances)
+    (bx, by), (rx, ry) = by_bearing, by_range = (-dy / r2, dx / r2), (dx / r, dy / r)
+    (xx, xy, _, _), (_, yy, _, _), _, _ = track.covariance.tolist()
+    of_bearing, of_range = variances = noise.bearing**2, noise.range**2
+    covariance = (
+        bx * bx * xx + 2 * bx * by * xy + by * by * yy + of_bearing,
+        bx * rx * xx + (bx * ry + by * rx) * xy + by * ry * yy,
+        rx * rx * xx + 2 * rx * ry * xy + ry * ry * yy + of_range,
+    )
+    turned = wrap(bearing - wrap(math.atan2(dy, dx) - pose.yaw))
+    further = None if distance is None else distance - expected
+    return Innovation(turned, further, by_bearing, by_range, covariance, variances)
 
 
 def update(track: Track, measured: Innovation) -> Track:
     """Correct the track by a measurement."""
-    gain = np.linalg.solve(measured.covariance, measured.jacobian @ track.covariance).T
-    covariance = track.covariance - gain @ measured.covariance @ gain.T
-    mean = track.mean + gain @ measured.difference
-    return replace(track, mean=mean, covariance=(covariance + covariance.T) / 2)
+    (bx, by), (rx, ry), (a, b, d) = measured.by_bearing, measured.by_range, measured.covariance
+    rows = track.covariance.tolist()
+    # Covariances of the state with bearing and range, and from these the gain.
+    bearing = [bx * row[0] + by * row[1] for row in rows]
+    if measured.range is None:
+        ranged, gain_range, further = [0.0] * 4, [0.0] * 4, 0.0
+        gain_bearing = [of / a for of in bearing]
+    else:
+        ranged, further = [rx * row[0] + ry * row[1] for row in rows], measured.range
+        det = a * d - b * b
+        gain_bearing = [(d * one - b * other) / det for one, other in zip(bearing, ranged, strict=True)]
+        gain_range = [(a * other - b * one) / det for one, other in zip(bearing, ranged, strict=True)]
+    mean = [
+        at + one * measured.bearing + other * further
+        for at, one, other in zip(track.mean.tolist(), gain_bearing, gain_range, strict=True)
+    ]
+    left = [
+        rows[i][j] - gain_bearing[i] * bearing[j] - gain_range[i] * ranged[j] for i in range(4) for j in range(i, 4)
+    ]
+    return Track(track.stamp, np.array(mean), _symmetric(*left))
 
 
 def wrap(angle: float) -> float:

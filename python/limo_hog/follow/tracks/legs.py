@@ -85,12 +85,14 @@ class Legs:
         distance = bearing_range(track, pose)[1]
         if distance > self.reach:
             return None
-        legs = returns.points[np.hypot(*(returns.points - track.mean[:2]).T) < self.radius]
+        legs = returns.points.compress(np.hypot(*(returns.points - track.mean[:2]).T) < self.radius, axis=0)
         if is_ground is not None and len(legs):
             legs = legs[~is_ground(legs)]
-        if len(legs) < self.fewest or np.hypot(*np.ptp(legs, axis=0)) > self.widest:
+        # Of a few points, lists are faster than arrays.
+        xs, ys = legs.T.tolist()
+        if len(xs) < self.fewest or math.hypot(max(xs) - min(xs), max(ys) - min(ys)) > self.widest:
             return None
-        dx, dy = legs.mean(axis=0) - (pose.x, pose.y)
+        dx, dy = sum(xs) / len(xs) - pose.x, sum(ys) / len(ys) - pose.y
         bearing = math.atan2(dy, dx) - pose.yaw
         return update(track, innovation(track, bearing, math.hypot(dx, dy), pose, self.noise_at(distance, noise)))
 

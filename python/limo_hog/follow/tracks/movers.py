@@ -38,8 +38,8 @@ class Mover:
         Stamp of the last scan that showed it [s].
     scans, shown
         How many did, and for how many of these the camera looked there and showed no person [1].
-    number
-        Of the person whom the camera showed there last; None if it showed none.
+    number, named
+        Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
     """
 
     track: Track
@@ -50,6 +50,7 @@ class Mover:
     scans: int = 1
     shown: int = 0
     number: int | None = None
+    named: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +115,15 @@ class Movers:
         if ground is not None:
             points = points[~grid.is_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
-        for mover in movers:
-            track = self.legs.update(mover.track, replace(returns, points=points), noise)
+        whose = self._whose(movers, points, returns.stamp, noise)
+        for mover in sorted(movers, key=lambda one: one.number is None):
+            own = np.full(len(points), True) if mover.number is None else whose == mover.number
+            track = self.legs.update(mover.track, replace(returns, points=points[own]), noise)
             if track is not None:
                 shown = mover.shown + is_in_view(track, returns, camera, self.robot)
                 kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1, shown=shown))
-                points = points[np.hypot(*(points - track.mean[:2]).T) > self.legs.radius]
+                rest = ~own | (np.hypot(*(points - track.mean[:2]).T) > self.legs.radius)
+                points, whose = points[rest], whose[rest]
             elif returns.stamp - mover.felt < self._patience(mover, returns, half_view):
                 kept.append(mover)
         still = [index for index, one in enumerate(kept) if not one.left]
@@ -165,7 +169,7 @@ class Movers:
                 numbers[which] = seen[who].number
         # What was taken for the person's legs until now, and is no more, was a piece of them, or begins again.
         return tuple(
-            replace(mover, number=numbers[which], shown=0) if which in numbers else mover
+            named(mover, numbers[which], stamp) if which in numbers else mover
             for which, mover in enumerate(movers)
             if which in numbers or mover.number not in numbers.values()
         )
@@ -182,6 +186,16 @@ class Movers:
         fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
+    def _whose(self, movers: tuple[Mover, ...], points: Points, stamp: float, noise: Noise) -> NDArray[np.int64]:
+        """Return for each of (N, 2) returns the number of the person whose legs it may be, the nearest; 0 for none."""
+        known = [one for one in movers if one.number is not None]
+        if not known:
+            return np.zeros(len(points), np.int64)
+        places = np.array([kalman.predict(one.track, stamp, noise).mean[:2] for one in known])
+        gaps = np.hypot(*(points[:, None] - places).transpose(2, 0, 1))
+        numbers = np.array([one.number for one in known])[gaps.argmin(axis=1)]
+        return np.where(gaps.min(axis=1) < self.legs.radius, numbers, 0)
+
     def _patience(self, mover: Mover, returns: Returns, half_view: float) -> float:
         if is_in_view(kalman.predict(mover.track, returns.stamp, Noise()), returns, half_view, self.robot):
             return self.forget_s
@@ -194,7 +208,8 @@ class Movers:
         (ends, far), (to, near) = (
             (np.arctan2(at[:, 1] - y, at[:, 0] - x), np.hypot(at[:, 0] - x, at[:, 1] - y)) for at in (points, places)
         )
-        beside = np.abs(np.angle(np.exp(1j * (ends[None, :] - to[:, None])))) < self.beams
+        off = ends[None, :] - to[:, None]
+        beside = np.abs(off - math.tau * np.rint(off / math.tau)) < self.beams
         shortest = np.where(beside, far[None, :], np.inf).min(axis=1, initial=np.inf)
         return np.asarray(beside.any(axis=1) & (shortest > near + self.gap))
 
@@ -228,6 +243,11 @@ class Movers:
         )
         track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, self.legs.noise_at(far, noise))
         return Mover(track, (float(place[0]), float(place[1])), returns.stamp, returns.stamp)
+
+
+def named(mover: Mover, number: int, stamp: float) -> Mover:
+    """Return what the camera shows to be the legs of the person of a number."""
+    return replace(mover, number=number, shown=0, named=mover.named if mover.number == number else stamp)
 
 
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry) -> bool:

@@ -20,7 +20,7 @@ from limo_hog.follow.tracks.association import Association
 from limo_hog.follow.tracks.existence import Existence, Recall
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
 from limo_hog.follow.tracks.legs import Legs, Returns, returns_of
-from limo_hog.follow.tracks.movers import Mover, Movers
+from limo_hog.follow.tracks.movers import Mover, Movers, named
 from limo_hog.follow.tracks.person import Person, initiate, predict
 from limo_hog.follow.tracks.poses import pose_at
 
@@ -80,8 +80,8 @@ class Tracker:
         An unmeasured person is forgotten after so long [s]. Chosen: the time the
         workshop's person takes for one side of the patrol.
     legs_only_s
-        A person not found by HOG is followed by their legs alone for so long [s]. Chosen: a chair's legs may have been
-        taken for theirs, so not as long as `forget_s`.
+        A person not found by HOG is followed by legs alone that do not walk for so long [s]. Chosen: a chair's legs may
+        have been taken for theirs, so not as long as `forget_s`.
     restart_s
         A person measured again after so long has a new track: the old velocity tells nothing [s]. Chosen: people turn
         within a second.
@@ -145,6 +145,7 @@ class Tracker:
         pairs = self.association.pair(known, measured, pose, self.noise, flat)
         people: list[Person] = []
         recall = tracks.recall
+        walking = {one.number for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s}
         for who, person in enumerate(known):
             expected = self._expected(person, pose, observation)
             height = person.window / max(bearing_range(person.track, pose)[1], 0.3)
@@ -154,8 +155,10 @@ class Tracker:
             if who in pairs:
                 people.append(self.correct(person, measured[pairs[who]], pose, chance))
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
-                # Later than that it shows only that the person walked on, not that there is none.
-                people.append(self.existence.update(person, self.existence.of_miss(chance), found=False))
+                # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
+                # that there is one.
+                evidence = 0.0 if person.number in walking else self.existence.of_miss(chance)
+                people.append(self.existence.update(person, evidence, found=False))
             else:
                 people.append(person)
         boxes = {people[who].number: which for who, which in pairs.items()}
@@ -279,13 +282,35 @@ class Tracker:
         for returns in new:
             movers = self.movers.update(movers, returns, half_view, self.noise, grid, ground, camera)
             movers = self.movers.assign(movers, seen, returns.stamp)
+            movers = self._come_back(movers, people, returns.stamp)
+            walking = {one.number for one in self.movers.moving(movers)}
             people = tuple(
                 self.movers.continued(one, movers, returns, self.noise)
-                if one.confirmed and 0 < (tracks.stamp or 0.0) - one.seen < self.legs_only_s
+                if one.confirmed
+                and one.seen != tracks.stamp
+                and ((tracks.stamp or 0.0) - one.seen < self.legs_only_s or one.number in walking)
                 else one
                 for one in people
             )
         return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
+
+    def _come_back(self, movers: tuple[Mover, ...], people: tuple[Person, ...], stamp: float) -> tuple[Mover, ...]:
+        """Take legs that began to walk since a person was lost, where that person can be, for theirs.
+
+        Only where they can be one person's alone, and that person has no others to choose from.
+        """
+        lost = [one for one in people if one.confirmed and self.scan_period_s < stamp - one.measured < self.legs_only_s]
+        walking = [one for one in self.movers.moving(movers) if one.number is None and one.felt == stamp]
+        pairs = [
+            (one.number, mover)
+            for one in lost
+            for mover in walking
+            if mover.since > one.measured and self._is_near(one, mover.track)
+        ]
+        if len(pairs) != 1:
+            return movers
+        number, legs = pairs[0]
+        return tuple(named(mover, number, stamp) if mover is legs else mover for mover in movers)
 
     def around(
         self, tracks: Tracks, followed: Person | None, now: float, lately_s: float

@@ -31,7 +31,7 @@ FOLLOW, ROS2, SIM = "python/limo_hog/follow", "python/limo_hog/ros2", "sim/limo_
 ROOMS: dict[str, tuple[list[str], list[str]]] = {
     "safety": (
         [f"{FOLLOW}/safety/*.py", f"{FOLLOW}/sense/clearance.py"],
-        ["tests/follow/safety/test_safety.py", "tests/follow/sense/test_clearance.py", "tests/follow/test_pipeline.py"],
+        ["tests/follow/safety", "tests/follow/sense/test_clearance.py", "tests/follow/test_pipeline.py"],
     ),
     "score": (
         [f"{SIM}/run/score/*.py", f"{SIM}/run/matching.py"],

@@ -239,6 +239,18 @@ fn asked(call: &dyn Fn(&Interrupt)) -> usize {
 }
 
 #[test]
+fn grouping_asks_its_caller_again_for_every_group() {
+    let [one, five] = [1, 5].map(|groups| {
+        let rect = |i: i32| Rect { x: 500 * (i % groups), y: 0, width: 64, height: 128 };
+        let rects: Vec<Rect> = (0..10).map(rect).collect();
+        asked(&|interrupt| {
+            assert_eq!(group_rectangles(&rects, 1, 0.2, interrupt).unwrap().len(), groups as usize);
+        })
+    });
+    assert_eq!(five - one, 5 - 1);
+}
+
+#[test]
 fn crops_that_are_described_at_once_are_asked_for_one_by_one_or_few_abreast() {
     let hog = Hog::new(&HogParams::default(), None).unwrap();
     let [one, sixteen] = [1, 16].map(|crops| {

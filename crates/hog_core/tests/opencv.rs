@@ -248,21 +248,30 @@ fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
     }
 }
 
+/// The votes of columns `from` to `to` of an image whose columns are those of one pattern, `first` and on.
+fn votes_of_columns(width: usize, first: usize, [from, to]: [usize; 2]) -> Vec<[f32; 2]> {
+    let pixel = |i: usize| {
+        let (x, y) = ((i % width).saturating_sub(first), i / width);
+        (7 * x * x + 13 * y * y + 5 * x * y) as u8
+    };
+    let data: Vec<u8> = (0..width * 64).map(pixel).collect();
+    let image = ImageView::new(&data, width, 64, 1, width).unwrap();
+    let hog = Hog::new(&HogParams::default(), None).unwrap();
+    let (found, _) = hog.gradient(image, [0; 4], &Interrupt::NEVER).unwrap();
+    found.shares.chunks_exact(width).flat_map(|row| row[from..to].to_vec()).collect()
+}
+
 #[test]
 fn angles_of_sixteen_columns_are_rounded_as_those_of_more() {
     // OpenCV's vector code takes runs of 16 pixels and more; with fused multiply-add its scalar code rounds otherwise.
-    let inner = |width: usize| {
-        let pixel = |i: usize| {
-            let (x, y) = (i % width, i / width);
-            (7 * x * x + 13 * y * y + 5 * x * y) as u8
-        };
-        let data: Vec<u8> = (0..width * 64).map(pixel).collect();
-        let image = ImageView::new(&data, width, 64, 1, width).unwrap();
-        let hog = Hog::new(&HogParams::default(), None).unwrap();
-        let (found, _) = hog.gradient(image, [0; 4], &Interrupt::NEVER).unwrap();
-        found.shares.chunks_exact(width).flat_map(|row| row[1..15].to_vec()).collect::<Vec<_>>()
-    };
-    assert_eq!(inner(16), inner(40));
+    assert_eq!(votes_of_columns(16, 0, [1, 15]), votes_of_columns(40, 0, [1, 15]));
+}
+
+#[test]
+fn the_last_columns_of_a_row_longer_than_1024_are_rounded_as_a_row_of_their_own() {
+    // A row is taken in runs of 1024.
+    assert_eq!(votes_of_columns(1024 + 8, 1024, [1025, 1031]), votes_of_columns(8, 0, [1, 7]));
+    assert_eq!(votes_of_columns(1024 + 16, 1024, [1025, 1039]), votes_of_columns(16, 0, [1, 15]));
 }
 
 #[test]

@@ -140,7 +140,6 @@ mod tests {
 
     #[test]
     fn the_order_in_which_regions_are_found_does_not_matter() {
-        let places = [(0, 0), (600, 0), (24, 8), (8, 0), (8, 300), (40, 310), (90, 24), (130, 16)];
         let merged = |places: &[(usize, usize)]| {
             let mut regions: Vec<_> = places.iter().map(|&(x, y)| region(x, y)).collect();
             merge(&mut regions, 0, WIN);
@@ -149,12 +148,21 @@ mod tests {
             corners.sort_unstable();
             corners
         };
-        let wanted = merged(&places);
-        let mut places = places;
-        for turn in 0..places.len() {
-            places.rotate_left(1);
-            places.swap(turn, 3);
-            assert_eq!(merged(&places), wanted);
+        for seed in 0..100 {
+            let place = |i: usize| (8 * ((i * i * 7 + 31 * seed) % 97), 8 * ((i * 29 + seed * i) % 41));
+            let mut places: Vec<_> = (1..13).map(place).collect();
+            let wanted = merged(&places);
+            places.reverse();
+            assert_eq!(merged(&places), wanted, "{seed}");
+        }
+    }
+
+    #[test]
+    fn two_regions_that_cost_less_together_become_one() {
+        for other in [(8, 0), (0, 8), (24, 16), (0, 160)] {
+            let mut regions = vec![region(0, 0), region(other.0, other.1)];
+            merge(&mut regions, 0, WIN);
+            assert_eq!(regions.len(), 1, "{other:?}");
         }
     }
 

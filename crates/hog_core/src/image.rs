@@ -124,6 +124,7 @@ mod tests {
         assert!(ImageView::new(&[0; 11], 4, 3, 1, 4).is_err());
         assert!(ImageView::new(&[0; 12], 4, 3, 1, 3).is_err());
         assert!(ImageView::new(&[0; 12], 1, 3, 4, 4).is_err());
+        assert!(ImageView::new(&[0; 36], 4, 3, 3, 4).is_err());
         assert!(ImageView::new(&[], 0, 3, 1, 4).is_err());
         assert!(ImageView::new(&[0; 12], 4, 3, 1, usize::MAX).is_err());
     }

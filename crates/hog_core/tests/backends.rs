@@ -224,18 +224,18 @@ fn a_window_at_the_threshold_is_decided_on_the_resized_image() {
     let (picture, size, detector) = (Picture::new(257, 200, 3, 6), Size::new(150, 170), Detector::people());
     let resized = resize(picture.view(), size).unwrap();
     let resized = ImageView::new(&resized, size.width, size.height, 3, size.width * 3).unwrap();
-    let every = detector.every_window(resized, &STEPS);
-    // One level alone, where most windows are far from the threshold.
-    let pyramid = Pyramid { first: Some(size), scale: 100.0, ..PYRAMID };
+    // Two levels, the second of which is resized twice; on either most windows are far from the threshold.
+    let all = Search { hit_threshold: ALL_WINDOWS, ..STEPS };
+    let every = candidates(&detector, resized, &all, 1.2);
+    let pyramid = Pyramid { first: Some(size), scale: 1.2 };
     for backend in available() {
         let hog = hog(&detector, backend);
-        for &Hit { weight: hit_threshold, .. } in every.iter().step_by(every.len() / 8) {
-            let search = Search { hit_threshold, ..STEPS };
-            let all = Grouping::Similar(0);
+        for &Candidate { weight: hit_threshold, .. } in every.iter().filter(|one| one.scale > 1.0) {
+            let wanted = every.iter().filter(|one| one.weight >= hit_threshold).count();
+            let (search, all) = (Search { hit_threshold, ..STEPS }, Grouping::Similar(0));
             let found = hog
                 .detect_multi_scale(picture.view(), &search, &pyramid, all, None, 1, &Interrupt::NEVER)
                 .unwrap();
-            let wanted = every.iter().filter(|hit| hit.weight >= hit_threshold).count();
             assert_eq!(found.len(), wanted, "{} {hit_threshold}", backend.name());
         }
     }

@@ -214,8 +214,6 @@ fn equal_channels_tie_for_the_lowest_but_in_the_last_columns_for_the_highest() {
 fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
     let (width, height) = (23, 11);
     let picture = Picture::new(width, height, 1, 5);
-    let params = HogParams { gamma_correction: false, ..HogParams::default() };
-    let hog = Hog::new(&params, None).unwrap();
     let mirrored = |at: i64, len: i64| {
         (if at < 0 {
             -at
@@ -229,7 +227,11 @@ fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
         let (x, y) = (mirrored(x, width as i64), mirrored(y, height as i64));
         f32::from(picture.data[y * width + x])
     };
-    for [left, top, right, bottom] in [[0, 0, 0, 0], [3, 2, 5, 4]] {
+    for ([left, top, right, bottom], signed_gradient) in
+        [([0; 4], false), ([3, 2, 5, 4], false), ([0; 4], true)]
+    {
+        let params = HogParams { gamma_correction: false, signed_gradient, ..HogParams::default() };
+        let hog = Hog::new(&params, None).unwrap();
         let (found, size) =
             hog.gradient(picture.view(), [left, top, right, bottom], &Interrupt::NEVER).unwrap();
         assert_eq!((size.width as i64, size.height as i64), (23 + left + right, 11 + top + bottom));
@@ -239,8 +241,9 @@ fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
             let (dx, dy) = (pixel(x + 1, y) - pixel(x - 1, y), pixel(x, y + 1) - pixel(x, y - 1));
             let magnitude = dx.hypot(dy);
             assert!((shares[0] + shares[1] - magnitude).abs() < 1e-3 * magnitude + 1e-3, "{x} {y}");
-            // Bins are 20° wide, their centres at 10°, 30°, ...; the share is the distance from the other centre.
-            let place = (dy.atan2(dx).to_degrees().rem_euclid(180.0) / 20.0 - 0.5).rem_euclid(9.0);
+            // Nine bins, 20° wide or 40° where signs count; the share is the distance from the other bin's centre.
+            let wide = if signed_gradient { 40.0 } else { 20.0 };
+            let place = (dy.atan2(dx).to_degrees().rem_euclid(9.0 * wide) / wide - 0.5).rem_euclid(9.0);
             let from_first = (place - f32::from(bins[0])).rem_euclid(9.0);
             assert_eq!(bins[1], (bins[0] + 1) % 9);
             assert!(magnitude == 0.0 || (shares[1] / magnitude - from_first).abs() < 2e-3, "{x} {y}");
@@ -252,10 +255,10 @@ fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
 fn votes_of_columns(width: usize, first: usize, [from, to]: [usize; 2]) -> Vec<[f32; 2]> {
     let pixel = |i: usize| {
         let (x, y) = ((i % width).saturating_sub(first), i / width);
-        (7 * x * x + 13 * y * y + 5 * x * y) as u8
+        (7 * x * x + 13 * y * y + 5 * x * y + (x * y * y) / 11) as u8
     };
-    let data: Vec<u8> = (0..width * 64).map(pixel).collect();
-    let image = ImageView::new(&data, width, 64, 1, width).unwrap();
+    let data: Vec<u8> = (0..width * 900).map(pixel).collect();
+    let image = ImageView::new(&data, width, 900, 1, width).unwrap();
     let hog = Hog::new(&HogParams::default(), None).unwrap();
     let (found, _) = hog.gradient(image, [0; 4], &Interrupt::NEVER).unwrap();
     found.shares.chunks_exact(width).flat_map(|row| row[from..to].to_vec()).collect()

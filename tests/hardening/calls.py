@@ -190,8 +190,8 @@ def search(a: Arguments) -> None:
         useMeanshiftGrouping=lambda: a.some(False, False, True),
         finalThreshold=lambda: a.some(0, 2, None),
     )
-    if options.get("useMeanshiftGrouping") is True:
-        # Its time grows with the square of the hits.
+    if options.get("useMeanshiftGrouping", False) is not False:
+        # Its time grows with the square of the hits. (What is no bool may stand for True.)
         options["hitThreshold"] = 1.0
     boxes, weights = boxes_and_weights(hog.detectMultiScale(image, **options), 4)
     assert weights.dtype == np.float64

@@ -26,6 +26,7 @@ FILES = (
     *("group/candidate.rs", "group/mean_shift.rs", "group/similar.rs"),
     *("pyramid/grid.rs", "pyramid/levels.rs", "pyramid/resize.rs"),
     *(f"exact/{name}.rs" for name in ("blocks", "gradient", "polar", "svm", "tables", "windows")),
+    *(f"separable/{name}.rs" for name in ("lattice", "mod", "plan")),
     *(f"fast/{name}.rs" for name in ("describe", "plan", "rows", "score", "search", "strip", "tile")),
 )
 #: Test programs, those that tell soonest first: name, arguments, cases of random tests. One test takes half the time.

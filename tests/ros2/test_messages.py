@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import struct
 
@@ -97,6 +98,12 @@ def test_a_scan_comes_back_with_its_angles() -> None:
     assert back.range_max == pytest.approx(8.0)
 
 
+def test_a_scan_message_is_of_one_moment_eight_times_a_second_without_intensities() -> None:
+    message = messages.laser_scan(Scan(2.0, np.ones(5, np.float32), -1.0, 1.0, 0.12, 8.0))
+    assert (message.time_increment, message.scan_time, message.angle_increment) == (0.0, 0.125, 0.5)
+    assert len(message.intensities) == 0
+
+
 @pytest.mark.parametrize("yaw", [0.0, 0.4, -3.1, math.pi / 2])
 def test_odometry_keeps_its_yaw_through_the_quaternion(yaw: float) -> None:
     reading = Odometry(3.25, 1.0, -2.0, yaw, 0.2, -0.4)
@@ -129,6 +136,7 @@ def test_camera_info_is_the_pinhole_of_rep_104() -> None:
     region = info.roi
     unused = (info.binning_x, info.binning_y, region.x_offset, region.y_offset, region.height, region.width)
     assert unused == (0, 0, 0, 0, 0, 0)
+    assert region.do_rectify is False
 
 
 @pytest.mark.parametrize(
@@ -154,6 +162,18 @@ def test_a_jpeg_looks_like_its_picture() -> None:
     assert "jpeg" in message.format
     back = cv2.imdecode(message.data, cv2.IMREAD_COLOR)
     assert np.abs(back.astype(int) - pixels).max() < 6
+
+
+def test_a_jpeg_is_of_quality_90() -> None:
+    pytest.importorskip("cv2")
+    from PIL import Image
+    from PIL.JpegImagePlugin import JpegImageFile
+
+    message = messages.compressed_image(0.0, np.zeros((16, 16, 3), np.uint8))
+    with Image.open(io.BytesIO(message.data.tobytes())) as picture:
+        assert isinstance(picture, JpegImageFile)
+        # libjpeg divides the standard's table (ITU T.81, K.1), whose greatest number is 121, by 5 at quality 90.
+        assert max(picture.quantization[0]) == (121 * (200 - 2 * 90) + 50) // 100
 
 
 def test_stamps_round_to_the_nearest_nanosecond() -> None:
@@ -216,4 +236,6 @@ def test_an_imu_sample_says_that_it_has_no_orientation() -> None:
     assert (message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z) == (0.1, 0.2, 0.3)
     assert (message.linear_acceleration.x, message.linear_acceleration.z) == (1.0, 9.8)
     assert message.header.frame_id == "imu_link"
+    none = message.orientation
+    assert (none.x, none.y, none.z, none.w) == (0.0, 0.0, 0.0, 1.0)
     messages.serialize(message)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 import warnings
-from dataclasses import replace
+from dataclasses import astuple, replace
 from typing import Any
 
 import gymnasium
@@ -18,6 +19,7 @@ from limo_sim.env.glimpse import Glimpse, glimpse, hiding
 from limo_sim.env.second import SHAPING, _reward
 from limo_sim.run.arena import Arena, Plan
 from limo_sim.run.sighting import sighted, state_of
+from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.world.person import Pose
 from limo_sim.world.scenario import DetectorFaults, Furniture, Person, Robot, Scenario, Wall
@@ -190,6 +192,31 @@ def test_a_glimpse_is_what_the_camera_shows() -> None:
         errors.append(abs(seen.visible - truth.visible))
     assert np.mean(errors) < 0.06
     assert max(errors) < 0.35
+
+
+@pytest.mark.parametrize("blocked", [False, True])
+@pytest.mark.parametrize("place", [(2.5, 0.4), (1.9, -0.6), (3.1, 0.0)])
+def test_a_glimpse_is_the_same_wherever_robot_and_person_are_together(
+    place: tuple[float, float], blocked: bool
+) -> None:
+    def seen(x: float, y: float, yaw: float) -> Glimpse:
+        def moved(at: tuple[float, float]) -> tuple[float, float]:
+            turned = complex(x, y) + complex(*at) * cmath.rect(1.0, yaw)
+            return turned.real, turned.imag
+
+        wall = Wall(moved((1.0, -0.5)), moved((1.6, 0.7) if blocked else (0.9, -1.5)))
+        scenario = Scenario(people=(Person(route=((2.5, 0.0, 0.0),), height=1.7),), walls=(wall,))
+        pose = Pose(*moved(place), math.pi + yaw)
+        found = glimpse(Plan(0.0, (x, y, yaw), (pose,)), scenario, 0, hiding(scenario))
+        assert found is not None
+        return found
+
+    here = seen(0.0, 0.0, 0.0)
+    # A pinhole's image of a height is focal length × height / depth.
+    assert here.height_px == pytest.approx(FOCAL_PX * 1.7 / (place[0] - MOUNT_AHEAD))
+    assert (here.visible > 0) == (not blocked)
+    for robot in ((1.0, -2.0, 0.9), (-2.5, 0.7, -2.0)):
+        assert astuple(seen(*robot)) == pytest.approx(astuple(here))
 
 
 @pytest.mark.parametrize(

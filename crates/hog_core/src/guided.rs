@@ -139,6 +139,41 @@ mod tests {
     }
 
     #[test]
+    fn the_order_in_which_regions_are_found_does_not_matter() {
+        let merged = |places: &[(usize, usize)]| {
+            let mut regions: Vec<_> = places.iter().map(|&(x, y)| region(x, y)).collect();
+            merge(&mut regions, 0, WIN);
+            let corners = |region: &Region| (region.x.start, region.x.end, region.y.start, region.y.end);
+            let mut corners: Vec<_> = regions.iter().map(corners).collect();
+            corners.sort_unstable();
+            corners
+        };
+        for seed in 0..100 {
+            let place = |i: usize| (8 * ((i * i * 7 + 31 * seed) % 97), 8 * ((i * 29 + seed * i) % 41));
+            let mut places: Vec<_> = (1..13).map(place).collect();
+            let wanted = merged(&places);
+            places.reverse();
+            assert_eq!(merged(&places), wanted, "{seed}");
+        }
+    }
+
+    #[test]
+    fn two_regions_that_cost_less_together_become_one() {
+        for other in [(8, 0), (0, 8), (24, 16), (0, 160)] {
+            let mut regions = vec![region(0, 0), region(other.0, other.1)];
+            merge(&mut regions, 0, WIN);
+            assert_eq!(regions.len(), 1, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn a_region_costs_the_pixels_of_its_windows_in_vectors_of_128_and_16_rows_more() {
+        let wide = Region { level: 1, x: 8..8 + 65, y: 0..9 };
+        assert_eq!(cost(&region(24, 40), WIN), 128 * (17 + 128 + 16));
+        assert_eq!(cost(&wide, WIN), 256 * (9 + 128 + 16));
+    }
+
+    #[test]
     fn windows_around_a_place_stay_on_the_level() {
         assert_eq!(around(3.0, 1, 10, 8), 16..33);
         assert_eq!(around(-5.0, 1, 10, 8), 0..1);

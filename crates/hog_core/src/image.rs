@@ -105,8 +105,10 @@ pub fn reflect_101(index: i64, len: usize) -> usize {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail")]
 mod tests {
     use super::*;
+    use crate::error::HogError;
 
     #[test]
     fn reflection_repeats_until_inside() {
@@ -122,7 +124,22 @@ mod tests {
         assert!(ImageView::new(&[0; 11], 4, 3, 1, 4).is_err());
         assert!(ImageView::new(&[0; 12], 4, 3, 1, 3).is_err());
         assert!(ImageView::new(&[0; 12], 1, 3, 4, 4).is_err());
+        assert!(ImageView::new(&[0; 36], 4, 3, 3, 4).is_err());
         assert!(ImageView::new(&[], 0, 3, 1, 4).is_err());
         assert!(ImageView::new(&[0; 12], 4, 3, 1, usize::MAX).is_err());
+    }
+
+    #[test]
+    fn the_longest_side_is_a_quarter_of_the_largest_32_bit_number() {
+        let most = (1 << 29) - 1;
+        for (width, height) in [(most, 1), (1, most)] {
+            // Refused for its data alone, of which there are none.
+            let error = ImageView::new(&[], width, height, 1, width).unwrap_err();
+            assert!(matches!(error, HogError::Image(ImageError::Data { .. })));
+        }
+        for (width, height) in [(most + 1, 1), (1, most + 1)] {
+            let error = ImageView::new(&[], width, height, 1, width).unwrap_err();
+            assert!(matches!(error, HogError::Image(ImageError::TooLarge { .. })));
+        }
     }
 }

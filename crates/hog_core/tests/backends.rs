@@ -220,6 +220,28 @@ fn a_search_at_another_size_is_that_of_the_resized_image_on_every_backend() {
 }
 
 #[test]
+fn a_window_at_the_threshold_is_decided_on_the_resized_image() {
+    let (picture, size, detector) = (Picture::new(257, 200, 3, 6), Size::new(150, 170), Detector::people());
+    let resized = resize(picture.view(), size).unwrap();
+    let resized = ImageView::new(&resized, size.width, size.height, 3, size.width * 3).unwrap();
+    // Two levels, the second of which is resized twice; on either most windows are far from the threshold.
+    let all = Search { hit_threshold: ALL_WINDOWS, ..STEPS };
+    let every = candidates(&detector, resized, &all, 1.2);
+    let pyramid = Pyramid { first: Some(size), scale: 1.2 };
+    for backend in available() {
+        let hog = hog(&detector, backend);
+        for &Candidate { weight: hit_threshold, .. } in every.iter().filter(|one| one.scale > 1.0) {
+            let wanted = every.iter().filter(|one| one.weight >= hit_threshold).count();
+            let (search, all) = (Search { hit_threshold, ..STEPS }, Grouping::Similar(0));
+            let found = hog
+                .detect_multi_scale(picture.view(), &search, &pyramid, all, None, 1, &Interrupt::NEVER)
+                .unwrap();
+            assert_eq!(found.len(), wanted, "{} {hit_threshold}", backend.name());
+        }
+    }
+}
+
+#[test]
 fn many_hits_of_a_loud_detector_weigh_what_each_weighs_exactly() {
     // Weights of hundreds: the kernels' sums are too coarse, and every hit is weighed exactly.
     let mut detector = Detector::people();

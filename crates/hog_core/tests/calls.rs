@@ -3,7 +3,10 @@
 
 mod common;
 
+use std::cell::Cell;
+
 use common::{Detector, Picture, assert_same, available, reached_by};
+use hog_core::exact::{Svm, Tables, scores};
 use hog_core::group::{Candidate, group_candidates, group_rectangles, mean_shift};
 use hog_core::pyramid::{Pyramid, Tap, resize, taps};
 use hog_core::{Grouping, Guide, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
@@ -224,6 +227,58 @@ fn a_caller_who_wants_no_answer_any_more_gets_none() {
     assert!(hog.describe(&[0; 64 * 128], 1, 1, &interrupt, &mut out[..3780]).is_err());
 }
 
+/// How often a call asks whether its answer is still wanted.
+fn asked(call: &dyn Fn(&Interrupt)) -> usize {
+    let times = Cell::new(0);
+    let ask = || {
+        times.set(times.get() + 1);
+        false
+    };
+    call(&Interrupt::when(&ask));
+    times.get()
+}
+
+#[test]
+fn grouping_asks_its_caller_again_for_every_group() {
+    let [one, five] = [1, 5].map(|groups| {
+        let rect = |i: i32| Rect { x: 500 * (i % groups), y: 0, width: 64, height: 128 };
+        let rects: Vec<Rect> = (0..10).map(rect).collect();
+        asked(&|interrupt| {
+            assert_eq!(group_rectangles(&rects, 1, 0.2, interrupt).unwrap().len(), groups as usize);
+        })
+    });
+    assert_eq!(five - one, 5 - 1);
+}
+
+#[test]
+fn crops_that_are_described_at_once_are_asked_for_one_by_one_or_few_abreast() {
+    let hog = Hog::new(&HogParams::default(), None).unwrap();
+    let [one, sixteen] = [1, 16].map(|crops| {
+        asked(&|interrupt| {
+            let mut found = vec![0.0; crops * 3780];
+            hog.describe(&vec![0; crops * 64 * 128], 1, 1, interrupt, &mut found).unwrap();
+        })
+    });
+    // A vector holds two crops at most.
+    assert!(sixteen >= one + 7, "{one} {sixteen}");
+}
+
+#[test]
+fn the_exact_path_asks_its_caller_again_for_every_row_of_windows() {
+    let (detector, picture) = (Detector::people(), Picture::new(64, 128 + 64, 1, 2));
+    let spec = detector.spec();
+    let tables = Tables::new(&spec).unwrap();
+    let svm = Svm::new(&detector.coefficients, &spec).unwrap();
+    // The gradient is the same; the windows are nine rows of one, then two.
+    let [nine, two] = [8, 64].map(|stride| {
+        let grid = detector.grid(picture.view(), &Search { win_stride: (stride, stride), ..STEPS });
+        asked(&|interrupt| {
+            scores(picture.view(), &grid, &spec, &tables, &svm, interrupt).unwrap();
+        })
+    });
+    assert_eq!(nine - two, 9 - 2);
+}
+
 fn guided(detector: &Detector, picture: &Picture, guide: Option<Guide>, threshold: f64) -> Vec<(Rect, f64)> {
     guided_by(detector, picture, guide, &Search { hit_threshold: threshold, ..STEPS })
 }
@@ -280,6 +335,34 @@ fn a_guided_search_in_wide_padding_finds_nothing_new() {
             let found = guided_by(&detector, &picture, Some(Guide { every, margin, reach }), &search);
             assert!(found.iter().all(|hit| all.contains(hit)), "{padding:?} {every} {margin} {reach}");
             assert!(4 * found.len() > all.len(), "{} of {}", found.len(), all.len());
+        }
+    }
+}
+
+#[test]
+fn a_guided_search_at_either_edge_of_a_wide_image_finds_nothing_new() {
+    let detector = Detector::people();
+    for left in [true, false] {
+        // Flat but for the columns at one edge: nothing is found elsewhere.
+        let mut picture = Picture::new(1200, 200, 1, 8);
+        for (at, pixel) in picture.data.iter_mut().enumerate() {
+            let x = at % 1200;
+            if (if left { x } else { 1199 - x }) >= 40 {
+                *pixel = 128;
+            }
+        }
+        for padding in [(48, 16), (96, 0)] {
+            let search = Search { hit_threshold: -3.0, padding, ..STEPS };
+            let all = guided_by(&detector, &picture, None, &search);
+            assert!(all.len() > 5, "{}", all.len());
+            let found =
+                guided_by(&detector, &picture, Some(Guide { every: 2, margin: 0.1, reach: 1 }), &search);
+            // (Sums are in another order where a vector is not full.)
+            let is_one = |hit: &(Rect, f64)| {
+                all.iter().any(|other| other.0 == hit.0 && (other.1 - hit.1).abs() <= detector.rounding())
+            };
+            assert!(found.iter().all(is_one), "{left} {padding:?}");
+            assert!(2 * found.len() > all.len(), "{} of {}", found.len(), all.len());
         }
     }
 }

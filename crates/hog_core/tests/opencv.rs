@@ -211,6 +211,73 @@ fn equal_channels_tie_for_the_lowest_but_in_the_last_columns_for_the_highest() {
 }
 
 #[test]
+fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
+    let (width, height) = (23, 11);
+    let picture = Picture::new(width, height, 1, 5);
+    let mirrored = |at: i64, len: i64| {
+        (if at < 0 {
+            -at
+        } else if at >= len {
+            2 * len - 2 - at
+        } else {
+            at
+        }) as usize
+    };
+    let pixel = |x: i64, y: i64| {
+        let (x, y) = (mirrored(x, width as i64), mirrored(y, height as i64));
+        f32::from(picture.data[y * width + x])
+    };
+    for ([left, top, right, bottom], signed_gradient) in
+        [([0; 4], false), ([3, 2, 5, 4], false), ([0; 4], true)]
+    {
+        let params = HogParams { gamma_correction: false, signed_gradient, ..HogParams::default() };
+        let hog = Hog::new(&params, None).unwrap();
+        let (found, size) =
+            hog.gradient(picture.view(), [left, top, right, bottom], &Interrupt::NEVER).unwrap();
+        assert_eq!((size.width as i64, size.height as i64), (23 + left + right, 11 + top + bottom));
+        for (at, (shares, bins)) in found.shares.iter().zip(&found.bins).enumerate() {
+            let (x, y) = ((at % size.width) as i64 - left, (at / size.width) as i64 - top);
+            // The image's own border is that of the padding: one mirrored pixel more.
+            let (dx, dy) = (pixel(x + 1, y) - pixel(x - 1, y), pixel(x, y + 1) - pixel(x, y - 1));
+            let magnitude = dx.hypot(dy);
+            assert!((shares[0] + shares[1] - magnitude).abs() < 1e-3 * magnitude + 1e-3, "{x} {y}");
+            // Nine bins, 20° wide or 40° where signs count; the share is the distance from the other bin's centre.
+            let wide = if signed_gradient { 40.0 } else { 20.0 };
+            let place = (dy.atan2(dx).to_degrees().rem_euclid(9.0 * wide) / wide - 0.5).rem_euclid(9.0);
+            let from_first = (place - f32::from(bins[0])).rem_euclid(9.0);
+            assert_eq!(bins[1], (bins[0] + 1) % 9);
+            assert!(magnitude == 0.0 || (shares[1] / magnitude - from_first).abs() < 2e-3, "{x} {y}");
+        }
+    }
+}
+
+/// The votes of columns `from` to `to` of an image whose columns are those of one pattern, `first` and on.
+fn votes_of_columns(width: usize, first: usize, [from, to]: [usize; 2]) -> Vec<[f32; 2]> {
+    let pixel = |i: usize| {
+        let (x, y) = ((i % width).saturating_sub(first), i / width);
+        (7 * x * x + 13 * y * y + 5 * x * y + (x * y * y) / 11) as u8
+    };
+    let data: Vec<u8> = (0..width * 900).map(pixel).collect();
+    let image = ImageView::new(&data, width, 900, 1, width).unwrap();
+    let hog = Hog::new(&HogParams::default(), None).unwrap();
+    let (found, _) = hog.gradient(image, [0; 4], &Interrupt::NEVER).unwrap();
+    found.shares.chunks_exact(width).flat_map(|row| row[from..to].to_vec()).collect()
+}
+
+#[test]
+fn angles_of_sixteen_columns_are_rounded_as_those_of_more() {
+    // OpenCV's vector code takes runs of 16 pixels and more; with fused multiply-add its scalar code rounds otherwise.
+    assert_eq!(votes_of_columns(16, 0, [1, 15]), votes_of_columns(40, 0, [1, 15]));
+}
+
+#[test]
+fn the_last_columns_of_a_row_longer_than_1024_are_rounded_as_a_row_of_their_own() {
+    // A row is taken in runs of 1024.
+    assert_eq!(votes_of_columns(1024 + 8, 1024, [1025, 1031]), votes_of_columns(8, 0, [1, 7]));
+    assert_eq!(votes_of_columns(1024 + 16, 1024, [1025, 1039]), votes_of_columns(16, 0, [1, 15]));
+}
+
+#[test]
 fn the_gaussian_is_an_eighth_of_the_block_sides_unless_one_is_given() {
     let sigma = |win_sigma, block_size| {
         HogParams { win_sigma, block_size, ..HogParams::default() }.effective_win_sigma()
@@ -219,6 +286,24 @@ fn the_gaussian_is_an_eighth_of_the_block_sides_unless_one_is_given() {
     assert_eq!([sigma(2.5, (16, 16)), sigma(1e-3, (16, 16))], [2.5, 1e-3]);
     let spec = HogSpec::new(&HogParams { block_size: (24, 16), win_size: (64, 128), ..HogParams::default() });
     assert_eq!(spec.unwrap().sigma, 5.0);
+}
+
+#[test]
+fn one_level_is_enough_and_none_is_refused() {
+    let of = |nlevels| HogSpec::new(&HogParams { nlevels, ..HogParams::default() });
+    assert_eq!(of(1).unwrap().nlevels, 1);
+    assert!(of(0).is_err() && of(-1).is_err());
+}
+
+#[test]
+fn cells_of_one_pixel_are_served_and_sides_of_none_refused() {
+    let of = |side: (i64, i64)| {
+        let sizes =
+            HogParams { win_size: (8, 8), block_size: side, block_stride: side, ..HogParams::default() };
+        HogSpec::new(&HogParams { cell_size: side, ..sizes })
+    };
+    assert_eq!(of((1, 1)).unwrap().descriptor_len(), 8 * 8 * 9);
+    assert!(of((0, 1)).is_err() && of((1, 0)).is_err());
 }
 
 #[test]

@@ -64,6 +64,21 @@ def test_depth_sees_what_the_lidar_misses() -> None:
     assert ahead().step(view, ahead().start()).twist.linear == 0
 
 
+def test_a_depth_image_of_zeros_shows_nothing_and_stops_the_robot() -> None:
+    decision = ahead().step(replace(look(), scan=scan(), depth=flat(0.0)), ahead().start())
+    assert decision.twist == Twist(0.0, 0.0)
+    assert "no valid pixel" in decision.reason
+
+
+def test_two_frames_may_have_one_stamp_but_time_may_not_run_backwards() -> None:
+    first = ahead().step(replace(look(stamp=3.0), scan=scan(stamp=3.0)), ahead().start())
+    again = ahead().step(replace(look(stamp=3.0), scan=scan(stamp=3.0)), first.state)
+    assert again.twist.linear == 0.5
+    before = ahead().step(replace(look(stamp=2.9), scan=scan(stamp=3.0)), first.state)
+    assert before.twist.linear == 0.0
+    assert "backwards" in before.reason
+
+
 def test_what_was_seen_before_a_turn_stops_the_way_back() -> None:
     guard = Guard(Headstrong(Twist(-0.3, 0.0)))
     there = replace(look(), scan=scan_of([(0.7, 0.0)]), odometry=Odometry())
@@ -77,7 +92,7 @@ def test_what_was_seen_before_a_turn_stops_the_way_back() -> None:
     assert guard.step(later, decision.state).twist.linear == -0.3
 
 
-@pytest.mark.parametrize(("age", "stopped"), [(9.9, True), (10.1, False)])
+@pytest.mark.parametrize(("age", "stopped"), [(0.2, True), (9.9, True), (10.1, False)])
 def test_what_was_seen_behind_counts_for_ten_seconds(age: float, stopped: bool) -> None:
     guard = Guard(Headstrong(Twist(-0.3, 0.0)))
     # On any clock, and not behind yet.

@@ -81,6 +81,13 @@ def test_ranges_beyond_the_lidars_limits_are_no_points() -> None:
     assert len(scan_points(scan(np.array([0.05, 9.0, np.nan, np.inf], np.float32)), LIMO)) == 0
 
 
+def test_a_range_of_exactly_the_lidars_reach_is_a_point() -> None:
+    # sensor_msgs/LaserScan: what is beyond range_max is to be discarded.
+    assert (
+        len(scan_points(scan(np.array([8.0, np.nextafter(np.float32(8.0), np.float32(9.0))], np.float32)), LIMO)) == 1
+    )
+
+
 def test_the_floor_is_no_obstacle() -> None:
     rows = np.arange(480, dtype=np.float32)[:, None] + 0.5 - 240
     floor = np.where(rows > 0, 0.175 * 448.6 / np.maximum(rows, 0.5), np.inf).astype(np.float32)
@@ -120,6 +127,17 @@ def test_the_pixels_looked_at_lie_8_apart_as_far_from_either_edge() -> None:
 def test_depth_of_exactly_the_reach_and_of_nothing_is_no_point() -> None:
     assert len(DepthGrid().points(flat(1.5), 448.6, 1.5, LIMO)) == 0
     assert len(DepthGrid().points(flat(0.0), 448.6, 1.5, LIMO)) == 0
+
+
+def test_every_pixel_looked_at_has_the_depth_of_its_own_row_and_column() -> None:
+    rows, columns = np.mgrid[0:480, 0:640]
+    depth = (1.0 + rows / 4800 + columns / 64000).astype(np.float32)
+    found = DepthGrid().points(depth, 448.6, 1.8, LIMO)
+    # From the fifth row and column on, every eighth, as far as it lies 5 cm above the floor.
+    for row, column in ((4, 4), (100, 316), (236, 636)):
+        z = float(depth[row, column])
+        wanted = (0.084 + z, (320 - column - 0.5) / 448.6 * z)
+        assert np.abs(found - wanted).max(axis=1).min() < 1e-6
 
 
 def test_points_go_to_the_odometry_frame_and_back() -> None:

@@ -79,6 +79,11 @@ def test_unseen_people_come_to_a_stop_and_grow_uncertain() -> None:
     assert np.linalg.eigvalsh(much_later.covariance).min() > 0
 
 
+def test_an_unseen_velocity_is_a_third_after_four_seconds() -> None:
+    track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.9, -0.6]))
+    assert predict(track, 4.0, NOISE).mean[2:] == pytest.approx(np.array([0.9, -0.6]) / math.e)
+
+
 def test_at_an_earlier_stamp_the_person_is_where_they_came_from() -> None:
     track = replace(initiate(5.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.0, 0.5]))
     before = predict(track, 4.0, NOISE)

@@ -242,6 +242,19 @@ def test_the_turn_rates_changes_are_averaged() -> None:
     assert result.mean_abs_domega == pytest.approx(0.8 / 3)
 
 
+def test_a_turn_rate_that_is_no_number_counts_as_none() -> None:
+    result = card(*(step(k, turn=turn) for k, turn in enumerate((0.0, math.nan, 0.2))))
+    assert result.mean_abs_domega == pytest.approx((0.0 + 0.2) / 2)
+
+
+def test_driving_is_the_share_of_the_steps_whose_command_moves_the_robot() -> None:
+    scorer = Scorer(Scenario.load("two_people"))
+    assert scorer.driving == 0.0
+    for k, turn in enumerate((0.0, 0.5, 0.2, 0.0)):
+        scorer.add(step(k, turn=turn))
+    assert scorer.driving == 2 / 4
+
+
 @pytest.mark.parametrize("turn", [1.7e308, math.inf, math.nan])
 def test_no_command_makes_a_figure_infinite(turn: float) -> None:
     result = card(*(step(k, person(), turn=turn * (-1) ** k) for k in range(4)))

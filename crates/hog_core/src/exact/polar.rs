@@ -65,6 +65,25 @@ mod tests {
     }
 
     #[test]
+    fn steep_angles_are_rounded_as_opencvs_vector_code_and_its_scalar_code_round_them() {
+        // cv2.cartToPolar 4.14 with fused multiply-add, of 16 equal gradients and of three: bits of the angles.
+        let recorded = [
+            ((2.0, 185.0), 0x3fc7_adb1, 0x3fc7_adb2),
+            ((3.0, 60.0), 0x3fc2_ab23, 0x3fc2_ab22),
+            ((4.0, 33.0), 0x3fb9_9fb2, 0x3fb9_9fb3),
+            ((6.0, 28.0), 0x3fae_0a68, 0x3fae_0a67),
+            ((6.0, 119.0), 0x3fc2_9d67, 0x3fc2_9d68),
+        ];
+        for ((dx, dy), vector, scalar) in recorded {
+            for (vector_rule, wanted) in [(true, vector), (false, scalar)] {
+                let (mut magnitude, mut angle) = ([dx], [dy]);
+                polar::<Fused>(&mut magnitude, &mut angle, vector_rule);
+                assert_eq!(angle[0].to_bits(), wanted, "{dx} {dy} {vector_rule}");
+            }
+        }
+    }
+
+    #[test]
     fn no_gradient_has_angle_and_magnitude_zero() {
         let (mut magnitude, mut angle) = ([0.0], [0.0]);
         polar::<Separate>(&mut magnitude, &mut angle, true);

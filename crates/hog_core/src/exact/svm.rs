@@ -60,3 +60,23 @@ fn add_block(score: f64, weights: &[f32], block: &[f32]) -> f64 {
     let tail = weights_tail.iter().zip(block_tail);
     tail.fold(score + sum, |score, (weight, value)| score + f64::from(value * weight))
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail")]
+mod tests {
+    use super::*;
+    use crate::params::HogParams;
+
+    #[test]
+    fn a_detector_without_a_bias_scores_as_one_whose_bias_is_zero() {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let mut coefficients = vec![0.5; spec.descriptor_len()];
+        let without = Svm::new(&coefficients, &spec).unwrap();
+        coefficients.push(0.0);
+        let with = Svm::new(&coefficients, &spec).unwrap();
+        let block = vec![0.25; spec.block_len];
+        assert_eq!(without, with);
+        let score = without.score([block.as_slice()].into_iter());
+        assert_eq!(score, 0.5 * 0.25 * spec.block_len as f64);
+    }
+}

@@ -39,5 +39,8 @@ mod tests {
             [rect(i32::MAX, i32::MIN, i32::MAX, i32::MAX), rect(i32::MIN, i32::MAX, i32::MAX, i32::MIN)];
         let found = clip(vec![(far[0], 1.0), (far[1], 1.0), (rect(-5, -5, 10, 10), 2.0)], 8, 8);
         assert_eq!(found, [(rect(0, 0, 5, 5), 2.0)]);
+        // What only touches the image has no part in it.
+        let beside = [rect(8, 2, 4, 4), rect(2, 8, 4, 4), rect(-4, 2, 4, 4), rect(2, -4, 4, 4)];
+        assert_eq!(clip(beside.map(|rect| (rect, 1.0)).to_vec(), 8, 8), []);
     }
 }

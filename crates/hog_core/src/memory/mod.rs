@@ -79,6 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[cfg_attr(miri, ignore = "Miri ends where memory cannot be had")]
     fn what_cannot_be_had_is_an_error_with_its_bytes() {
         let bytes = usize::MAX / 2;
         assert_eq!(filled(bytes, 0u8).unwrap_err(), HogError::Memory { bytes });

@@ -78,6 +78,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "Miri takes minutes to fill ten megabytes")]
     fn a_workspace_is_used_again_unless_it_is_large() {
         let pool: Pool<Vec<u8>> = Pool::new();
         pool.with(|bytes| bytes.extend([1, 2, 3]));

@@ -42,7 +42,7 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
         [
             *(
                 f"tests/follow/control/test_{name}.py"
-                for name in ("steer", "company", "backing", "workshop_controllers")
+                for name in ("steer", "company", "backing", "lookout", "workshop_controllers")
             ),
             *("tests/follow/sense/test_clearance.py", "tests/follow/control/test_tracking.py", "tests/follow/tracks"),
             "tests/follow/test_pipeline.py",
@@ -58,7 +58,8 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
     "sense": (
         [f"{FOLLOW}/sense/{name}.py" for name in ("appearance", "measurement", "ranging", "region", "visibility")],
         [
-            *("tests/follow/sense/test_appearance.py", "tests/follow/sense/test_region.py", "tests/follow/tracks"),
+            *(f"tests/follow/sense/test_{name}.py" for name in ("appearance", "region", "ranging")),
+            "tests/follow/tracks",
             *(f"tests/follow/control/test_{name}.py" for name in ("workshop_controllers", "tracking")),
             "tests/follow/test_pipeline.py",
         ],

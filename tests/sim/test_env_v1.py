@@ -245,3 +245,48 @@ def test_what_hog_cannot_find_is_not_found(place: tuple[float, float], found: bo
     seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(*place, 0.0),)), scenario, 0, [])
     assert seen is not None
     assert seen.found == found
+
+
+@pytest.mark.parametrize(
+    ("column", "found"), [(0.0, True), (250.0, True), (-250.0, True), (275.0, False), (-275.0, False)]
+)
+def test_a_person_near_a_side_of_the_image_is_seen_and_not_found(column: float, found: bool) -> None:
+    # 320 px from the middle to a side, of which the last 60 are too near to it.
+    place = (2.5, -column * (2.5 - MOUNT_AHEAD) / FOCAL_PX)
+    scenario = Scenario(people=(Person(route=((*place, 0.0),)),))
+    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(*place, 0.0),)), scenario, 0, [])
+    assert seen is not None
+    assert seen.visible == pytest.approx(1.0)
+    assert seen.found == found
+
+
+def test_the_gray_image_has_the_size_that_is_documented() -> None:
+    observation, _ = LimoFollowV1(STANDING, "gray").reset(seed=0)
+    assert observation["gray"].shape == (60, 80, 1)
+
+
+@pytest.mark.parametrize("share", [-3.0, -0.5, 0.5, 3.0])
+def test_a_motion_faster_than_the_actions_is_cut_off_at_one(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    env = LimoFollowV1(STANDING, "gray")
+    env.reset(seed=0)
+    moving = Odometry(linear=share * 0.7, angular=share * 1.5)
+    monkeypatch.setattr(Arena, "odometry", lambda _: moving)
+    motion = env.step(STILL)[0]["motion"]
+    assert motion.tolist() == pytest.approx([min(max(share, -1.0), 1.0)] * 2)
+
+
+def test_the_scan_is_the_distance_to_what_it_hits_and_eight_where_it_hits_nothing() -> None:
+    wall = Wall((1.5, -0.5), (1.5, 0.5))
+    observation, _ = LimoFollowV1(Scenario(walls=(wall,)), "camera").reset(seed=0)
+    scan = observation["scan"]
+    lidar_x = 0.103
+    assert scan[146] == pytest.approx(1.5 - lidar_x, abs=0.1)
+    # Beside it the arena ends further off.
+    assert 2.0 < scan[60:100].min() <= scan.max() <= 8.0
+
+
+@pytest.mark.parametrize("others", [(), ((3.0, 0.5),), ((-2.0, 0.0), (3.0, 0.5))])
+def test_the_state_is_of_the_scenarios_first_person(others: tuple[tuple[float, float], ...]) -> None:
+    people = tuple(Person(route=((*place, 0.0),)) for place in ((2.5, 0.0), *others))
+    state, _ = LimoFollowV1(Scenario(people=people)).reset(seed=0)
+    np.testing.assert_allclose(state[:5], [1, 1, 0, 2.5 / 8, 0], atol=0.03)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from limo_hog.follow.control.backing import Backing, Other
 from limo_hog.follow.control.steer import Aim
@@ -101,3 +104,32 @@ def test_with_nobody_else_about_it_backs_slowly() -> None:
     command, reason = BACKING.blindly(Twist(-0.4, 0.1), limit, NEAR, -0.5, 0.3, "following a person")
     assert command == Twist(-0.2, 0.1)
     assert reason == "following a person"
+
+
+def test_a_person_to_the_left_is_turned_away_from_to_the_right_to_look_behind() -> None:
+    left, right = Aim(0.1, 1.0, 0.0, 0.0, 0.1, False), NEAR
+    turns = [BACKING.blindly(Twist(-0.4, 0.0), 0.0, aim, -0.5, 0.3, "")[0].angular for aim in (left, right)]
+    assert turns[0] == -turns[1] < -1
+
+
+@pytest.mark.parametrize("yaw", [-3.0, -2.0, -np.pi / 2, -0.7, 0.0, 0.7, np.pi / 2, 2.0, 3.0])
+def test_the_ground_behind_a_pose_is_up_to_three_decimetres_behind_its_outline(yaw: float) -> None:
+    pose = np.array([0.4, -0.3, yaw])
+    back, side = np.array([-np.cos(yaw), -np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+    behind = np.array(
+        [pose[:2] + (0.145 + far) * back + 0.11 * share * side for far in (0.1, 0.2, 0.3) for share in (-1, 0, 1)]
+    )
+    ground = GRID.start(HERE)
+    freed = np.full((GRID.cells, GRID.cells), -np.inf, np.float32)
+    rows, columns = GRID.index(ground, behind)[0].T
+    freed[rows, columns] = np.inf
+    assert BACKING.is_free_behind(pose, HERE, GRID, replace(ground, freed=freed), (), LIMO)
+    for row, column in zip(rows, columns, strict=True):
+        missing = freed.copy()
+        missing[row, column] = -np.inf
+        assert not BACKING.is_free_behind(pose, HERE, GRID, replace(ground, freed=missing), (), LIMO)
+
+
+def test_before_the_first_scan_nothing_is_known_to_block() -> None:
+    assert not BACKING.is_blocked(HERE, GRID, None, LIMO)
+    assert BACKING.is_free_behind(AHEAD, HERE, GRID, None, (), LIMO)

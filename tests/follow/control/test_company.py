@@ -10,9 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from limo_hog.follow.control.backing import Poses
-from limo_hog.follow.control.company import Company, Walker, Way
+from limo_hog.follow.control.company import Company, Walker, Way, walker_of
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.clearance import NO_POINTS
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.tracks.kalman import Track
 from limo_hog.follow.twist import Twist
 from limo_hog.follow.wheels import Wheels
 
@@ -154,3 +156,46 @@ def test_it_does_not_stay_standing_once_another_way_is_better() -> None:
     way = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, standing, may_back=never)
     assert way is not None
     assert way.speed != 0.0
+
+
+def test_a_track_is_carried_into_the_robots_frame_with_its_velocity() -> None:
+    track = Track(0.0, np.array([1.0, 3.0, 0.5, -0.25]), np.eye(4))
+    # The robot is at (1, 1) and looks along +y, so that ahead is +y and left is -x.
+    walker = walker_of(track, Odometry(0.0, 1.0, 1.0, math.pi / 2), followed=True)
+    np.testing.assert_allclose((walker.x, walker.y, walker.vx, walker.vy), (2.0, 0.0, -0.25, -0.5), atol=1e-12)
+    assert walker.followed
+
+
+def test_a_command_is_driven_on_in_a_circle_for_half_of_the_time_and_then_straight_on() -> None:
+    speed, rate = 0.5, 0.8
+    poses = COMPANY._driven_on(Twist(speed, rate), Twist(speed, rate), 100.0, LIMO)[0]
+    times = COMPANY.step_s * np.arange(1, len(poses) + 1)
+    circle = times <= COMPANY.horizon_s / 2 + 1e-9
+    radius, angle = speed / rate, rate * times[circle]
+    exact = np.stack([radius * np.sin(angle), radius * (1 - np.cos(angle)), angle], axis=1)
+    np.testing.assert_allclose(poses[circle], exact, atol=2e-3)
+    steps = np.diff(poses[~circle], axis=0)
+    np.testing.assert_allclose(np.hypot(steps[:, 0], steps[:, 1]), speed * COMPANY.step_s)
+
+
+@pytest.mark.parametrize("now", [Twist(), Twist(0.4, 0.0), Twist(0.3, -1.0)])
+def test_each_step_of_a_way_leads_along_the_chord_half_way_between_its_two_directions(now: Twist) -> None:
+    ways = [Way(turn, speed) for turn in COMPANY.turns for speed in COMPANY.speeds]
+    for one, back in zip(*COMPANY._driven(ways, now, 1.0, LIMO), strict=True):
+        poses = np.concatenate([np.zeros((1, 3)), one])
+        middle = (poses[1:, 2] + poses[:-1, 2]) / 2
+        dx, dy = np.diff(poses[:, :2], axis=0).T
+        np.testing.assert_allclose(dx * np.sin(middle), dy * np.cos(middle), atol=1e-12)
+        np.testing.assert_array_equal(dx * np.cos(middle) + dy * np.sin(middle) < 0, back)
+
+
+def test_it_backs_straight_off_from_a_person_who_comes_straight_at_it_slowly() -> None:
+    walker = Walker(1.3, 0.0, -0.35, 0.0, followed=True)
+    way = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO)
+    assert way is not None
+    assert way.turn == 0.0
+    assert way.speed < 0
+
+
+def test_to_lose_the_person_followed_from_the_image_costs_less_than_to_come_too_near_another() -> None:
+    assert COMPANY.away < min(COMPANY.clear, COMPANY.clear_other)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from limo_hog.follow import Mode, Twist
+from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.steer import Aim, Steering
 from limo_hog.follow.robot import LIMO
 
@@ -80,3 +82,17 @@ def test_a_possible_person_is_faced_and_driven_to_only_where_that_tells_at_half_
 def test_the_side_is_where_the_person_walks_to_or_else_where_they_are() -> None:
     assert STEERING.side_of(replace(THERE, bearing=-0.2, bearing_rate=0.3)) == 1.0
     assert STEERING.side_of(replace(THERE, bearing=-0.2, bearing_rate=0.01)) == -1.0
+
+
+@pytest.mark.parametrize("bearing", [0.0, 0.8, -0.8, 2.0])
+def test_a_person_is_hidden_by_what_is_on_the_line_of_sight_and_not_beside_or_behind(bearing: float) -> None:
+    along = np.array([math.cos(bearing), math.sin(bearing)])
+    across = np.array([-math.sin(bearing), math.cos(bearing)])
+    for place, hidden in (
+        (along, True),
+        (along + 0.1 * across, True),
+        (along - 0.2 * across, False),
+        (-along, False),
+        (3.0 * along, False),
+    ):
+        assert Detour().hides(place[None], bearing, 2.0) == hidden

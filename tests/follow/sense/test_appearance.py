@@ -80,3 +80,27 @@ def test_no_boxes_have_no_clothes_and_what_are_no_boxes_none_known() -> None:
 def test_in_a_grey_image_clothes_are_light_or_dark() -> None:
     light, dark = (worn(dressed(BOX, (grey, grey, grey), RED)[..., 2]) for grey in (230, 15))
     assert APPEARANCE.cost(light, dark) > OTHER_CLOTHES
+
+
+@pytest.mark.parametrize(
+    "box", [(-69, 100, 120, 240), (200, -90, 120, 240), (200, -66, 120, 240), (640 - 61, 100, 120, 240)]
+)
+def test_what_the_images_edge_leaves_of_a_patch_shows_the_clothes(box: tuple[int, int, int, int]) -> None:
+    image = np.full((480, 640, 3), RED, np.uint8)
+    seen, whole = worn(image, box), worn(image)
+    known = np.isfinite(seen)
+    assert known[1].all()
+    np.testing.assert_array_equal(seen[known], whole[known])
+
+
+def test_a_shirt_that_is_half_above_the_image_is_seen_all_the_same() -> None:
+    # The chest is looked at from .28 to .42 of the box; the image begins within that, or below it.
+    image = np.full((480, 640, 3), RED, np.uint8)
+    assert [bool(np.isfinite(worn(image, (200, y, 120, 240))[0]).all()) for y in (-85, -200)] == [True, False]
+
+
+def test_clothes_are_anothers_only_where_they_clearly_differ() -> None:
+    red, green = worn(dressed(BOX, RED, BLUE)), worn(dressed(BOX, GREEN, BLUE))
+    assert APPEARANCE.is_other(red, green)
+    assert not APPEARANCE.is_other(red, red)
+    assert not APPEARANCE.is_other(None, green)

@@ -43,3 +43,15 @@ def test_where_the_person_is_out_of_the_image_or_fills_it_all_of_it_is_searched(
     bearing: float, distance: float
 ) -> None:
     assert RegionSize().around(bearing, distance, 536.0, -120.0, FOCAL, 640, 480) is None
+
+
+def test_a_small_person_near_by_has_a_region_for_it_is_not_most_of_the_image() -> None:
+    region = RegionSize().around(0.0, 0.8, 160.0, 0.0, FOCAL, 640, 480)
+    assert region is not None
+    assert region.width * region.height < 0.7 * 640 * 480
+
+
+@pytest.mark.parametrize(("column", "within"), [(-0.5, False), (0.5, True), (639.5, True), (640.5, False)])
+def test_a_person_whose_middle_is_beside_the_image_has_no_region(column: float, within: bool) -> None:
+    bearing = math.atan((320 - column) / FOCAL)
+    assert (RegionSize().around(bearing, 3.0, 536.0, -120.0, FOCAL, 640, 480) is not None) == within

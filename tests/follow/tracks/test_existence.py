@@ -112,3 +112,27 @@ def test_the_head_ends_the_outline() -> None:
     assert top_row(depth, BOX, 2.0) == 150
     depth[:330, 290:350] = 2.0
     assert top_row(depth, BOX, 2.0) == 0
+
+
+@pytest.mark.parametrize("found", [1, 2, 3])
+def test_the_recall_that_is_learnt_is_the_share_of_frames_in_which_the_person_was_found(found: int) -> None:
+    learnt = Recall()
+    for frame in range(2000):
+        learnt = EXISTENCE.learn(learnt, 300.0, found=frame % 4 < found)
+    # A hundred frames are kept in mind, and ten of the recall that is assumed before anything is learnt.
+    expected = (100 * found / 4 + 10 * 0.4) / 110
+    assert EXISTENCE.recall_of(learnt, 300.0) == pytest.approx(expected, abs=0.01)
+
+
+def test_misses_are_counted_since_the_last_box() -> None:
+    person, counted = somebody(1, 2.5), []
+    for found in (True, False, False, True, False):
+        person = EXISTENCE.update(person, 0.0, found=found)
+        counted.append(person.misses)
+    assert counted == [0, 1, 2, 0, 1]
+
+
+def test_log_odds_are_those_of_a_probability_and_nothing_known_is_one_half() -> None:
+    assert initiate(1, box(2.5), 0.0, POSE, NOISE, UnknownRange()).existence == 0.5
+    assert replace(new(), log_odds=math.log(4.0)).existence == pytest.approx(4 / 5)
+    assert replace(new(), log_odds=-math.log(4.0)).existence == pytest.approx(1 / 5)

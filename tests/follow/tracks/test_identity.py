@@ -199,3 +199,19 @@ def test_one_who_may_be_the_lost_person_is_looked_at_for_some_seconds_and_then_l
     assert later.candidates == ()
     # They are not looked at anew as long as they are in view.
     assert later.unsure_at == 3.0
+
+
+def test_a_box_that_contradicts_the_track_in_this_frame_may_be_anothers() -> None:
+    # Clothes and stature tell nothing, so what is left is the chance that the box is another person's.
+    for strained, late_s, low, high in ((True, 0.0, 0.88, 0.92), (False, 0.0, 0.99, 1.0), (True, 0.1, 0.99, 1.0)):
+        one = replace(person(1, 1.1, clothes=None, measured=1.1 - late_s), tall=None, strained=strained)
+        assert low < IDENTITY.update(followed(), at(1.1, one)).of(1) < high
+
+
+def test_everyone_else_who_is_about_is_remembered_once() -> None:
+    known = followed()
+    for frame in range(11, 16):
+        stamp = 0.1 * frame
+        others = person(2, stamp, 1.5, IN_GREEN), person(3, stamp, -1.5, IN_GREEN)
+        known = IDENTITY.update(known, at(stamp, person(1, stamp), *others))
+    assert sorted(one.number for one in known.others) == [2, 3]

@@ -222,3 +222,7 @@ def test_the_legs_in_the_scans_between_two_slow_frames_show_that_a_person_has_tu
     assert without.people[0].track.mean[1] == pytest.approx(0.19, abs=0.02)
     assert with_legs.people[0].track.mean[1] == pytest.approx(-0.6 * 0.33, abs=0.1)
     assert with_legs.people[0].felt == 0.3
+
+
+def test_the_velocity_of_a_person_outside_the_gate_may_have_changed_as_by_a_right_angle_at_a_walk() -> None:
+    assert TRACKER.turn_speed == pytest.approx(math.dist((0.75, 0.0), (0.0, 0.75)), rel=0.1)

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from tests.follow.views import look
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import Measurement
@@ -208,3 +209,21 @@ def test_a_place_is_empty_as_soon_as_a_beam_ends_behind_it_and_not_where_somethi
             points = np.array(sorted([(2.0, y - 0.03), (2.0, y + 0.03), *hidden, *after], key=lambda p: p[1] / p[0]))
             movers = MOVERS.update(movers, Returns(index * SCAN_S, points, Odometry()), HALF_VIEW, NOISE, GRID, never)
         assert len(MOVERS.moving(movers)) == moving
+
+
+def test_what_begins_is_where_its_returns_are_wherever_the_robot_is() -> None:
+    for pose in (Odometry(), Odometry(0.0, -1.0, 1.5, 0.7), Odometry(0.0, 2.0, -0.8, -2.5)):
+        angle = pose.yaw - 0.4
+        place = (pose.x + 2.0 * math.cos(angle), pose.y + 2.0 * math.sin(angle))
+        (mover,) = MOVERS.update((), Returns(0.0, np.array([place, place]), pose), HALF_VIEW, NOISE, GRID, FREE)
+        np.testing.assert_allclose(mover.track.mean, [*place, 0.0, 0.0], atol=1e-9)
+
+
+def test_a_miss_says_nothing_of_a_person_whose_legs_walk() -> None:
+    known = person(1, 2.5, 0.0, 0.95)
+    for movers, falls in (((walker(1, 2.5, 0.0),), False), ((), True)):
+        before = Tracks(people=(known,), stamp=0.95, movers=movers)
+        after, boxes = Tracker().update(look(stamp=1.05), before)
+        assert boxes == {}
+        assert (after.people[0].log_odds < known.log_odds) == falls
+        assert after.people[0].misses == 1

@@ -16,9 +16,9 @@ from limo_hog.follow import detector_named
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.twist import Twist
-from limo_sim.run.arena import Arena
+from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.run.catalogue import load
-from limo_sim.sensing.camera import CENTRE_X, FOCAL_PX
+from limo_sim.sensing.camera import CENTRE_X, FOCAL_PX, CameraPose
 from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Person, Robot, Room, Scenario, Wall, Wheels
 from limo_sim.world.truth import Contacts
 from limo_sim.world.variants import made_up
@@ -288,3 +288,47 @@ def test_the_robot_is_stopped_by_an_inner_wall_and_drives_on_in_a_larger_room() 
     assert ends[0][1] == 0
     assert ends[1][0] == pytest.approx(5.4 - LIMO.half_length, abs=0.01)
     assert ends[1][1] == 1
+
+
+def test_a_plan_is_of_now_unless_that_of_the_frame_is_asked_for() -> None:
+    arena = Arena(Scenario(camera=Camera(rate_hz=10, latency_s=0.1)))
+    for _ in range(78):
+        arena.command(Twist(0.5, 0.3))
+        arena.step()
+    now, then = arena.plan(), arena.plan(of_frame=True)
+    assert (now.stamp, now.robot) == (arena.time, arena.truth().robot)
+    assert then.stamp == arena.frame().stamp <= arena.time - 0.1
+    assert then.robot == arena.frame().truth.robot != now.robot
+
+
+def test_a_robot_that_was_never_told_to_drive_is_at_rest_from_the_first_reading_on() -> None:
+    arena = Arena(Scenario())
+    for _ in range(3):
+        for reading in arena.imu():
+            assert math.hypot(*reading.angular_velocity) < 0.1
+            assert math.hypot(*reading.acceleration[:2]) < 1.0
+        arena.step()
+
+
+def test_what_there_was_a_step_ago_is_where_everything_was_a_step_ago() -> None:
+    arena = Arena(Scenario(robot=Robot(yaw=0.8)))
+    for _ in range(100):
+        arena.command(Twist(0.5, 0.6))
+        before = arena.plan().robot
+        arena.step()
+    camera, *_ = arena._earlier(arena._state, 1 / STEPS_PER_SECOND)
+    expected = CameraPose.on_robot(*before)
+    assert (camera.x, camera.y, camera.yaw) == pytest.approx((expected.x, expected.y, expected.yaw), abs=1e-3)
+
+
+def test_a_wall_that_is_touched_again_after_more_than_half_a_second_is_another_contact() -> None:
+    arena = Arena(Scenario(robot=Robot(x=4.5)))
+    furthest, apart = 0.0, 0
+    for speed, seconds in ((0.3, 3.0), (-0.3, 0.6), (0.3, 2.0)):
+        for _ in range(round(seconds * STEPS_PER_SECOND)):
+            arena.command(Twist(speed, 0.0))
+            arena.step()
+            furthest = max(furthest, arena.plan().robot[0])
+            apart += arena.contacts.wall > 0 and arena.plan().robot[0] < furthest - 0.005
+    assert 0.6 < apart / STEPS_PER_SECOND < 1.8
+    assert arena.contacts.wall == 2

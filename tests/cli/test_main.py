@@ -107,6 +107,15 @@ def test_help_imports_no_library() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 0
 
 
+def test_detect_imports_rich_only_where_a_terminal_shows_its_progress(tmp_path: Path) -> None:
+    code = "import sys; from limo_hog.cli.main import main; main(sys.argv[1:]); sys.exit('rich' in sys.modules)"
+    (tmp_path / "broken.jpg").write_bytes(b"no picture")
+    command = [sys.executable, "-c", code, "detect", "--json", "-", str(tmp_path / "broken.jpg")]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "limo-hog: " in done.stderr and "broken.jpg" in done.stderr
+
+
 def test_a_reader_that_has_seen_enough_is_no_error() -> None:
     command = f"{LIMO_HOG} --help | true; echo ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], check=True, capture_output=True, text=True)

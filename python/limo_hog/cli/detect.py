@@ -11,7 +11,6 @@ from pathlib import Path
 
 from limo_hog.cli.support.arguments import count, number, output_file, threads
 from limo_hog.cli.support.output import STDOUT, UsageError
-from limo_hog.cli.support.progress import progress
 from limo_hog.cli.support.results import json_lines, refuse_to_overwrite, write_coco, write_csv
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
@@ -124,7 +123,13 @@ def run(args: argparse.Namespace) -> int:
     from limo_hog.cli.support.pictures import Run
 
     with ExitStack() as stack:
-        run = Run(args, detector, stack.enter_context(progress("pictures")))
+        bar = None
+        if sys.stderr.isatty():
+            # Imported only where it is shown: rich takes a sixth of a call for one picture.
+            from limo_hog.cli.support.progress import progress
+
+            bar = stack.enter_context(progress("pictures"))
+        run = Run(args, detector, bar)
         run.find(stack)
         results = stack.enter_context(json_lines(args.json, parameters, args.resume, args.overwrite))
         start = time.perf_counter()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
@@ -12,12 +13,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from rich.progress import Progress
 
 import limo_hog
 from limo_hog.cli.support.environment import cores
@@ -37,6 +37,9 @@ from limo_hog.imaging.reading import (
     standard_input,
 )
 from limo_hog.imaging.writing import video_writer, write_image
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 Image = NDArray[np.uint8]
 Item = TypeVar("Item")
@@ -72,9 +75,9 @@ class Found:
 
 
 class Run:
-    """One `detect` run: its options and its results so far."""
+    """One `detect` run: its options and its results so far; `bar` shows them on a terminal."""
 
-    def __init__(self, args: argparse.Namespace, detector: PeopleDetector, bar: Progress) -> None:
+    def __init__(self, args: argparse.Namespace, detector: PeopleDetector, bar: Progress | None) -> None:
         self._args, self._detector, self._bar = args, detector, bar
         self._sources: list[Source] = []
         self._copies: dict[Source, Path] = {}
@@ -83,7 +86,7 @@ class Run:
         self._done: dict[str, set[int]] | None = None
         #: The result of each picture, kept if a table is written at the end.
         self.results: list[Result] | None = [] if args.csv or args.coco else None
-        self._task = bar.add_task("looking", total=0)
+        self._task = bar.add_task("looking", total=0) if bar else None
         self.pictures = self.peopled = self.people = self.failed = self.known = 0
         self._ms = 0.0
 
@@ -166,7 +169,7 @@ class Run:
                 self._keep(found)
             else:
                 self._fail(found)
-            self._bar.advance(self._task)
+            self._advance()
 
     def _look_at_video(self, source: Source) -> None:
         copy = self._copies.get(source)
@@ -201,7 +204,7 @@ class Run:
                         write(picture)
                     if found.frame not in done:
                         self._keep(found)
-                    self._bar.advance(self._task)
+                    self._advance()
             except KeyboardInterrupt:
                 # Ctrl-C is how a camera's or a stream's run ends: its copy is complete.
                 if source.kind not in (Kind.CAMERA, Kind.STREAM):
@@ -226,7 +229,12 @@ class Run:
         return written and (source not in self._copies or self._copies[source].exists())
 
     def _expect(self, pictures: int) -> None:
-        self._bar.update(self._task, total=(self._bar.tasks[0].total or 0) + pictures)
+        if self._bar and self._task is not None:
+            self._bar.update(self._task, total=(self._bar.tasks[0].total or 0) + pictures)
+
+    def _advance(self) -> None:
+        if self._bar and self._task is not None:
+            self._bar.advance(self._task)
 
     def _keep(self, found: Found) -> None:
         self._write(vars(found))
@@ -242,7 +250,11 @@ class Run:
 
     def _fail(self, line: str) -> None:
         self.failed += 1
-        self._bar.console.print(f"limo-hog: {line}", highlight=False, markup=False, soft_wrap=True)
+        line = f"limo-hog: {line}"
+        if self._bar:
+            self._bar.console.print(line, highlight=False, markup=False, soft_wrap=True)
+        else:
+            print(line, file=sys.stderr)
 
 
 def _copies(sources: list[Source], folder: Path, wanted: str | None) -> dict[Source, Path]:

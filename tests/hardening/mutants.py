@@ -78,7 +78,10 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "run": (
         [f"{SIM}/run/{name}.py" for name in ("episode", "detector_faults", "sweep")],
-        [f"tests/sim/run/test_{name}.py" for name in ("detector_faults", "episode", "score_sweep", "everywhere")],
+        [
+            f"tests/sim/run/test_{name}.py"
+            for name in ("summary", "detector_faults", "episode", "score_sweep", "everywhere")
+        ],
     ),
     "env": ([f"{SIM}/env/*.py"], ["tests/sim/test_env.py", "tests/sim/test_env_v1.py"]),
     "messages": ([f"{ROS2}/messages.py"], ["tests/ros2/test_messages.py"]),

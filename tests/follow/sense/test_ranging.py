@@ -59,3 +59,11 @@ def test_a_box_is_low_whose_middle_is_below_the_persons(centre: float, low: bool
 def test_a_window_just_as_high_as_the_models_is_expected() -> None:
     for height, found in ((128.0, True), (127.9, False)):
         assert Visibility().expected(0.0, 4.0, 4.0 * height, 0.0, look(), confirmed=True) == found
+
+
+def test_the_depth_of_a_box_is_that_of_a_square_of_twenty_pixels_in_its_middle() -> None:
+    depth = flat(8.0)
+    depth[190:210, 290:310] = 3.0
+    # A quarter of the square; it would be all of one half as wide.
+    depth[195:205, 295:305] = 1.0
+    assert person_depth(depth, np.array([270, 140, 60, 120], np.int32)) == 3.0

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import t as student
+from scipy.stats import ttest_1samp
 from tests.sim.run.test_score import card, person, step
 
 from limo_sim.run.score import ScoreCard
@@ -57,3 +58,12 @@ def test_two_controllers_are_compared_run_by_run() -> None:
     assert comparison.differences["found_again"] is None
     overall = compare([*mine, *theirs], "theirs", {"one": "all"})[0]
     assert (overall.scenario, overall.differences) == ("all", comparison.differences)
+
+
+@pytest.mark.parametrize("values", [[1.0, 2.0, 1.5], [-3.0, -2.5, -3.5, -2.9], [1.0, -1.0, 0.5], [0.1, 4.0, 0.2, -1.0]])
+def test_a_difference_is_sure_where_students_test_rejects_that_there_is_none(values: list[float]) -> None:
+    assert estimate(values).is_sure == (ttest_1samp(values, 0.0).pvalue < 0.05)
+
+
+def test_of_one_run_nothing_is_sure() -> None:
+    assert not estimate([3.0]).is_sure

@@ -199,3 +199,11 @@ def test_it_backs_straight_off_from_a_person_who_comes_straight_at_it_slowly() -
 
 def test_to_lose_the_person_followed_from_the_image_costs_less_than_to_come_too_near_another() -> None:
     assert COMPANY.away < min(COMPANY.clear, COMPANY.clear_other)
+
+
+def test_a_twist_of_whole_numbers_leads_where_the_same_twist_of_floats_does() -> None:
+    walker = Walker(1.6, 0.0, -0.8, 0.1)
+    whole, real = Twist(0, 0), Twist(0.0, 0.0)
+    ways = [COMPANY.way_out(now, now, [walker], NO_POINTS, LIMO, may_back=never) for now in (whole, real)]
+    assert ways[0] == ways[1]
+    assert ways[0] is not None

@@ -34,7 +34,7 @@ class Visibility:
         arena, by camera distance: a .9 m person is found in .92 of the frames at 1.52 m, where .05 is cut, a 1.75 m
         person in .69 at 3.0 m (.10) and in all at 3.5 m (0).
     occluder
-        Something nearer than the person by at least this hides them [m]. Measured: the depth at a box's centre was
+        Something nearer than the person by more than this hides them [m]. Measured: the depth at a box's centre was
         never more than 0.5 m off the person in 3,500 frames.
     """
 

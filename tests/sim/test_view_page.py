@@ -66,7 +66,7 @@ async def _see_it_move(tab: Tab) -> None:
     before = await tab.value("[document.querySelector('#camera').src, document.querySelector('#depth').src]")
     await tab.until(f"document.querySelector('#camera').src !== {before[0]!r}")
     await tab.until(f"document.querySelector('#depth').src !== {before[1]!r}")
-    assert await tab.value("document.querySelector('#camera').naturalWidth") == 640
+    await tab.until("document.querySelector('#camera').naturalWidth === 640")
     # Boxes: the arena itself has nothing that is as green or as red.
     await tab.until(
         """(() => {
@@ -155,5 +155,5 @@ async def _see_it_end(tab: Tab) -> None:
     await tab.value("document.querySelector('#live').click()")
     assert await tab.value("document.querySelector('#shown').textContent") == "now"
     # The page keeps what it showed last.
-    assert await tab.value("document.querySelector('#camera').naturalWidth") == 640
+    await tab.until("document.querySelector('#camera').naturalWidth === 640")
     assert await tab.value("document.querySelector('#pause').disabled") is True

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 from limo_hog.follow.sense.appearance import Clothes
@@ -159,12 +160,13 @@ class Identity:
     def update(self, known: Likeness, tracks: Tracks) -> Likeness:
         """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
         people = {one.number: one for one in tracks.people}
-        chances = self._passed(known, people, tracks)
+        walking = {one.number for one in tracks.people if self._walks_on(one, tracks)}
+        chances = self._passed(known, people, tracks, walking)
         odds = dict(chances)
         for one in tracks.in_view:
             if not self._is_alone(one, tracks):
                 continue
-            stays = known.of(one.number) >= self.stays and self._walks_on(one, tracks)
+            stays = known.of(one.number) >= self.stays and one.number in walking
             evidence = self._evidence(known, one, first=one.age <= 1)
             odds[one.number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
@@ -174,15 +176,20 @@ class Identity:
             known = self._learnt(known, one, tracks)
         return known
 
-    def _passed(self, known: Likeness, people: dict[int, Person], tracks: Tracks) -> dict[int, float]:
-        """Return the probabilities of the tracks before the frame's boxes are looked at."""
+    def _passed(
+        self, known: Likeness, people: dict[int, Person], tracks: Tracks, walking: AbstractSet[int]
+    ) -> dict[int, float]:
+        """Return the probabilities of the tracks before the frame's boxes are looked at.
+
+        `walking` are the numbers of those whose legs go on (`_walks_on`).
+        """
         stamp = tracks.stamp or 0.0
         chances = {number: chance for number, chance in known.chances if number in people}
         for number in chances:
             one = people[number]
             if stamp - one.measured > self.unseen_s:
                 leaves = 1.0 - math.exp(-tracks.period / self.fades_s)
-            elif self._walks_on(one, tracks):
+            elif number in walking:
                 leaves = 0.0
             else:
                 leaves = self.strained if one.strained and one.seen == stamp else self.passes
@@ -206,7 +213,6 @@ class Identity:
         if own in chances and people[own] in measured:
             # What was taken for another person's box may have been none.
             chances[own] += self.passes * absent
-        walking = {one.number for one in measured if self._walks_on(one, tracks)}
         for left, right in itertools.combinations(measured, 2):
             if separation(left, right) < self.meets and not {left.number, right.number} <= walking:
                 swapped = self.swaps * (chances[right.number] - chances[left.number])

@@ -1,7 +1,7 @@
 //! A row's gradients and votes with the exact path's roundings, by vectors: for `computeGradient`.
 
 use std::arch::x86_64::*;
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use crate::exact::{RowKernel, RowVotes, Turn, polar};
 
@@ -187,22 +187,35 @@ fn roots_of_bytes(l: Avx512, pixels: &[u8], roots: &mut [f32]) {
     }
 }
 
+impl Avx512 {
+    /// Whether the square roots of all bytes are those of the CPU's own instruction: asked of the CPU once.
+    ///
+    /// Without a lock, for a child forked meanwhile would wait for it: two threads may ask at once, for the same answer.
+    fn roots_are_exact(self) -> bool {
+        const UNKNOWN: u8 = 2;
+        static ARE_EXACT: AtomicU8 = AtomicU8::new(UNKNOWN);
+        let known = ARE_EXACT.load(Ordering::Relaxed);
+        if known != UNKNOWN {
+            return known == 1;
+        }
+        let bytes: [u8; 256] = std::array::from_fn(|i| i as u8);
+        let mut roots = [0.0; 256];
+        // SAFETY: the token proves that the CPU has the instructions.
+        unsafe { roots_of_bytes(self, &bytes, &mut roots) };
+        let are_exact = roots == bytes.map(|byte| f32::from(byte).sqrt());
+        ARE_EXACT.store(u8::from(are_exact), Ordering::Relaxed);
+        are_exact
+    }
+}
+
 impl VoteLane for Avx512 {
     compiled!("avx2,fma,avx512f,avx512bw,avx512vl,avx512dq");
 
     #[inline(always)]
     fn roots(self, pixels: &[u8], roots: &mut [f32]) -> bool {
-        static ARE_EXACT: OnceLock<bool> = OnceLock::new();
-        let are_exact = || {
-            let bytes: [u8; 256] = std::array::from_fn(|i| i as u8);
-            let mut roots = [0.0; 256];
-            // SAFETY: the token proves that the CPU has the instructions.
-            unsafe { roots_of_bytes(self, &bytes, &mut roots) };
-            roots == bytes.map(|byte| f32::from(byte).sqrt())
-        };
         let fits = pixels.len() >= Self::LANES && pixels.len() == roots.len();
-        if fits && *ARE_EXACT.get_or_init(are_exact) {
-            // SAFETY: as above.
+        if fits && self.roots_are_exact() {
+            // SAFETY: the token proves that the CPU has the instructions.
             unsafe { roots_of_bytes(self, pixels, roots) };
             return true;
         }

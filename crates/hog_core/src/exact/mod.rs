@@ -17,7 +17,9 @@ mod windows;
 pub(crate) use blocks::normalise;
 pub(crate) use gradient::{each_row, gradient};
 pub use kernel::RowVotes;
-pub(crate) use kernel::{Loops, RowKernel, Turn};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use kernel::Turn;
+pub(crate) use kernel::{Loops, RowKernel};
 pub use svm::Svm;
 pub(crate) use tables::cells_along;
 pub use tables::{Tables, gamma_table};

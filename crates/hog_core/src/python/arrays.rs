@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use numpy::{Element, PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 
 use super::errors::raised;
 use crate::error::ImageError;
@@ -21,21 +22,26 @@ pub(super) fn array1<T: Element>(
     Ok(PyArray1::from_vec(py, values))
 }
 
-/// `len` numbers in memory of numpy's, as its function `make` makes them.
-///
-/// (`PyArray1::zeros` would panic where there is no memory.)
-pub(super) fn made<'py, T: Element>(py: Python<'py>, make: &str, len: usize) -> PyResult<Array1<'py, T>> {
-    match py.import("numpy")?.call_method1(make, (len, T::get_dtype(py))) {
+/// `len` numbers of any value in memory of numpy's.
+pub(super) fn empty<T: Element>(py: Python<'_>, len: usize) -> PyResult<Array1<'_, T>> {
+    static EMPTY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    made(py, EMPTY.import(py, "numpy", "empty")?, len)
+}
+
+/// `len` zeros in memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
+pub(super) fn zeros(py: Python<'_>, len: usize) -> PyResult<Array1<'_, f32>> {
+    static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    made(py, ZEROS.import(py, "numpy", "zeros")?, len)
+}
+
+/// `len` numbers as a function of numpy's makes them. (`PyArray1::zeros` would panic where there is no memory.)
+fn made<'py, T: Element>(py: Python<'py>, make: &Bound<'py, PyAny>, len: usize) -> PyResult<Array1<'py, T>> {
+    match make.call1((len, T::get_dtype(py))) {
         Err(error) if error.is_instance_of::<PyMemoryError>(py) => {
             Err(raised(py, &HogError::Memory { bytes: len.saturating_mul(size_of::<T>()) }))
         }
         array => Ok(array?.cast_into()?),
     }
-}
-
-/// `len` zeros in memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
-pub(super) fn zeros(py: Python<'_>, len: usize) -> PyResult<Array1<'_, f32>> {
-    made(py, "zeros", len)
 }
 
 /// The bytes of an array in C order: borrowed where they lie so, else copied.

@@ -15,7 +15,7 @@ use numpy::{
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 
-use self::arrays::{Array1, Pixels, array1, contiguous, made, zeros};
+use self::arrays::{Array1, Pixels, array1, contiguous, empty, zeros};
 use self::errors::{raised, raised_as};
 use crate::error::{ImageError, ParameterError};
 use crate::exact::RowVotes;
@@ -160,8 +160,8 @@ impl Hog {
         let view = pixels.view().map_err(raise)?;
         let size = crate::Hog::gradient_size(view, padding).map_err(raise)?;
         // Every number is written: zeros would be written twice.
-        let shares = made::<f32>(py, "empty", 2 * size.area())?;
-        let bins = made::<u8>(py, "empty", 2 * size.area())?;
+        let shares = empty::<f32>(py, 2 * size.area())?;
+        let bins = empty::<u8>(py, 2 * size.area())?;
         let (mut of_shares, mut of_bins) = (shares.readwrite(), bins.readwrite());
         let out = RowVotes {
             shares: of_shares.as_slice_mut()?.as_chunks_mut().0,

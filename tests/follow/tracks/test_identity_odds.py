@@ -79,6 +79,16 @@ def test_a_box_multiplies_the_odds_by_how_much_more_often_the_person_shows_it(
         assert chance / (1 - chance) == pytest.approx(expected * before / (1 - before))
 
 
+def test_a_shirt_in_other_light_is_as_likely_as_its_three_numbers_say() -> None:
+    for chi2 in (0.5, 2.0, 4.5):
+        worn = IN_RED + np.array([[math.sqrt(chi2 / 2), 0.0, math.sqrt(chi2 / 2)], [0.0, 0.0, 0.0]])
+        one = replace(person(1, 1.0, clothes=worn, age=2), tall=None)
+        chance = IDENTITY.update(known_as((1, 0.5)), at(1.0, one)).of(1)
+        shirt = (0.9 * math.exp(-chi2 / 2) + 0.1 * 0.1) / 0.1
+        before = 0.5 * 0.998 + 0.002 * (1 - 0.5 * 0.998)
+        assert chance / (1 - chance) == pytest.approx((shirt * ratio("trousers")) ** 0.5 * before / (1 - before))
+
+
 def test_one_box_is_never_worth_more_than_a_factor_of_twelve_either_way() -> None:
     before = 0.5 * 0.998 + 0.002 * (1 - 0.5 * 0.998)
     for clothes, times, most in ((IN_RED, 1.0, 12.18), (IN_RED + 9.0, 2.0, 1 / 12.18)):

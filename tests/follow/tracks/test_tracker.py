@@ -288,3 +288,54 @@ def test_no_detector_is_believed_to_find_fewer_than_one_in_five_or_more_than_49_
     for _ in range(3000):
         learnt = Existence(recall_frames=0.01).learn(learnt, 300.0, found=found)
     assert Existence(recall_frames=0.01).recall_of(learnt, 300.0) == recall
+
+
+def test_clothes_are_the_mean_of_the_boxes_until_a_person_is_known_and_then_move_by_a_twentieth() -> None:
+    one = replace(somebody(1, 2.0, clothes=IN_RED), confirmed=False, log_odds=-5.0, age=1)
+    for boxes_ in range(2, 6):
+        one = TRACKER.correct(replace(one, log_odds=-5.0), box(2.0, clothes=IN_GREEN), POSE, 0.4)
+        assert one.clothes == pytest.approx(IN_RED + (IN_GREEN - IN_RED) * (boxes_ - 1) / boxes_)
+        assert one.age == boxes_
+    near = IN_RED + 1.0
+    known = TRACKER.correct(somebody(1, 2.0, clothes=IN_RED), box(2.0, clothes=near), POSE)
+    assert known.clothes == pytest.approx(IN_RED + 0.05)
+    # The first clothes seen are taken; none seen leave those that are known.
+    assert TRACKER.correct(somebody(1, 2.0), box(2.0, clothes=near), POSE).clothes is near
+    assert TRACKER.correct(somebody(1, 2.0, clothes=near), box(2.0), POSE).clothes is near
+
+
+def test_a_box_outside_the_gate_moves_a_track_that_may_have_turned_and_stepped_aside() -> None:
+    one, seen = somebody(1, 3.0), replace(box(3.0, 0.15), stands_out=1.0)
+    loose = one.track.covariance + np.diag([0.5**2, 0.5**2, 1.0, 1.0])
+    fit = kalman.innovation(replace(one.track, covariance=loose), 0.15, 3.0, POSE, NOISE)
+    expected = kalman.update(replace(one.track, covariance=loose), fit)
+    corrected = TRACKER.correct(one, seen, POSE)
+    assert corrected.track.mean == pytest.approx(expected.mean)
+    assert corrected.track.covariance == pytest.approx(expected.covariance)
+    assert corrected.strained
+
+
+def test_legs_that_walk_continue_a_person_for_longer_than_four_seconds_and_legs_that_stand_do_not() -> None:
+    for last, walks, goes_on in ((-2.9, False, True), (-3.1, False, False), (-3.1, True, True)):
+        one = unseen(7, last)
+        legs = replace(walker(7, 2.0, 0.1), began=(2.0 - walks, 0.1))
+        scan = Returns(1.0, np.array([(2.0, 0.08), (2.0, 0.12)]), Odometry())
+        tracks = Tracks((one,), scans=(scan,), stamp=1.0, movers=(replace(legs, felt=0.9),), moved_at=0.9)
+        assert (TRACKER.follow_movers(tracks, 2.0, 0.5, GRID, FREE).people[0].felt == 1.0) == goes_on
+    # One who was found in this frame is where the box is.
+    found = Tracks((unseen(7, 1.0),), scans=(scan,), stamp=1.0, movers=(replace(legs, felt=0.9),), moved_at=0.9)
+    assert TRACKER.follow_movers(found, 2.0, 0.5, GRID, FREE).people[0].felt < 0
+
+
+def test_a_scan_is_entered_once_into_what_moves() -> None:
+    scan = Returns(1.0, np.array([(2.0, 0.08), (2.0, 0.12)]), Odometry())
+    tracks = Tracks((), scans=(scan,), stamp=1.0)
+    after_ = TRACKER.follow_movers(tracks, 2.0, 0.5, GRID, FREE)
+    assert (len(after_.movers), after_.moved_at) == (1, 1.0)
+    assert TRACKER.follow_movers(after_, 2.0, 0.5, GRID, FREE) is after_
+
+
+def test_a_box_exactly_half_a_metre_from_everyone_found_is_a_new_person() -> None:
+    people = [somebody(1, 2.0), replace(somebody(2, 2.5), misses=1)]
+    for distance, new in ((2.5, True), (2.49, False), (1.5, True), (1.51, False)):
+        assert TRACKER.association.is_new(box(distance), people, POSE) == new

@@ -112,8 +112,8 @@ def test_a_beam_passes_a_place_that_it_ends_well_behind(pose: Odometry) -> None:
     x, y = pose.x + LIMO.lidar_x * math.cos(pose.yaw), pose.y + LIMO.lidar_x * math.sin(pose.yaw)
 
     def passed(*ends: tuple[float, float]) -> bool:
-        """Whether beams at these angles off the place, of these lengths, pass a place at 2 m, 3 rad to the left."""
-        to = pose.yaw + 3.0
+        """Whether beams at these angles off the place, of these lengths, pass a place 2 m off, where angles wrap."""
+        to = math.pi
         points = np.array([(x + r * math.cos(to + a), y + r * math.sin(to + a)) for a, r in ends]).reshape(-1, 2)
         place = np.array([(x + 2.0 * math.cos(to), y + 2.0 * math.sin(to))])
         return bool(MOVERS._passed(Returns(0.0, points, pose), place)[0])

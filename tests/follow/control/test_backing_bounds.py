@@ -76,6 +76,11 @@ def test_it_looks_behind_where_a_person_who_stands_is_a_quarter_of_a_metre_too_n
         assert (reason == "why") != looks
 
 
+def test_from_a_person_straight_ahead_it_looks_behind_by_a_turn_to_the_left() -> None:
+    straight = replace(NEAR, bearing=0.0, heading=0.0)
+    assert BACKING.blindly(Twist(-0.4, 0.0), 0.0, straight, -0.5, 0.3, "")[0] == Twist(0.0, 3.0)
+
+
 def test_a_person_walks_who_comes_or_crosses_faster_than_standing_people_seem_to() -> None:
     for range_rate, bearing_rate, walks in (
         (-0.29, 0.0, False),

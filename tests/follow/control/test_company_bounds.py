@@ -225,3 +225,13 @@ def test_a_way_is_kept_for_eight_tenths_of_a_second_and_then_where_it_is_nearly_
         assert (way is worse) == kept
     mirrored = replace(fresh, turn=-fresh.turn, age=5.0)
     assert COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, mirrored) is mirrored
+
+
+def test_a_way_is_left_at_once_where_it_leads_into_a_wall() -> None:
+    walker = ahead(1.3, 0.35, followed=True)
+    back = Way(0.0, -0.4, 0.2)
+    wall = np.array([(-0.4, y) for y in np.arange(-0.5, 0.5, 0.05)])
+    assert COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, back) is back
+    left = COMPANY.way_out(STANDING, STANDING, [walker], wall, LIMO, back)
+    assert left is not None
+    assert left.speed >= 0

@@ -13,6 +13,7 @@ from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import (
     DepthGrid,
     Margin,
+    beam_directions,
     from_odometry,
     room_ahead,
     room_behind,
@@ -75,6 +76,14 @@ def test_without_room_the_robot_stands_and_without_obstacle_nothing_limits_it() 
 def test_a_scan_becomes_points_counter_clockwise_from_the_first_beam() -> None:
     (point,) = scan_points(scan(np.array([np.inf, np.inf, 1.0], np.float32)), LIMO)
     assert point == pytest.approx([0.103 + np.cos(2.0), np.sin(2.0)])
+
+
+def test_what_every_scan_shares_cannot_be_changed() -> None:
+    seen = scan(np.ones(5, np.float32))
+    for shared in (beam_directions(-1.0, 1.0, 5), scan_points(seen, LIMO)):
+        with pytest.raises(ValueError, match="read-only"):
+            shared[0, 0] = 9.0
+    assert scan_points(seen, LIMO) is scan_points(seen, LIMO)
 
 
 def test_ranges_beyond_the_lidars_limits_are_no_points() -> None:

@@ -1,8 +1,8 @@
 """A seeded sample of mutants: one operator, number, condition or statement changed at a time, which a test must notice.
 
 `python -m tests.hardening.mutants safety score --count 200 --state FILE` prints those that no test notices. Each mutant
-runs in a fork of this process that imports the changed module from memory; no file is touched. FILE keeps what was
-decided, and a later run goes on.
+runs in a fork of this process that imports the changed module from memory, and tries the tests that run the changed
+statement, the quickest first; no file is touched. FILE keeps what was decided, and a later run goes on.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
+
+import pytest
+from tests.hardening.traced import OPTIONS, choice, silence, traced
 
 ROOT = Path(__file__).parents[2]
 FOLLOW, ROS2, SIM = "python/limo_hog/follow", "python/limo_hog/ros2", "sim/limo_sim"
@@ -273,17 +276,10 @@ def tried(tests: Sequence[str], mutant: Mutant | None, seconds: float) -> tuple[
     if child == 0:
         code = 3
         try:
-            os.setsid()
-            quiet = os.open(os.devnull, os.O_RDWR)
-            for fd in (0, 1, 2):
-                os.dup2(quiet, fd)
+            silence()
             if mutant is not None:
                 sys.meta_path.insert(0, Changed(mutant))
-            import pytest
-
-            options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-o", "addopts=", "-m", "not slow"]
-            options += ["-W", "ignore:Module already imported", "--no-header"]
-            code = int(pytest.main([*options, *tests]))
+            code = int(pytest.main(["-x", *OPTIONS, *tests]))
         finally:
             os._exit(code)
     while (done := os.waitpid(child, os.WNOHANG)) == (0, 0):
@@ -316,13 +312,14 @@ def main() -> int:
         every = [mutant for path in files for mutant in mutants_of(path)]
         sample = random.Random(args.seed).sample(every, min(args.count, len(every)))
         decided = state.setdefault(room, {})
-        fails, took = tried(tests, None, 600.0)
-        if fails:
+        if tried(tests, None, 600.0)[0]:
             print(f"{room}: the tests fail without a mutant")
             return 2
+        ran = traced(tests, files)
         for mutant in sample:
             if mutant.key not in decided or (args.again and not decided[mutant.key]):
-                decided[mutant.key], _ = tried(tests, mutant, LATEST[0] * took + LATEST[1])
+                chosen, took = choice(mutant.path, mutant.line, ran)
+                decided[mutant.key] = bool(chosen) and tried(chosen, mutant, LATEST[0] * took + LATEST[1])[0]
                 if args.state:
                     args.state.write_text(json.dumps(state, indent=1))
         noticed = sum(decided[mutant.key] for mutant in sample)

@@ -339,3 +339,21 @@ def test_a_box_exactly_half_a_metre_from_everyone_found_is_a_new_person() -> Non
     people = [somebody(1, 2.0), replace(somebody(2, 2.5), misses=1)]
     for distance, new in ((2.5, True), (2.49, False), (1.5, True), (1.51, False)):
         assert TRACKER.association.is_new(box(distance), people, POSE) == new
+
+
+def test_how_often_a_person_is_found_is_learnt_for_the_size_they_have_in_the_image() -> None:
+    # Windows of 125 to 400 px, one in each class; whoever is nearer than .3 m counts as there.
+    for window, distance, size in ((500.0, 2.5, 1), (500.0, 3.5, 0), (500.0, 1.8, 2), (700.0, 1.8, 3)):
+        one = replace(unseen(1, 0.9, distance), window=window, centre=0.0)
+        tracks, _ = TRACKER.update(look(stamp=1.0), Tracks(people=(one,), stamp=0.9))
+        assert tracks.recall.expected == tuple(float(index == size) for index in range(4))
+        assert tracks.recall.found == (0.0,) * 4
+
+
+def test_misses_are_no_chance_where_people_of_that_size_are_nearly_always_found() -> None:
+    learnt = Recall()
+    for _ in range(300):
+        learnt = TRACKER.existence.learn(learnt, 200.0, found=True)
+    for distance, felt in ((2.0, False), (1.0, True)):
+        one = replace(unseen(1, 0.9, distance), misses=3)
+        assert (with_legs(one, 1.0, (distance, 0.1), recall=learnt).felt == 1.0) == felt

@@ -16,7 +16,7 @@ from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingContr
 from limo_hog.follow.control.memory import TrackingState, believed
 from limo_hog.follow.control.selection import Choice
 from limo_hog.follow.control.steer import Aim
-from limo_hog.follow.sense.clearance import NO_POINTS, scan_points
+from limo_hog.follow.sense.clearance import NO_POINTS
 from limo_hog.follow.space.grid import Ground
 from limo_hog.follow.tracks.identity import Likeness, Traits
 from limo_hog.follow.tracks.kalman import Noise, Track
@@ -275,93 +275,3 @@ def test_something_hides_a_place_only_if_it_lasts() -> None:
         ground = blocked((1.5, 0.0), (1.5, 0.05), (1.5, -0.05), since=since)
         assert CONTROLLER._hides(ground, Odometry(), np.array([3.0, 0.0])) == hides
         assert not CONTROLLER._hides(ground, Odometry(), np.array([3.0, 1.5]))
-
-
-def aim_at(one: Person, *points: tuple[float, float], keeps: float = 1.5, **known: Any) -> tuple[Aim, TrackingState]:
-    """Return where a person is, and which way leads there, with a scan that hits points."""
-    seen = replace(view(), scan=scan_of(list(points), NOW))
-    returns = scan_points(seen.scan, CONTROLLER.robot) if seen.scan else NO_POINTS
-    return CONTROLLER._aim(one, keeps, returns, replace(state(one), **known), seen)
-
-
-@pytest.mark.parametrize("yaw", [0.0, 0.4, -1.0])
-def test_an_aim_is_the_persons_place_and_their_own_motion_seen_from_the_robot(yaw: float) -> None:
-    pose = Odometry(NOW, 1.0, -1.0, yaw)
-    angle = yaw + 0.3
-    along, across = (math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))
-    velocity = [0.5 * one + 0.2 * other for one, other in zip(along, across, strict=True)]
-    one = someone(1, 1.0 + 2.0 * along[0], -1.0 + 2.0 * along[1], *velocity)
-    aim, _ = CONTROLLER._aim(one, 1.5, NO_POINTS, state(one, pose=pose), replace(view(), odometry=pose))
-    assert (aim.bearing, aim.distance, aim.range_rate, aim.bearing_rate) == pytest.approx((0.3, 2.0, 0.5, 0.1))
-    assert (aim.heading, aim.hidden) == (aim.bearing, False)
-
-
-def test_a_way_around_is_looked_for_only_to_come_nearer_to_a_person() -> None:
-    post = [(1.0, 0.0), (1.0, 0.1), (1.0, -0.1)]
-    # From .08 m nearer than is held the robot does not drive on.
-    for distance, around in ((1.5 + 0.084 - 0.07, True), (1.5 + 0.084 - 0.09, False)):
-        aim, after = aim_at(someone(1, distance), *post)
-        assert (aim.heading != aim.bearing) == around
-        assert aim.hidden
-    assert aim_at(replace(someone(1, 3.0), confirmed=False), *post)[0].heading == 0.0
-    assert len(after.way) == 0
-
-
-def test_a_detour_leans_to_the_side_the_person_walks_to_and_keeps_to_the_one_begun() -> None:
-    post = [(1.2, 0.0)]
-    for vy, begun, side in ((0.5, 0.0, 1), (-0.5, 0.0, -1), (0.5, -0.4, -1), (-0.5, 0.4, 1)):
-        aim, _ = aim_at(someone(1, 3.0, 0.0, 0.0, vy), *post, detour=begun)
-        assert aim.heading is not None
-        assert math.copysign(1, aim.heading) == side
-
-
-def wall_across(x: float, low: float, high: float) -> list[tuple[float, float]]:
-    return [(x, y) for y in np.arange(low, high, 0.02)]
-
-
-def test_where_what_lasts_is_in_the_way_a_way_is_planned_and_kept_for_eight_tenths_of_a_second() -> None:
-    wall = wall_across(1.25, -0.9, 0.9)
-    lasts, passing = blocked(*wall), blocked(*wall, since=NOW - 1.0)
-    one = someone(1, 3.0)
-    aim, after = aim_at(one, *wall, ground=lasts)
-    assert len(after.way) > 1
-    assert after.way_at == NOW
-    assert aim.heading is not None
-    assert aim.heading != 0.0
-    # What came lately goes away as well.
-    assert len(aim_at(one, *wall, ground=passing)[1].way) == 0
-    old = np.array([(0.0, 0.0), (0.5, -0.5), (1.0, -1.2)])
-    for ago, anew in ((0.7, False), (0.9, True)):
-        kept = aim_at(one, *wall, ground=lasts, way=old, way_at=NOW - ago)[1]
-        assert (kept.way is not old) == anew
-    # Where nothing is in the way it is forgotten.
-    clear = aim_at(one, ground=lasts, way=old, way_at=NOW)[1]
-    assert (len(clear.way), clear.way_at) == (0, -math.inf)
-
-
-def test_along_a_way_it_goes_to_the_point_half_a_metre_ahead_or_beside_what_stands_there() -> None:
-    way = np.array([(0.0, 0.0), (0.3, 0.1), (0.3, 0.4), (0.3, 2.0)])
-    pose = Odometry(NOW, 0.0, 0.0, 0.5)
-    off = math.atan2(0.4, 0.3) - 0.5
-    assert CONTROLLER._along(way, NO_POINTS, pose) == pytest.approx(off)
-
-    def before(bearing: float) -> NDArray[np.float64]:
-        return np.array([(0.9 * math.cos(bearing + turn), 0.9 * math.sin(bearing + turn)) for turn in (-0.1, 0.0, 0.1)])
-
-    assert abs(CONTROLLER._along(way, before(off), pose) - off) > 0.3
-    # More than .8 rad aside it turns first, whatever stands there.
-    turned = Odometry(NOW, 0.0, 0.0, -0.2)
-    assert CONTROLLER._along(way, before(off + 0.7), turned) == pytest.approx(off + 0.7)
-
-
-def test_the_direct_way_is_free_of_what_lasts_as_far_as_is_looked_or_the_person_s_legs_are() -> None:
-    # 1.2 m are looked ahead, and as much as robot and margin take.
-    aim = Aim(0.0, 3.0, 0.0, 0.0, 0.4, hidden=False)
-    for x, passing in ((1.2 + 0.145 + 0.65 + 0.06, True), (1.2 + 0.145 + 0.65 - 0.06, False)):
-        wall = wall_across(x, -1.0, 1.0)
-        assert CONTROLLER._is_passing(blocked(*wall), np.array(wall), aim, Odometry(NOW)) == passing
-    # A person at 1.5 m: six tenths of a metre must be free.
-    near = replace(aim, distance=1.5)
-    for x, passing in ((0.6 + 0.795 + 0.06, True), (0.6 + 0.795 - 0.06, False)):
-        wall = wall_across(x, -1.0, 1.0)
-        assert CONTROLLER._is_passing(blocked(*wall), np.array(wall), near, Odometry(NOW)) == passing

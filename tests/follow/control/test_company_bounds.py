@@ -235,3 +235,39 @@ def test_a_way_is_left_at_once_where_it_leads_into_a_wall() -> None:
     left = COMPANY.way_out(STANDING, STANDING, [walker], wall, LIMO, back)
     assert left is not None
     assert left.speed >= 0
+
+
+@pytest.mark.parametrize("speed", [0.6, -0.4, 0.3])
+def test_from_standing_it_drives_half_the_acceleration_times_the_time_squared(speed: float) -> None:
+    times = 0.2 * np.arange(1, 21)
+    reached = np.minimum(times, abs(speed))
+    expected = np.sign(speed) * (reached**2 / 2 + abs(speed) * (times - reached))
+    # Speeds change within a step, not at its end alone: .3 m/s is reached in the middle of one.
+    ways, backs = COMPANY._driven([Way(0.0, speed)], STANDING, 1.0, LIMO)
+    for poses in (ways[0], COMPANY._driven_on(Twist(speed, 0.0), STANDING, 1.0, LIMO)[0]):
+        assert poses[:, 0] == pytest.approx(expected, abs=0.011)
+        assert not poses[:, 1:].any()
+    assert backs.all() == backs.any() == (speed < 0)
+
+
+def test_a_command_to_back_is_driven_on_no_faster_than_the_safety_layer_lets_it() -> None:
+    fast, slow = (COMPANY._driven_on(Twist(speed, 0.0), STANDING, 1.0, LIMO) for speed in (-0.7, -0.4))
+    assert fast == pytest.approx(slow)
+
+
+@pytest.mark.parametrize("turn", [0.5, -1.6])
+def test_a_way_turns_to_its_direction_and_then_goes_straight_along_it(turn: float) -> None:
+    (way,), _ = COMPANY._driven([Way(turn, 0.3)], STANDING, 1.0, LIMO)
+    assert way[-1, 2] == pytest.approx(turn, abs=0.02)
+    # Steps of .2 s overshoot a little.
+    assert abs(way[:, 2]).max() < abs(turn) + 0.25
+    along = np.diff(way[-5:, :2], axis=0)
+    assert np.hypot(*along.T) == pytest.approx(0.3 * 0.2, abs=1e-3)
+    assert np.arctan2(along[:, 1], along[:, 0]) == pytest.approx(turn, abs=0.02)
+
+
+def test_of_ways_that_clear_a_person_alike_it_takes_the_easiest() -> None:
+    # One who comes slowly from far on is clear of all ways that leave; it backs as fast as it must and does not turn.
+    slow = COMPANY.way_out(STANDING, STANDING, [ahead(1.7, 0.35, followed=True)], NO_POINTS, LIMO)
+    assert slow is not None
+    assert (slow.turn, slow.speed) in ((0.0, -0.2), (0.0, -0.4))

@@ -141,6 +141,8 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
     for frame in range(100):
         detector.face(truth(frame), None)
         x, y, w, h = detector.detect(IMAGE).boxes.T
+        # Windows of HOG are twice as high as wide.
+        np.testing.assert_array_equal(w, h // 2)
         within = (x >= 32) & (y >= 64) & (x + w <= 544) & (y + h <= 448)
         expected = np.stack([x - 32, y - 64, w, h], axis=1)[within] // half
         detector.face(truth(frame), region)

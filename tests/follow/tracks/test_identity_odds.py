@@ -139,6 +139,12 @@ def test_a_track_that_begins_is_the_person_as_likely_as_any_who_is_about(others:
                 assert after.of(1) == pytest.approx(0.8 * math.exp(-0.1 / 2.0) * (1 - sure * share), rel=1e-4)
 
 
+def test_a_track_that_begins_within_three_frames_is_another() -> None:
+    after = IDENTITY.update(known_as((1, 0.8)), at(1.1, plain(1, 1.1), plain(2, 1.1, 0.55)))
+    assert after.of(2) == 0.0
+    assert after.of(1) == pytest.approx(0.8 * 0.998 + 0.002 * (1 - 0.8 * 0.998))
+
+
 @pytest.mark.parametrize("lost_s", [1.0, 2.5])
 def test_a_track_that_begins_is_the_persons_only_where_they_can_have_walked(lost_s: float) -> None:
     stamp = 1.0 + lost_s

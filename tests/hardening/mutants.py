@@ -38,7 +38,7 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "score": (
         [f"{SIM}/run/score/*.py", f"{SIM}/run/matching.py"],
-        ["tests/sim/run/test_score.py", "tests/sim/run/test_score_sweep.py"],
+        [f"tests/sim/run/test_{name}.py" for name in ("score", "score_bounds", "score_sweep")],
     ),
     "control": (
         [f"{FOLLOW}/control/*.py", f"{FOLLOW}/twist.py", f"{FOLLOW}/zones.py"],

@@ -1,0 +1,29 @@
+"""What exactly counts: frames, the time after which a person was lost, and the share in view."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.sim.run.test_score import ON, card, person, step
+
+
+def test_frames_are_counted_and_periods_without_one_are_not() -> None:
+    steps = [step(k, person()) for k in range(5)]
+    steps[2] = replace(steps[2], frame=None)
+    assert card(*steps).frames == 4
+
+
+@pytest.mark.parametrize(("until", "lost"), [(0.5, 0), (0.75, 1)])
+def test_a_person_is_lost_who_was_not_the_target_for_longer_than_half_a_second(until: float, lost: int) -> None:
+    # Times whose sums are exact.
+    followed = replace(step(0, person(), boxes=[ON], target=0), time=0.0)
+    without = replace(followed, decision=replace(followed.decision, target=None))
+    between = [replace(without, time=float(time)) for time in np.arange(0.25, until, 0.25)]
+    assert card(followed, *between, replace(followed, time=until)).lost == lost
+
+
+@pytest.mark.parametrize(("visible", "share"), [(0.5, 1.0), (0.499, 0.5)])
+def test_a_person_is_in_view_of_whom_half_is_visible(visible: float, share: float) -> None:
+    assert card(step(0, person()), step(1, person(visible=visible))).in_view == share

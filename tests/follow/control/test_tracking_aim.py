@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.follow.control.test_tracking_bounds import CONTROLLER, NOW, blocked, someone, state, view
+from tests.follow.control.test_tracking_bounds import CONTROLLER, GRID, NOW, blocked, likely, someone, state, view
 from tests.follow.views import World, flat, scan_of
 
-from limo_hog.follow import Mode, Odometry
+from limo_hog.follow import Decision, Mode, Odometry, Twist
 from limo_hog.follow.control.memory import TrackingState
+from limo_hog.follow.control.selection import Choice
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.sense.clearance import NO_POINTS, scan_points
 from limo_hog.follow.tracks.person import Person
@@ -202,3 +203,50 @@ def test_an_unmeasured_person_is_faced_for_two_seconds_and_behind_something_unti
 def test_who_was_given_way_to_is_faced_for_three_seconds() -> None:
     for seconds, ago, faced in ((2.5, 0.0, True), (3.1, 0.0, False), (2.5, 2.9, True), (2.5, 3.1, False)):
         assert (unseen_for(seconds, gave_way_s=ago) == "turning to the predicted position") == faced
+
+
+def lost(**other: Any) -> TrackingState:
+    """Return the state of a controller that lost a person 2 m ahead 2 s ago, on ground seen all around."""
+    one = someone(1, 2.0, seen=NOW - 2.0)
+    ground = GRID.start(Odometry())
+    now = np.full_like(ground.seen, NOW)
+    ground = replace(ground, occupied=ground.occupied - 1, seen=now, freed=now)
+    before: dict[str, Any] = {
+        "choice": Choice(None, likely(_1=0.0), NOW - 2.0),
+        "known": replace(one.track, stamp=NOW - 2.0),
+        "ground": replace(ground, stamp=NOW),
+        "side": -1.0,
+    }
+    return replace(state(), **{**before, **other})
+
+
+def searched(known: TrackingState, *, scan: bool = True) -> Decision[TrackingState]:
+    blind = np.full(292, np.nan, np.float32)
+    seen = replace(scan_of([], NOW), ranges=blind) if scan else None
+    return CONTROLLER._search(known, replace(view(), scan=seen))
+
+
+def test_a_lost_person_is_looked_for_where_they_can_be_by_one_who_knows_ground_and_scan() -> None:
+    looks = searched(lost())
+    assert looks.mode is Mode.LOST
+    assert looks.state.hunt is not None
+    assert len(looks.belief.places) == 150
+    for reason in (looks.reason, searched(looks.state).reason):
+        assert "searching for" not in reason
+    for without in (lost(known=None), lost(ground=None), lost(choice=Choice())):
+        turned = searched(without)
+        assert turned.state.hunt is None
+        assert turned.twist == Twist(0.0, -0.7)
+    assert searched(lost(), scan=False).twist == Twist(0.0, -0.7)
+    assert searched(lost(choice=Choice())).mode is Mode.SEARCH
+    # After a minute it turns in place.
+    for ago, hunts in ((59.0, True), (61.0, False)):
+        long_lost = lost(known=replace(someone(1, 2.0).track, stamp=NOW - ago))
+        assert (searched(long_lost).state.hunt is not None) == hunts
+
+
+def test_it_says_that_another_person_is_in_view() -> None:
+    for number, other in ((2, True), (1, False)):
+        known = lost(choice=Choice(None, likely(_1=0.9), NOW - 2.0))
+        known = replace(known, tracks=replace(known.tracks, people=(someone(number, 3.0, 1.0),)))
+        assert searched(known).reason.endswith(": another is in view") == other

@@ -201,3 +201,23 @@ def test_nearer_than_three_decimetres_a_window_grows_no_more() -> None:
     # The model's window is 128 px high: 38.4 px at 1 m.
     for window, found in ((39.0, True), (38.0, False)):
         assert Visibility().expected(0.0, 0.1, window, 0.0, look(), confirmed=False) == found
+
+
+def test_what_the_images_edge_leaves_of_a_strip_counts() -> None:
+    # Of 120 px the left strip is from -.46 to -.36 about column 50: its first five columns are out of the image.
+    for mirrored in (False, True):
+        depth = flat(4.0)
+        depth[:, :20] = 3.0
+        depth[:, 43:57] = 2.0
+        box = np.array([-10, 120, 120, 240], np.int32)
+        if mirrored:
+            depth, box[0] = depth[:, ::-1], WIDTH - 110
+        assert stands_out(depth, box) == pytest.approx(2 / (1 / 3 + 1 / 4) - 2.0)
+
+
+@pytest.mark.parametrize("unknown", [0.0, -0.5, np.nan, np.inf])
+def test_unknown_pixels_change_no_relief_as_long_as_a_fifth_is_known(unknown: float) -> None:
+    depth = flat(4.0)
+    depth[:, 300:340] = 2.0
+    depth[185:225] = unknown
+    assert stands_out(depth, np.array([260, 120, 120, 240], np.int32)) == pytest.approx(2.0)

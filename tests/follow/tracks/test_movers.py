@@ -204,3 +204,11 @@ def test_nothing_moves_or_has_left_before_the_ground_is_mapped() -> None:
         movers = MOVERS.update(movers, returns, HALF_VIEW, NOISE, GRID, None)
     assert len(movers) == 1
     assert MOVERS.moving(movers) == []
+
+
+def test_returns_are_one_movers_and_those_of_a_persons_legs_first() -> None:
+    persons, nameless = walker(7, 2.0, 0.0), walker(None, 2.0, 0.2)
+    after = update((nameless, persons), 1.1, (2.0, 0.08), (2.0, 0.12))
+    assert {one.number: one.felt for one in after} == {7: 1.1, None: 1.0}
+    both = update((nameless, persons), 1.1, (2.0, -0.02), (2.0, 0.0), (2.0, 0.4), (2.0, 0.42))
+    assert {one.number: one.felt for one in both} == {7: 1.1, None: 1.1}

@@ -221,3 +221,11 @@ def test_unknown_pixels_change_no_relief_as_long_as_a_fifth_is_known(unknown: fl
     depth[:, 300:340] = 2.0
     depth[185:225] = unknown
     assert stands_out(depth, np.array([260, 120, 120, 240], np.int32)) == pytest.approx(2.0)
+
+
+def test_an_outline_at_a_side_of_the_image_is_followed_in_what_is_left_of_its_strip() -> None:
+    # The strip is ten pixels to either side of column 8.
+    depth = flat(8.0)
+    depth[150:330, :40] = 2.0
+    assert top_row(depth, np.array([-52, 120, 120, 240], np.int32), 2.0) == 150
+    assert top_row(depth[:, ::-1], np.array([WIDTH - 68, 120, 120, 240], np.int32), 2.0) == 150

@@ -178,6 +178,7 @@ def test_a_window_cut_off_by_the_image_excuses_a_person_and_not_a_new_track(midd
 
 def test_too_near_for_hog_excuses_a_person_and_not_a_new_track() -> None:
     assert expected(1.75)
+    assert expected(1.7)
     assert not expected(1.65)
     assert expected(1.65, confirmed=False)
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from tests.sim.run.test_score import ON, card, person, step
 
+from limo_sim.run.matching import person_of
+
 
 def test_frames_are_counted_and_periods_without_one_are_not() -> None:
     steps = [step(k, person()) for k in range(5)]
@@ -27,3 +29,10 @@ def test_a_person_is_lost_who_was_not_the_target_for_longer_than_half_a_second(u
 @pytest.mark.parametrize(("visible", "share"), [(0.5, 1.0), (0.499, 0.5)])
 def test_a_person_is_in_view_of_whom_half_is_visible(visible: float, share: float) -> None:
     assert card(step(0, person()), step(1, person(visible=visible))).in_view == share
+
+
+def test_of_two_people_at_a_box_it_is_on_the_one_of_whom_half_is_visible() -> None:
+    hidden, half = person(visible=0.4), person(visible=0.5, box=(305, 100, 60, 120))
+    assert person_of(np.array(ON, np.int32), (hidden, half)) == 1
+    # Of two in view it is on the one whose middle is nearer to its own.
+    assert person_of(np.array(ON, np.int32), (person(), half)) == 0

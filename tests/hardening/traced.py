@@ -88,7 +88,7 @@ def choice(path: str, line: int, ran: Ran) -> tuple[list[str], float]:
     around = [one for one in spans(ast.parse((ROOT / path).read_text())) if one[0] <= line <= one[1]]
     first, last, whenever = min(around, key=lambda one: one[1] - one[0], default=(0, 0, False))
     lines = {f"{path}:{number}" for number in range(first, last + 1)}
-    tests = sorted((took, test) for test, (took, its) in ran.items() if (lines & set(its) if whenever else its))
+    tests = sorted((took, test) for test, (took, its) in ran.items() if not whenever or lines & set(its))
     return [test for _, test in tests], sum(took for took, _ in tests)
 
 

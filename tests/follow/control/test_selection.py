@@ -108,6 +108,13 @@ def test_a_track_that_is_another_by_nine_in_ten_is_left_only_where_it_is_measure
         assert choose(Choice(1, known(one=chance), NOW), one).number == number
 
 
+def test_a_track_that_is_just_as_likely_as_is_possible_is_kept() -> None:
+    # Chances that no frame changes, and a bound that floating point holds exactly.
+    exact = replace(SELECTION, possible=0.25, identity=replace(SELECTION.identity, passes=0.0))
+    for chance, number in ((0.25, 1), (0.2499, None)):
+        assert exact.choose(at(NOW, plain(1)), Choice(1, known(one=chance), NOW)).number == number
+
+
 def test_a_track_that_is_no_person_after_all_is_left() -> None:
     one = replace(unproved(1, 0.2, age=40), seen=NOW - 2.0)
     assert choose(Choice(1, known(one=0.5), NOW - 2.0), one).number is None

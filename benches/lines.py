@@ -1,4 +1,4 @@
-"""Single figures beside OpenCV's, a table each: `uv run python benches/lines.py describe growth corners files`.
+"""Single figures beside OpenCV's, a table each: `uv run python benches/lines.py describe growth corners guided files`.
 
 `LIMO_HOG_BACKEND` chooses the kernels; calls take turns, milliseconds are the least of each. Run on a quiet machine.
 `limo-hog bench [--search guided]` gives the searches, `benches/methods.py` the other methods.
@@ -19,9 +19,11 @@ import cv2
 import numpy as np
 
 import limo_hog
-from limo_hog import _core
+from limo_hog import PeopleDetector, _core
 from limo_hog.cli.support.race import Rounds, race
 from limo_hog.cli.support.scene import street
+from limo_sim.run.arena import Arena
+from limo_sim.run.catalogue import load
 
 ROUNDS = Rounds(seconds=2.0, most=100_000)
 SEARCH: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
@@ -167,6 +169,33 @@ def corners() -> None:
         line(name, f"{ours.min:.2f}", f"{theirs.min:.2f}", f"{theirs.min / ours.min:.2f}", equal)
 
 
+def guided() -> None:
+    """The guided search at 640×480, of streets and of the arena's first frame, with people in sight and without."""
+    cv2.setNumThreads(1)
+    limo_hog.set_num_threads(1)
+    frames = {
+        "street": street(640, 480, 3),
+        "arena, people crossing": Arena(load("crossing"), 0).frame().image,
+        "street, nobody": street(640, 480, 3, people=False),
+        "arena, nobody": Arena(load("empty"), 0).frame().image,
+    }
+    detectors = [
+        PeopleDetector(min_height=None, nms="group", group_threshold=2, search=search) for search in ("guided", "exact")
+    ]
+    cv = cv2.HOGDescriptor()
+    cv.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
+    table("search=guided", "guided ms", "exact ms", "cv2 ms", "times faster", "exact", "rectangles")
+    for name, frame in frames.items():
+        for kind, image in (("gray", cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)), ("BGR", frame)):
+            calls = [partial(detector.detect, image) for detector in detectors]
+            ours, exact, theirs = race([*calls, partial(cv.detectMultiScale, image, **SEARCH)], Rounds(4.0))
+            wanted, _ = cv.detectMultiScale(image, **SEARCH)
+            same = "equal" if calls[0]().boxes.tolist() == np.reshape(wanted, (-1, 4)).tolist() else "DIFFERENT"
+            ratios = (f"{theirs.min / ours.min:.1f}", f"{theirs.min / exact.min:.1f}")
+            spent = (f"{timing.min:.2f}" for timing in (ours, exact, theirs))
+            line(f"{name}, {kind}", *spent, *ratios, f"{len(wanted)}, {same}")
+
+
 def files() -> None:
     """`limo-hog detect` over VGA JPEGs beside a plain cv2 script, in turn, each as a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
@@ -196,7 +225,7 @@ def seconds(ours: list[str], theirs: list[str]) -> tuple[str, str, str]:
 
 def main() -> None:
     """Print the tables that were asked for."""
-    tables = {work.__name__: work for work in (describe, growth, corners, files)}
+    tables = {work.__name__: work for work in (describe, growth, corners, guided, files)}
     print(f"{_core.backend()}, OpenCV {cv2.__version__}")
     for name in sys.argv[1:] or tables:
         tables[name]()

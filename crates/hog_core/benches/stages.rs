@@ -8,6 +8,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use hog_core::exact::RowVotes;
 use hog_core::pyramid::Pyramid;
 use hog_core::{Backend, Grouping, Hog, HogParams, ImageView, Interrupt, Search, Size, model, pyramid};
 
@@ -38,8 +39,12 @@ fn exact_path(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements((WIDTH * HEIGHT) as u64));
         let smaller = Size::new(WIDTH * 20 / 21, HEIGHT * 20 / 21);
         group.bench_function("resize", |b| b.iter(|| pyramid::resize(black_box(image), smaller)));
+        let (mut shares, mut bins) = (vec![[0.0; 2]; WIDTH * HEIGHT], vec![[0; 2]; WIDTH * HEIGHT]);
         group.bench_function("gradient", |b| {
-            b.iter(|| hog.gradient(black_box(image), [0; 4], &Interrupt::NEVER))
+            b.iter(|| {
+                let votes = RowVotes { shares: &mut shares, bins: &mut bins };
+                hog.gradient(black_box(image), [0; 4], &Interrupt::NEVER, votes)
+            })
         });
         group.bench_function("compute", |b| {
             b.iter(|| hog.compute(black_box(image), &SEARCH, None, &Interrupt::NEVER, &mut out))

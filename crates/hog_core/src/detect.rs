@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::{BackendError, ParameterError, Result};
-use crate::exact::{self, Gradient, Svm, Tables};
+use crate::exact::{self, RowVotes, Svm, Tables};
 use crate::fast::{self, Backend, Found, Plan, Planes, Region};
 use crate::geometry::{Padding, Rect, Size};
 use crate::group::{Candidate, clip, group_candidates, mean_shift};
@@ -89,13 +89,8 @@ impl Hog {
         &self.exact.spec
     }
 
-    /// The gradient of the image with `left`, `top`, `right`, `bottom` columns and rows more (or fewer) around it.
-    pub fn gradient(
-        &self,
-        image: ImageView,
-        [left, top, right, bottom]: [i64; 4],
-        interrupt: &Interrupt,
-    ) -> Result<(Gradient, Size)> {
+    /// The size of the image with `left`, `top`, `right`, `bottom` columns and rows more (or fewer) around it.
+    pub fn gradient_size(image: ImageView, [left, top, right, bottom]: [i64; 4]) -> Result<Size> {
         let side = |axis: &'static str, length: usize, before: i64, after: i64| {
             let padded = (length as i64).saturating_add(before).saturating_add(after);
             if (1..=i64::from(i32::MAX)).contains(&padded) {
@@ -110,8 +105,20 @@ impl Hog {
         if size.width.saturating_mul(size.height) > i32::MAX as usize {
             return Err(ParameterError::PaddedArea { width: size.width, height: size.height }.into());
         }
-        let padding = Padding { left, top, size };
-        Ok((exact::gradient(image, padding, self.spec(), interrupt)?, size))
+        Ok(size)
+    }
+
+    /// The gradient of that image as OpenCV returns it, into `out`, which has a place for each of its pixels.
+    pub fn gradient(
+        &self,
+        image: ImageView,
+        borders: [i64; 4],
+        interrupt: &Interrupt,
+        out: RowVotes,
+    ) -> Result<()> {
+        let [left, top, ..] = borders;
+        let padding = Padding { left, top, size: Self::gradient_size(image, borders)? };
+        fast::gradient(self.backend, image, padding, self.spec(), interrupt, out)
     }
 
     /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).

@@ -6,7 +6,7 @@ mod common;
 use std::cell::Cell;
 
 use common::{Detector, Picture, assert_same, available, reached_by};
-use hog_core::exact::{Svm, Tables, scores};
+use hog_core::exact::{RowVotes, Svm, Tables, scores};
 use hog_core::group::{Candidate, group_candidates, group_rectangles, mean_shift};
 use hog_core::pyramid::{Pyramid, Tap, resize, taps};
 use hog_core::{Grouping, Guide, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
@@ -220,7 +220,9 @@ fn a_caller_who_wants_no_answer_any_more_gets_none() {
     assert!(mean_shift(&candidates, 0.0, (64, 128), &interrupt).is_err());
     assert!(hog.detect(picture.view(), &STEPS, None, &interrupt).is_err());
     assert!(hog.detect(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt).is_err());
-    assert!(hog.gradient(picture.view(), [0; 4], &interrupt).is_err());
+    let (mut shares, mut bins) = (vec![[0.0; 2]; 150 * 190], vec![[0; 2]; 150 * 190]);
+    let votes = RowVotes { shares: &mut shares, bins: &mut bins };
+    assert!(hog.gradient(picture.view(), [0; 4], &interrupt, votes).is_err());
     let mut out = vec![0.0; hog.compute_len(picture.view(), &STEPS, None).unwrap()];
     assert!(hog.compute(picture.view(), &STEPS, None, &interrupt, &mut out).is_err());
     assert!(hog.compute(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt, &mut out).is_err());

@@ -3,11 +3,11 @@
 
 mod common;
 
-use common::{Detector, Picture, available};
+use common::{Detector, Gradient, Picture, available};
 use hog_core::exact::Svm;
 use hog_core::group::{Candidate, group_rectangles, mean_shift};
 use hog_core::pyramid::Pyramid;
-use hog_core::{Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, Search};
+use hog_core::{Backend, Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, Search};
 
 fn rect([x, y, width, height]: [i32; 4]) -> Rect {
     Rect { x, y, width, height }
@@ -204,7 +204,7 @@ fn equal_channels_tie_for_the_lowest_but_in_the_last_columns_for_the_highest() {
     let data: Vec<u8> = (0..7 * 6).flat_map(pixel).collect();
     let image = ImageView::new(&data, 7, 6, 3, 21).unwrap();
     let params = HogParams { gamma_correction: false, ..HogParams::default() };
-    let (found, _) = Hog::new(&params, None).unwrap().gradient(image, [0; 4], &Interrupt::NEVER).unwrap();
+    let found = Gradient::new(&Hog::new(&params, None).unwrap(), image, [0; 4]);
     assert_eq!(found.bins[14..21], [[4, 5], [8, 0], [8, 0], [8, 0], [4, 5], [4, 5], [4, 5]]);
     assert_eq!(found.shares[14], [10.0, 0.0]);
     assert_eq!(found.shares[15..18], [[5.0, 5.0]; 3]);
@@ -232,8 +232,8 @@ fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
     {
         let params = HogParams { gamma_correction: false, signed_gradient, ..HogParams::default() };
         let hog = Hog::new(&params, None).unwrap();
-        let (found, size) =
-            hog.gradient(picture.view(), [left, top, right, bottom], &Interrupt::NEVER).unwrap();
+        let found = Gradient::new(&hog, picture.view(), [left, top, right, bottom]);
+        let size = found.size;
         assert_eq!((size.width as i64, size.height as i64), (23 + left + right, 11 + top + bottom));
         for (at, (shares, bins)) in found.shares.iter().zip(&found.bins).enumerate() {
             let (x, y) = ((at % size.width) as i64 - left, (at / size.width) as i64 - top);
@@ -251,6 +251,39 @@ fn the_gradient_is_that_of_central_differences_in_the_mirrored_image() {
     }
 }
 
+#[test]
+fn the_gradient_is_the_same_on_every_backend() {
+    let same = |params: &HogParams, (width, height): (usize, usize), channels: usize, borders: [i64; 4]| {
+        let picture = Picture::new(width, height, channels, (width + height) as u32);
+        let on = |backend| {
+            let hog = Hog::with_backend(params, None, backend).unwrap();
+            let found = Gradient::new(&hog, picture.view(), borders);
+            let bits: Vec<_> = found.shares.iter().map(|shares| shares.map(f32::to_bits)).collect();
+            (found.size, bits, found.bins)
+        };
+        let wanted = on(Backend::Scalar);
+        for backend in available() {
+            let what = format!("{} {params:?} {width} × {height} × {channels} {borders:?}", backend.name());
+            assert!(on(backend) == wanted, "{what}");
+        }
+    };
+    for channels in [1, 3] {
+        let people = HogParams::default();
+        for width in (1..70).chain([1023, 1024, 1025, 1034, 1039, 1040, 1049]) {
+            same(&people, (width, 5), channels, [0; 4]);
+        }
+        for borders in [[3, 2, 5, 4], [-3, -2, -5, -4], [40, 9, 0, 0], [-30, 0, 60, 0]] {
+            same(&people, (53, 21), channels, borders);
+        }
+        for (nbins, signed_gradient) in
+            [(1, false), (2, true), (9, true), (18, true), (256, false), (256, true)]
+        {
+            let params = HogParams { nbins, signed_gradient, gamma_correction: false, ..people };
+            same(&params, (77, 40), channels, [0; 4]);
+        }
+    }
+}
+
 /// The votes of columns `from` to `to` of an image whose columns are those of one pattern, `first` and on.
 fn votes_of_columns(width: usize, first: usize, [from, to]: [usize; 2]) -> Vec<[f32; 2]> {
     let pixel = |i: usize| {
@@ -260,7 +293,7 @@ fn votes_of_columns(width: usize, first: usize, [from, to]: [usize; 2]) -> Vec<[
     let data: Vec<u8> = (0..width * 900).map(pixel).collect();
     let image = ImageView::new(&data, width, 900, 1, width).unwrap();
     let hog = Hog::new(&HogParams::default(), None).unwrap();
-    let (found, _) = hog.gradient(image, [0; 4], &Interrupt::NEVER).unwrap();
+    let found = Gradient::new(&hog, image, [0; 4]);
     found.shares.chunks_exact(width).flat_map(|row| row[from..to].to_vec()).collect()
 }
 

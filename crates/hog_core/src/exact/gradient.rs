@@ -12,16 +12,8 @@ use crate::memory;
 use crate::params::HogSpec;
 
 use super::isa::{MulAdd, Work, run};
+use super::kernel::{Loops, RowKernel, RowVotes, Turn};
 use super::polar::polar;
-
-/// The gradient of an image as OpenCV returns it: of each pixel, two shares of its magnitude for two bins.
-#[derive(Debug, Clone, Default)]
-pub struct Gradient {
-    /// Row by row.
-    pub shares: Vec<[f32; 2]>,
-    /// The two neighbouring orientation bins, row by row.
-    pub bins: Vec<[u8; 2]>,
-}
 
 /// A pixel's two votes: `shares` for `bins`.
 #[derive(Debug, Clone, Copy, Default)]
@@ -53,22 +45,23 @@ const SPLIT: usize = 128;
 /// How many rows are made between two looks at the interrupt: a look takes as long as ten pixels.
 const CHECK_EVERY: usize = 16;
 
-/// The gradient of the whole padded image.
-pub fn gradient(
+/// The gradient of the whole padded image as OpenCV returns it, into `out`, which has a place for each pixel.
+pub(crate) fn gradient(
     image: ImageView,
     padding: Padding,
     spec: &HogSpec,
+    kernel: &dyn RowKernel,
     interrupt: &Interrupt,
-) -> Result<Gradient> {
+    out: RowVotes,
+) -> Result<()> {
     let Size { width, height } = padding.size;
-    let pixels = width.saturating_mul(height);
-    let mut out = Gradient { shares: memory::with_room(pixels)?, bins: memory::with_room(pixels)? };
-    let mut put = |_, row: &RowVotes| {
-        out.shares.extend_from_slice(&row.shares);
-        out.bins.extend_from_slice(&row.bins);
-    };
-    each_row(image, padding, Region { x: 0, y: 0, width, height }, spec, interrupt, &mut put)?;
-    Ok(out)
+    let mut shares = out.shares.chunks_exact_mut(width);
+    let mut bins = out.bins.chunks_exact_mut(width);
+    let mut next =
+        || RowVotes { shares: shares.next().unwrap_or_default(), bins: bins.next().unwrap_or_default() };
+    let first = next();
+    let region = Region { x: 0, y: 0, width, height };
+    run(Rows::new(image, padding, region, spec, kernel, interrupt, first, &mut |_, row| *row = next())?)
 }
 
 /// The votes of `region` of the padded image, as if the whole padded image had been computed.
@@ -81,19 +74,11 @@ pub(super) fn votes(
 ) -> Result<Votes> {
     let mut pixels = memory::with_room(region.width.saturating_mul(region.height))?;
     let mut put = |_, row: &RowVotes| {
-        let votes = row.shares.iter().zip(&row.bins);
+        let votes = row.shares.iter().zip(&*row.bins);
         pixels.extend(votes.map(|(&shares, &bins)| Vote { shares, bins }));
     };
     each_row(image, padding, region, spec, interrupt, &mut put)?;
     Ok(Votes { width: region.width, pixels })
-}
-
-/// The votes of a row of pixels.
-pub(crate) struct RowVotes {
-    /// What the two bins get.
-    pub shares: Vec<[f32; 2]>,
-    /// Which bins these are.
-    pub bins: Vec<[u8; 2]>,
 }
 
 /// Hands the votes of a region to `put`, row by row, with the number of each.
@@ -105,70 +90,91 @@ pub(crate) fn each_row(
     interrupt: &Interrupt,
     put: &mut dyn FnMut(usize, &RowVotes),
 ) -> Result<()> {
-    if region.width == 0 {
-        return Ok(());
-    }
-    let row = || memory::filled(region.width, 0.0f32);
-    let votes = RowVotes {
-        shares: memory::filled(region.width, [0.0; 2])?,
-        bins: memory::filled(region.width, [0; 2])?,
-    };
-    let padded_row = || memory::filled((region.width + 2) * image.channels(), 0.0f32);
-    run(Rows {
-        image,
-        padding,
-        region,
-        spec,
-        interrupt,
-        put,
-        source: Source::new(image, padding, region, spec)?,
-        lines: [row()?, row()?],
-        votes,
-        padded: [padded_row()?, padded_row()?, padded_row()?],
-    })
+    let mut shares = memory::filled(region.width, [0.0; 2])?;
+    let mut bins = memory::filled(region.width, [0; 2])?;
+    let row = RowVotes { shares: &mut shares, bins: &mut bins };
+    run(Rows::new(image, padding, region, spec, &Loops, interrupt, row, &mut |y, row| put(y, row))?)
 }
 
-/// The work of [`each_row`], and its memory.
-struct Rows<'a> {
-    image: ImageView<'a>,
+/// The work of [`each_row`] and [`gradient`], and its memory.
+struct Rows<'a, 'b> {
     padding: Padding,
     region: Region,
-    spec: &'a HogSpec,
+    turn: Turn,
+    kernel: &'a dyn RowKernel,
     interrupt: &'a Interrupt<'a>,
-    put: &'a mut dyn FnMut(usize, &RowVotes),
+    /// Where the votes of a row go.
+    votes: RowVotes<'b>,
+    /// Takes them, with the row's number, and may change where those of the next one go.
+    put: &'a mut dyn FnMut(usize, &mut RowVotes<'b>),
     source: Source<'a>,
     /// Of one row: derivatives along x and y, then magnitude and angle.
     lines: [Vec<f32>; 2],
-    votes: RowVotes,
     /// Three neighbouring rows of the padded image.
     padded: [Vec<f32>; 3],
 }
 
-impl Work for Rows<'_> {
+impl<'a, 'b> Rows<'a, 'b> {
+    #[allow(clippy::too_many_arguments, reason = "they are its fields, and what others are made of")]
+    fn new(
+        image: ImageView<'a>,
+        padding: Padding,
+        region: Region,
+        spec: &HogSpec,
+        kernel: &'a dyn RowKernel,
+        interrupt: &'a Interrupt<'a>,
+        votes: RowVotes<'b>,
+        put: &'a mut dyn FnMut(usize, &mut RowVotes<'b>),
+    ) -> Result<Self> {
+        let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
+        let turn = Turn { bins: spec.nbins as f32, bins_per_radian: (spec.nbins as f64 / range) as f32 };
+        let source = Source::new(image, padding, region, spec)?;
+        let line = || memory::filled(region.width, 0.0f32);
+        let padded = || memory::filled((region.width + 2) * image.channels(), 0.0f32);
+        let (lines, padded) = ([line()?, line()?], [padded()?, padded()?, padded()?]);
+        Ok(Self { padding, region, turn, kernel, interrupt, votes, put, source, lines, padded })
+    }
+}
+
+impl Work for Rows<'_, '_> {
     type Output = Result<()>;
 
     #[inline(always)]
     fn run<M: MulAdd>(self) -> Result<()> {
-        let Self { image, padding, region, spec, interrupt, put, source, lines, mut votes, padded } = self;
+        let Self { padding, region, turn, kernel, interrupt, mut votes, put, source, lines, padded } = self;
         let ([mut dx, mut dy], mut rows) = (lines, padded);
-        source.fill(0, &mut rows[0]);
-        source.fill(1, &mut rows[1]);
+        let (width, whole) = (region.width, padding.size.width);
+        if width == 0 {
+            return Ok(());
+        }
+        // Columns where the lowest channel wins among equals, and where angles are rounded as in vectors.
+        let until = |column: usize| column.saturating_sub(region.x).min(width);
+        let is_colour = source.image.channels() == 3;
+        let first_of_tail = if is_colour { until(whole / 4 * 4) } else { width };
+        let last_run = whole % POLAR_RUN;
+        let vectors = if last_run < POLAR_VECTOR_MIN { until(whole - last_run) } else { width };
+        source.fill(kernel, 0, &mut rows[0]);
+        source.fill(kernel, 1, &mut rows[1]);
         for y in 0..region.height {
             if y.is_multiple_of(CHECK_EVERY) {
                 interrupt.check()?;
             }
-            source.fill(y + 2, &mut rows[(y + 2) % 3]);
+            source.fill(kernel, y + 2, &mut rows[(y + 2) % 3]);
             let neighbours = [y, y + 1, y + 2].map(|row| rows[row % 3].as_slice());
-            if image.channels() == 1 {
-                derive_gray(neighbours, &mut dx, &mut dy);
-            } else {
-                let first_of_tail = (padding.size.width / 4 * 4).saturating_sub(region.x).min(region.width);
-                derive_colour::<false>(neighbours, 0..first_of_tail, &mut dx, &mut dy);
-                derive_colour::<true>(neighbours, first_of_tail..region.width, &mut dx, &mut dy);
+            let made =
+                kernel.votes(neighbours, first_of_tail.min(vectors), turn, [&mut dx, &mut dy], &mut votes);
+            if made < width {
+                if is_colour {
+                    derive_colour::<false>(neighbours, made..first_of_tail.max(made), &mut dx, &mut dy);
+                    derive_colour::<true>(neighbours, first_of_tail.max(made)..width, &mut dx, &mut dy);
+                } else {
+                    derive_gray(neighbours.map(|row| &row[made..]), &mut dx[made..], &mut dy[made..]);
+                }
+                polar_row::<M>(region.x + made, whole, &mut dx[made..], &mut dy[made..]);
+                let (shares, bins) = (&mut votes.shares[made..], &mut votes.bins[made..]);
+                vote(turn, &dx[made..], &dy[made..], &mut RowVotes { shares, bins });
             }
-            polar_row::<M>(region.x, padding.size.width, &mut dx, &mut dy);
-            vote(spec, &dx, &dy, &mut votes);
-            put(y, &votes);
+            put(y, &mut votes);
         }
         Ok(())
     }
@@ -207,16 +213,24 @@ impl<'a> Source<'a> {
 
     /// Writes the channels of row `y`, one after the other.
     #[inline(always)]
-    fn fill(&self, y: usize, out: &mut [f32]) {
+    fn fill(&self, kernel: &dyn RowKernel, y: usize, out: &mut [f32]) {
         if self.gamma_correction {
-            self.fill_with(y, out, |pixel| f32::from(pixel).sqrt());
+            let roots = |pixels: &[u8], to: &mut [f32]| kernel.roots(pixels, to);
+            self.fill_with(y, out, |pixel| f32::from(pixel).sqrt(), roots);
         } else {
-            self.fill_with(y, out, f32::from);
+            self.fill_with(y, out, f32::from, |_, _| false);
         }
     }
 
+    /// As `value` makes numbers of pixels; `values` may make many at once.
     #[inline(always)]
-    fn fill_with(&self, y: usize, out: &mut [f32], value: impl Fn(u8) -> f32) {
+    fn fill_with(
+        &self,
+        y: usize,
+        out: &mut [f32],
+        value: impl Fn(u8) -> f32,
+        values: impl Fn(&[u8], &mut [f32]) -> bool,
+    ) {
         let Self { image, width, .. } = self;
         let row = image.row(reflect_101(self.top + y as i64, image.height()));
         // (A region may lie beyond the image altogether.)
@@ -232,16 +246,26 @@ impl<'a> Source<'a> {
                 }
                 for (plane, split) in out.chunks_exact_mut(*width).zip(&split) {
                     let plane = &mut plane[self.inside.start + part * SPLIT..][..pixels.len()];
-                    plane.iter_mut().zip(split).for_each(|(to, &pixel)| *to = value(pixel));
+                    if !values(&split[..plane.len()], plane) {
+                        plane.iter_mut().zip(split).for_each(|(to, &pixel)| *to = value(pixel));
+                    }
                 }
             }
         } else {
-            let inside = out[self.inside.clone()].iter_mut();
-            inside.zip(&row[first..]).for_each(|(to, &pixel)| *to = value(pixel));
+            let (inside, pixels) = (&mut out[self.inside.clone()], &row[first..][..self.inside.len()]);
+            if !values(pixels, inside) {
+                inside.iter_mut().zip(pixels).for_each(|(to, &pixel)| *to = value(pixel));
+            }
         }
         for (c, plane) in out.chunks_exact_mut(*width).enumerate() {
             for &(to, from) in &self.mirrored {
-                plane[to] = value(row[from * image.channels() + c]);
+                // Most have been made already.
+                let made = (from as i64 - self.left) as usize;
+                plane[to] = if self.inside.contains(&made) {
+                    plane[made]
+                } else {
+                    value(row[from * image.channels() + c])
+                };
             }
         }
     }
@@ -305,11 +329,9 @@ fn polar_row<M: MulAdd>(first_column: usize, padded_width: usize, dx: &mut [f32]
 
 /// Splits each gradient between the two bins whose centres are nearest.
 #[inline(always)]
-fn vote(spec: &HogSpec, magnitude: &[f32], angle: &[f32], votes: &mut RowVotes) {
-    let range = if spec.signed_gradient { 2.0 * std::f64::consts::PI } else { std::f64::consts::PI };
-    let bins_per_radian = (spec.nbins as f64 / range) as f32;
-    let nbins = spec.nbins as f32;
-    let votes = votes.shares.iter_mut().zip(&mut votes.bins);
+fn vote(turn: Turn, magnitude: &[f32], angle: &[f32], votes: &mut RowVotes) {
+    let Turn { bins: nbins, bins_per_radian } = turn;
+    let votes = votes.shares.iter_mut().zip(&mut *votes.bins);
     for ((magnitude, angle), (shares, bins)) in magnitude.iter().zip(angle).zip(votes) {
         let position = bins_per_radian * angle - 0.5;
         let floor = position.floor();

@@ -6,11 +6,13 @@ use super::isa::MulAdd;
 
 /// Degrees of the odd polynomial that stands for the arctangent on 0..=1.
 const DEGREES: f32 = (180.0 / std::f64::consts::PI) as f32;
-const P1: f32 = 0.9997878412794807_f64 as f32 * DEGREES;
-const P3: f32 = -0.3258083974640975_f64 as f32 * DEGREES;
-const P5: f32 = 0.1555786518463281_f64 as f32 * DEGREES;
-const P7: f32 = -0.04432655554792128_f64 as f32 * DEGREES;
-const RADIANS: f32 = (std::f64::consts::PI / 180.0) as f32;
+pub const P1: f32 = 0.9997878412794807_f64 as f32 * DEGREES;
+pub const P3: f32 = -0.3258083974640975_f64 as f32 * DEGREES;
+pub const P5: f32 = 0.1555786518463281_f64 as f32 * DEGREES;
+pub const P7: f32 = -0.04432655554792128_f64 as f32 * DEGREES;
+/// Keeps a gradient of 0 from 0 / 0.
+pub const TINY: f32 = f64::EPSILON as f32;
+pub const RADIANS: f32 = (std::f64::consts::PI / 180.0) as f32;
 
 /// Turns gradients (`dx`, `dy`) into magnitude and angle [0, 2π], in their places; both of one length.
 ///
@@ -31,7 +33,7 @@ fn polar_of<M: MulAdd, const VECTOR_RULE: bool>(dx: f32, dy: f32) -> (f32, f32) 
     let (ax, ay) = (dx.abs(), dy.abs());
     let steep = ax < ay;
     let (short, long) = if steep { (ax, ay) } else { (ay, ax) };
-    let c = short / (long + f64::EPSILON as f32);
+    let c = short / (long + TINY);
     let cc = c * c;
     let t = M::mul_add(M::mul_add(M::mul_add(cc, P7, P5), cc, P3), cc, P1);
     let flat = t * c;

@@ -1,9 +1,10 @@
 //! Which kernels serve a call: every entry to the fast path.
 
 use crate::error::Result;
-use crate::exact::Svm;
-use crate::geometry::Size;
+use crate::exact::{self, Loops, RowKernel, RowVotes, Svm};
+use crate::geometry::{Padding, Size};
 use crate::image::ImageView;
+use crate::interrupt::Interrupt;
 use crate::params::HogSpec;
 use crate::pyramid::Grid;
 
@@ -16,6 +17,8 @@ use super::lane::portable::Portable;
 use super::lane::{Kernel, avx2::Avx2, avx512::Avx512, sse41::Sse41};
 use super::plan::{Geometry, Plan};
 use super::rows::Planes;
+#[cfg(target_arch = "x86_64")]
+use super::votes::Votes;
 
 /// The kernels' constants of this geometry, if they can serve it.
 pub(crate) fn geometry(backend: Backend, spec: &HogSpec) -> Option<Geometry> {
@@ -119,4 +122,25 @@ pub(crate) fn resize_planes(
         }
     }
     on_lane(backend, Resize(source, resized, size))
+}
+
+/// [`exact::gradient`], by kernels where there are any.
+pub(crate) fn gradient(
+    backend: Backend,
+    image: ImageView,
+    padding: Padding,
+    spec: &HogSpec,
+    interrupt: &Interrupt,
+    out: RowVotes,
+) -> Result<()> {
+    let on = |kernel: &dyn RowKernel| exact::gradient(image, padding, spec, kernel, interrupt, out);
+    match backend {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a backend is only chosen where it is available.
+        Backend::Avx512 => on(&Votes(unsafe { Avx512::new() })),
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Avx2 => on(&Votes(unsafe { Avx2::new() })),
+        _ => on(&Loops),
+    }
 }

@@ -1,9 +1,9 @@
 //! The Python module `limo_hog._core`: reads arguments, releases the GIL, calls, wraps, maps errors. Nothing else.
 
+mod arrays;
 mod canvas;
 mod errors;
 
-use std::borrow::Cow;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -12,18 +12,17 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyMemoryError, PyOverflowError};
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 
+use self::arrays::{Array1, Pixels, array1, contiguous, made, zeros};
 use self::errors::{raised, raised_as};
 use crate::error::{ImageError, ParameterError};
+use crate::exact::RowVotes;
 use crate::pyramid::Pyramid;
-use crate::{
-    Backend, Grouping, Guide, HogError, HogParams, ImageView, Interrupt, Rect, Search, Size, memory,
-};
+use crate::{Backend, Grouping, Guide, HogParams, ImageView, Interrupt, Rect, Search, Size, memory};
 
 type Pair = (i64, i64);
-type Array1<'py, T> = Bound<'py, PyArray1<T>>;
 type Array2<'py, T> = Bound<'py, PyArray2<T>>;
 type Array3<'py, T> = Bound<'py, PyArray3<T>>;
 
@@ -88,61 +87,6 @@ fn detached<R: Send>(
     match signal {
         Some(error) => Err(error),
         None => found.map_err(|error| raised(py, &error)),
-    }
-}
-
-/// Numbers as an array of numpy's.
-fn array1<T: numpy::Element>(py: Python<'_>, values: impl IntoIterator<Item = T>) -> PyResult<Array1<'_, T>> {
-    let values = memory::collect(values).map_err(|error| raised(py, &error))?;
-    Ok(PyArray1::from_vec(py, values))
-}
-
-/// `len` zeros in memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
-///
-/// (`PyArray1::zeros` would panic where there is none.)
-fn zeros(py: Python<'_>, len: usize) -> PyResult<Array1<'_, f32>> {
-    match py.import("numpy")?.call_method1("zeros", (len, "float32")) {
-        Err(error) if error.is_instance_of::<PyMemoryError>(py) => {
-            Err(raised(py, &HogError::Memory { bytes: len.saturating_mul(size_of::<f32>()) }))
-        }
-        zeros => Ok(zeros?.cast_into()?),
-    }
-}
-
-/// The bytes of an array in C order: borrowed where they lie so, else copied.
-fn contiguous<'a>(py: Python<'_>, array: &'a PyReadonlyArrayDyn<'_, u8>) -> PyResult<Cow<'a, [u8]>> {
-    // `as_slice` also succeeds on Fortran order, with the pixels in that order.
-    match array.as_slice() {
-        Ok(slice) if array.is_c_contiguous() => Ok(Cow::Borrowed(slice)),
-        _ => {
-            let copy = memory::collect(array.as_array().iter().copied());
-            Ok(Cow::Owned(copy.map_err(|error| raised(py, &error))?))
-        }
-    }
-}
-
-/// The pixels of a numpy image: borrowed where it is contiguous, else copied.
-struct Pixels<'a> {
-    data: Cow<'a, [u8]>,
-    width: usize,
-    height: usize,
-    channels: usize,
-}
-
-impl<'a> Pixels<'a> {
-    fn new(py: Python<'_>, array: &'a PyReadonlyArrayDyn<'_, u8>) -> PyResult<Self> {
-        let (height, width, channels) = match *array.shape() {
-            [height, width] => (height, width, 1),
-            [height, width, channels] => (height, width, channels),
-            ref shape => {
-                return Err(raised(py, &ImageError::Dimensions { got: shape.len() }.into()));
-            }
-        };
-        Ok(Self { data: contiguous(py, array)?, width, height, channels })
-    }
-
-    fn view(&self) -> crate::Result<ImageView<'_>> {
-        ImageView::new(&self.data, self.width, self.height, self.channels, self.width * self.channels)
     }
 }
 
@@ -211,10 +155,21 @@ impl Hog {
         padding: [i64; 4],
     ) -> PyResult<(Array3<'py, f32>, Array3<'py, u8>)> {
         let py = image.py();
-        let (found, size) = self.on(&image, |hog, view, interrupt| hog.gradient(view, padding, interrupt))?;
+        let raise = |error| raised(py, &error);
+        let pixels = Pixels::new(py, &image)?;
+        let view = pixels.view().map_err(raise)?;
+        let size = crate::Hog::gradient_size(view, padding).map_err(raise)?;
+        // Every number is written: zeros would be written twice.
+        let shares = made::<f32>(py, "empty", 2 * size.area())?;
+        let bins = made::<u8>(py, "empty", 2 * size.area())?;
+        let (mut of_shares, mut of_bins) = (shares.readwrite(), bins.readwrite());
+        let out = RowVotes {
+            shares: of_shares.as_slice_mut()?.as_chunks_mut().0,
+            bins: of_bins.as_slice_mut()?.as_chunks_mut().0,
+        };
+        detached(py, |interrupt| self.inner.gradient(view, padding, interrupt, out))?;
         let shape = [size.height, size.width, 2];
-        let shares = PyArray1::from_vec(py, found.shares.into_flattened()).reshape(shape)?;
-        Ok((shares, PyArray1::from_vec(py, found.bins.into_flattened()).reshape(shape)?))
+        Ok((shares.reshape(shape)?, bins.reshape(shape)?))
     }
 
     fn compute<'py>(

@@ -109,8 +109,8 @@ impl<'a> Lattice<'a> {
         if y < self.y || self.is_whole() {
             return;
         }
-        self.shares.extend_from_slice(&votes.shares);
-        self.bins.extend_from_slice(&votes.bins);
+        self.shares.extend_from_slice(votes.shares);
+        self.bins.extend_from_slice(votes.bins);
         if self.shares.len() == self.width * self.spec.stride.height {
             self.sum(scores);
         }

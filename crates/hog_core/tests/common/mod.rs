@@ -1,9 +1,9 @@
 //! Images and the exact path's answers, for the tests of the fast path.
 #![allow(dead_code, reason = "each test binary uses a part")]
 
-use hog_core::exact::{self, Svm, Tables};
+use hog_core::exact::{self, RowVotes, Svm, Tables};
 use hog_core::pyramid::{Grid, Steps};
-use hog_core::{Backend, Hit, HogParams, HogSpec, ImageView, Interrupt, Search, Size, model};
+use hog_core::{Backend, Hit, Hog, HogParams, HogSpec, ImageView, Interrupt, Search, Size, model};
 
 /// The backends of this CPU.
 pub fn available() -> impl Iterator<Item = Backend> {
@@ -42,6 +42,25 @@ impl Picture {
     pub fn view(&self) -> ImageView<'_> {
         ImageView::new(&self.data, self.width, self.height, self.channels, self.width * self.channels)
             .unwrap()
+    }
+}
+
+/// The gradient of an image: of each pixel, two shares of its magnitude, and the bins that get them.
+pub struct Gradient {
+    pub size: Size,
+    pub shares: Vec<[f32; 2]>,
+    pub bins: Vec<[u8; 2]>,
+}
+
+impl Gradient {
+    /// Of the image with `borders` (left, top, right, bottom) around it.
+    pub fn new(hog: &Hog, image: ImageView, borders: [i64; 4]) -> Self {
+        let size = Hog::gradient_size(image, borders).unwrap();
+        // No share is negative, and no bin 255, unless it is not written.
+        let (mut shares, mut bins) = (vec![[-1.0; 2]; size.area()], vec![[255; 2]; size.area()]);
+        let out = RowVotes { shares: &mut shares, bins: &mut bins };
+        hog.gradient(image, borders, &Interrupt::NEVER, out).unwrap();
+        Self { size, shares, bins }
     }
 }
 

@@ -25,8 +25,8 @@ _PARTS = (
 )
 
 
-def street(width: int, height: int, channels: int) -> NDArray[np.uint8]:
-    """Draw a street with people of many sizes; the same picture for the same arguments.
+def street(width: int, height: int, channels: int, *, people: bool = True) -> NDArray[np.uint8]:
+    """Draw a street with people of many sizes, or without; the same picture for the same arguments.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def street(width: int, height: int, channels: int) -> NDArray[np.uint8]:
     canvas = np.broadcast_to(ground, (height, width, 3)) + rng.normal(0, 6, 3).astype(np.float32)
     for _ in range(40):
         _house(canvas, rng)
-    count = max(2, width // 160)
+    count = max(2, width // 160) if people else 0
     places = rng.permutation((np.arange(count) + 0.5) / count) * width
     # From near to far, each in a strip of the street, the far ones higher up.
     for size, place in zip(np.geomspace(0.8 * height, min(105, 0.7 * height), count), places, strict=True):

@@ -36,3 +36,10 @@ def test_of_two_people_at_a_box_it_is_on_the_one_of_whom_half_is_visible() -> No
     assert person_of(np.array(ON, np.int32), (hidden, half)) == 1
     # Of two in view it is on the one whose middle is nearer to its own.
     assert person_of(np.array(ON, np.int32), (person(), half)) == 0
+
+
+def test_the_jerk_is_measured_over_the_whole_run() -> None:
+    # Straight on, in pushes that come late in the run.
+    along = np.cumsum([0.1] * 8 + [0.1, 0.15, 0.3, 0.3, 0.1, 0.4])
+    steps = [step(k, person(), robot=(float(x), 0.0, 0.0)) for k, x in enumerate(along)]
+    assert card(*steps).jerk_mean == pytest.approx(np.abs(np.diff(along, 3)).mean() / 0.1**3)

@@ -1,8 +1,8 @@
 """A seeded sample of mutants: one operator, number, condition or statement changed at a time, which a test must notice.
 
 `python -m tests.hardening.mutants safety score --count 200 --state FILE` prints those that no test notices. Each mutant
-runs in a fork of this process that imports the changed module from memory; no file is touched. FILE keeps what was
-decided, and a later run goes on.
+runs in a fork of this process that imports the changed module from memory, and tries the tests that run the changed
+statement, the quickest first; no file is touched. FILE keeps what was decided, and a later run goes on.
 """
 
 from __future__ import annotations
@@ -24,10 +24,13 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
+import pytest
+from tests.hardening.traced import OPTIONS, choice, silence, traced
+
 ROOT = Path(__file__).parents[2]
 FOLLOW, ROS2, SIM = "python/limo_hog/follow", "python/limo_hog/ros2", "sim/limo_sim"
 
-#: What is changed, and the tests that must notice, those that tell soonest first.
+#: What is changed, and the tests that must notice.
 ROOMS: dict[str, tuple[list[str], list[str]]] = {
     "safety": (
         [f"{FOLLOW}/safety/*.py", f"{FOLLOW}/sense/clearance.py"],
@@ -35,25 +38,18 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "score": (
         [f"{SIM}/run/score/*.py", f"{SIM}/run/matching.py"],
-        ["tests/sim/run/test_score.py", "tests/sim/run/test_score_sweep.py"],
+        [f"tests/sim/run/test_{name}.py" for name in ("score", "score_bounds", "score_sweep")],
     ),
     "control": (
         [f"{FOLLOW}/control/*.py", f"{FOLLOW}/twist.py", f"{FOLLOW}/zones.py"],
         [
-            *(
-                f"tests/follow/control/test_{name}.py"
-                for name in ("steer", "company", "backing", "lookout", "workshop_controllers")
-            ),
-            *("tests/follow/sense/test_clearance.py", "tests/follow/control/test_tracking.py", "tests/follow/tracks"),
+            *("tests/follow/control", "tests/follow/sense/test_clearance.py", "tests/follow/tracks"),
             "tests/follow/test_pipeline.py",
         ],
     ),
     "tracks": (
         [f"{FOLLOW}/tracks/*.py"],
-        [
-            *(f"tests/follow/tracks/test_{name}.py" for name in ("kalman", "poses", "existence", "identity")),
-            *("tests/follow/tracks", "tests/follow/control/test_tracking.py"),
-        ],
+        ["tests/follow/tracks", "tests/follow/control/test_tracking.py"],
     ),
     "sense": (
         [f"{FOLLOW}/sense/{name}.py" for name in ("appearance", "measurement", "ranging", "region", "visibility")],
@@ -273,17 +269,10 @@ def tried(tests: Sequence[str], mutant: Mutant | None, seconds: float) -> tuple[
     if child == 0:
         code = 3
         try:
-            os.setsid()
-            quiet = os.open(os.devnull, os.O_RDWR)
-            for fd in (0, 1, 2):
-                os.dup2(quiet, fd)
+            silence()
             if mutant is not None:
                 sys.meta_path.insert(0, Changed(mutant))
-            import pytest
-
-            options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-o", "addopts=", "-m", "not slow"]
-            options += ["-W", "ignore:Module already imported", "--no-header"]
-            code = int(pytest.main([*options, *tests]))
+            code = int(pytest.main(["-x", *OPTIONS, *tests]))
         finally:
             os._exit(code)
     while (done := os.waitpid(child, os.WNOHANG)) == (0, 0):
@@ -316,13 +305,14 @@ def main() -> int:
         every = [mutant for path in files for mutant in mutants_of(path)]
         sample = random.Random(args.seed).sample(every, min(args.count, len(every)))
         decided = state.setdefault(room, {})
-        fails, took = tried(tests, None, 600.0)
-        if fails:
+        if tried(tests, None, 600.0)[0]:
             print(f"{room}: the tests fail without a mutant")
             return 2
+        ran = traced(tests, files)
         for mutant in sample:
             if mutant.key not in decided or (args.again and not decided[mutant.key]):
-                decided[mutant.key], _ = tried(tests, mutant, LATEST[0] * took + LATEST[1])
+                chosen, took = choice(mutant.path, mutant.line, ran)
+                decided[mutant.key] = bool(chosen) and tried(chosen, mutant, LATEST[0] * took + LATEST[1])[0]
                 if args.state:
                     args.state.write_text(json.dumps(state, indent=1))
         noticed = sum(decided[mutant.key] for mutant in sample)

@@ -22,7 +22,7 @@ from limo_sim.run.sighting import sighted, state_of
 from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.world.person import Pose
-from limo_sim.world.scenario import DetectorFaults, Furniture, Person, Robot, Scenario, Wall
+from limo_sim.world.scenario import Depth, DetectorFaults, Furniture, Person, Robot, Scenario, Wall
 from limo_sim.world.schema import ScenarioError
 
 STILL, AHEAD = np.zeros(2, np.float32), np.array([0.3, 0.0], np.float32)
@@ -290,3 +290,24 @@ def test_the_state_is_of_the_scenarios_first_person(others: tuple[tuple[float, f
     people = tuple(Person(route=((*place, 0.0),)) for place in ((2.5, 0.0), *others))
     state, _ = LimoFollowV1(Scenario(people=people)).reset(seed=0)
     np.testing.assert_allclose(state[:5], [1, 1, 0, 2.5 / 8, 0], atol=0.03)
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.084 + 0.04, -2.0])
+def test_of_a_person_behind_or_at_the_camera_nothing_is_seen(ahead: float) -> None:
+    scenario = Scenario(people=(Person(route=((2.0, 0.0, 0.0),)),))
+    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(ahead, 0.3, 0.0),)), scenario, 0, [])
+    assert seen is not None
+    assert (seen.visible, seen.height_px, seen.found) == (0.0, 0.0, False)
+    assert seen.distance == pytest.approx(math.hypot(ahead, 0.3))
+
+
+def test_the_depth_image_may_be_as_deep_as_a_scenario_may_ask_for() -> None:
+    spaces = LimoFollowV1(observe="camera").observation_space
+    assert isinstance(spaces, gymnasium.spaces.Dict)
+    space = spaces["depth"]
+    assert isinstance(space, gymnasium.spaces.Box)
+    furthest = float(space.high.max())
+    assert space.low.min() == 0.0
+    replace(STANDING, depth=Depth(far_m=furthest)).check()
+    with pytest.raises(ScenarioError, match="far_m"):
+        replace(STANDING, depth=Depth(far_m=furthest + 0.5)).check()

@@ -22,9 +22,10 @@ def test_both_stop_when_nobody_is_seen() -> None:
 
 
 def test_somebody_who_is_gone_is_lost() -> None:
-    controller = ApproachController()
-    seen = controller.step(look(boxes((300, 100, 60, 120))), controller.start())
-    assert controller.step(look(NOBODY), seen.state).mode is Mode.LOST
+    for controller in (ApproachController(), ProxemicController()):
+        for depth in (None, flat(2.0)):
+            seen = controller.step(replace(look(boxes((300, 100, 60, 120))), depth=depth), controller.start())
+            assert controller.step(look(NOBODY), seen.state).mode is Mode.LOST
 
 
 @pytest.mark.parametrize(("cx", "angular"), [(320, 0.0), (301, 0.0), (300, 0.1), (340, -0.1), (120, 1.0), (520, -1.0)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from tests.follow.views import flat, scan
 from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import (
+    NO_POINTS,
     DepthGrid,
     Margin,
+    beam_directions,
     from_odometry,
     room_ahead,
     room_behind,
@@ -77,8 +80,26 @@ def test_a_scan_becomes_points_counter_clockwise_from_the_first_beam() -> None:
     assert point == pytest.approx([0.103 + np.cos(2.0), np.sin(2.0)])
 
 
+def test_what_every_scan_shares_cannot_be_changed() -> None:
+    seen = scan(np.ones(5, np.float32))
+    for shared in (beam_directions(-1.0, 1.0, 5), scan_points(seen, LIMO)):
+        with pytest.raises(ValueError, match="read-only"):
+            shared[0, 0] = 9.0
+    assert scan_points(seen, LIMO) is scan_points(seen, LIMO)
+
+
 def test_ranges_beyond_the_lidars_limits_are_no_points() -> None:
     assert len(scan_points(scan(np.array([0.05, 9.0, np.nan, np.inf], np.float32)), LIMO)) == 0
+
+
+def test_a_range_of_exactly_the_lidars_least_is_a_point_and_a_shorter_one_is_not() -> None:
+    least = np.float32(0.125)
+    ranges = np.array([least, np.nextafter(least, np.float32(0.0))], np.float32)
+    assert len(scan_points(replace(scan(ranges), range_min=0.125), LIMO)) == 1
+
+
+def test_without_sensors_there_are_no_points() -> None:
+    assert NO_POINTS.shape == (0, 2)
 
 
 def test_a_range_of_exactly_the_lidars_reach_is_a_point() -> None:

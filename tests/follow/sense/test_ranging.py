@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from tests.follow.views import HEIGHT, WIDTH, boxes, flat, look
+from tests.follow.views import FOCAL, HEIGHT, WIDTH, boxes, flat, look
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import Measurement, measure
-from limo_hog.follow.sense.ranging import median, person_depth, top_row
+from limo_hog.follow.sense.ranging import median, person_depth, stands_out, top_row
 from limo_hog.follow.sense.visibility import Visibility
 
 
@@ -67,3 +69,163 @@ def test_the_depth_of_a_box_is_that_of_a_square_of_twenty_pixels_in_its_middle()
     # A quarter of the square; it would be all of one half as wide.
     depth[195:205, 295:305] = 1.0
     assert person_depth(depth, np.array([270, 140, 60, 120], np.int32)) == 3.0
+
+
+def test_five_rows_without_the_person_end_the_outline_and_four_do_not() -> None:
+    for gap, top in ((4, 120), (5, 200)):
+        depth = flat(8.0)
+        depth[120:330, 290:350] = 2.0
+        depth[200 - gap : 200, 290:350] = 8.0
+        assert top_row(depth, np.array([260, 120, 120, 240], np.int32), 2.0) == top
+
+
+def test_a_row_is_the_persons_whose_known_pixels_are_theirs_in_one_of_four() -> None:
+    # A strip of 2 · round(.08 · 120) = 20 px around column 320; five of them are a quarter.
+    for own, top in ((5, 150), (4, 200)):
+        depth = flat(8.0)
+        depth[200:330, 290:350] = 2.0
+        depth[150:200, 320 : 320 + own] = 2.0
+        assert top_row(depth, np.array([260, 120, 120, 240], np.int32), 2.0) == top
+
+
+@pytest.mark.parametrize("nearer", [-1, 1])
+def test_a_pixel_is_the_persons_within_a_trunk_and_an_arm(nearer: int) -> None:
+    for off, top in ((0.34, 150), (0.36, 200)):
+        depth = flat(8.0)
+        depth[200:330, 290:350] = 2.0
+        depth[150:200, 290:350] = 2.0 + nearer * off
+        assert top_row(depth, np.array([260, 120, 120, 240], np.int32), 2.0) == top
+
+
+def test_a_narrow_box_is_looked_at_four_pixels_to_either_side() -> None:
+    box = np.array([310, 120, 20, 240], np.int32)
+    for columns, top in ((slice(316, 324), 150), (slice(310, 316), 200), (slice(324, 330), 200)):
+        depth = flat(8.0)
+        depth[200:330, 310:330] = 2.0
+        depth[150:200, columns] = 2.0
+        assert top_row(depth, box, 2.0) == top
+
+
+def before_and_beside(rows: slice, columns: slice, wall: float = 4.0) -> float | None:
+    """How far a person at 2 m stands out before a wall of which a part is at 3 m."""
+    depth = flat(wall)
+    depth[:, 300:340] = 2.0
+    depth[rows, columns] = 3.0
+    return stands_out(depth, np.array([260, 120, 120, 240], np.int32))
+
+
+def test_a_person_stands_out_from_what_is_beside_the_chest() -> None:
+    # Of a window of 240 px the chest is from row 120 + .27 · 240 to 120 + .5 · 240; beside it are the columns .36 to
+    # .46 of 120 px from the middle.
+    left, right = slice(320 - 55, 320 - 43), slice(320 + 43, 320 + 55)
+    all_of_it = slice(0, HEIGHT)
+    assert before_and_beside(slice(0, 0), left) == pytest.approx(2.0)
+    for outside in (slice(0, 184), slice(241, HEIGHT)):
+        assert before_and_beside(outside, left) == pytest.approx(2.0)
+    # A plane through both has in the middle the mean of the inverse depths.
+    for side in (left, right):
+        assert before_and_beside(slice(185, 240), side) == pytest.approx(2 / (1 / 3 + 1 / 4) - 2.0)
+    for beside in (slice(0, 264), slice(278, 299), slice(341, 362), slice(376, WIDTH)):
+        assert before_and_beside(all_of_it, beside) == pytest.approx(2.0)
+
+
+def test_the_chest_is_looked_at_where_people_seen_from_the_side_still_are() -> None:
+    # .06 of the window's width to either side: 7 px.
+    for half, near in ((4, 3.0), (3, 4.0)):
+        depth = flat(4.0)
+        depth[:, 320 - half : 320 + half] = 3.0
+        assert stands_out(depth, np.array([260, 120, 120, 240], np.int32)) == pytest.approx(4.0 - near)
+
+
+def test_a_strip_of_which_a_fifth_is_known_is_known() -> None:
+    # A strip of 12 columns and 55 rows; unknown, what is beside a person counts as far away.
+    for rows, known in ((13, True), (10, False)):
+        depth = flat(4.0)
+        depth[:, 300:340] = 2.0
+        depth[185:240, 265:277] = np.nan
+        depth[185 : 185 + rows, 265:277] = 4.0
+        relief = stands_out(depth, np.array([260, 120, 120, 240], np.int32))
+        assert relief is not None
+        assert (relief == pytest.approx(2.0)) == known
+
+
+def test_an_outline_at_one_edge_of_the_image_stands_out_from_the_other_side_alone() -> None:
+    depth = flat(4.0)
+    depth[:, :40] = 2.0
+    assert stands_out(depth, np.array([-40, 120, 120, 240], np.int32)) == pytest.approx(2.0)
+    assert stands_out(depth, np.array([-400, 120, 120, 240], np.int32)) is None
+
+
+def seen_at(box: tuple[int, int, int, int], depth: float, top: int) -> Measurement:
+    """Measure a box on a person whose outline begins at a row."""
+    x, y, w, h = box
+    image = flat(8.0)
+    image[top : y + h, x + w // 4 : x + w - w // 4] = depth
+    (seen,) = measure(replace(look(boxes(box)), depth=image), LIMO)
+    return seen
+
+
+@pytest.mark.parametrize(("depth", "top"), [(2.0, 150), (2.0, 170), (3.0, 130)])
+def test_the_stature_is_from_the_floor_to_the_top_of_the_outline(depth: float, top: int) -> None:
+    seen = seen_at((260, 120, 120, 240), depth, top)
+    # The camera looks level from .175 m above the floor; HOG's window is 128 px where a person is 96.
+    stature = 0.175 + (240 - top) / FOCAL * depth
+    assert seen.window == pytest.approx(stature * FOCAL * 128 / 96)
+    assert seen.middle == pytest.approx((0.175 - stature / 2) * FOCAL)
+    assert seen.whole
+    assert seen.stands_out == pytest.approx(8.0 - depth)
+
+
+def test_a_person_whose_outline_ends_within_a_gap_of_the_images_edge_is_not_whole() -> None:
+    assert seen_at((260, 20, 120, 240), 2.0, 5).whole
+    assert not seen_at((260, 20, 120, 240), 2.0, 4).whole
+
+
+def test_a_person_is_hidden_by_what_is_before_their_window_s_middle_and_not_below_it() -> None:
+    # Their middle is 60 px above the image's.
+    for row, found in ((180, False), (300, True)):
+        depth = flat(8.0)
+        depth[row - 20 : row + 20, 300:340] = 1.0
+        view = replace(look(), depth=depth)
+        assert Visibility().expected(0.0, 2.0, 536.0, -120.0, view, confirmed=True) == found
+
+
+def test_a_person_may_be_as_near_as_leaves_six_hundredths_of_the_window_above_the_image() -> None:
+    # A window of 536 px at 1 m whose middle is 120 px above the image's.
+    distance = Visibility().least_distance(536.0, -120.0, 480)
+    top = 240 - 120.0 / distance - 536.0 / distance / 2
+    assert -top == pytest.approx(0.06 * 536.0 / distance)
+
+
+def test_nearer_than_three_decimetres_a_window_grows_no_more() -> None:
+    # The model's window is 128 px high: 38.4 px at 1 m.
+    for window, found in ((39.0, True), (38.0, False)):
+        assert Visibility().expected(0.0, 0.1, window, 0.0, look(), confirmed=False) == found
+
+
+def test_what_the_images_edge_leaves_of_a_strip_counts() -> None:
+    # Of 120 px the left strip is from -.46 to -.36 about column 50: its first five columns are out of the image.
+    for mirrored in (False, True):
+        depth = flat(4.0)
+        depth[:, :20] = 3.0
+        depth[:, 43:57] = 2.0
+        box = np.array([-10, 120, 120, 240], np.int32)
+        if mirrored:
+            depth, box[0] = depth[:, ::-1], WIDTH - 110
+        assert stands_out(depth, box) == pytest.approx(2 / (1 / 3 + 1 / 4) - 2.0)
+
+
+@pytest.mark.parametrize("unknown", [0.0, -0.5, np.nan, np.inf])
+def test_unknown_pixels_change_no_relief_as_long_as_a_fifth_is_known(unknown: float) -> None:
+    depth = flat(4.0)
+    depth[:, 300:340] = 2.0
+    depth[185:225] = unknown
+    assert stands_out(depth, np.array([260, 120, 120, 240], np.int32)) == pytest.approx(2.0)
+
+
+def test_an_outline_at_a_side_of_the_image_is_followed_in_what_is_left_of_its_strip() -> None:
+    # The strip is ten pixels to either side of column 8.
+    depth = flat(8.0)
+    depth[150:330, :40] = 2.0
+    assert top_row(depth, np.array([-52, 120, 120, 240], np.int32), 2.0) == 150
+    assert top_row(depth[:, ::-1], np.array([WIDTH - 68, 120, 120, 240], np.int32), 2.0) == 150

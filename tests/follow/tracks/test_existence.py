@@ -136,3 +136,63 @@ def test_log_odds_are_those_of_a_probability_and_nothing_known_is_one_half() -> 
     assert initiate(1, box(2.5), 0.0, POSE, NOISE, UnknownRange()).existence == 0.5
     assert replace(new(), log_odds=math.log(4.0)).existence == pytest.approx(4 / 5)
     assert replace(new(), log_odds=-math.log(4.0)).existence == pytest.approx(1 / 5)
+
+
+def frames_until(person: Person, *, found: bool, confirmed: bool) -> int:
+    """Return after how many frames of the same outcome a track is confirmed, or is not any more."""
+    frames = 0
+    while person.confirmed != confirmed:
+        evidence = EXISTENCE.of_box(replace(box(2.5), score=4.0), 0.9) if found else EXISTENCE.of_miss(0.98)
+        person = EXISTENCE.update(person, evidence, found=found)
+        frames += 1
+    assert person.age == frames + (1 if found else 50)
+    return frames
+
+
+def test_four_clear_frames_confirm_and_fifteen_misses_drop_who_was_certain() -> None:
+    assert frames_until(new(), found=True, confirmed=True) == 4
+    assert frames_until(somebody(1, 2.5), found=False, confirmed=False) == 15
+
+
+def test_a_track_is_confirmed_from_95_percent_until_it_is_below_27() -> None:
+    for before, confirmed, after_ in (
+        (2.9, False, False),
+        (3.0, False, True),
+        (-1.0, True, True),
+        (-1.01, True, False),
+    ):
+        person = replace(somebody(1, 2.5), log_odds=before, confirmed=confirmed)
+        assert EXISTENCE.update(person, 0.0, found=True).confirmed == after_
+    assert replace(new(), log_odds=3.0).existence == pytest.approx(0.95, abs=0.005)
+    assert replace(new(), log_odds=-1.0).existence == pytest.approx(0.27, abs=0.005)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_what_is_certain_is_so_to_five_either_way(sign: int) -> None:
+    person = new()
+    for _ in range(100):
+        person = EXISTENCE.update(person, sign * 0.4, found=True)
+    assert person.log_odds == sign * 5.0
+
+
+def test_of_ten_boxes_that_begin_a_track_one_is_on_a_person() -> None:
+    assert new().existence == pytest.approx(0.1, abs=0.001)
+
+
+def test_a_box_is_flat_whose_surroundings_are_within_two_decimetres_before_or_behind() -> None:
+    for relief, solid in ((None, True), (0.19, False), (0.21, True), (-0.19, False), (-0.21, True), (0.0, False)):
+        assert EXISTENCE.is_solid(replace(box(2.5), stands_out=relief)) == solid
+
+
+@pytest.mark.parametrize(("window", "same"), [(169, 100), (171, 200), (239, 200), (241, 300), (329, 300), (331, 400)])
+def test_people_are_of_one_size_up_to_170_240_and_330_pixels(window: float, same: float) -> None:
+    learnt = Recall()
+    for _ in range(300):
+        learnt = EXISTENCE.learn(learnt, window, found=True)
+    for other in (100.0, 200.0, 300.0, 400.0):
+        assert (EXISTENCE.recall_of(learnt, other) > 0.8) == (other == same)
+
+
+def test_a_box_can_take_as_much_as_a_miss_and_no_more() -> None:
+    assert EXISTENCE.of_box(replace(box(2.5), score=0.0), 0.4) == -0.4
+    assert EXISTENCE.of_box(replace(box(2.5), score=9.0), 0.9) == 1.5

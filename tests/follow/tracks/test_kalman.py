@@ -85,9 +85,9 @@ def test_an_unseen_velocity_is_a_third_after_four_seconds() -> None:
 
 
 def test_at_an_earlier_stamp_the_person_is_where_they_came_from() -> None:
-    track = replace(initiate(5.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.0, 0.5]))
+    track = replace(initiate(5.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, -0.2, 0.5]))
     before = predict(track, 4.0, NOISE)
-    assert before.mean == pytest.approx([3.0, 0.5, 0.0, 0.5])
+    assert before.mean == pytest.approx([3.2, 0.5, -0.2, 0.5])
     assert before.stamp == 4.0
 
 
@@ -142,3 +142,36 @@ def test_a_predicted_track_of_the_same_stamp_is_the_track() -> None:
     same = predict(track, 1.0, NOISE)
     assert same.mean == pytest.approx(track.mean)
     assert same.covariance == pytest.approx(track.covariance)
+
+
+def test_what_place_and_velocity_share_is_carried_along_as_the_matrices_say() -> None:
+    random = np.random.default_rng(4)
+    for _ in range(20):
+        root = random.normal(0.0, 0.5, (4, 4))
+        track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), covariance=root @ root.T)
+        dt = float(random.uniform(0.05, 2.0))
+        kept = math.exp(-dt / 4.0)
+        move = np.eye(4)
+        move[[0, 1], [2, 3]], move[[2, 3], [2, 3]] = 4.0 * (1 - kept), kept
+        noise = 0.36 * np.kron(np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]), np.eye(2))
+        assert predict(track, dt, NOISE).covariance == pytest.approx(move @ track.covariance @ move.T + noise)
+
+
+def test_a_bearing_and_range_equal_the_textbooks_form_for_any_covariance() -> None:
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        root = random.normal(0.0, 0.3, (4, 4))
+        pose = Odometry(0.0, *random.uniform(-1, 1, 3).tolist())
+        track = replace(initiate(0.0, 0.4, 2.5, pose, NOISE), covariance=root @ root.T)
+        for distance in (2.7, None):
+            seen = innovation(track, 0.5, distance, pose, NOISE)
+            rows = [(*seen.by_bearing, 0.0, 0.0), (*seen.by_range, 0.0, 0.0)][: 2 if distance else 1]
+            h, r = np.array(rows), np.diag([0.02**2, 0.15**2])[: len(rows), : len(rows)]
+            s = h @ track.covariance @ h.T + r
+            gain = track.covariance @ h.T @ np.linalg.inv(s)
+            off = np.array([0.1, 0.2][: len(rows)])
+            after = update(track, seen)
+            assert after.mean == pytest.approx(track.mean + gain @ off)
+            assert after.covariance == pytest.approx(track.covariance - gain @ s @ gain.T)
+            assert seen.distance2 == pytest.approx(float(off @ np.linalg.inv(s) @ off))
+            assert seen.log_volume_ratio == pytest.approx(math.log(np.linalg.det(s) / np.linalg.det(r)))

@@ -178,6 +178,7 @@ def test_a_window_cut_off_by_the_image_excuses_a_person_and_not_a_new_track(midd
 
 def test_too_near_for_hog_excuses_a_person_and_not_a_new_track() -> None:
     assert expected(1.75)
+    assert expected(1.7)
     assert not expected(1.65)
     assert expected(1.65, confirmed=False)
 
@@ -226,3 +227,56 @@ def test_the_legs_in_the_scans_between_two_slow_frames_show_that_a_person_has_tu
 
 def test_the_velocity_of_a_person_outside_the_gate_may_have_changed_as_by_a_right_angle_at_a_walk() -> None:
     assert TRACKER.turn_speed == pytest.approx(math.dist((0.75, 0.0), (0.0, 0.75)), rel=0.1)
+
+
+def test_a_box_of_another_size_is_behind_a_person_from_half_a_metre_further_off() -> None:
+    for distance, theirs in ((1.2, True), (1.7, True), (2.05, True), (2.15, False)):
+        wrong_size = replace(box(1.6), height=round(1.5 * WINDOW / distance), range=distance)
+        assert pairs((somebody(1, 1.6),), wrong_size) == ({0: 0} if theirs else {})
+    # As high as the person at its range, it is where they went.
+    assert pairs((replace(somebody(1, 1.6), confirmed=False),), box(1.65)) == {0: 0}
+
+
+def test_a_box_is_as_high_as_the_person_to_within_35_hundredths() -> None:
+    for share, fits in ((0.66, True), (0.64, False), (1.34, True), (1.36, False)):
+        seen = replace(box(2.0), height=100, range=share * WINDOW / 100)
+        assert TRACKER.association.fits_size(somebody(1, 2.0), seen) == fits
+        assert (TRACKER.association.without_bad_range(somebody(1, 2.0), seen) is seen) == fits
+    assert TRACKER.association.fits_size(somebody(1, 2.0), replace(box(2.0), range=None))
+
+
+def test_an_unconfirmed_tracks_box_is_within_the_gate_of_18_and_a_certain_persons_within_half_a_metre() -> None:
+    person = somebody(1, 4.0)
+    spread = math.sqrt(person.track.covariance[1, 1] / 16 + NOISE.bearing**2)
+    for sigmas, fits in ((4.2, True), (4.3, False)):
+        aside = box(4.0, sigmas * spread)
+        assert (pairs((replace(person, confirmed=False),), aside) == {0: 0}) == fits
+        assert pairs((person,), aside) == {0: 0}
+    for off, fits in ((0.49, True), (0.51, False)):
+        assert (pairs((person,), box(4.0, 2 * math.asin(off / 2 / 4.0))) == {0: 0}) == fits
+
+
+def test_two_boxes_on_one_person_are_within_half_a_metre_and_in_the_same_clothes() -> None:
+    def double(one: Measurement, other: Measurement) -> bool:
+        return TRACKER.association._is_double(one, other)
+
+    for off, same in ((0.49, True), (0.51, False)):
+        turn = 2 * math.asin(off / 2 / 2.0)
+        for bearings in ((0.3, 0.3 + turn), (3.1, 3.1 + turn - math.tau)):
+            first, second = (box(2.0, bearing) for bearing in bearings)
+            assert double(first, second) == double(second, first) == same
+            # A box without a range is as far off as the other one.
+            assert double(replace(first, range=None), second) == double(first, replace(second, range=None)) == same
+        assert double(box(2.0), box(2.0 + off)) == same
+    # Where neither is known, at three metres.
+    for turn, same in ((0.49 / 3.0, True), (0.51 / 3.0, False)):
+        assert double(replace(box(2.0), range=None), replace(box(2.0, turn), range=None)) == same
+    assert not double(box(2.0, clothes=IN_RED), box(2.0, clothes=IN_GREEN + np.array([[0.0, 0.0, 9.0], [9.0, 0, 0]])))
+
+
+def test_boxes_go_to_confirmed_people_first_and_then_to_who_fits_best() -> None:
+    sure, new = somebody(1, 2.0, 0.05), replace(somebody(2, 2.0, 0.0), confirmed=False)
+    assert pairs((new, sure), box(2.0, 0.01)) == {1: 0}
+    assert TRACKER.association.pair((sure,), [box(2.0)], POSE, NOISE, flat={0}) == {}
+    assert TRACKER.association.pair((new,), [box(2.0)], POSE, NOISE, flat={0}) == {0: 0}
+    assert TRACKER.association.pair((sure, new), [box(2.0)], POSE, NOISE, others={(0, 0)}) == {1: 0}

@@ -52,6 +52,10 @@ def test_different_seeds_differ() -> None:
     assert len({fingerprint("followable", seed, 30) for seed in range(4)}) == 4
 
 
+def test_a_run_without_a_seed_is_that_of_seed_0() -> None:
+    assert Arena(FOLLOWABLE).seed == Arena(FOLLOWABLE, 0).seed == 0
+
+
 def test_reading_one_sensor_changes_no_other() -> None:
     busy, idle = Arena(FOLLOWABLE, 1), Arena(FOLLOWABLE, 1)
     for step in range(100):

@@ -128,6 +128,32 @@ def test_a_search_in_part_of_the_image_or_at_half_size_loses_the_same_people(win
     assert 0 < extra < 400
 
 
+@pytest.mark.parametrize("half", [1, 2])
+def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(half: int) -> None:
+    class SeesNobody:
+        def detect(self, image: NDArray[np.uint8]) -> Detections:
+            del image
+            return Detections.none()
+
+    detector = FaultyDetector(SeesNobody(), DetectorFaults(false_rate=2.0), 10.0, 2, 0)
+    region, part = Region(32, 64, 512, 384, 200.0), IMAGE[64:448:half, 32:544:half]
+    count = from_the_top = 0
+    for frame in range(100):
+        detector.face(truth(frame), None)
+        x, y, w, h = detector.detect(IMAGE).boxes.T
+        from_the_top += np.count_nonzero((y == 0) & (h == 480))
+        # Windows of HOG are twice as high as wide.
+        np.testing.assert_array_equal(w, h // 2)
+        within = (x >= 32) & (y >= 64) & (x + w <= 544) & (y + h <= 448)
+        expected = np.stack([x - 32, y - 64, w, h], axis=1)[within] // half
+        detector.face(truth(frame), region)
+        np.testing.assert_array_equal(detector.detect(part).boxes, expected)
+        count += len(expected)
+    assert count > 20
+    # One window in eighty is drawn as high as the image or higher.
+    assert from_the_top > 0
+
+
 def test_the_half_size_detector_keeps_its_own_boxes() -> None:
     detector = FaultyDetector(HalfSize(SeesBoth()), DetectorFaults(false_rate=0.001), 10.0, 2, 0)
     detector.face(truth(0), None)

@@ -40,6 +40,7 @@ def node(tmp_path: Path) -> Path:
 def test_an_arena_has_the_people_of_its_seed() -> None:
     assert Arena(DRAWN, 3).scenario == of_run(DRAWN, 3)
     assert Arena(DRAWN, 3).scenario != Arena(DRAWN, 4).scenario
+    assert Arena(DRAWN).scenario == Arena(DRAWN, 0).scenario
 
 
 def test_the_closed_loop_and_a_sweep_run_with_the_people_of_the_seed(tmp_path: Path) -> None:

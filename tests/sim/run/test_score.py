@@ -401,6 +401,10 @@ def test_a_run_fails_only_beyond_the_time_unseen_that_the_criteria_allow() -> No
     episode = Episode(Scenario.load("two_people"), "c", "d", 0, 0.6, tuple(steps), Contacts(0, 0), 0.5)
     assert score(episode, Criteria(unseen_s=0.31)).success is True
     assert score(episode, Criteria(unseen_s=0.29)).success is False
+    # From .5 s to 1 s, and no longer than allowed.
+    steps = [step(k, person(visible=float(not 5 < k < 10))) for k in range(11)]
+    episode = replace(episode, seconds=1.1, steps=tuple(steps))
+    assert score(episode, Criteria(unseen_s=0.5)).success is True
 
 
 def test_a_box_is_on_a_person_of_its_size_and_place() -> None:

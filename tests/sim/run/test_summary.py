@@ -67,3 +67,18 @@ def test_a_difference_is_sure_where_students_test_rejects_that_there_is_none(val
 
 def test_of_one_run_nothing_is_sure() -> None:
     assert not estimate([3.0]).is_sure
+
+
+@pytest.mark.parametrize("count", [51, 201, 1001])
+def test_students_quantile_is_right_to_the_third_power_of_the_degrees_of_freedom(count: int) -> None:
+    values = np.random.default_rng(1).normal(0.0, 1.0, count).tolist()
+    found, freedom = estimate(values), count - 1
+    assert found.interval is not None
+    quantile = found.interval / (np.std(values, ddof=1) / math.sqrt(count))
+    assert quantile == pytest.approx(float(student.ppf(0.975, freedom)), abs=5 / freedom**3)
+
+
+def test_two_runs_have_an_interval() -> None:
+    # Half the difference of two values is their deviation over the square root of two.
+    assert estimate([1.0, 2.0]).interval is not None
+    assert (estimate([1.0, 2.0]).mean, estimate([1.0, 2.0]).least, estimate([1.0, 2.0]).most) == (1.5, 1.0, 2.0)

@@ -47,6 +47,18 @@ def test_a_mover_pushes_the_robot_aside_which_counts_as_a_contact() -> None:
     assert arena.truth().robot[0] < -0.3
 
 
+@pytest.mark.parametrize("heading", [0.0, math.pi / 2, -2.0])
+def test_a_mover_has_the_velocity_of_its_way_in_the_physics(heading: float) -> None:
+    end = (2.0 + math.cos(heading), math.sin(heading), 0)
+    arena = Arena(Scenario(movers=(Mover("trolley", ((2.0, 0.0, 0), end), 0.5),)))
+    for _ in range(25):
+        arena.step()
+    (body,) = arena._moving
+    # Half a second at half a metre a second.
+    assert tuple(body.velocity) == pytest.approx((0.5 * math.cos(heading), 0.5 * math.sin(heading)))
+    assert tuple(body.position) == pytest.approx((2.0 + 0.25 * math.cos(heading), 0.25 * math.sin(heading)))
+
+
 def test_who_yields_walks_round_a_mover() -> None:
     person = Person(route=((-1.0, 0.03, 0), (4.0, 0.03, 900)), behaviour="social_force", speed=0.7)
     scenario = dataclasses.replace(

@@ -5,6 +5,7 @@ Run on a quiet machine: `uv run python benches/compare.py`.
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import subprocess
@@ -45,6 +46,7 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
 
 def main() -> None:
     """Measures, then replaces the page."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     results = [measure(backend) for backend in _core.available_backends()]
     facts = results[0]["environment"]
     lines = [

@@ -102,12 +102,12 @@ class Company:
         The same of people who are not followed, who pass close by as people do [s, m]. Chosen: the time to stop or to
         turn aside; .2 m of clearance.
     wanted
-        Of more distance than this nothing is gained [m]. Chosen: the edge of Hall's intimate zone, and half a trunk.
+        Of more distance than this nothing is gained [m]. Chosen: `clear`, and half a trunk.
     walls
         Distance kept from everything else [m]. Chosen: `Guard` keeps more ahead and behind, where it can.
     near, person_radius
         What the lidar sees further off than `near`, or nearer than `person_radius` to one who comes, is no wall [m].
-        Chosen: what the robot backs in the time compared; as `Grid`'s.
+        Chosen: nearly what the robot backs in the time compared; as `Grid`'s.
     never
         What a way costs that ends at a wall or backs blindly [m]. Chosen: more than all distances together are worth.
     speeds, turns
@@ -121,7 +121,7 @@ class Company:
     settle_s, stay
         A way is left for another only after so long [s], unless it costs `never`, and if the other is worth more by so
         much [m]; standing is left at once. Measured: while the robot turns, which takes .8 s, a person's velocity
-        across their way strays by .4 m/s, and the sides would be taken in turns; chosen: half of the distance wanted.
+        across their way strays by .4 m/s, and the sides would be taken in turns; chosen: less than half of `wanted`.
     away
         What a way costs on which the person followed is out of the image all the time [m], unless it is they who come.
         Chosen: less than the clearance wanted.

@@ -23,8 +23,8 @@ class Detour:
         Directions tried: so far apart [rad], so many to either side [1]. Chosen: at .48 rad to either side the
         person stays in the Limo's image, which ends at .62.
     preference
-        Weight of the difference to the preferred detour against that to the direct way [1]. Chosen: of two detours of
-        one size the preferred is taken, of two sizes the smaller.
+        Weight of the difference to the preferred detour against that to the direct way [1]. Chosen: a detour is kept
+        until one to the other side is less than a third of it.
     look_ahead
         So much of the way must be free [m]. Chosen: two seconds at 0.6 m/s.
     lean_s

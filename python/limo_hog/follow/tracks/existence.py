@@ -64,7 +64,7 @@ class Existence:
         Heights of windows that part the classes of size [px].
     recall, recall_frames
         Recall before anything is learnt, and how many frames that is worth [1]. Chosen: a start with a detector that
-        finds three people in ten; one that finds more has shown it after a second.
+        finds few, three people in ten or four; one that finds more has shown it after a second.
     recall_memory
         Share of what was learnt that is kept from frame to frame [1]. Chosen: 100 frames, ten seconds.
     least_recall, most_recall

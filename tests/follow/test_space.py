@@ -139,7 +139,7 @@ def test_a_person_walks_on_where_they_went_and_not_through_walls() -> None:
     assert free.points[moving, 0].mean() == pytest.approx(-2.4, abs=0.25)
 
 
-def test_nobody_is_where_beams_pass() -> None:
+def test_no_person_is_where_beams_pass() -> None:
     points = at((1.0, 0.5), (1.75, 0.5), (1.9, 0.5), (2.5, 0.5), (3.0, -2.0), (-1.0, 0.0))
     passed = WANDERING.looked_through(points, wall_scan(), HERE)
     assert passed.tolist() == [True, True, False, False, True, False]

@@ -26,7 +26,7 @@ def boxes(*rows: tuple[int, int, int, int], scores: tuple[float, ...] | None = N
 def dressed(
     box: tuple[int, int, int, int], shirt: tuple[int, int, int], trousers: tuple[int, int, int]
 ) -> NDArray[np.uint8]:
-    """A grey image with somebody in a detection window, in BGR colours: a shirt above, trousers below."""
+    """A grey image with a person in a detection window, in BGR colours: a shirt above, trousers below."""
     x, y, w, h = box
     image = np.full((HEIGHT, WIDTH, 3), 180, np.uint8)
     left, right = x + round(0.35 * w), x + round(0.65 * w)
@@ -41,7 +41,7 @@ def flat(depth: float) -> NDArray[np.float32]:
 
 
 def before_wall(depth: float, box: tuple[int, int, int, int], wall: float = 8.0) -> NDArray[np.float32]:
-    """A depth image of somebody in a detection window, half as wide, three quarters as high, and a wall behind."""
+    """A depth image of a person in a detection window, half as wide, three quarters as high, and a wall behind."""
     x, y, w, h = box
     image = flat(wall)
     image[max(y + h // 8, 0) : y + h - h // 8, max(x + w // 4, 0) : max(x + w - w // 4, 0)] = depth

@@ -102,7 +102,7 @@ def test_onto_unknown_ground_it_backs_at_the_limit_at_most() -> None:
 
 
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
-def test_one_who_can_be_at_any_place_behind_makes_it_stand(yaw: float) -> None:
+def test_a_person_who_can_be_at_any_place_behind_makes_it_stand(yaw: float) -> None:
     pose = Odometry(9.0, 1.0, -2.0, yaw)
     back = complex(-math.cos(yaw), -math.sin(yaw))
     # Seen a second ago: 1.5 m from the farthest place, .3 m behind the outline.

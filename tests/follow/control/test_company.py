@@ -71,12 +71,12 @@ def at_the_robot(distance: float, speed: float, bearing: float = 0.0, *, followe
     return Walker(distance * cos, distance * sin, -speed * cos, -speed * sin, followed)
 
 
-def test_nobody_who_stands_or_leaves_is_given_way_to() -> None:
+def test_no_person_who_stands_or_leaves_is_given_way_to() -> None:
     for walker in (Walker(1.0, 0, 0, 0), Walker(1.0, 0, 0.8, 0), Walker(1.0, 0.8, 0.1, 0)):
         assert COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO) is None
 
 
-def test_nobody_who_passes_at_a_distance_is_given_way_to() -> None:
+def test_no_person_who_passes_at_a_distance_is_given_way_to() -> None:
     assert COMPANY.way_out(STANDING, STANDING, [Walker(2.0, 1.0, -0.8, 0)], NO_POINTS, LIMO) is None
 
 

@@ -1,4 +1,4 @@
-"""Who is given way to, and what a way is worth: plain geometry, and both sides of what is documented."""
+"""Which people are given way to, and what a way is worth: plain geometry, and both sides of what is documented."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def ahead(distance: float, speed: float, *, followed: bool) -> Walker:
 
 @pytest.mark.parametrize(("followed", "seconds", "clear"), [(True, 2.8, 0.65), (False, 1.5, 0.35)])
 @pytest.mark.parametrize("speed", [0.5, 1.5])
-def test_who_comes_too_near_within_the_time_is_given_way_to(
+def test_a_person_who_comes_too_near_within_the_time_is_given_way_to(
     followed: bool, seconds: float, clear: float, speed: float
 ) -> None:
     # To the outline's front, and so much nearer when the time is over; times are steps of .2 s.
@@ -39,7 +39,7 @@ def test_who_comes_too_near_within_the_time_is_given_way_to(
 
 
 @pytest.mark.parametrize(("followed", "clear"), [(True, 0.65), (False, 0.35)])
-def test_who_passes_nearer_than_is_wanted_is_given_way_to(followed: bool, clear: float) -> None:
+def test_a_person_who_passes_nearer_than_is_wanted_is_given_way_to(followed: bool, clear: float) -> None:
     for more, given in ((-0.03, True), (0.03, False)):
         for side in (-1, 1):
             beside = Walker(0.5, side * (LIMO.half_width + clear + more), -0.8, 0.0, followed)

@@ -37,7 +37,7 @@ def hunt_for(points: Points, planned: float) -> Hunt:
     return Hunt(track, Places(NOW, points, np.zeros(points.shape)), planned=planned)
 
 
-def test_nobody_is_where_the_camera_shows_nobody() -> None:
+def test_no_person_is_where_the_camera_shows_none() -> None:
     sure = Lookout(wandering=Wandering(found=1.0))
     around = np.array([(r * np.cos(a), r * np.sin(a)) for r in (1.0, 3.3, 3.7, 4.5) for a in np.arange(-3, 3.1, 0.3)])
     after = sure.step(hunt_for(around, NOW), BLIND, NOW, HERE, GRID, free_ground())

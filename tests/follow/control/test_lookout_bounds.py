@@ -170,7 +170,7 @@ def test_where_no_place_is_left_it_begins_anywhere_or_turns_on(place: tuple[floa
     assert turned.places is hunt.places
 
 
-def test_nobody_begins_on_the_other_side_of_a_wall() -> None:
+def test_no_place_begins_on_the_other_side_of_a_wall() -> None:
     ground = ground_of({(row, 60): (2.0, NOW) for row in range(100)})
     track = kalman.initiate(NOW, 0.0, 0.5, HERE, Noise())
     track = replace(track, mean=np.array([0.0, 0.9, 0.0, 0.0]), covariance=np.diag([0.04, 0.04, 0.01, 0.01]))

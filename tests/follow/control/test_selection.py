@@ -84,7 +84,7 @@ def test_after_four_seconds_the_likelier_of_two_is_taken_and_is_as_likely_as_not
             assert (after.number, after.unsure_at) == (1, since)
 
 
-def test_who_may_be_the_lost_person_by_one_in_ten_is_looked_at_for_four_seconds() -> None:
+def test_a_person_who_may_be_the_lost_person_by_one_in_ten_is_looked_at_for_four_seconds() -> None:
     for chance, since, looked in (
         (0.12, None, True),
         (0.08, None, False),
@@ -97,7 +97,7 @@ def test_who_may_be_the_lost_person_by_one_in_ten_is_looked_at_for_four_seconds(
         assert (after.unsure_at is None) == (chance < 0.1)
 
 
-def test_one_who_is_followed_in_doubt_is_followed_on_and_not_looked_at() -> None:
+def test_a_person_who_is_followed_in_doubt_is_followed_on_and_not_looked_at() -> None:
     after = choose(Choice(1, known(one=0.3), NOW), plain(1))
     assert (after.number, after.candidates, after.unsure_at) == (1, (), NOW)
 

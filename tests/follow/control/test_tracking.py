@@ -37,7 +37,7 @@ def test_it_searches_by_turning_and_does_not_drive() -> None:
     assert abs(decision.twist.angular) == CONTROLLER.search.rate
 
 
-def test_it_faces_somebody_new_at_once_and_drives_only_when_sure() -> None:
+def test_it_faces_a_new_person_at_once_and_drives_only_when_sure() -> None:
     world = World(person=(3.0, 1.0))
     first = run(world, 0.1)
     assert first.twist.angular > 0.3
@@ -46,21 +46,21 @@ def test_it_faces_somebody_new_at_once_and_drives_only_when_sure() -> None:
     assert run(world, 1.5, first.state).twist.linear > 0.2
 
 
-def test_it_holds_its_distance_to_somebody_who_stands() -> None:
+def test_it_holds_its_distance_to_a_person_who_stands() -> None:
     world = World()
     decision = run(world, 12.0)
     assert decision.mode is Mode.HOLD
     assert world.distance - 0.084 == pytest.approx(1.5, abs=0.1)
 
 
-def test_it_follows_without_lag_somebody_who_walks_around_it() -> None:
+def test_it_follows_without_lag_a_person_who_walks_around_it() -> None:
     world = World(person=(2.0, -1.0), velocity=(0.0, 0.4))
     run(world, 6.0)
     # A proportional controller of the same gain lags by rate / gain: 0.2 / 2.5 rad here.
     assert abs(world.bearing) < 0.03
 
 
-def test_it_backs_away_from_somebody_who_comes_near() -> None:
+def test_it_backs_away_from_a_person_who_comes_near() -> None:
     world = World()
     state = run(world, 12.0).state
     world.velocity = (-0.3, 0.0)
@@ -79,7 +79,7 @@ def test_it_coasts_over_missing_frames_and_says_where_it_looks() -> None:
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_somebody_gone_is_lost_and_searched_for_the_way_they_went(side: float) -> None:
+def test_a_person_gone_is_lost_and_searched_for_the_way_they_went(side: float) -> None:
     world = World(person=(3.0, side * -1.0), velocity=(0.0, side * 0.4), lidar=False)
     state = run(world, 4.0).state
     decision = run(world, 1.5, state, visible=False)
@@ -90,7 +90,7 @@ def test_somebody_gone_is_lost_and_searched_for_the_way_they_went(side: float) -
     assert decision.twist.angular == side * CONTROLLER.search.rate
 
 
-def test_legs_in_the_scan_keep_somebody_too_near_for_the_camera() -> None:
+def test_legs_in_the_scan_keep_a_person_too_near_for_the_camera() -> None:
     world = World(person=(1.6, 0.0))
     state = run(world, 4.0).state
     for _ in range(30):
@@ -141,7 +141,7 @@ def seen_in(view: Observation, shirt: tuple[int, int, int]) -> Observation:
 
 
 def lost(world: World) -> TrackingState:
-    """Follow somebody in red, who goes out of sight to the right for 9 s."""
+    """Follow a person in red, who goes out of sight to the right for 9 s."""
     state = CONTROLLER.start()
     for _ in range(130):
         view = seen_in(world.observe(visible=world.time < 4.0), RED)
@@ -153,7 +153,7 @@ def lost(world: World) -> TrackingState:
     return state
 
 
-def test_somebody_in_other_clothes_is_not_who_was_lost_until_long_after() -> None:
+def test_a_person_in_other_clothes_is_not_the_lost_one_until_long_after() -> None:
     world = World()
     state = lost(world)
     parted = 4.0
@@ -173,7 +173,7 @@ def test_somebody_in_other_clothes_is_not_who_was_lost_until_long_after() -> Non
     assert decision.reason == "following a person"
 
 
-def test_whoever_wears_what_the_lost_person_wore_is_followed_at_once() -> None:
+def test_a_person_who_wears_what_the_lost_person_wore_is_followed_at_once() -> None:
     world = World()
     state = lost(world)
     decision = CONTROLLER.step(seen_in(world.observe(), RED), state)
@@ -412,7 +412,7 @@ def test_a_box_on_the_wall_beside_a_missed_person_does_not_take_their_track() ->
     assert person.track.mean[:2] == pytest.approx(world.person, abs=0.1)
 
 
-def test_it_keeps_further_off_somebody_who_walks_where_the_images_come_late() -> None:
+def test_it_keeps_further_off_a_person_who_walks_where_the_images_come_late() -> None:
     kept = []
     for period in (0.1, 0.4):
         world = World(person=(2.5, -1.0), velocity=(0.0, 0.5), period=period)

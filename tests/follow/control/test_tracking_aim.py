@@ -200,7 +200,7 @@ def test_an_unmeasured_person_is_faced_for_two_seconds_and_behind_something_unti
         assert (unseen_for(seconds, pillar=pillar) == "turning to the predicted position") == faced
 
 
-def test_who_was_given_way_to_is_faced_for_three_seconds() -> None:
+def test_a_person_who_was_given_way_to_is_faced_for_three_seconds() -> None:
     for seconds, ago, faced in ((2.5, 0.0, True), (3.1, 0.0, False), (2.5, 2.9, True), (2.5, 3.1, False)):
         assert (unseen_for(seconds, gave_way_s=ago) == "turning to the predicted position") == faced
 

@@ -21,7 +21,7 @@ def test_both_stop_when_nobody_is_seen() -> None:
         assert decision.target is None
 
 
-def test_somebody_who_is_gone_is_lost() -> None:
+def test_a_person_who_is_gone_is_lost() -> None:
     for controller in (ApproachController(), ProxemicController()):
         for depth in (None, flat(2.0)):
             seen = controller.step(replace(look(boxes((300, 100, 60, 120))), depth=depth), controller.start())

@@ -39,7 +39,7 @@ def test_the_way_is_free_when_nothing_is_there() -> None:
     assert decision.reason == "because"
 
 
-def test_somebody_near_ahead_stops_the_robot_but_not_its_turn() -> None:
+def test_a_person_near_ahead_stops_the_robot_but_not_its_turn() -> None:
     decision = ahead().step(replace(look(), scan=scan_of([(0.6, 0.0)])), ahead().start())
     assert decision.twist == Twist(0.0, 0.3)
     assert decision.mode is Mode.BLOCKED

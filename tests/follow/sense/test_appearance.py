@@ -46,7 +46,7 @@ def test_a_box_that_slipped_down_to_the_trousers_shows_no_other_shirt() -> None:
     assert APPEARANCE.cost(worn(image), worn(image, (x, y + 60, w, h))) < OTHER_CLOTHES
 
 
-def test_a_hand_before_the_trousers_is_not_enough_for_somebody_else() -> None:
+def test_a_hand_before_the_trousers_is_not_enough_for_another_person() -> None:
     one, other = worn(dressed(BOX, RED, BLUE)), worn(dressed(BOX, RED, (140, 170, 220)))
     assert 0 < APPEARANCE.cost(one, other) < OTHER_CLOTHES
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.tracks.test_people import NOISE, POSE, box, somebody
+from tests.follow.tracks.test_people import NOISE, POSE, a_person, box
 from tests.follow.views import FOCAL, HEIGHT, before_wall, flat
 
 from limo_hog.follow.sense.ranging import stands_out, top_row
@@ -61,7 +61,7 @@ def test_a_pillar_found_in_every_other_frame_with_a_low_score_is_never_confirmed
 
 
 def test_a_certain_person_survives_a_second_of_misses_and_not_two() -> None:
-    person = somebody(1, 2.5)
+    person = a_person(1, 2.5)
     for miss in range(20):
         person = EXISTENCE.update(person, EXISTENCE.of_miss(0.95), found=False)
         if miss == 9:
@@ -125,7 +125,7 @@ def test_the_recall_that_is_learnt_is_the_share_of_frames_in_which_the_person_wa
 
 
 def test_misses_are_counted_since_the_last_box() -> None:
-    person, counted = somebody(1, 2.5), []
+    person, counted = a_person(1, 2.5), []
     for found in (True, False, False, True, False):
         person = EXISTENCE.update(person, 0.0, found=found)
         counted.append(person.misses)
@@ -151,7 +151,7 @@ def frames_until(person: Person, *, found: bool, confirmed: bool) -> int:
 
 def test_four_clear_frames_confirm_and_fifteen_misses_drop_who_was_certain() -> None:
     assert frames_until(new(), found=True, confirmed=True) == 4
-    assert frames_until(somebody(1, 2.5), found=False, confirmed=False) == 15
+    assert frames_until(a_person(1, 2.5), found=False, confirmed=False) == 15
 
 
 def test_a_track_is_confirmed_from_95_percent_until_it_is_below_27() -> None:
@@ -161,7 +161,7 @@ def test_a_track_is_confirmed_from_95_percent_until_it_is_below_27() -> None:
         (-1.0, True, True),
         (-1.01, True, False),
     ):
-        person = replace(somebody(1, 2.5), log_odds=before, confirmed=confirmed)
+        person = replace(a_person(1, 2.5), log_odds=before, confirmed=confirmed)
         assert EXISTENCE.update(person, 0.0, found=True).confirmed == after_
     assert replace(new(), log_odds=3.0).existence == pytest.approx(0.95, abs=0.005)
     assert replace(new(), log_odds=-1.0).existence == pytest.approx(0.27, abs=0.005)

@@ -85,7 +85,7 @@ def test_a_person_whose_legs_have_been_the_same_stays_the_person() -> None:
         assert low <= known.of(1) <= high
 
 
-def test_one_who_is_hardly_likely_is_known_again_while_their_legs_go_on() -> None:
+def test_a_person_who_is_hardly_likely_is_known_again_while_their_legs_go_on() -> None:
     known = replace(followed(), chances=((1, 0.1),))
     for frame in range(11, 21):
         one = person(1, 0.1 * frame)
@@ -188,7 +188,7 @@ def test_before_one_is_followed_the_one_straight_ahead_and_near_is_meant() -> No
     assert SELECTION.choose(at(0.0, aside, behind, ahead), Choice()).number == 1
 
 
-def test_one_who_may_be_the_lost_person_is_looked_at_for_some_seconds_and_then_left() -> None:
+def test_a_person_who_may_be_the_lost_person_is_looked_at_for_some_seconds_and_then_left() -> None:
     def looked(stamp: float, unsure_at: float | None) -> Choice:
         likeness = replace(followed(), chances=((2, 0.3),), at=stamp)
         back = replace(person(2, stamp, clothes=None), tall=None)

@@ -163,7 +163,7 @@ def test_of_two_who_pass_nearer_than_half_a_metre_one_in_fifty_changes_places_in
         assert (after.of(1), after.of(2)) == pytest.approx((one - swapped, two + swapped))
 
 
-def test_nobody_changes_places_with_one_who_is_not_measured() -> None:
+def test_no_person_changes_places_with_one_who_is_not_measured() -> None:
     after = IDENTITY.update(known_as((1, 0.8), (2, 0.1)), at(5.0, plain(1, 5.0), plain(2, 5.0, 0.3, measured=4.0)))
     one, two = 0.8 * 0.998, 0.1 * math.exp(-0.1 / 2.0)
     assert (after.of(1), after.of(2)) == pytest.approx((one + 0.002 * (1 - one - two), two))
@@ -175,7 +175,7 @@ def test_the_place_is_learnt_where_nineteen_in_twenty_are_right() -> None:
         assert (after.place, after.at) == (((2.0, 0.7), 3.0) if learnt else ((2.0, 0.0), 1.0))
 
 
-def test_who_is_not_the_person_in_nineteen_of_twenty_is_remembered_as_another() -> None:
+def test_a_person_who_is_not_the_person_in_nineteen_of_twenty_is_remembered_as_another() -> None:
     for chance, remembered in ((0.04, True), (0.07, False)):
         after = IDENTITY.update(known_as((2, chance)), at(1.0, plain(2, 1.0)))
         assert [one.number for one in after.others] == ([2] if remembered else [])

@@ -27,7 +27,7 @@ IN_RED: NDArray[np.float64] = np.array([[10.0, 4.0, 10.0], [6.0, 6.0, 9.0]])
 IN_GREEN: NDArray[np.float64] = np.array([[5.0, 10.0, 10.0], [6.0, 6.0, 9.0]])
 
 
-def somebody(number: int, distance: float, bearing: float = 0.0, clothes: NDArray[np.float64] | None = None) -> Person:
+def a_person(number: int, distance: float, bearing: float = 0.0, clothes: NDArray[np.float64] | None = None) -> Person:
     """A person who is known well, last seen at time 0."""
     sharp = replace(NOISE, range=0.05, bearing=0.01, velocity=0.1)
     track = kalman.initiate(0.0, bearing, distance, POSE, sharp)
@@ -35,7 +35,7 @@ def somebody(number: int, distance: float, bearing: float = 0.0, clothes: NDArra
 
 
 def box(distance: float, bearing: float = 0.0, clothes: NDArray[np.float64] | None = None) -> Measurement:
-    """A box on the whole of somebody."""
+    """A box on the whole of a person."""
     height, centre = round(WINDOW / distance), -120.0 / distance
     return Measurement(bearing, distance, height, centre, 2.0, clothes, window=WINDOW, middle=-120.0)
 
@@ -44,35 +44,35 @@ def pairs(people: tuple[Person, ...], *boxes: Measurement) -> dict[int, int]:
     return TRACKER.association.pair(people, boxes, POSE, NOISE)
 
 
-def test_somebody_long_unseen_does_not_take_the_box_of_who_is_seen() -> None:
-    seen, gone = somebody(1, 1.6), predict(replace(somebody(2, 2.6), seen=-2.0), 2.0, NOISE)
+def test_a_person_long_unseen_does_not_take_the_box_of_one_in_view() -> None:
+    seen, gone = a_person(1, 1.6), predict(replace(a_person(2, 2.6), seen=-2.0), 2.0, NOISE)
     # He may be anywhere by now, and so fits everywhere.
     assert pairs((gone,), box(1.7, 0.05)) == {0: 0}
     assert pairs((gone, seen), box(1.7, 0.05)) == {1: 0}
 
 
-def test_a_second_box_on_somebody_is_nobody_elses() -> None:
-    seen, gone = somebody(1, 1.6), predict(replace(somebody(2, 2.6), seen=-2.0), 2.0, NOISE)
+def test_a_second_box_on_a_person_is_no_other_persons() -> None:
+    seen, gone = a_person(1, 1.6), predict(replace(a_person(2, 2.6), seen=-2.0), 2.0, NOISE)
     assert pairs((seen, gone), box(1.6), box(1.65, 0.05)) == {0: 0}
 
 
 def test_two_who_meet_are_told_apart_by_their_clothes() -> None:
-    one, other = somebody(1, 2.0, 0.0, IN_RED), somebody(2, 2.1, 0.1, IN_GREEN)
+    one, other = a_person(1, 2.0, 0.0, IN_RED), a_person(2, 2.1, 0.1, IN_GREEN)
     # Each box is a little nearer to the wrong one.
     assert pairs((one, other), box(2.02, 0.03, IN_GREEN), box(2.08, 0.07, IN_RED)) == {0: 1, 1: 0}
 
 
 def test_two_who_meet_in_equal_clothes_are_told_apart_by_their_ways() -> None:
-    one, other = somebody(1, 2.0, 0.0, IN_RED), somebody(2, 2.6, 0.1, IN_RED)
+    one, other = a_person(1, 2.0, 0.0, IN_RED), a_person(2, 2.6, 0.1, IN_RED)
     assert pairs((one, other), box(2.55, 0.08, IN_RED), box(2.05, 0.02, IN_RED)) == {0: 1, 1: 0}
 
 
 def test_a_glimpse_of_wrong_colours_does_not_lose_who_is_certain() -> None:
-    assert pairs((somebody(1, 2.0, 0.0, IN_RED),), box(2.02, 0.01, IN_GREEN)) == {0: 0}
+    assert pairs((a_person(1, 2.0, 0.0, IN_RED),), box(2.02, 0.01, IN_GREEN)) == {0: 0}
 
 
 def test_somebody_unseen_does_not_become_somebody_in_other_clothes() -> None:
-    gone = predict(somebody(1, 2.0, 0.0, IN_RED), 2.0, NOISE)
+    gone = predict(a_person(1, 2.0, 0.0, IN_RED), 2.0, NOISE)
     assert pairs((gone,), box(2.5, 0.2, IN_RED)) == {0: 0}
     assert pairs((gone,), box(2.5, 0.2, IN_GREEN)) == {}
 
@@ -80,19 +80,19 @@ def test_somebody_unseen_does_not_become_somebody_in_other_clothes() -> None:
 def test_a_box_behind_somebody_that_is_not_their_size_is_not_theirs() -> None:
     behind = replace(box(1.6), range=4.0)
     before = replace(box(1.6), range=0.8)
-    assert pairs((somebody(1, 1.6),), behind) == {}
-    assert pairs((somebody(1, 1.6),), before) == {0: 0}
+    assert pairs((a_person(1, 1.6),), behind) == {}
+    assert pairs((a_person(1, 1.6),), before) == {0: 0}
 
 
 def test_a_person_grows_no_smaller_for_being_cut_off_by_the_image() -> None:
     cut_off = replace(box(1.5), window=0.8 * WINDOW, whole=False)
-    assert TRACKER.correct(somebody(1, 1.5), cut_off, POSE).window == WINDOW
-    assert TRACKER.correct(somebody(1, 1.5), replace(cut_off, whole=True), POSE).window < WINDOW
-    assert TRACKER.correct(somebody(1, 1.5), replace(cut_off, window=1.5 * WINDOW), POSE).window == 1.5 * WINDOW
+    assert TRACKER.correct(a_person(1, 1.5), cut_off, POSE).window == WINDOW
+    assert TRACKER.correct(a_person(1, 1.5), replace(cut_off, whole=True), POSE).window < WINDOW
+    assert TRACKER.correct(a_person(1, 1.5), replace(cut_off, window=1.5 * WINDOW), POSE).window == 1.5 * WINDOW
 
 
 def test_clothes_are_averaged_until_somebody_is_known_and_then_kept() -> None:
-    new = replace(somebody(1, 2.0, 0.0, IN_GREEN), confirmed=False, age=1)
+    new = replace(a_person(1, 2.0, 0.0, IN_GREEN), confirmed=False, age=1)
     for _ in range(10):
         new = TRACKER.correct(replace(new, confirmed=False), box(2.0, 0.0, IN_RED), POSE)
     assert APPEARANCE.cost(new.clothes, IN_RED) < APPEARANCE.other / 2
@@ -116,10 +116,10 @@ def test_a_box_is_measured_from_the_robots_centre_by_its_depth() -> None:
 
 def test_a_box_without_a_range_is_as_far_off_as_across_the_line_of_sight() -> None:
     without = replace(box(2.0), range=None)
-    assert distance_to(somebody(1, 2.0), replace(without, bearing=0.3), POSE) == pytest.approx(2.0 * math.tan(0.3))
-    assert distance_to(somebody(1, 2.0), replace(without, bearing=-0.3), POSE) == pytest.approx(2.0 * math.tan(0.3))
-    assert distance_to(somebody(1, 2.0), replace(without, bearing=3.0), POSE) == math.inf
-    assert distance_to(somebody(1, 2.0), box(3.0, 0.3), POSE) == pytest.approx(
+    assert distance_to(a_person(1, 2.0), replace(without, bearing=0.3), POSE) == pytest.approx(2.0 * math.tan(0.3))
+    assert distance_to(a_person(1, 2.0), replace(without, bearing=-0.3), POSE) == pytest.approx(2.0 * math.tan(0.3))
+    assert distance_to(a_person(1, 2.0), replace(without, bearing=3.0), POSE) == math.inf
+    assert distance_to(a_person(1, 2.0), box(3.0, 0.3), POSE) == pytest.approx(
         math.dist((2, 0), (3 * math.cos(0.3), 3 * math.sin(0.3)))
     )
 
@@ -132,7 +132,7 @@ def test_a_new_person_without_a_range_may_be_anywhere_along_the_line_of_sight() 
 
 
 def test_a_range_that_contradicts_the_size_of_the_box_moves_nobody() -> None:
-    person = somebody(1, 3.0)
+    person = a_person(1, 3.0)
     hand_in_front = replace(box(3.0, 0.02), range=0.8)
     after = TRACKER.correct(person, hand_in_front, POSE)
     assert math.hypot(*after.track.mean[:2]) == pytest.approx(3.0, abs=0.02)
@@ -141,7 +141,7 @@ def test_a_range_that_contradicts_the_size_of_the_box_moves_nobody() -> None:
 
 def test_a_person_who_turned_sharply_is_where_the_box_is() -> None:
     aside = box(3.0, 0.15)
-    after = TRACKER.correct(somebody(1, 3.0), aside, POSE)
+    after = TRACKER.correct(a_person(1, 3.0), aside, POSE)
     # By the gain of a certain track alone it would be a fifth of the way.
     assert math.atan2(after.track.mean[1], after.track.mean[0]) > 0.8 * 0.15
 
@@ -215,7 +215,7 @@ def test_clothes_of_which_one_number_is_missing_are_unknown() -> None:
 def test_the_legs_in_the_scans_between_two_slow_frames_show_that_a_person_has_turned() -> None:
     # The person walked to the left at .6 m/s; after the frame at 0 s they turn and walk to the right as fast.
     track = replace(kalman.initiate(0.0, 0.0, 2.0, POSE, NOISE), mean=np.array([2.0, 0.0, 0.0, 0.6]))
-    tracks = Tracks(people=(replace(somebody(1, 2.0), track=track),), stamp=0.0, poses=(POSE,))
+    tracks = Tracks(people=(replace(a_person(1, 2.0), track=track),), stamp=0.0, poses=(POSE,))
     between = tuple((scan_of([(2.0, -0.6 * t)], stamp=t), Odometry(t)) for t in (0.1, 0.2, 0.3))
     seen = replace(look(stamp=0.33), odometry=Odometry(0.33), between=between)
     without, _ = TRACKER.update(replace(seen, between=()), tracks)
@@ -232,21 +232,21 @@ def test_the_velocity_of_a_person_outside_the_gate_may_have_changed_as_by_a_righ
 def test_a_box_of_another_size_is_behind_a_person_from_half_a_metre_further_off() -> None:
     for distance, theirs in ((1.2, True), (1.7, True), (2.05, True), (2.15, False)):
         wrong_size = replace(box(1.6), height=round(1.5 * WINDOW / distance), range=distance)
-        assert pairs((somebody(1, 1.6),), wrong_size) == ({0: 0} if theirs else {})
+        assert pairs((a_person(1, 1.6),), wrong_size) == ({0: 0} if theirs else {})
     # As high as the person at its range, it is where they went.
-    assert pairs((replace(somebody(1, 1.6), confirmed=False),), box(1.65)) == {0: 0}
+    assert pairs((replace(a_person(1, 1.6), confirmed=False),), box(1.65)) == {0: 0}
 
 
 def test_a_box_is_as_high_as_the_person_to_within_35_hundredths() -> None:
     for share, fits in ((0.66, True), (0.64, False), (1.34, True), (1.36, False)):
         seen = replace(box(2.0), height=100, range=share * WINDOW / 100)
-        assert TRACKER.association.fits_size(somebody(1, 2.0), seen) == fits
-        assert (TRACKER.association.without_bad_range(somebody(1, 2.0), seen) is seen) == fits
-    assert TRACKER.association.fits_size(somebody(1, 2.0), replace(box(2.0), range=None))
+        assert TRACKER.association.fits_size(a_person(1, 2.0), seen) == fits
+        assert (TRACKER.association.without_bad_range(a_person(1, 2.0), seen) is seen) == fits
+    assert TRACKER.association.fits_size(a_person(1, 2.0), replace(box(2.0), range=None))
 
 
 def test_an_unconfirmed_tracks_box_is_within_the_gate_of_18_and_a_certain_persons_within_half_a_metre() -> None:
-    person = somebody(1, 4.0)
+    person = a_person(1, 4.0)
     spread = math.sqrt(person.track.covariance[1, 1] / 16 + NOISE.bearing**2)
     for sigmas, fits in ((4.2, True), (4.3, False)):
         aside = box(4.0, sigmas * spread)
@@ -275,7 +275,7 @@ def test_two_boxes_on_one_person_are_within_half_a_metre_and_in_the_same_clothes
 
 
 def test_boxes_go_to_confirmed_people_first_and_then_to_who_fits_best() -> None:
-    sure, new = somebody(1, 2.0, 0.05), replace(somebody(2, 2.0, 0.0), confirmed=False)
+    sure, new = a_person(1, 2.0, 0.05), replace(a_person(2, 2.0, 0.0), confirmed=False)
     assert pairs((new, sure), box(2.0, 0.01)) == {1: 0}
     assert TRACKER.association.pair((sure,), [box(2.0)], POSE, NOISE, flat={0}) == {}
     assert TRACKER.association.pair((new,), [box(2.0)], POSE, NOISE, flat={0}) == {0: 0}

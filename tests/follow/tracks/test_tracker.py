@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.follow.tracks.test_people import IN_GREEN, IN_RED, NOISE, POSE, WINDOW, box, somebody
+from tests.follow.tracks.test_people import IN_GREEN, IN_RED, NOISE, POSE, WINDOW, a_person, box
 from tests.follow.tracks.test_scan_movers import FREE, GRID, person, walker
 from tests.follow.views import boxes, flat, look, scan_of
 
@@ -59,45 +59,45 @@ def test_before_the_second_frame_ten_a_second_are_expected() -> None:
 
 def test_a_person_not_measured_is_forgotten_after_eight_seconds() -> None:
     for unseen_s, people in ((7.9, 1), (8.1, 0)):
-        tracks, _ = TRACKER.update(frame(unseen_s), Tracks(people=(somebody(1, 2.0),), stamp=0.0))
+        tracks, _ = TRACKER.update(frame(unseen_s), Tracks(people=(a_person(1, 2.0),), stamp=0.0))
         assert len(tracks.people) == people
 
 
 def test_one_box_moves_the_known_size_by_a_fifth_of_the_difference() -> None:
     seen = replace(box(2.0), window=1.1 * WINDOW, middle=-130.0)
-    corrected = TRACKER.correct(somebody(1, 2.0), seen, POSE)
+    corrected = TRACKER.correct(a_person(1, 2.0), seen, POSE)
     assert corrected.window == pytest.approx(WINDOW * (1 + 0.1 / 5))
     assert corrected.centre == pytest.approx(-120.0 - 10.0 / 5)
     # A box on a picture, in one plane with what is beside it, shows no size.
-    on_a_picture = TRACKER.correct(somebody(1, 2.0), replace(seen, stands_out=0.1), POSE)
+    on_a_picture = TRACKER.correct(a_person(1, 2.0), replace(seen, stands_out=0.1), POSE)
     assert (on_a_picture.window, on_a_picture.centre) == (WINDOW, -120.0)
 
 
 def test_a_person_cut_off_by_the_image_can_only_be_taller_than_they_show() -> None:
     shown = replace(box(2.0), whole=False, middle=-140.0)
     for window, known in ((0.9 * WINDOW, (WINDOW, -120.0)), (1.1 * WINDOW, (1.1 * WINDOW, -140.0))):
-        corrected = TRACKER.correct(somebody(1, 2.0), replace(shown, window=window), POSE)
+        corrected = TRACKER.correct(a_person(1, 2.0), replace(shown, window=window), POSE)
         assert (corrected.window, corrected.centre) == known
 
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_a_box_half_of_what_people_keep_from_each_other_off_may_be_anothers(side: int) -> None:
     for off, in_place in ((0.2, True), (0.3, False)):
-        corrected = TRACKER.correct(somebody(1, 2.5), replace(box(2.5), range=2.5 + side * off), POSE)
+        corrected = TRACKER.correct(a_person(1, 2.5), replace(box(2.5), range=2.5 + side * off), POSE)
         assert corrected.strained == (not in_place)
         assert corrected.tall == (WINDOW if in_place else None)
 
 
 def test_the_stature_is_taken_from_whole_outlines_not_too_near() -> None:
     for distance, tall in ((1.35, None), (1.45, WINDOW)):
-        assert TRACKER.correct(somebody(1, distance), box(distance), POSE).tall == tall
+        assert TRACKER.correct(a_person(1, distance), box(distance), POSE).tall == tall
     for partly in (replace(box(2.0), whole=False), replace(box(2.0), window=0.0), replace(box(2.0), range=None)):
-        assert TRACKER.correct(somebody(1, 2.0), partly, POSE).tall is None
+        assert TRACKER.correct(a_person(1, 2.0), partly, POSE).tall is None
 
 
 def test_clothes_are_seen_where_the_patches_are_on_shirt_and_trousers() -> None:
     def worn(seen_: object) -> NDArray[np.float64] | None:
-        return TRACKER.correct(somebody(1, 2.0, clothes=IN_RED), seen_, POSE).worn  # type: ignore[arg-type]
+        return TRACKER.correct(a_person(1, 2.0, clothes=IN_RED), seen_, POSE).worn  # type: ignore[arg-type]
 
     seen = box(2.0, clothes=IN_GREEN)
     height = seen.height
@@ -112,7 +112,7 @@ def test_clothes_are_seen_where_the_patches_are_on_shirt_and_trousers() -> None:
 
 
 def test_a_weak_box_says_nothing_against_a_person_who_is_known_and_something_against_one_who_is_not() -> None:
-    known = replace(somebody(1, 2.0), log_odds=3.5)
+    known = replace(a_person(1, 2.0), log_odds=3.5)
     weak = replace(box(2.0), score=0.05)
     assert TRACKER.correct(known, weak, POSE, 0.9).log_odds == 3.5
     assert TRACKER.correct(replace(known, confirmed=False), weak, POSE, 0.9).log_odds == pytest.approx(3.5 - 0.4)
@@ -121,8 +121,8 @@ def test_a_weak_box_says_nothing_against_a_person_who_is_known_and_something_aga
 
 def test_a_person_measured_again_after_a_second_begins_anew_without_a_velocity() -> None:
     for unseen_s, anew in ((0.9, False), (1.1, True)):
-        track = replace(somebody(1, 2.0).track, stamp=unseen_s, mean=np.array([2.0, 0.0, 0.5, 0.5]))
-        corrected = TRACKER.correct(replace(somebody(1, 2.0), track=track), box(2.1, 0.05), POSE)
+        track = replace(a_person(1, 2.0).track, stamp=unseen_s, mean=np.array([2.0, 0.0, 0.5, 0.5]))
+        corrected = TRACKER.correct(replace(a_person(1, 2.0), track=track), box(2.1, 0.05), POSE)
         fresh = kalman.initiate(unseen_s, 0.05, 2.1, POSE, NOISE)
         assert np.allclose(corrected.track.mean, fresh.mean) == anew
         assert corrected.seen == unseen_s
@@ -155,7 +155,7 @@ def unseen(number: int, stamp: float, x: float = 2.0, y: float = 0.0) -> Person:
     return person(number, x, y, stamp)
 
 
-def test_who_is_not_found_for_a_second_walked_on_and_is_no_less_a_person() -> None:
+def test_a_person_who_is_not_found_for_a_second_walked_on_and_is_no_less_a_person() -> None:
     for last, falls in ((0.1, True), (-0.1, False)):
         one = replace(unseen(1, last, 2.5), window=WINDOW)
         after_ = TRACKER.update(look(stamp=1.0), Tracks(people=(one,), stamp=0.9))[0].people[0]
@@ -198,7 +198,7 @@ def test_everyone_measured_lately_or_moving_is_around_and_all_but_the_followed_a
     # Who was not measured for .8 s is not around, nor what is no person yet.
     assert around(mine, (mine, unseen(2, 0.1, 4.0))) == (1, [], True)
     assert around(mine, (mine, replace(other, confirmed=False))) == (1, [], True)
-    # Legs that walk are one more, but for those of somebody who is counted, or within half a metre of one.
+    # Legs that walk are one more, but for those of a person who is counted, or within half a metre of one.
     assert around(mine, (mine,), walker(None, 5.0, 0.0)) == (2, [5.0], True)
     assert around(mine, (mine, other), walker(2, 5.0, 0.0)) == (2, [4.0], True)
     assert around(mine, (mine,), walker(None, 2.45, 0.0)) == (1, [], True)
@@ -237,7 +237,7 @@ def test_a_scan_that_was_made_before_the_last_legs_or_the_lidars_period_before_t
     assert with_legs(replace(unseen(1, 0.8), felt=1.0), 1.0, (2.0, 0.1)).track.mean[1] == 0.0
 
 
-def test_legs_follow_nobody_who_is_not_known_and_nobody_missed_too_often_for_chance() -> None:
+def test_legs_follow_no_person_who_is_unknown_or_missed_too_often_for_chance() -> None:
     assert with_legs(replace(unseen(1, 1.0), confirmed=False), 1.0, (2.0, 0.1)).felt < 0
     # Of a person who is found in four frames of ten, fourteen misses in a row happen once in a thousand times.
     for misses, felt in ((13, True), (14, False)):
@@ -291,21 +291,21 @@ def test_no_detector_is_believed_to_find_fewer_than_one_in_five_or_more_than_49_
 
 
 def test_clothes_are_the_mean_of_the_boxes_until_a_person_is_known_and_then_move_by_a_twentieth() -> None:
-    one = replace(somebody(1, 2.0, clothes=IN_RED), confirmed=False, log_odds=-5.0, age=1)
+    one = replace(a_person(1, 2.0, clothes=IN_RED), confirmed=False, log_odds=-5.0, age=1)
     for boxes_ in range(2, 6):
         one = TRACKER.correct(replace(one, log_odds=-5.0), box(2.0, clothes=IN_GREEN), POSE, 0.4)
         assert one.clothes == pytest.approx(IN_RED + (IN_GREEN - IN_RED) * (boxes_ - 1) / boxes_)
         assert one.age == boxes_
     near = IN_RED + 1.0
-    known = TRACKER.correct(somebody(1, 2.0, clothes=IN_RED), box(2.0, clothes=near), POSE)
+    known = TRACKER.correct(a_person(1, 2.0, clothes=IN_RED), box(2.0, clothes=near), POSE)
     assert known.clothes == pytest.approx(IN_RED + 0.05)
     # The first clothes seen are taken; none seen leave those that are known.
-    assert TRACKER.correct(somebody(1, 2.0), box(2.0, clothes=near), POSE).clothes is near
-    assert TRACKER.correct(somebody(1, 2.0, clothes=near), box(2.0), POSE).clothes is near
+    assert TRACKER.correct(a_person(1, 2.0), box(2.0, clothes=near), POSE).clothes is near
+    assert TRACKER.correct(a_person(1, 2.0, clothes=near), box(2.0), POSE).clothes is near
 
 
 def test_a_box_outside_the_gate_moves_a_track_that_may_have_turned_and_stepped_aside() -> None:
-    one, seen = somebody(1, 3.0), replace(box(3.0, 0.15), stands_out=1.0)
+    one, seen = a_person(1, 3.0), replace(box(3.0, 0.15), stands_out=1.0)
     loose = one.track.covariance + np.diag([0.5**2, 0.5**2, 1.0, 1.0])
     fit = kalman.innovation(replace(one.track, covariance=loose), 0.15, 3.0, POSE, NOISE)
     expected = kalman.update(replace(one.track, covariance=loose), fit)
@@ -336,7 +336,7 @@ def test_a_scan_is_entered_once_into_what_moves() -> None:
 
 
 def test_a_box_exactly_half_a_metre_from_everyone_found_is_a_new_person() -> None:
-    people = [somebody(1, 2.0), replace(somebody(2, 2.5), misses=1)]
+    people = [a_person(1, 2.0), replace(a_person(2, 2.5), misses=1)]
     for distance, new in ((2.5, True), (2.49, False), (1.5, True), (1.51, False)):
         assert TRACKER.association.is_new(box(distance), people, POSE) == new
 

@@ -57,7 +57,7 @@ def test_a_run_apart_is_the_run_in_this_process(script: Callable[[str], Path]) -
         assert getattr(here.episode, name) == getattr(there.episode, name), name
 
 
-def test_who_watches_is_given_the_same_pictures(script: Callable[[str], Path]) -> None:
+def test_a_person_who_watches_is_given_the_same_pictures(script: Callable[[str], Path]) -> None:
     path = script(node(FOLLOW))
     here: list[Moment] = []
     there: list[Moment] = []

@@ -264,7 +264,7 @@ def test_the_contacts_of_a_frame_are_those_at_its_stamp() -> None:
     assert arena.truth().contacts == Contacts(1, 0)
 
 
-def test_somebody_who_left_is_neither_seen_nor_in_the_way() -> None:
+def test_a_person_who_left_is_neither_seen_nor_in_the_way() -> None:
     gone = Person(route=((0.8, 0.0, 0.0),), height=1.85, leaves_s=1.0)
     arena = Arena(Scenario(people=(gone,)), 0)
     before = arena.frame()

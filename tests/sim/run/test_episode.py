@@ -127,7 +127,7 @@ def test_a_controller_that_holds_its_distance_has_little_error(target: float) ->
     assert error < 0.03
 
 
-def test_the_tracking_controller_closes_in_on_somebody_who_stands() -> None:
+def test_the_tracking_controller_closes_in_on_a_person_who_stands() -> None:
     result = score(run("standing", 9.0))
     assert result.in_view == 1.0
     assert result.detected == 1.0
@@ -135,7 +135,7 @@ def test_the_tracking_controller_closes_in_on_somebody_who_stands() -> None:
     assert result.modes["hold"] > 0.1
 
 
-def test_somebody_who_walks_in_between_is_not_followed_instead() -> None:
+def test_a_person_who_walks_in_between_is_not_followed_instead() -> None:
     result = score(run("crossing", 22.0, seed=1))
     assert result.follows_first is not None
     assert result.follows_first > 0.95
@@ -167,7 +167,7 @@ def test_the_workshops_controllers_follow_behind_the_safety_layer(name: str) -> 
 
 def test_nobody_is_approached_nearer_than_the_safety_layer_allows() -> None:
     class Blind:
-        """Sees somebody straight ahead whatever there is."""
+        """Sees a person straight ahead whatever there is."""
 
         def detect(self, image: NDArray[np.uint8]) -> Detections:
             del image

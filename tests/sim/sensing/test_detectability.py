@@ -54,7 +54,7 @@ def rate(scenario: Scenario, distance: float, phases: int, seed: int) -> float:
 
 
 def false_rate(frames: int, seed: int) -> float:
-    """Share of frames of the empty arena, from anywhere in it, in which somebody is found."""
+    """Share of frames of the empty arena, from anywhere in it, in which a person is found."""
     renderer, random = Renderer(Scenario(), np.random.default_rng(seed)), np.random.default_rng(seed)
     hits = []
     for _ in range(frames):
@@ -70,7 +70,7 @@ def test_the_person_is_found_from_every_side_in_any_phase(distance: float) -> No
 
 
 @pytest.mark.parametrize("distance", [2.5])
-def test_somebody_who_stands_is_found_from_every_side(distance: float) -> None:
+def test_a_person_who_stands_is_found_from_every_side(distance: float) -> None:
     renderer = Renderer(SOMEBODY, np.random.default_rng(0))
     for direction in range(8):
         pose = Pose(distance, 0.0, direction * math.tau / 8)

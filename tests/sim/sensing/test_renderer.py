@@ -284,7 +284,7 @@ def test_somebody_behind_the_camera_is_not_seen() -> None:
 
 
 @pytest.mark.parametrize("distance", [0.05, 0.15, 0.25, 0.5])
-def test_somebody_who_touches_the_camera_does_no_harm(distance: float) -> None:
+def test_a_person_who_touches_the_camera_does_no_harm(distance: float) -> None:
     for y in (-0.2, 0.0, 0.2):
         _, depth, [(visible, _)] = picture(Pose(distance, y, 1.0, 2.0, 1.0))
         assert 0.0 <= visible <= 1.0

@@ -58,7 +58,7 @@ def test_each_leg_is_walked_at_its_own_speed() -> None:
     assert np.mean(second) == pytest.approx(0.9, rel=0.05)
 
 
-def test_headings_and_gait_are_those_of_somebody_who_walks() -> None:
+def test_headings_and_gait_are_those_of_a_person_who_walks() -> None:
     seen = [there(one) for (one,) in poses(Scenario(people=(YIELDS,), robot=CORNER), 25.0)]
     turns = [math.remainder(b.yaw - a.yaw, math.tau) for a, b in pairwise(seen)]
     assert max(map(abs, turns)) < math.radians(6)
@@ -78,7 +78,7 @@ def test_somebody_finds_the_door_between_two_rooms() -> None:
     assert math.dist((seen[-1].x, seen[-1].y), (2, -2)) < 0.1
 
 
-def test_who_arrives_walks_in_through_a_door_and_who_leaves_walks_out() -> None:
+def test_a_person_who_arrives_walks_in_through_a_door_and_who_leaves_walks_out() -> None:
     person = dataclasses.replace(YIELDS, arrives_s=1.0, leaves_s=14.0, enters=(-4.9, 2.0), exits=(0.5, 4.9))
     seen = [one for (one,) in poses(Scenario(people=(person,), robot=CORNER), 30.0)]
     assert seen[49] is None
@@ -111,7 +111,7 @@ def test_two_who_walk_at_each_other_give_way() -> None:
     assert there(seen[-1][1]).x < -2.8
 
 
-def test_who_yields_walks_round_somebody_on_a_timetable() -> None:
+def test_a_person_who_yields_walks_round_somebody_on_a_timetable() -> None:
     walker = dataclasses.replace(YIELDS, route=((-3, 0, 0), (3, 0, 900)))
     rail = Person(route=((3, 0.02, 0), (-3, 0.02, 900)), speed=0.5)
     seen = poses(Scenario(people=(rail, walker), robot=CORNER), 12.0)

@@ -59,7 +59,7 @@ def test_a_mover_has_the_velocity_of_its_way_in_the_physics(heading: float) -> N
     assert tuple(body.position) == pytest.approx((2.0 + 0.25 * math.cos(heading), 0.25 * math.sin(heading)))
 
 
-def test_who_yields_walks_round_a_mover() -> None:
+def test_a_person_who_yields_walks_round_a_mover() -> None:
     person = Person(route=((-1.0, 0.03, 0), (4.0, 0.03, 900)), behaviour="social_force", speed=0.7)
     scenario = dataclasses.replace(
         TROLLEY, people=(person,), robot=Robot(x=-4), movers=(Mover("trolley", ((4.2, 0, 0), (-2.0, 0, 0)), 0.4),)

@@ -82,7 +82,7 @@ def test_the_gait_is_tied_to_the_distance_walked() -> None:
         assert one.phase == pytest.approx(math.tau * metres / 0.75 % math.tau)
 
 
-def test_somebody_who_pauses_stands_with_limbs_at_rest() -> None:
+def test_a_person_who_pauses_stands_with_limbs_at_rest() -> None:
     walk = Walk(Scenario.load("followable").people[0])
     pause = walk.pose(1.7 / 0.22 + 2.0)
     assert pause is not None
@@ -98,7 +98,7 @@ def test_somebody_late_is_not_there_before() -> None:
     assert walk.pose(20.0) is not None
 
 
-def test_somebody_who_left_is_not_there_any_more() -> None:
+def test_a_person_who_left_is_not_there_any_more() -> None:
     walk = Walk(Person(route=((2, 1, 0), (2, -1, 0)), arrives_s=1.0, leaves_s=4.0))
     assert [walk.pose(time) is not None for time in (0.9, 1.0, 3.99, 4.0, 100.0)] == [False, True, True, False, False]
 
@@ -150,7 +150,7 @@ def test_a_turned_body_is_the_same_body_turned() -> None:
 
 
 @pytest.mark.parametrize("height", [0.9, 1.8])
-def test_who_sits_is_on_a_stool_with_feet_on_the_floor_and_three_quarters_as_tall(height: float) -> None:
+def test_a_person_who_sits_is_on_a_stool_with_feet_on_the_floor_and_three_quarters_as_tall(height: float) -> None:
     person = Person(route=((2, 0, 0),), height=height, sits=True)
     figure = body(person, Pose(2, 0, 0.4))
     assert lowest(figure) == pytest.approx(0.0, abs=0.01 * height)

@@ -137,7 +137,7 @@ def test_two_streams_pass_a_door_by_turns(seed: int) -> None:
 
 @pytest.mark.parametrize(("height", "speed"), [(0.9, 0.7), (1.75, 1.34)])
 @pytest.mark.parametrize("aside", [0.0, 0.05, -0.2])
-def test_somebody_who_meets_a_standing_robot_walks_round_it_and_on(height: float, speed: float, aside: float) -> None:
+def test_a_person_who_meets_a_standing_robot_walks_round_it_and_on(height: float, speed: float, aside: float) -> None:
     person = Person(route=((-3, aside, 0), (3, aside, 900)), speed=speed, height=height, behaviour="social_force")
     places = walked(Scenario(people=(person,)), 16.0, (0.0, 0.0, 0.0))[:, 0]
     gap = np.hypot(*places.T).min() - person.radius
@@ -150,7 +150,7 @@ def test_somebody_who_meets_a_standing_robot_walks_round_it_and_on(height: float
     assert pace[behind][:10].mean() == pytest.approx(speed, rel=0.1)
 
 
-def test_somebody_who_ignores_the_robot_walks_straight_through_its_place() -> None:
+def test_a_person_who_ignores_the_robot_walks_straight_through_its_place() -> None:
     person = Person(route=((-3, 0, 0), (3, 0, 900)), behaviour="social_force", reaction="ignore")
     places = walked(Scenario(people=(person,)), 8.0, (0.0, 0.0, 0.0))[:, 0]
     assert np.hypot(*places.T).min() < 0.1

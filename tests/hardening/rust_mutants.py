@@ -27,7 +27,7 @@ FILES = (
     *("pyramid/grid.rs", "pyramid/levels.rs", "pyramid/resize.rs"),
     *(f"exact/{name}.rs" for name in ("blocks", "gradient", "polar", "svm", "tables", "windows")),
     *(f"separable/{name}.rs" for name in ("lattice", "mod", "plan")),
-    *(f"fast/{name}.rs" for name in ("describe", "plan", "rows", "score", "search", "strip", "tile")),
+    *(f"fast/{name}.rs" for name in ("describe", "plan", "rows", "score", "search", "strip", "tile", "votes")),
 )
 #: Test programs, those that tell soonest first: name, arguments, cases of random tests. One test takes half the time.
 PYRAMIDS = "pyramids_are"

@@ -5,12 +5,10 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use crate::exact::{RowKernel, RowVotes, Turn, polar};
 
-use super::lane::{Lane, avx2::Avx2, avx512::Avx512};
+use super::lane::{Kernel, Lane, avx2::Avx2, avx512::Avx512};
 
 /// What the votes need beyond a [`Lane`], where multiply-add is fused: without it OpenCV rounds otherwise.
 pub(super) trait VoteLane: Lane {
-    /// Runs [`Row::run`] in a function that enables the instruction set.
-    fn votes(self, row: Row);
     /// Writes the square root of each of `pixels`, and gives whether it has: where that is faster than the CPU's own.
     fn roots(self, pixels: &[u8], roots: &mut [f32]) -> bool;
     fn floor(self, x: Self::F) -> Self::F;
@@ -44,7 +42,8 @@ impl<L: VoteLane> RowKernel for Votes<L> {
         if columns < L::LANES || !fits {
             return 0;
         }
-        self.0.votes(Row { neighbours, plane, columns, turn, magnitude, position, votes });
+        let row = Row { neighbours, plane, columns, turn, magnitude, position, votes };
+        self.0.compiled(RowOn(row, self.0));
         columns
     }
 
@@ -64,6 +63,18 @@ pub(super) struct Row<'a, 'b> {
     magnitude: &'a mut [f32],
     position: &'a mut [f32],
     votes: &'a mut RowVotes<'b>,
+}
+
+/// A row, and its lane: a [`Kernel`] is given one that knows less.
+struct RowOn<'a, 'b, L>(Row<'a, 'b>, L);
+
+impl<V: VoteLane> Kernel for RowOn<'_, '_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane>(self, _: L) {
+        self.0.run(self.1);
+    }
 }
 
 impl Row<'_, '_> {
@@ -158,20 +169,6 @@ impl Row<'_, '_> {
     }
 }
 
-macro_rules! compiled {
-    ($features:literal) => {
-        #[inline(always)]
-        fn votes(self, row: Row) {
-            #[target_feature(enable = $features)]
-            fn enabled<L: VoteLane>(l: L, row: Row) {
-                row.run(l);
-            }
-            // SAFETY: the token proves that the CPU has these features.
-            unsafe { enabled(self, row) }
-        }
-    };
-}
-
 /// Square roots of at least a vector of bytes, from the CPU's estimate.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512dq")]
 fn roots_of_bytes(l: Avx512, pixels: &[u8], roots: &mut [f32]) {
@@ -209,8 +206,6 @@ impl Avx512 {
 }
 
 impl VoteLane for Avx512 {
-    compiled!("avx2,fma,avx512f,avx512bw,avx512vl,avx512dq");
-
     #[inline(always)]
     fn roots(self, pixels: &[u8], roots: &mut [f32]) -> bool {
         let fits = pixels.len() >= Self::LANES && pixels.len() == roots.len();
@@ -245,8 +240,6 @@ impl VoteLane for Avx512 {
 }
 
 impl VoteLane for Avx2 {
-    compiled!("avx2,fma");
-
     #[inline(always)]
     fn roots(self, _pixels: &[u8], _roots: &mut [f32]) -> bool {
         false // it has no estimate that one Newton step makes exact

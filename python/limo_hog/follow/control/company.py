@@ -273,10 +273,7 @@ class Company:
         turns, speeds = np.array([way.turn for way in ways]), np.array([way.speed for way in ways])
         count, steps = len(ways), round(self.horizon_s / self.step_s)
         # The speeds and the yaw at the beginning and after each step.
-        linear, angular = (
-            np.full((steps + 1, count), float(now.linear)),
-            np.full((steps + 1, count), float(now.angular)),
-        )
+        linear, angular = (np.full((steps + 1, count), speed, np.float64) for speed in (now.linear, now.angular))
         yaw = np.zeros((steps + 1, count))
         for step in range(steps):
             for_linear, for_angular = self._wanted(turns - yaw[step], speeds, acceleration, robot)

@@ -44,7 +44,7 @@ def places(*points: tuple[float, float]) -> Points:
 
 def test_ground_behind_is_known_for_a_while_after_the_robot_looked_round() -> None:
     assert not is_free_behind(looked((), until=0.0))
-    assert [is_free_behind(looked((1.5, -1.5), until=until)) for until in (2.0, 8.0, 40.0)] == [True, True, False]
+    assert [is_free_behind(looked((1.5, -1.5), until=until)) for until in (2.0, 58.0, 70.0)] == [True, True, False]
 
 
 def test_where_a_person_out_of_sight_can_be_ground_is_known_for_a_shorter_time() -> None:
@@ -72,7 +72,7 @@ def test_a_person_who_goes_out_of_sight_is_remembered_until_measured_again() -> 
     others = BACKING.remember(others, places((3.0, 1.0)), nobody, nobody, 3.0)
     assert others == (Other(3.0, 1.0, 3.0),)
     assert not BACKING.can_hold_other(others, behind, 3.0).any()
-    assert BACKING.remember(others, nobody, nobody, nobody, 60.0) == ()
+    assert BACKING.remember(others, nobody, nobody, nobody, 63.0) == ()
 
 
 def test_legs_in_the_scan_continue_another_person_and_begin_none() -> None:
@@ -133,3 +133,32 @@ def test_the_ground_behind_a_pose_is_up_to_three_decimetres_behind_its_outline(y
 def test_before_the_first_scan_nothing_is_known_to_block() -> None:
     assert not BACKING.is_blocked(HERE, GRID, None, LIMO)
     assert BACKING.is_free_behind(AHEAD, HERE, GRID, None, (), LIMO)
+
+
+def post(bearing: float, distance: float) -> Points:
+    """A post at a bearing from straight behind [rad] and a distance [m]."""
+    return places((-distance * np.cos(bearing), -distance * np.sin(bearing)))
+
+
+def test_to_back_it_faces_the_person_while_nothing_stands_behind() -> None:
+    assert BACKING.heading(0.15, NO_POINTS, LIMO) == 0.15
+    # Nor does what stands ahead or beside matter, nor what is further than a metre from what `Guard` keeps.
+    for around in (places((0.5, 0.1)), places((0.0, 0.5)), post(0.0, 1.8)):
+        assert BACKING.heading(0.15, around, LIMO) == 0.15
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_to_back_it_faces_beside_the_person_where_that_leaves_room(side: float) -> None:
+    # A post behind, a little to one side: turned so that it passes on that side.
+    heading = BACKING.heading(0.0, post(side * 0.15, 0.8), LIMO)
+    assert heading == pytest.approx(-side * 0.4)
+    # It is passed by more than `Guard` keeps beside the robot.
+    turned = post(side * 0.15 - heading, 0.8)
+    assert abs(turned[0, 1]) > LIMO.half_width + 0.25
+
+
+def test_it_faces_no_further_beside_the_person_than_the_image_shows() -> None:
+    # Of a post so near, `Guard` would keep off from .54 rad beside it on.
+    heading = BACKING.heading(0.0, post(0.0, 0.6), LIMO)
+    assert heading == 0.5
+    assert LIMO.field_of_view / 2 - heading > 0.1

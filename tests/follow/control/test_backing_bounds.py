@@ -21,8 +21,8 @@ from limo_hog.follow.twist import Twist
 NOBODY = places()
 
 
-def test_ground_and_people_are_remembered_for_29_seconds() -> None:
-    for age, known in ((28.9, True), (29.1, False)):
+def test_ground_and_people_are_remembered_for_59_seconds() -> None:
+    for age, known in ((58.9, True), (59.1, False)):
         # The ground on one side was seen at 0 s, on the other at 1 s.
         assert is_free_behind(looked((1.5, -1.5), until=age)) == known
         others = BACKING.remember((Other(1.0, 1.0, 0.0),), NOBODY, NOBODY, NOBODY, age)

@@ -64,6 +64,9 @@ def test_a_detour_is_driven_in_its_own_direction() -> None:
     twist, _, reason = command(replace(at(3.0), heading=0.4))
     assert twist.angular == pytest.approx(1.0)
     assert reason == "driving around an obstacle"
+    twist, _, reason = command(replace(at(1.0), heading=0.4))
+    assert twist.linear < 0 < twist.angular
+    assert reason == "backing around an obstacle"
 
 
 def test_after_coasting_it_turns_and_does_not_drive() -> None:

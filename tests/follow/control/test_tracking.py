@@ -13,6 +13,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingController
 from limo_hog.follow.control.memory import TrackingState
 from limo_hog.follow.sense.appearance import clothes_in
+from limo_hog.follow.sense.clearance import NO_POINTS
 from limo_hog.follow.tracks.poses import pose_at
 
 CONTROLLER = TrackingController()
@@ -304,6 +305,26 @@ def test_it_does_not_back_into_what_its_map_shows_behind_though_the_lidar_sees_i
     wall = CONTROLLER.grid.flat(ground, np.array([(x, y) for y in np.arange(-0.5, 0.5, 0.05)]))
     ground.occupied.flat[wall], ground.freed.flat[wall] = 2.0, -np.inf
     assert CONTROLLER.step(world.observe(), state).twist.linear == 0
+
+
+def test_it_backs_past_what_was_seen_behind_and_keeps_the_person_in_the_image() -> None:
+    # A person has stopped nearer than it keeps; a post .5 m behind is a little to the left of the way straight back.
+    world = World()
+    state = run(world, 12.0).state
+    world.robot = (world.robot[0] + 0.3, 0.0, 0.0)
+    state = run(world, 0.2, state).state
+    post = np.array([[-CONTROLLER.robot.half_length - 0.5, 0.05]])
+    turns = {}
+    for side in (1.0, -1.0):
+        decision = CONTROLLER.step(replace(world.observe(), remembered=post * (1.0, side)), state)
+        assert decision.twist.linear < 0
+        assert decision.reason == "backing around an obstacle"
+        turns[side] = decision.twist.angular
+    # Turned to the right its back goes to the left, and the other way round.
+    assert turns[1.0] > 0.3
+    assert turns[-1.0] < -0.3
+    straight = CONTROLLER.step(replace(world.observe(), remembered=NO_POINTS), state)
+    assert abs(straight.twist.angular) < 0.1
 
 
 def test_between_two_alike_it_stands_and_looks_and_says_that_it_is_not_sure() -> None:

@@ -19,6 +19,7 @@ from limo_hog.follow.sense.clearance import (
     from_odometry,
     room_ahead,
     room_behind,
+    rooms_ahead,
     scan_points,
     speed_within,
     to_odometry,
@@ -60,6 +61,16 @@ def test_what_is_behind_is_not_in_the_way_ahead_nor_the_other_way_round() -> Non
     assert room_ahead(np.array([[-0.3, 0.0]]), MARGIN, LIMO) == math.inf
     assert room_behind(np.array([[0.3, 0.0]]), MARGIN, LIMO) == math.inf
     assert room_behind(np.array([[-1.0, 0.0]]), MARGIN, LIMO) == pytest.approx(0.355)
+
+
+def test_the_room_ahead_of_a_turned_robot_is_that_of_points_turned_the_other_way() -> None:
+    points = np.random.default_rng(3).uniform(-2, 2, (60, 2))
+    headings = np.array([-2.0, -0.4, 0.0, 0.3, 1.5, 3.0])
+    cos, sin = np.cos(headings), np.sin(headings)
+    turned = [points @ np.array([[c, -s], [s, c]]) for c, s in zip(cos, sin, strict=True)]
+    expected = [room_ahead(one, MARGIN, LIMO) for one in turned]
+    assert rooms_ahead(points, headings, MARGIN, LIMO) == pytest.approx(expected)
+    assert rooms_ahead(points[:0], headings, MARGIN, LIMO).tolist() == [math.inf] * 6
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.3, 0.7, 1.4])

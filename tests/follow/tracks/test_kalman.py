@@ -166,7 +166,7 @@ def test_a_bearing_and_range_equal_the_textbooks_form_for_any_covariance() -> No
         for distance in (2.7, None):
             seen = innovation(track, 0.5, distance, pose, NOISE)
             rows = [(*seen.by_bearing, 0.0, 0.0), (*seen.by_range, 0.0, 0.0)][: 2 if distance else 1]
-            h, r = np.array(rows), np.diag([0.02**2, 0.15**2])[: len(rows), : len(rows)]
+            h, r = np.array(rows), np.diag([0.015**2, 0.06**2])[: len(rows), : len(rows)]
             s = h @ track.covariance @ h.T + r
             gain = track.covariance @ h.T @ np.linalg.inv(s)
             off = np.array([0.1, 0.2][: len(rows)])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.clearance import Points, to_odometry
+from limo_hog.follow.sense.clearance import Margin, Points, rooms_ahead, to_odometry
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.twist import Twist
@@ -64,9 +64,18 @@ class Backing:
         82°, which shows the ground behind, in .7 s; nearer, HOG would miss the head. Until then it stands.
     depths
         So far behind the outline the ground must be known [m]. Chosen: from .4 m/s the robot stops within .26 m.
+    offs
+        To back, the robot faces one of these directions beside the person's [rad]. Chosen: they stay in the image, half
+        of which is .62 rad wide.
+    enough, aside
+        More room behind than this gains nothing, and a radian beside the person's direction costs so much of it [m].
+        Chosen: 2.5 s of backing; half a radian is worth no more than the length by which measured room strays.
+    margins, shares
+        The room is that within each of these margins, by these shares [1]. Chosen: what `Guard` keeps; and 6 cm more
+        beside, since along a wall's end that is just outside of what `Guard` keeps an error of 4° stops the robot.
     """
 
-    remembers_s: float = bounded(29.0, 0, 3600)
+    remembers_s: float = bounded(59.0, 0, 3600)
     lately_s: float = bounded(5.0, 0, 600)
     unseen_s: float = bounded(0.8, 0, 60)
     same: float = bounded(0.5, 0, 5)
@@ -75,6 +84,11 @@ class Backing:
     glance_turn: float = bounded(3.0, 0, 6)
     glance_from: float = bounded(0.25, 0, 2)
     depths: tuple[float, ...] = (0.1, 0.2, 0.3)
+    offs: tuple[float, ...] = (0.0, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3, 0.4, -0.4, 0.5, -0.5)
+    enough: float = bounded(1.0, 0, 5)
+    aside: float = bounded(0.2, 0, 5)
+    margins: tuple[Margin, ...] = (Margin(), Margin(beside=0.26))
+    shares: tuple[float, ...] = (0.7, 0.3)
 
     def remember(
         self, others: tuple[Other, ...], seen: Points, felt: Points, followed: Points, now: float
@@ -143,6 +157,26 @@ class Backing:
         within = np.where(self.can_hold_other(others, places, ground.stamp), self.lately_s, self.remembers_s)
         known = grid.is_free_since(ground, places, ground.stamp - within)
         return np.asarray(known.reshape(x.shape).all(axis=-1))
+
+    def heading(self, bearing: float, points: Points, robot: RobotGeometry) -> float:
+        """Return the direction near a person's bearing to face while backing, by the room behind [rad].
+
+        A robot that keeps facing a person who comes along a wall backs into the wall.
+
+        Parameters
+        ----------
+        bearing
+            Of the person [rad].
+        points
+            float64 (N, 2) [m], base frame: what stands around the robot.
+        robot
+            Its outline.
+        """
+        offs = np.array(self.offs)
+        worth = -self.aside * np.abs(offs)
+        for share, margin in zip(self.shares, self.margins, strict=True):
+            worth += share * np.minimum(rooms_ahead(-points, bearing + offs, margin, robot), self.enough)
+        return bearing + self.offs[int(np.argmax(worth))]
 
     def is_blocked(self, pose: Odometry, grid: Grid, ground: Ground | None, robot: RobotGeometry) -> bool:
         """Whether the map shows something that lasts close behind: `Guard` remembers for a shorter time."""

@@ -49,7 +49,7 @@ class Steering:
     regain_angular
         Limit of the turn rate while the person is out of the image [rad/s]. Chosen: half a turn a second.
     distance_tolerance, bearing_tolerance
-        Smaller errors are not corrected [m, rad]. Chosen: half the standard deviation of the range; one of the bearing.
+        Smaller errors are not corrected [m, rad]. Chosen: a little more than the standard deviations of one measurement.
     steady_bearing_rate, steady_range_rate
         A person whose bearing and range change more slowly stands [rad/s, m/s]. Chosen: at 1.5 m both are a walk of
         less than .1 m/s.
@@ -123,7 +123,7 @@ class Steering:
             return Twist(0.0, facing), Mode.BLOCKED, "no free way to the person"
         twist = Twist(linear, angular)
         if aim.heading != aim.bearing:
-            return twist, Mode.FOLLOW, "driving around an obstacle"
+            return twist, Mode.FOLLOW, f"{'driving' if linear >= 0 else 'backing'} around an obstacle"
         if in_view:
             return twist, Mode.FOLLOW, "following a person"
         return twist, Mode.FOLLOW, "following the legs or the predicted position"

@@ -185,7 +185,7 @@ class TrackingController:
         state = replace(
             state,
             since_full=0 if region is None else state.since_full + 1,
-            detour=0.0 if aim.heading is None else aim.heading - aim.bearing,
+            detour=0.0 if aim.heading is None or wanted < 0 else aim.heading - aim.bearing,
         )
         belief = Belief(keeps, followed=person.number)
         return Decision(twist, state, mode, reason, boxes.get(person.number), region, belief), person
@@ -342,6 +342,9 @@ class TrackingController:
                 state = replace(state, way=way if len(way) > 1 else NO_POINTS, way_at=now)
             if len(state.way):
                 aim = replace(aim, heading=self._along(state.way, obstacles, pose))
+        elif observation.remembered is not None:
+            around = np.concatenate([points, observation.remembered])
+            aim = replace(aim, heading=self.backing.heading(bearing, around, self.robot))
         return replace(aim, hidden=self.detour.hides(obstacles, bearing, distance)), state
 
     def _is_passing(self, ground: Ground, obstacles: Points, aim: Aim, pose: Odometry) -> bool:

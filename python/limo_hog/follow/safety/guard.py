@@ -86,15 +86,15 @@ class Guard(Generic[S]):
         Depth further than this from the margin's end is not looked at [m]. Computed: with 1.0 m of room .88 m/s are
         allowed, more than any controller drives.
     memory_s, memory_radius
-        Returns count for the space behind the robot for so long, if they were so near [s, m]. Chosen: the time a robot
-        backs off at .15 m/s through the radius; further than it the robot never backs off at once.
+        Returns count for the space behind the robot for so long, if they were so near [s, m]. Chosen: as
+        `look_memory_s`; further than the radius the robot never backs off at once.
     look_every_s
         A scan is kept for the ground it shows to be free when the last one kept is so old [s]. Chosen: at .4 m/s the
         robot is less than its own length further.
     look_memory_s, unseen_speed
-        Highest speed backwards onto ground that was not seen to be free within so long [s, m/s]. Chosen: of a standing
-        follower's ground longer ago is no news; from .2 m/s the robot stops within .09 m. To stand would be run into:
-        with 0 `two_people` ends with a person at .5 m.
+        Highest speed backwards onto ground that was not seen to be free within so long [s, m/s]. Chosen: a person
+        turns back in a corridor that the robot entered 40 s ago; from .2 m/s the robot stops within .09 m. To stand
+        would be run into: with 0 `two_people` ends with a person at .5 m.
     max_backward
         Highest speed backwards [m/s]. Chosen: what has come up from behind since is in no sensor's field of view; from
         .4 m/s the robot stops within .26 m.
@@ -112,10 +112,10 @@ class Guard(Generic[S]):
     braking: float = 0.5
     reaction_s: float = 0.25
     depth_reach: float = 1.0
-    memory_s: float = 10.0
+    memory_s: float = 60.0
     memory_radius: float = 1.5
     look_every_s: float = 0.5
-    look_memory_s: float = 30.0
+    look_memory_s: float = 60.0
     unseen_speed: float = 0.2
     max_backward: float = 0.4
     max_age_s: float = 0.5
@@ -135,6 +135,10 @@ class Guard(Generic[S]):
             stamp = observation.stamp if math.isfinite(observation.stamp) else state.stamp
             after = replace(self.start() if set_back else state, stamp=stamp, proposed=None)
             return Decision(Twist(), after, Mode.BLOCKED, fault)
+        state = self._remember(state, observation.scan, observation.odometry)
+        if observation.scan is not None and observation.odometry is not None:
+            old = state.scan_points[state.scan_points_at < state.scan_stamp]
+            observation = replace(observation, remembered=from_odometry(old, observation.odometry))
         proposed = self.controller.step(observation, state.inner)
         depth_points = NO_POINTS
         if observation.depth is not None:
@@ -173,13 +177,8 @@ class Guard(Generic[S]):
         odometry: Odometry | None,
         now: float,
     ) -> Decision[GuardState[S]]:
-        # Without odometry, remembered points cannot be carried along.
         pose = odometry or Odometry()
-        if odometry is None:
-            nothing = NO_POINTS, np.empty(0)
-            state = replace(state, scan_points=nothing[0], scan_points_at=nothing[1], scan_stamp=-math.inf, looks=())
-        if scan is not None and scan.stamp != state.scan_stamp:
-            state = self._remember(state, scan, pose)
+        state = self._remember(state, scan, odometry)
 
         def decision(twist: Twist, mode: Mode, reason: str) -> Decision[GuardState[S]]:
             return Decision(twist, state, mode, reason, proposed.target, proposed.region, proposed.belief)
@@ -208,8 +207,15 @@ class Guard(Generic[S]):
     def _speed(self, room: float) -> float:
         return speed_within(room, self.braking, self.reaction_s)
 
-    def _remember(self, state: GuardState[S], scan: Scan, pose: Odometry) -> GuardState[S]:
-        """Add a scan; of earlier returns, keep those that are recent and out of the lidar's field of view now."""
+    def _remember(self, state: GuardState[S], scan: Scan | None, odometry: Odometry | None) -> GuardState[S]:
+        """Add a new scan; of earlier returns, keep those that are recent and out of the lidar's field of view now."""
+        pose = odometry or Odometry()
+        if odometry is None:
+            # What is remembered cannot be carried along.
+            nothing = NO_POINTS, np.empty(0)
+            state = replace(state, scan_points=nothing[0], scan_points_at=nothing[1], scan_stamp=-math.inf, looks=())
+        if scan is None or scan.stamp == state.scan_stamp:
+            return state
         new = scan_points(scan, self.robot)
         new = to_odometry(new[np.hypot(new[:, 0], new[:, 1]) < self.memory_radius], pose)
         old = from_odometry(state.scan_points, pose)

@@ -99,13 +99,18 @@ def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
 
     Negative where a point ahead is too near already, inf where nothing is in the way.
     """
-    ahead, aside = points.T
+    return float(rooms_ahead(points, np.zeros(1), margin, robot)[0])
+
+
+def rooms_ahead(
+    points: Points, headings: NDArray[np.float64], margin: Margin, robot: RobotGeometry
+) -> NDArray[np.float64]:
+    """Return `room_ahead` of a robot that has turned to each of H headings [rad], float64 (H,)."""
+    (x, y), cos, sin = points.T, np.cos(headings)[:, None], np.sin(headings)[:, None]
+    ahead, aside = cos * x + sin * y, cos * y - sin * x
     beside = np.maximum(np.abs(aside) - robot.half_width, 0) / margin.beside
-    in_the_way = np.flatnonzero((ahead > 0) & (beside < 1))
-    if len(in_the_way) == 0:
-        return math.inf
-    gap = ahead[in_the_way] - robot.half_length
-    return float((gap - margin.ahead * np.sqrt(1 - beside[in_the_way] ** 2)).min())
+    gap = ahead - robot.half_length - margin.ahead * np.sqrt(np.maximum(1 - beside**2, 0))
+    return np.asarray(np.where((ahead > 0) & (beside < 1), gap, np.inf).min(axis=1, initial=np.inf))
 
 
 def room_behind(points: Points, margin: Margin, robot: RobotGeometry) -> float:

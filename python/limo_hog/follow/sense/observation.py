@@ -80,6 +80,9 @@ class Observation:
     between
         Scans that came since the frame before, and where the robot was, oldest first: of a camera slower than the
         lidar.
+    remembered
+        float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
+        not look. `Guard` fills it in; None without it.
     """
 
     stamp: float
@@ -94,6 +97,7 @@ class Observation:
     fault: str = ""
     clothes: Clothes | None = None
     between: tuple[tuple[Scan, Odometry], ...] = ()
+    remembered: NDArray[np.float64] | None = None
 
     @property
     def now(self) -> float:

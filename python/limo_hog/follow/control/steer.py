@@ -49,7 +49,7 @@ class Steering:
     regain_angular
         Limit of the turn rate while the person is out of the image [rad/s]. Chosen: half a turn a second.
     distance_tolerance, bearing_tolerance
-        Smaller errors are not corrected [m, rad]. Chosen: a little more than the standard deviations of one measurement.
+        Smaller errors are not corrected [m, rad]. Chosen: a little more than one measurement strays.
     steady_bearing_rate, steady_range_rate
         A person whose bearing and range change more slowly stands [rad/s, m/s]. Chosen: at 1.5 m both are a walk of
         less than .1 m/s.

@@ -227,14 +227,16 @@ def test_a_way_is_kept_for_eight_tenths_of_a_second_and_then_where_it_is_nearly_
     assert COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, mirrored) is mirrored
 
 
-def test_a_way_goes_on_for_eight_tenths_of_a_second_though_the_command_seems_clear_of_everybody() -> None:
+def test_before_a_fast_person_a_way_goes_on_for_eight_tenths_of_a_second_though_the_command_seems_clear() -> None:
     # The estimate strays while the robot turns: a moment later the person may seem to come again.
     passing = Walker(1.6, 2.0, -0.8, 0.0, followed=True)
     assert not notices(passing)
     for age, goes_on in ((0.7, True), (0.9, False)):
         assert notices(passing, Way(-0.5, -0.4, age)) == goes_on
-    # A robot that stands leaves that at once.
+    # A robot that stands leaves that at once; and one before a person no faster than it drives.
     assert not notices(passing, Way(0.0, 0.0, 0.3))
+    for speed, goes_on in ((0.59, False), (0.61, True)):
+        assert notices(replace(passing, vx=-speed), Way(-0.5, -0.4, 0.3)) == goes_on
 
 
 def test_a_way_is_left_at_once_where_it_leads_into_a_wall() -> None:

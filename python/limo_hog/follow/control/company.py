@@ -119,10 +119,10 @@ class Company:
         What a change of speed by 1 m/s, and a turn by 2.5 rad, are worth [m]. Chosen: of ways that clear people alike,
         to within the error of their places, the easiest.
     settle_s, stay
-        A way is left only after so long [s], also where the command seems clear again, unless it costs `never`; and for
-        another if that is worth more by so much [m]. Standing is left at once. Measured: while the robot turns, which
-        takes .8 s, a person's velocity across their way strays by .4 m/s, and the sides would be taken in turns;
-        chosen: less than half of `wanted`.
+        A way is left for another only after so long [s], unless it costs `never`, and if the other is worth more by so
+        much [m]; so long, too, before people faster than the robot where the command seems clear again. Standing is
+        left at once. Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by
+        .4 m/s, and the sides would be taken in turns; chosen: less than half of `wanted`.
     away
         What a way costs on which the person followed is out of the image all the time [m], unless it is they who come.
         Chosen: less than the clearance wanted.
@@ -207,7 +207,8 @@ class Company:
             is_followed, self.notice_s, self.notice_other_s
         )
         room = np.where(late[:, None], np.inf, gaps[0]).min(axis=0) - clear
-        settles = begun is not None and begun.speed != 0 and begun.age < self.settle_s
+        fast = bool((np.hypot(people[:, 2], people[:, 3]) > max(self.speeds)).any())
+        settles = fast and begun is not None and begun.speed != 0 and begun.age < self.settle_s
         if not settles and (room[0] if begun is None else room).min() > 0:
             return None
         ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]

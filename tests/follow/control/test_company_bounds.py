@@ -237,6 +237,9 @@ def test_before_a_fast_person_a_way_goes_on_for_eight_tenths_of_a_second_though_
     assert not notices(passing, Way(0.0, 0.0, 0.3))
     for speed, goes_on in ((0.59, False), (0.61, True)):
         assert notices(replace(passing, vx=-speed), Way(-0.5, -0.4, 0.3)) == goes_on
+    # While they are not measured, it is not known that the way is clear.
+    assert notices(replace(passing, measured=False), Way(-0.5, -0.4, 2.0))
+    assert not notices(replace(passing, measured=False))
 
 
 def test_a_way_is_left_at_once_where_it_leads_into_a_wall() -> None:

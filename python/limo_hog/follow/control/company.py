@@ -33,6 +33,8 @@ class Walker:
         Place and velocity in the base frame as it is now, which is taken to stand still [m, m/s].
     followed
         Whether this is the person followed.
+    measured
+        Whether they were measured just now; else they are where their velocity leads.
     """
 
     x: float
@@ -40,6 +42,7 @@ class Walker:
     vx: float
     vy: float
     followed: bool = False
+    measured: bool = True
 
     def at_least(self, speed: float, slowest: float) -> Walker:
         """Return one who has set out, faster than `slowest`, at the speed at which they are known to walk [m/s].
@@ -51,11 +54,11 @@ class Walker:
         return replace(self, vx=share * self.vx, vy=share * self.vy)
 
 
-def walker_of(track: Track, pose: Odometry, *, followed: bool = False) -> Walker:
+def walker_of(track: Track, pose: Odometry, *, followed: bool = False, measured: bool = True) -> Walker:
     """Return a track in the odometry frame as a walker in the base frame of a robot at `pose`."""
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
     x, y, vx, vy = (track.mean - (pose.x, pose.y, 0.0, 0.0)).tolist()
-    return Walker(cos * x + sin * y, cos * y - sin * x, cos * vx + sin * vy, cos * vy - sin * vx, followed)
+    return Walker(cos * x + sin * y, cos * y - sin * x, cos * vx + sin * vy, cos * vy - sin * vx, followed, measured)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +123,10 @@ class Company:
         to within the error of their places, the easiest.
     settle_s, stay
         A way is left for another only after so long [s], unless it costs `never`, and if the other is worth more by so
-        much [m]; so long, too, before people faster than the robot where the command seems clear again. Standing is
-        left at once. Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by
-        .4 m/s, and the sides would be taken in turns; chosen: less than half of `wanted`.
+        much [m]. Where the command seems clear again, a way before people faster than the robot is left only after so
+        long, and if they are measured. Standing is left at once. Measured: while the robot turns, which takes .8 s, a
+        person's velocity across their way strays by .4 m/s, and the sides would be taken in turns; chosen: less than
+        half of `wanted`.
     away
         What a way costs on which the person followed is out of the image all the time [m], unless it is they who come.
         Chosen: less than the clearance wanted.
@@ -208,8 +212,9 @@ class Company:
         )
         room = np.where(late[:, None], np.inf, gaps[0]).min(axis=0) - clear
         fast = bool((np.hypot(people[:, 2], people[:, 3]) > max(self.speeds)).any())
-        settles = fast and begun is not None and begun.speed != 0 and begun.age < self.settle_s
-        if not settles and (room[0] if begun is None else room).min() > 0:
+        unsure = begun is not None and (begun.age < self.settle_s or not all(one.measured for one in walkers))
+        stays = fast and unsure and begun is not None and begun.speed != 0
+        if not stays and (room[0] if begun is None else room).min() > 0:
             return None
         ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]
         if begun is not None:

@@ -206,16 +206,17 @@ class TrackingController:
 
         tracks, seen, own = self.tracker.around(state.tracks, person, observation.now, self.steering.coast_s)
         felt = self.tracker.movers.felt(state.tracks.movers, observation.now)
-        is_measured = person is not None and observation.now - person.measured < self.backing.unseen_s
-        followed = person.track.mean[None, :2] if person is not None and is_measured else NO_POINTS
+        lost_s = math.inf if person is None else observation.now - person.measured
+        followed = person.track.mean[None, :2] if person is not None and lost_s < self.backing.unseen_s else NO_POINTS
         others = self.backing.remember(state.others, seen, felt, followed, observation.now)
-        state = replace(state, others=others)
 
         def may_back(poses: Poses) -> NDArray[np.bool_]:
             return self.backing.is_free_behind(poses, pose, self.grid, state.ground, others, self.robot)
 
         walkers = [
-            walker_of(track, pose, followed=True).at_least(state.brisk, self.company.slowest)
+            walker_of(track, pose, followed=True, measured=lost_s <= self.tracker.scan_period_s).at_least(
+                state.brisk, self.company.slowest
+            )
             if track is own
             else walker_of(track, pose)
             for track in tracks
@@ -230,9 +231,8 @@ class TrackingController:
             mode = mode if mode in (Mode.LOST, Mode.SEARCH) else Mode.FOLLOW
         twist = self.wheels.within_reach(twist, driven, acceleration, state.tracks.period, self.robot)
         way_out = None if way is None else (pose.yaw + way.turn, way.speed, observation.now - way.age)
-        return replace(
-            decision, state=replace(state, way_out=way_out, sent=twist), twist=twist, mode=mode, reason=reason
-        )
+        state = replace(state, way_out=way_out, sent=twist, others=others)
+        return replace(decision, state=state, twist=twist, mode=mode, reason=reason)
 
     def _map(self, state: TrackingState, observation: Observation) -> TrackingState:
         """Enter a new scan into what moves, and with the depth image into the map of the ground."""

@@ -10,8 +10,8 @@ use crate::memory;
 use crate::pyramid::Steps;
 use crate::threads::for_each;
 
-/// Crops that a thread takes at a time: half a millisecond's work, ten times as much as making a thread.
-const AT_ONCE: usize = 16;
+/// Crops that a thread takes at a time: 50 µs of work, so that of 200 crops on two threads neither waits long for the other.
+const AT_ONCE: usize = 4;
 
 impl Hog {
     /// Writes the descriptors of the crops in `pixels`, one after the other, into `out`: within 1e-6 of those that

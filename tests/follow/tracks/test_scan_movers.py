@@ -92,6 +92,20 @@ def test_the_end_of_a_wall_that_comes_into_view_does_not_move_for_it_is_still_wa
         assert len(MOVERS.moving(movers)) == moving
 
 
+def test_what_is_seen_of_a_wall_at_the_edge_of_its_cells_does_not_move_along_it() -> None:
+    # The wall is in the cells up to 2 m; its returns stray by a centimetre to either side of that.
+    wall = GRID.flat(FREE, np.array([(1.95, 0.05 * step - 1.0) for step in range(60)]))
+    occupied, freed = FREE.occupied.copy(), FREE.freed.copy()
+    occupied.flat[wall], freed.flat[wall] = 2.0, -np.inf
+    walled = replace(FREE, stamp=0.0, occupied=occupied, freed=freed)
+    for ground, moving in ((FREE, 1), (walled, 0)):
+        movers: tuple[Mover, ...] = ()
+        for index in range(12):
+            seen = np.array([(2.01, 0.07 * index + 0.05 * step - 0.8) for step in range(5)])
+            movers = MOVERS.update(movers, Returns(index * SCAN_S, seen, Odometry()), HALF_VIEW, NOISE, GRID, ground)
+        assert len(MOVERS.moving(movers)) == moving
+
+
 def test_what_the_camera_has_shown_for_long_is_counted() -> None:
     movers: tuple[Mover, ...] = ()
     for index in range(10):

@@ -183,12 +183,12 @@ class Grid:
         free[inside] = ground.freed[cells[inside, 0], cells[inside, 1]] > np.broadcast_to(stamps, len(points))[inside]
         return free
 
-    def is_near_blocked(self, ground: Ground, points: Points) -> NDArray[np.bool_]:
-        """Return whether an occupied cell is within half a cell of each point, bool (N,)."""
+    def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
+        """Return whether an occupied cell is within half a cell of each point, bool (N,); `lasting` as `is_blocked`."""
         half = self.cell / 2
         corners = np.array([(-half, -half), (-half, half), (half, -half), (half, half)])
         around = (points[:, None] + corners).reshape(-1, 2)
-        return np.asarray(self.is_blocked(ground, around).reshape(-1, 4).any(axis=1))
+        return np.asarray(self.is_blocked(ground, around, lasting=lasting).reshape(-1, 4).any(axis=1))
 
     def sees(
         self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24

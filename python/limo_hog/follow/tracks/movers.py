@@ -121,7 +121,7 @@ class Movers:
         """
         points = returns.points
         if ground is not None:
-            points = points[~grid.is_blocked(ground, points, lasting=True)]
+            points = points[~grid.is_near_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
         whose = self._whose(movers, points, returns.stamp, noise)
         for mover in sorted(movers, key=lambda one: one.number is None):

@@ -69,10 +69,12 @@ class Backing:
         of which is .62 rad wide.
     enough, aside
         More room behind than this gains nothing, and a radian beside the person's direction costs so much of it [m].
-        Chosen: 2.5 s of backing; half a radian is worth no more than the length by which measured room strays.
+        Measured in 32 development runs of the corridor: with .5 m two end with a contact, with 1 m none; with .5 m a
+        radian a person comes as near as .32 m, with .2 m as .63 m.
     margins, shares
         The room is that within each of these margins, by these shares [1]. Chosen: what `Guard` keeps; and 6 cm more
         beside, since along a wall's end that is just outside of what `Guard` keeps an error of 4° stops the robot.
+        The wider one alone ended one of 23 such runs with a contact.
     """
 
     remembers_s: float = bounded(59.0, 0, 3600)

@@ -196,7 +196,8 @@ class Company:
         """
         people = np.array([(one.x, one.y, one.vx, one.vy) for one in walkers]).reshape(-1, 4)
         is_followed = np.array([one.followed for one in walkers], bool)
-        coming = np.hypot(people[:, 2], people[:, 3]) > self.slowest
+        pace = np.hypot(people[:, 2], people[:, 3])
+        coming = pace > self.slowest
         # Those who come no nearer than they are, whatever the robot does, need no way.
         coming &= (people[:, :2] * people[:, 2:]).sum(axis=1) < 0
         if not coming.any():
@@ -211,9 +212,12 @@ class Company:
             is_followed, self.notice_s, self.notice_other_s
         )
         room = np.where(late[:, None], np.inf, gaps[0]).min(axis=0) - clear
-        fast = bool((np.hypot(people[:, 2], people[:, 3]) > max(self.speeds)).any())
-        unsure = begun is not None and (begun.age < self.settle_s or not all(one.measured for one in walkers))
-        stays = fast and unsure and begun is not None and begun.speed != 0
+        stays = (
+            begun is not None
+            and begun.speed != 0
+            and pace[coming].max() > max(self.speeds)
+            and (begun.age < self.settle_s or not all(one.measured for one in walkers))
+        )
         if not stays and (room[0] if begun is None else room).min() > 0:
             return None
         ways = [Way(turn, speed) for turn in self.turns for speed in self.speeds]

@@ -167,7 +167,7 @@ class Guard(Generic[S]):
         if age > self.max_age_s:
             return Decision(Twist(), state, Mode.BLOCKED, f"no camera frame for {age:.1f} s")
         proposed = replace(state.proposed, target=None, region=None)
-        return self._limited(proposed, state, scan, odometry, now)
+        return self._limited(proposed, self._remember(state, scan, odometry), scan, odometry, now)
 
     def _limited(
         self,
@@ -178,7 +178,6 @@ class Guard(Generic[S]):
         now: float,
     ) -> Decision[GuardState[S]]:
         pose = odometry or Odometry()
-        state = self._remember(state, scan, odometry)
 
         def decision(twist: Twist, mode: Mode, reason: str) -> Decision[GuardState[S]]:
             return Decision(twist, state, mode, reason, proposed.target, proposed.region, proposed.belief)

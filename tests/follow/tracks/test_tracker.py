@@ -274,6 +274,17 @@ def test_two_returns_within_half_a_stride_are_legs_and_a_wider_group_is_furnitur
     assert not found((2.25, 0.0), (2.25, 0.1), x=2.25)
 
 
+def test_the_legs_of_a_person_who_walks_are_where_the_person_was_a_twentieth_of_a_second_ago() -> None:
+    legs = Legs()
+    for speed in (0.0, 0.8, -0.8):
+        one = replace(leg_track(2.0), mean=np.array([2.0, 0.0, 0.0, speed]))
+        trailing = -0.05 * speed
+        returns = Returns(1.0, np.array([(2.0, trailing - 0.02), (2.0, trailing + 0.02)]), Odometry())
+        corrected = legs.update(one, returns, NOISE)
+        assert corrected is not None
+        assert corrected.mean == pytest.approx(one.mean, abs=1e-3)
+
+
 def test_the_middle_of_two_legs_is_a_decimetre_from_the_person_however_far() -> None:
     noise = Legs().noise_at(2.0, NOISE)
     assert (noise.range, noise.bearing) == pytest.approx((0.1, 0.1 / 2.0))
@@ -290,18 +301,26 @@ def test_no_detector_is_believed_to_find_fewer_than_one_in_five_or_more_than_49_
     assert Existence(recall_frames=0.01).recall_of(learnt, 300.0) == recall
 
 
-def test_clothes_are_the_mean_of_the_boxes_until_a_person_is_known_and_then_move_by_a_twentieth() -> None:
+def test_each_box_moves_the_clothes_by_a_fifth_until_a_person_is_known_and_then_by_a_twentieth() -> None:
     one = replace(a_person(1, 2.0, clothes=IN_RED), confirmed=False, log_odds=-5.0, age=1)
-    for boxes_ in range(2, 6):
+    for count in range(1, 5):
         one = TRACKER.correct(replace(one, log_odds=-5.0), box(2.0, clothes=IN_GREEN), POSE, 0.4)
-        assert one.clothes == pytest.approx(IN_RED + (IN_GREEN - IN_RED) * (boxes_ - 1) / boxes_)
-        assert one.age == boxes_
+        assert one.clothes == pytest.approx(IN_GREEN + (IN_RED - IN_GREEN) * 0.8**count)
     near = IN_RED + 1.0
     known = TRACKER.correct(a_person(1, 2.0, clothes=IN_RED), box(2.0, clothes=near), POSE)
     assert known.clothes == pytest.approx(IN_RED + 0.05)
     # The first clothes seen are taken; none seen leave those that are known.
     assert TRACKER.correct(a_person(1, 2.0), box(2.0, clothes=near), POSE).clothes is near
     assert TRACKER.correct(a_person(1, 2.0, clothes=near), box(2.0), POSE).clothes is near
+
+
+def test_no_clothes_are_learnt_from_a_box_whose_patches_are_not_on_shirt_and_trousers() -> None:
+    # Once the first of 23 boxes, on a part of the body, gave half of the shirt that the person was known by.
+    partly = replace(box(2.0, clothes=IN_GREEN), whole=False)
+    for clothes in (None, IN_RED):
+        assert TRACKER.correct(a_person(1, 2.0, clothes=clothes), partly, POSE).clothes is clothes
+    for seen, clothes in ((partly, None), (box(2.0, clothes=IN_GREEN), IN_GREEN)):
+        assert TRACKER.begin(1, seen, 1.0, POSE).clothes is clothes
 
 
 def test_a_box_outside_the_gate_moves_a_track_that_may_have_turned_and_stepped_aside() -> None:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
-from limo_hog.follow.sense.appearance import Appearance
+from limo_hog.follow.sense.appearance import Appearance, Clothes
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Noise, bearing_range, innovation, wrap
@@ -113,6 +113,13 @@ class Association:
         if seen.range is None:
             return True
         return abs(seen.range * seen.height - person.window) < self.size_tolerance * person.window
+
+    def worn(self, seen: Measurement) -> Clothes | None:
+        """Return the clothes in a box; None where its patches are not on shirt and trousers.
+
+        Where the head is cut off, or the box sits lower, they are not.
+        """
+        return seen.clothes if seen.range is None or (seen.whole and not seen.is_low(self.low)) else None
 
     def without_bad_range(self, person: Person, seen: Measurement) -> Measurement:
         """Return a box without its range where its size contradicts it: something stands in front of the person."""

@@ -86,7 +86,8 @@ class Tracker:
         A person measured again after so long has a new track: the old velocity tells nothing [s]. Chosen: people turn
         within a second.
     size_rate
-        Share by which one box moves a person's known size [1]. Chosen: a time constant of five frames, half a second.
+        Share by which one box moves a person's known size, and their clothes until they are confirmed [1]. Chosen: a
+        time constant of five frames, half a second.
     turn_speed
         Standard deviation added to each component of the velocity of a person whose box is outside the gate [m/s], and
         `association.same_place` to the position's. Chosen: a sharp turn at 0.75 m/s changes the velocity by 1.06 m/s.
@@ -169,12 +170,17 @@ class Tracker:
             if which in boxes.values() or which in flat:
                 continue
             if self.association.is_new(seen, people, pose):
-                odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
-                people.append(initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds))
+                people.append(self.begin(number, seen, stamp, pose))
                 boxes[number] = which
                 number += 1
         found = tuple(boxes.items())
         return replace(tracks, people=tuple(people), next_number=number, recall=recall, boxes=found), boxes
+
+    def begin(self, number: int, seen: Measurement, stamp: float, pose: Odometry) -> Person:
+        """Begin to track a box that belongs to no known person."""
+        odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
+        seen = replace(seen, clothes=self.association.worn(seen))
+        return initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds)
 
     def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
         """Update a person by their box; the track is at the box's stamp.
@@ -189,13 +195,9 @@ class Tracker:
                 centre += self.size_rate * (seen.middle - centre)
             elif seen.window > window:
                 window, centre = seen.window, seen.middle
-        clothes = self._clothes(person, seen)
-        fits = self.association.fits_size(person, seen)
         off = 0.0 if seen.range is None else abs(seen.range - bearing_range(person.track, pose)[1])
         in_place = off < self.astray
-        # Where the head is cut off, the box sits lower, and its patches are not on shirt and trousers.
-        aligned = seen.range is None or (seen.whole and not seen.is_low(self.association.low))
-        worn = seen.clothes if fits and aligned else None
+        worn = self.association.worn(seen) if self.association.fits_size(person, seen) else None
         # A box on a part of the body still shows the stature, by the depth image.
         tall = seen.window if in_place and seen.whole and seen.window and seen.range else None
         if seen.range is not None and seen.range < self.stature_from:
@@ -221,7 +223,7 @@ class Tracker:
             seen=track.stamp,
             window=window,
             centre=centre,
-            clothes=clothes,
+            clothes=self._clothes(person, worn),
             worn=worn,
             tall=tall,
             strained=strained or not in_place,
@@ -375,12 +377,10 @@ class Tracker:
             bearing, distance, person.window, person.centre, observation, confirmed=person.confirmed
         )
 
-    def _clothes(self, person: Person, seen: Measurement) -> Clothes | None:
-        """Return a person's clothes after one more box: the mean until they are confirmed, then slowly learnt."""
-        if seen.clothes is None or not self.association.fits_size(person, seen):
-            return person.clothes
-        if person.clothes is None:
-            return seen.clothes
+    def _clothes(self, person: Person, worn: Clothes | None) -> Clothes | None:
+        """Return a person's clothes after one more box: quickly learnt until they are confirmed, then slowly."""
+        if person.clothes is None or worn is None:
+            return person.clothes if worn is None else worn
         if person.confirmed:
-            return self.association.appearance.learn(person.clothes, seen.clothes)
-        return person.clothes + (seen.clothes - person.clothes) / (person.age + 1)
+            return self.association.appearance.learn(person.clothes, worn)
+        return person.clothes + self.size_rate * (worn - person.clothes)

@@ -130,14 +130,14 @@ def test_the_controller_is_told_what_was_seen_where_the_lidar_does_not_look_now(
 
 
 def test_it_backs_fast_only_onto_ground_that_was_seen_to_be_free() -> None:
-    guard = Guard(Headstrong(Twist(-0.4, 0.0)))
+    guard = Guard(Headstrong(Twist(-0.7, 0.0)))
     free = np.full(292, 8.0, np.float32)
     # At the start nothing behind has been seen.
     first = guard.step(replace(look(), scan=scan(free), odometry=Odometry()), guard.start())
     assert first.twist.linear == -guard.unseen_speed
     # Turned about: what was ahead is behind now.
     turned = replace(look(stamp=1.0), scan=scan(free, 1.0), odometry=Odometry(1.0, yaw=np.pi))
-    assert guard.step(turned, first.state).twist.linear < -0.35
+    assert guard.step(turned, first.state).twist.linear == -guard.max_backward == -0.6
     long_after = replace(look(stamp=61.0), scan=scan(free, 61.0), odometry=Odometry(61.0, yaw=np.pi))
     assert guard.step(long_after, first.state).twist.linear == -guard.unseen_speed
 
@@ -260,7 +260,7 @@ def test_a_fault_of_the_same_instant_forgets_nothing() -> None:
 def test_backwards_it_goes_slowly_for_it_does_not_look_there() -> None:
     guard = Guard(Headstrong(Twist(-0.7, 0.2)))
     decision = guard.step(replace(look(), scan=scan()), guard.start())
-    assert decision.twist == Twist(-guard.max_backward, 0.2)
+    assert decision.twist == Twist(-guard.max_blind, 0.2)
     assert decision.reason == "because"
 
 

@@ -110,12 +110,13 @@ class Company:
         Distance kept from everything else [m]. Chosen: `Guard` keeps more ahead and behind, where it can.
     near, person_radius
         What the lidar sees further off than `near`, or nearer than `person_radius` to one who comes, is no wall [m].
-        Chosen: nearly what the robot backs in the time compared; as `Grid`'s.
+        Chosen: what the robot backs in two and a half seconds; as `Grid`'s.
     never
         What a way costs that ends at a wall or backs blindly [m]. Chosen: more than all distances together are worth.
     speeds, turns
-        Ways compared [m/s, rad]. Chosen: what the drive can do, `Guard` limits the way back to .4 m/s; directions half
-        a person's width apart after half a metre, none from which a person ahead is out of the lidar's sight.
+        Ways compared [m/s, rad]. Chosen: what the drive can do and `Guard` lets it back at, and `Backing.blind_speed`;
+        directions half a person's width apart after half a metre, none from which a person ahead is out of the lidar's
+        sight.
     turn_gain, max_turn
         Turn rate for each radian to turn [1/s], and its limit [rad/s]. Chosen: to a right angle in .8 s.
     ease
@@ -149,7 +150,7 @@ class Company:
     near: float = 1.5
     person_radius: float = 0.45
     never: float = 2.0
-    speeds: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.3, 0.6)
+    speeds: tuple[float, ...] = (-0.6, -0.2, 0.0, 0.3, 0.6)
     turns: tuple[float, ...] = (-1.6, -1.1, -0.5, 0.0, 0.5, 1.1, 1.6)
     turn_gain: float = 4.0
     max_turn: float = bounded(3.0, 0, 6)

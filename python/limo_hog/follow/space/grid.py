@@ -171,10 +171,7 @@ class Grid:
         """
         cells, inside = self.index(ground, points)
         flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
-        blocked = inside & (ground.occupied.ravel()[flat] > 0)
-        if lasting:
-            blocked &= ground.freed.ravel()[flat] < ground.stamp - self.lasts_s
-        return np.asarray(blocked)
+        return inside & self._is_occupied(ground, flat, lasting)
 
     def is_free_since(self, ground: Ground, points: Points, stamps: float | NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return whether each point was seen to be free after its stamp [s], bool (N,); outside of the square none."""
@@ -184,11 +181,23 @@ class Grid:
         return free
 
     def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
-        """Return whether an occupied cell is within half a cell of each point, bool (N,); `lasting` as `is_blocked`."""
-        half = self.cell / 2
-        corners = np.array([(-half, -half), (-half, half), (half, -half), (half, half)])
-        around = (points[:, None] + corners).reshape(-1, 2)
-        return np.asarray(self.is_blocked(ground, around, lasting=lasting).reshape(-1, 4).any(axis=1))
+        """Return whether an occupied cell is within half a cell of each point, bool (N,); `lasting` as `is_blocked`.
+
+        At the square's edge and outside of it none is.
+        """
+        lowest, _ = self.index(ground, points - self.cell / 2)
+        within = lowest.view(np.uint64) < self.cells - 1
+        inside = within[:, 0] & within[:, 1]
+        flat = np.where(inside, lowest[:, 0] * self.cells + lowest[:, 1], 0)
+        around = flat[:, None] + (0, 1, self.cells, self.cells + 1)
+        return np.asarray(inside & self._is_occupied(ground, around, lasting).any(axis=1))
+
+    def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> NDArray[np.bool_]:
+        """Return whether the cells of flat indices are occupied, bool of their shape; `lasting` as `is_blocked`."""
+        occupied = ground.occupied.ravel()[flat] > 0
+        if lasting:
+            occupied &= ground.freed.ravel()[flat] < ground.stamp - self.lasts_s
+        return np.asarray(occupied)
 
     def sees(
         self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24

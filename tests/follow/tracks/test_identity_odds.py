@@ -154,8 +154,8 @@ def test_a_track_that_begins_is_the_persons_only_where_they_can_have_walked(lost
         assert (after.of(2) > 0.1) == may
 
 
-def test_of_two_who_pass_nearer_than_half_a_metre_one_in_fifty_changes_places_in_a_frame() -> None:
-    for apart, swaps in ((0.45, 0.02), (0.55, 0.0)):
+def test_of_two_who_pass_nearer_than_a_quarter_of_a_metre_one_in_fifty_changes_places_in_a_frame() -> None:
+    for apart, swaps in ((0.2, 0.02), (0.3, 0.0)):
         after = IDENTITY.update(known_as((1, 0.8), (2, 0.1)), at(1.0, plain(1, 1.0), plain(2, 1.0, apart)))
         one, two = 0.8 * 0.998, 0.1 * 0.998
         one += 0.002 * (1 - one - two)
@@ -164,7 +164,7 @@ def test_of_two_who_pass_nearer_than_half_a_metre_one_in_fifty_changes_places_in
 
 
 def test_no_person_changes_places_with_one_who_is_not_measured() -> None:
-    after = IDENTITY.update(known_as((1, 0.8), (2, 0.1)), at(5.0, plain(1, 5.0), plain(2, 5.0, 0.3, measured=4.0)))
+    after = IDENTITY.update(known_as((1, 0.8), (2, 0.1)), at(5.0, plain(1, 5.0), plain(2, 5.0, 0.2, measured=4.0)))
     one, two = 0.8 * 0.998, 0.1 * math.exp(-0.1 / 2.0)
     assert (after.of(1), after.of(2)) == pytest.approx((one + 0.002 * (1 - one - two), two))
 

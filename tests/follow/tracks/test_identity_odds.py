@@ -154,8 +154,8 @@ def test_a_track_that_begins_is_the_persons_only_where_they_can_have_walked(lost
         assert (after.of(2) > 0.1) == may
 
 
-def test_of_two_who_pass_nearer_than_a_quarter_of_a_metre_one_in_fifty_changes_places_in_a_frame() -> None:
-    for apart, swaps in ((0.2, 0.02), (0.3, 0.0)):
+def test_of_two_who_pass_close_by_one_in_fifty_changes_places_in_a_frame_and_further_off_one_in_five_hundred() -> None:
+    for apart, swaps in ((0.2, 0.02), (0.3, 0.002), (0.45, 0.002), (0.55, 0.0)):
         after = IDENTITY.update(known_as((1, 0.8), (2, 0.1)), at(1.0, plain(1, 1.0), plain(2, 1.0, apart)))
         one, two = 0.8 * 0.998, 0.1 * 0.998
         one += 0.002 * (1 - one - two)

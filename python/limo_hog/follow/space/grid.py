@@ -189,8 +189,8 @@ class Grid:
         within = lowest.view(np.uint64) < self.cells - 1
         inside = within[:, 0] & within[:, 1]
         flat = np.where(inside, lowest[:, 0] * self.cells + lowest[:, 1], 0)
-        around = flat[:, None] + (0, 1, self.cells, self.cells + 1)
-        return np.asarray(inside & self._is_occupied(ground, around, lasting).any(axis=1))
+        steps = np.array((0, 1, self.cells, self.cells + 1), np.int64)
+        return np.asarray(inside & self._is_occupied(ground, flat[:, None] + steps, lasting).any(axis=1))
 
     def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> NDArray[np.bool_]:
         """Return whether the cells of flat indices are occupied, bool of their shape; `lasting` as `is_blocked`."""

@@ -12,6 +12,8 @@ import math
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from limo_hog.follow.sense.appearance import Clothes
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
@@ -108,13 +110,12 @@ class Identity:
         Time constant with which a track that is not measured stops to be where the person is [s]. Chosen: people turn
         within a second.
     meets
-        A box on one of two people nearer than this to each other may show both, or the other [m]. Chosen: a body's
-        width and a stride.
+        Two people nearer than this to each other may swap their tracks, with the chance `passes` in a frame, and a box
+        on one may show both [m]. Chosen: a body's width and a stride.
     crosses, swaps
-        Two tracks nearer than this to each other may swap their people [m], with this chance in a frame [1]. Measured
-        in the arena, where the legs of two alike were not told apart: of 9 pairs who came nearer than .2 m, 2 swapped;
-        of 8 who did not, none in 141 frames. Chosen: more, for the error of a place; in the second in which they pass,
-        one in five.
+        Nearer than this, with this chance [m, 1]. Measured in the arena, where the legs of two alike were not told
+        apart: of 9 pairs who came nearer than .2 m, 2 swapped; of 8 who did not, none in 141 frames. Chosen: more, for
+        the error of a place; in the second in which they pass, one in five.
     unseen_s
         A person not measured for longer than this may be a track that begins [s], and surely may be after two seconds.
         Chosen: three frames.
@@ -122,8 +123,8 @@ class Identity:
         A track that begins nearer than this to the last place, and so much more for each second since, may be the
         person's [m, m/s]. Chosen: a body's width, and a walk.
     clear
-        A shirt or trousers that differ by more are not learnt [chi-squared of 3 numbers]. Chosen: half of
-        `Appearance.other`; other light stays below.
+        A shirt or trousers that differ by more are not learnt; if by less, they do not tell two apart [chi-squared of 3
+        numbers]. Chosen: half of `Appearance.other`; other light stays below.
     rate
         Share by which one box moves clothes and stature once they are learnt [1]. Chosen: as in `Appearance`.
     remembered
@@ -220,8 +221,10 @@ class Identity:
             # What was taken for another person's box may have been none.
             chances[own] += self.passes * absent
         for left, right in itertools.combinations(measured, 2):
-            if separation(left, right) < self.crosses:
-                swapped = self.swaps * (chances[right.number] - chances[left.number])
+            gap = separation(left, right)
+            if gap < self.meets and not {left.number, right.number} <= walking:
+                rate = self.swaps if gap < self.crosses else self.passes
+                swapped = rate * (chances[right.number] - chances[left.number])
                 chances[left.number] += swapped
                 chances[right.number] -= swapped
         return chances
@@ -280,8 +283,18 @@ class Identity:
         if not person.confirmed or chance > 1.0 - self.sure:
             return known
         rest = [traits for traits in known.others if traits.number != person.number]
-        mine = Traits(person.number, person.clothes, person.window)
+        mine = Traits(person.number, self._told_apart(person.clothes, known.traits.clothes), person.window)
         return replace(known, others=(*rest, mine)[-self.remembered :])
+
+    def _told_apart(self, clothes: Clothes | None, own: Clothes | None) -> Clothes | None:
+        """Return another's clothes, and the person's own in place of a shirt or trousers that do not clearly differ.
+
+        What little they differ by is light, the same in every frame, and would soon add up to a proof.
+        """
+        if clothes is None or own is None:
+            return clothes
+        same = ((clothes - own) ** 2).sum(axis=1) < self.clear
+        return np.where(same[:, None], own, clothes)
 
     def _moved(self, traits: Traits, person: Person) -> Traits:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))

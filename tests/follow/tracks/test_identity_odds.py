@@ -154,9 +154,24 @@ def test_a_track_that_begins_is_the_persons_only_where_they_can_have_walked(lost
         assert (after.of(2) > 0.1) == may
 
 
-def test_of_two_who_pass_close_by_one_in_fifty_changes_places_in_a_frame_and_further_off_one_in_five_hundred() -> None:
-    for apart, swaps in ((0.2, 0.02), (0.3, 0.002), (0.45, 0.002), (0.55, 0.0)):
-        after = IDENTITY.update(known_as((1, 0.8), (2, 0.1)), at(1.0, plain(1, 1.0), plain(2, 1.0, apart)))
+def walking(one: Person, vx: float, vy: float) -> Person:
+    """The person, walking at so many metres a second."""
+    return replace(one, track=replace(one.track, mean=np.array([*one.track.mean[:2], vx, vy])))
+
+
+def test_of_two_nearer_than_half_a_metre_one_in_500_changes_places_and_one_in_5_for_each_metre_past() -> (
+    None
+):
+    for apart, speeds, swaps in (
+        (0.45, (0.0, 0.0), 0.002),
+        (0.45, (0.6, 0.6), 0.002),
+        (0.45, (0.6, -0.4), 0.002 + 0.2 * 1.0 * 0.1),
+        (0.2, (0.0, 0.5), 0.002 + 0.2 * 0.5 * 0.1),
+        (0.2, (50.0, 0.0), 0.5),
+        (0.55, (0.6, -0.4), 0.0),
+    ):
+        both = (walking(plain(1, 1.0), speeds[0], 0.0), walking(plain(2, 1.0, apart), speeds[1], 0.0))
+        after = IDENTITY.update(known_as((1, 0.8), (2, 0.1)), at(1.0, *both))
         one, two = 0.8 * 0.998, 0.1 * 0.998
         one += 0.002 * (1 - one - two)
         swapped = swaps * (one - two)

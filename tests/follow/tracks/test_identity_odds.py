@@ -159,9 +159,7 @@ def walking(one: Person, vx: float, vy: float) -> Person:
     return replace(one, track=replace(one.track, mean=np.array([*one.track.mean[:2], vx, vy])))
 
 
-def test_of_two_nearer_than_half_a_metre_one_in_500_changes_places_and_one_in_5_for_each_metre_past() -> (
-    None
-):
+def test_of_two_nearer_than_half_a_metre_one_in_500_changes_places_and_one_in_5_for_each_metre_past() -> None:
     for apart, speeds, swaps in (
         (0.45, (0.0, 0.0), 0.002),
         (0.45, (0.6, 0.6), 0.002),

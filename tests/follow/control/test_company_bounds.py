@@ -252,8 +252,10 @@ def test_a_way_is_left_at_once_where_it_leads_into_a_wall() -> None:
     assert COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, back) is back
     left = COMPANY.way_out(STANDING, STANDING, [walker], wall, LIMO, back)
     assert left is not None
-    # Ahead, or along the wall.
-    assert left.speed >= 0 or abs(left.turn) > 1.5
+    # Wherever it leads instead, a decimetre from the wall is kept.
+    poses, _ = COMPANY._driven([left, back], STANDING, 1.0, LIMO)
+    kept, given_up = COMPANY._room(poses, wall, LIMO)
+    assert kept >= COMPANY.walls > given_up
 
 
 @pytest.mark.parametrize("speed", [0.6, -0.4, 0.3])

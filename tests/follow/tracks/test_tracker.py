@@ -306,6 +306,7 @@ def test_each_box_moves_the_clothes_by_a_fifth_until_a_person_is_known_and_then_
     for count in range(1, 5):
         one = TRACKER.correct(replace(one, log_odds=-5.0), box(2.0, clothes=IN_GREEN), POSE, 0.4)
         assert one.clothes == pytest.approx(IN_GREEN + (IN_RED - IN_GREEN) * 0.8**count)
+        assert one.age == count + 1
     near = IN_RED + 1.0
     known = TRACKER.correct(a_person(1, 2.0, clothes=IN_RED), box(2.0, clothes=near), POSE)
     assert known.clothes == pytest.approx(IN_RED + 0.05)

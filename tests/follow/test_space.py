@@ -123,8 +123,7 @@ def test_the_point_ahead_is_on_the_way_at_the_distance_asked_for() -> None:
 
 
 def lost_at(x: float, y: float, velocity: tuple[float, float]) -> Places:
-    mean = np.array([x, y, *velocity])
-    return WANDERING.start(0.0, mean, np.diag([0.01, 0.01, 0.02, 0.02]), 1)
+    return WANDERING.start(0.0, (x, y, *velocity), np.diag([0.01, 0.01, 0.02, 0.02]), 1)
 
 
 def test_a_person_walks_on_where_they_went_and_not_through_walls() -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.follow.estimates import upper
 
 from limo_hog.follow.control.backing import Poses
 from limo_hog.follow.control.company import Company, Walker, Way, walker_of
@@ -159,7 +160,7 @@ def test_it_does_not_stay_standing_once_another_way_is_better() -> None:
 
 
 def test_a_track_is_carried_into_the_robots_frame_with_its_velocity() -> None:
-    track = Track(0.0, np.array([1.0, 3.0, 0.5, -0.25]), np.eye(4))
+    track = Track(0.0, (1.0, 3.0, 0.5, -0.25), upper(np.eye(4)))
     # The robot is at (1, 1) and looks along +y, so that ahead is +y and left is -x.
     walker = walker_of(track, Odometry(0.0, 1.0, 1.0, math.pi / 2), followed=True)
     np.testing.assert_allclose((walker.x, walker.y, walker.vx, walker.vy), (2.0, 0.0, -0.25, -0.5), atol=1e-12)

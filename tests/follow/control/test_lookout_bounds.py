@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests.follow.control.test_lookout import BLIND, GRID, HERE, LOOKOUT, NOW, free_ground, hunt_for
+from tests.follow.estimates import upper
 
 from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.lookout import Hunt, Lookout
@@ -46,7 +47,7 @@ def test_anywhere_is_ground_that_was_free_and_not_seen_for_two_seconds_within_a_
         }
     )
     hunt = hunt_for(np.zeros((3, 2)), NOW)
-    hunt = replace(hunt, track=replace(hunt.track, stamp=NOW - 4.0, mean=np.zeros(4)))
+    hunt = replace(hunt, track=replace(hunt.track, stamp=NOW - 4.0, mean=(0.0, 0.0, 0.0, 0.0)))
     places = LOOKOUT._anywhere(hunt, NOW, GRID, ground)
     assert places is not None
     expected = {tuple(one) for one in GRID.middle_of(ground, np.array([free, unclear])).tolist()}
@@ -61,7 +62,7 @@ def test_a_person_can_be_a_metre_and_half_a_metre_for_each_second_from_where_the
     row = GRID.cells // 2
     ground = ground_of({(row, column): (-1.0, NOW - 3.0) for column in range(GRID.cells)})
     hunt = hunt_for(np.zeros((3, 2)), NOW)
-    hunt = replace(hunt, track=replace(hunt.track, stamp=NOW - lost_s, mean=np.zeros(4)))
+    hunt = replace(hunt, track=replace(hunt.track, stamp=NOW - lost_s, mean=(0.0, 0.0, 0.0, 0.0)))
     places = LOOKOUT._anywhere(hunt, NOW, GRID, ground)
     assert places is not None
     far = np.hypot(*places.points.T).max()
@@ -173,7 +174,7 @@ def test_where_no_place_is_left_it_begins_anywhere_or_turns_on(place: tuple[floa
 def test_no_place_begins_on_the_other_side_of_a_wall() -> None:
     ground = ground_of({(row, 60): (2.0, NOW) for row in range(100)})
     track = kalman.initiate(NOW, 0.0, 0.5, HERE, Noise())
-    track = replace(track, mean=np.array([0.0, 0.9, 0.0, 0.0]), covariance=np.diag([0.04, 0.04, 0.01, 0.01]))
+    track = replace(track, mean=(0.0, 0.9, 0.0, 0.0), covariance=upper(np.diag([0.04, 0.04, 0.01, 0.01])))
     places = LOOKOUT.begin(track, 1, GRID, ground).places
     assert places.points.shape == (150, 2)
     behind = places.points[:, 1] > 1.1

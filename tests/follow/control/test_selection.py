@@ -32,7 +32,7 @@ def unproved(number: int, existence: float, x: float = 2.0, y: float = 0.0, age:
     """A track in view that is not confirmed, of a probability of being a person."""
     one = plain(number, age=age)
     odds = float(np.log(existence / (1 - existence)))
-    return replace(one, confirmed=False, log_odds=odds, track=replace(one.track, mean=np.array([x, y, 0.0, 0.0])))
+    return replace(one, confirmed=False, log_odds=odds, track=replace(one.track, mean=(x, y, 0.0, 0.0)))
 
 
 def choose(choice: Choice, *people: Person) -> Choice:

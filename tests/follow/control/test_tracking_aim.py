@@ -99,15 +99,13 @@ def test_along_a_way_it_goes_to_the_point_half_a_metre_ahead_or_beside_what_stan
 
 def test_the_direct_way_is_free_of_what_lasts_as_far_as_is_looked_or_the_person_s_legs_are() -> None:
     # 1.2 m are looked ahead, and as much as robot and margin take.
-    aim = Aim(0.0, 3.0, 0.0, 0.0, 0.4, hidden=False)
     for x, passing in ((1.2 + 0.145 + 0.65 + 0.06, True), (1.2 + 0.145 + 0.65 - 0.06, False)):
         wall = wall_across(x, -1.0, 1.0)
-        assert CONTROLLER._is_passing(blocked(*wall), np.array(wall), aim, Odometry(NOW)) == passing
+        assert CONTROLLER._is_passing(blocked(*wall), np.array(wall), 0.0, 3.0, Odometry(NOW)) == passing
     # A person at 1.5 m: six tenths of a metre must be free.
-    near = replace(aim, distance=1.5)
     for x, passing in ((0.6 + 0.795 + 0.06, True), (0.6 + 0.795 - 0.06, False)):
         wall = wall_across(x, -1.0, 1.0)
-        assert CONTROLLER._is_passing(blocked(*wall), np.array(wall), near, Odometry(NOW)) == passing
+        assert CONTROLLER._is_passing(blocked(*wall), np.array(wall), 0.0, 1.5, Odometry(NOW)) == passing
 
 
 def followed(seconds: float = 4.0, **world: Any) -> tuple[World, TrackingState]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.follow.estimates import upper
 from tests.follow.tracks.test_scan_movers import person, walker
 from tests.follow.views import flat, look, scan_of
 
@@ -33,7 +34,7 @@ def someone(
 ) -> Person:
     """A confirmed person who is at a place now, with a velocity; the window is small enough to be whole anywhere."""
     one = person(number, x, y, seen)
-    track = replace(one.track, stamp=NOW, mean=np.array([x, y, vx, vy]), covariance=np.diag([0.01, 0.01, 0.01, 0.01]))
+    track = replace(one.track, stamp=NOW, mean=(x, y, vx, vy), covariance=upper(0.01 * np.eye(4)))
     return replace(one, track=track, window=window, centre=0.0)
 
 
@@ -116,7 +117,7 @@ def test_it_turns_to_the_least_turn_to_what_moves_where_a_lost_person_can_be() -
     assert moving(None, (0.0, 2.0), (-2.0, -2.0)) == pytest.approx(math.pi / 2)
     assert moving(None, (0.0, 2.0), (2.0, -2.0)) == pytest.approx(-math.pi / 4)
     # Half a metre, and half a metre a second for four seconds.
-    known = Track(NOW - 4.0, np.array([2.0, 0.0, 0.3, 0.3]), np.eye(4))
+    known = Track(NOW - 4.0, (2.0, 0.0, 0.3, 0.3), upper(np.eye(4)))
     for far, may in ((2.45, True), (2.55, False)):
         assert (moving(known, (2.0, far)) is not None) == may
 
@@ -273,5 +274,5 @@ def test_the_people_believed_in_are_in_the_robots_frame_with_their_velocities() 
 def test_something_hides_a_place_only_if_it_lasts() -> None:
     for since, hides in ((-math.inf, True), (NOW - 6.1, True), (NOW - 5.9, False)):
         ground = blocked((1.5, 0.0), (1.5, 0.05), (1.5, -0.05), since=since)
-        assert CONTROLLER._hides(ground, Odometry(), np.array([3.0, 0.0])) == hides
-        assert not CONTROLLER._hides(ground, Odometry(), np.array([3.0, 1.5]))
+        assert CONTROLLER._hides(ground, Odometry(), (3.0, 0.0)) == hides
+        assert not CONTROLLER._hides(ground, Odometry(), (3.0, 1.5))

@@ -35,7 +35,7 @@ def person(
 ) -> Person:
     """Return a confirmed person 2 m ahead, found in the frame of `stamp` unless `measured` says when."""
     track = kalman.initiate(stamp, 0.0, 2.0, Odometry(), Noise())
-    track = replace(track, mean=np.array([2.0, y, 0.0, 0.0]))
+    track = replace(track, mean=(2.0, y, 0.0, 0.0))
     seen = stamp if measured is None else measured
     return Person(number, track, seen, 5.0, tall, -120.0, True, age, clothes=clothes, worn=clothes, tall=tall)
 
@@ -166,7 +166,7 @@ def test_two_alike_who_turn_round_each_other_cannot_be_told_apart_after_it() -> 
     for frame in range(11, 71):
         stamp = 0.1 * frame
         one, other = person(1, stamp), person(2, stamp, 0.3)
-        turns = replace(other, track=replace(other.track, mean=np.array([2.0, 0.3, 0.5, 0.0])))
+        turns = replace(other, track=replace(other.track, mean=(2.0, 0.3, 0.5, 0.0)))
         known = IDENTITY.update(known, at(stamp, one, turns))
     assert known.of(1) < 0.9
     assert known.of(2) > 0.1
@@ -196,7 +196,7 @@ def test_the_likelier_of_two_is_followed_even_if_the_other_was() -> None:
 
 def test_before_one_is_followed_the_one_straight_ahead_and_near_is_meant() -> None:
     ahead, aside, behind = person(1, 0.0, 0.1), person(2, 0.0, -1.0), person(3, 0.0)
-    behind = replace(behind, track=replace(behind.track, mean=np.array([4.4, 0.0, 0.0, 0.0])))
+    behind = replace(behind, track=replace(behind.track, mean=(4.4, 0.0, 0.0, 0.0)))
     assert SELECTION.choose(at(0.0, aside, behind, ahead), Choice()).number == 1
 
 

@@ -156,7 +156,8 @@ def test_a_track_that_begins_is_the_persons_only_where_they_can_have_walked(lost
 
 def walking(one: Person, vx: float, vy: float) -> Person:
     """The person, walking at so many metres a second."""
-    return replace(one, track=replace(one.track, mean=np.array([*one.track.mean[:2], vx, vy])))
+    x, y, _, _ = one.track.mean
+    return replace(one, track=replace(one.track, mean=(x, y, vx, vy)))
 
 
 def test_of_two_nearer_than_half_a_metre_one_in_500_changes_places_and_one_in_5_for_each_metre_past() -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
+from tests.follow.estimates import upper
 
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Noise, bearing_range, initiate, innovation, predict, rates, update
@@ -25,7 +26,7 @@ def test_a_track_begins_where_the_person_was_seen() -> None:
 def test_its_first_uncertainty_is_the_measurements() -> None:
     track = initiate(0.0, 0.0, 3.0, HERE, NOISE)
     expected = np.diag([NOISE.range**2, (3.0 * NOISE.bearing) ** 2])
-    assert track.covariance[:2, :2] == pytest.approx(expected)
+    assert track.matrix[:2, :2] == pytest.approx(expected)
 
 
 def test_a_walker_is_learnt_and_foreseen() -> None:
@@ -57,35 +58,35 @@ def test_an_update_equals_the_textbooks_information_form() -> None:
     seen = innovation(track, 0.25, 2.6, HERE, NOISE)
     r = np.diag([NOISE.bearing**2, NOISE.range**2])
     jacobian = np.array([(*seen.by_bearing, 0.0, 0.0), (*seen.by_range, 0.0, 0.0)])
-    information = np.linalg.inv(track.covariance) + jacobian.T @ np.linalg.inv(r) @ jacobian
+    information = np.linalg.inv(track.matrix) + jacobian.T @ np.linalg.inv(r) @ jacobian
     after = update(track, seen)
-    assert after.covariance == pytest.approx(np.linalg.inv(information), abs=1e-9)
+    assert after.matrix == pytest.approx(np.linalg.inv(information), abs=1e-9)
     gain = np.linalg.inv(information) @ jacobian.T @ np.linalg.inv(r)
-    assert after.mean == pytest.approx(track.mean + gain @ [seen.bearing, seen.range])
+    assert after.mean == pytest.approx(np.array(track.mean) + gain @ [seen.bearing, seen.range])
 
 
 def test_a_bearing_alone_narrows_the_bearing_alone() -> None:
     track = predict(initiate(0.0, 0.0, 3.0, HERE, NOISE), 1.0, NOISE)
     after = update(track, innovation(track, 0.0, None, HERE, NOISE))
-    assert after.covariance[0, 0] == pytest.approx(track.covariance[0, 0])
-    assert after.covariance[1, 1] < 0.1 * track.covariance[1, 1]
+    assert after.matrix[0, 0] == pytest.approx(track.matrix[0, 0])
+    assert after.matrix[1, 1] < 0.1 * track.matrix[1, 1]
 
 
 def test_unseen_people_come_to_a_stop_and_grow_uncertain() -> None:
     track = initiate(0.0, 0.0, 3.0, HERE, NOISE)
     later, much_later = (predict(track, t, NOISE) for t in (1.0, 60.0))
-    assert later.covariance[0, 0] > track.covariance[0, 0]
+    assert later.matrix[0, 0] > track.matrix[0, 0]
     assert much_later.mean[2:] == pytest.approx([0.0, 0.0], abs=1e-6)
-    assert np.linalg.eigvalsh(much_later.covariance).min() > 0
+    assert np.linalg.eigvalsh(much_later.matrix).min() > 0
 
 
 def test_an_unseen_velocity_is_a_third_after_four_seconds() -> None:
-    track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.9, -0.6]))
+    track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), mean=(3.0, 1.0, 0.9, -0.6))
     assert predict(track, 4.0, NOISE).mean[2:] == pytest.approx(np.array([0.9, -0.6]) / math.e)
 
 
 def test_at_an_earlier_stamp_the_person_is_where_they_came_from() -> None:
-    track = replace(initiate(5.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, -0.2, 0.5]))
+    track = replace(initiate(5.0, 0.0, 3.0, HERE, NOISE), mean=(3.0, 1.0, -0.2, 0.5))
     before = predict(track, 4.0, NOISE)
     assert before.mean == pytest.approx([3.2, 0.5, -0.2, 0.5])
     assert before.stamp == 4.0
@@ -99,36 +100,36 @@ def test_the_jacobian_is_the_slope_of_bearing_and_range(pose: Odometry) -> None:
     for axis in range(4):
         ends = []
         for side in (1e-6, -1e-6):
-            mean = track.mean.copy()
-            mean[axis] += side
-            ends.append(np.array(bearing_range(replace(track, mean=mean), pose)))
+            x, y, vx, vy = (np.array(track.mean) + side * np.eye(4)[axis]).tolist()
+            ends.append(np.array(bearing_range(replace(track, mean=(x, y, vx, vy)), pose)))
         assert found[:, axis] == pytest.approx((ends[0] - ends[1]) / 2e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize("pose", [Odometry(x=1.0, y=-2.0, yaw=0.7), Odometry(x=-1.5, y=3.0, yaw=-2.0)])
 def test_rates_are_how_bearing_and_range_change_with_the_persons_velocity(pose: Odometry) -> None:
     track = replace(initiate(0.0, 0.3, 2.0, pose, NOISE), stamp=0.0)
-    track = replace(track, mean=track.mean + np.array([0.0, 0.0, 0.4, -0.9]))
+    x, y, _, _ = track.mean
+    track = replace(track, mean=(x, y, 0.4, -0.9))
     ends = []
     for dt in (1e-6, -1e-6):
-        moved = track.mean.copy()
-        moved[:2] += dt * moved[2:]
+        moved = x + 0.4 * dt, y - 0.9 * dt, 0.4, -0.9
         ends.append(np.array(bearing_range(replace(track, mean=moved), pose)))
     assert rates(track, pose) == pytest.approx(tuple((ends[0] - ends[1]) / 2e-6), abs=1e-6)
 
 
 def test_a_prediction_is_the_integral_of_a_velocity_that_fades_and_of_white_acceleration() -> None:
-    track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), mean=np.array([3.0, 1.0, 0.4, -0.8]))
+    track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), mean=(3.0, 1.0, 0.4, -0.8))
     for dt in (0.1, 0.7, 2.0):
         later = predict(track, dt, NOISE)
         times = np.linspace(0.0, dt, 20_001)
         fading = np.exp(-times / NOISE.persistence)
-        assert later.mean[2:] == pytest.approx(track.mean[2:] * fading[-1])
-        assert later.mean[:2] == pytest.approx(track.mean[:2] + track.mean[2:] * trapezoid(fading, times), rel=1e-6)
+        place, velocity = np.array(track.mean).reshape(2, 2)
+        assert later.mean[2:] == pytest.approx(velocity * fading[-1])
+        assert later.mean[:2] == pytest.approx(place + velocity * trapezoid(fading, times), rel=1e-6)
         # What was uncertain is carried along, and what accelerates meanwhile is added: dt³/3, dt²/2 and dt.
         move = np.eye(4)
         move[[0, 1], [2, 3]], move[[2, 3], [2, 3]] = trapezoid(fading, times), fading[-1]
-        added = later.covariance - move @ track.covariance @ move.T
+        added = later.matrix - move @ track.matrix @ move.T
         left = dt - times
         q = NOISE.acceleration**2
         assert added[0, 0] == pytest.approx(q * trapezoid(left**2, times), rel=1e-4)
@@ -141,20 +142,20 @@ def test_a_predicted_track_of_the_same_stamp_is_the_track() -> None:
     track = predict(initiate(0.0, 0.2, 3.0, HERE, NOISE), 1.0, NOISE)
     same = predict(track, 1.0, NOISE)
     assert same.mean == pytest.approx(track.mean)
-    assert same.covariance == pytest.approx(track.covariance)
+    assert same.matrix == pytest.approx(track.matrix)
 
 
 def test_what_place_and_velocity_share_is_carried_along_as_the_matrices_say() -> None:
     random = np.random.default_rng(4)
     for _ in range(20):
         root = random.normal(0.0, 0.5, (4, 4))
-        track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), covariance=root @ root.T)
+        track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), covariance=upper(root @ root.T))
         dt = float(random.uniform(0.05, 2.0))
         kept = math.exp(-dt / 4.0)
         move = np.eye(4)
         move[[0, 1], [2, 3]], move[[2, 3], [2, 3]] = 4.0 * (1 - kept), kept
         noise = 0.36 * np.kron(np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]), np.eye(2))
-        assert predict(track, dt, NOISE).covariance == pytest.approx(move @ track.covariance @ move.T + noise)
+        assert predict(track, dt, NOISE).matrix == pytest.approx(move @ track.matrix @ move.T + noise)
 
 
 def test_a_bearing_and_range_equal_the_textbooks_form_for_any_covariance() -> None:
@@ -162,16 +163,21 @@ def test_a_bearing_and_range_equal_the_textbooks_form_for_any_covariance() -> No
     for _ in range(20):
         root = random.normal(0.0, 0.3, (4, 4))
         pose = Odometry(0.0, *random.uniform(-1, 1, 3).tolist())
-        track = replace(initiate(0.0, 0.4, 2.5, pose, NOISE), covariance=root @ root.T)
+        track = replace(initiate(0.0, 0.4, 2.5, pose, NOISE), covariance=upper(root @ root.T))
         for distance in (2.7, None):
             seen = innovation(track, 0.5, distance, pose, NOISE)
             rows = [(*seen.by_bearing, 0.0, 0.0), (*seen.by_range, 0.0, 0.0)][: 2 if distance else 1]
             h, r = np.array(rows), np.diag([0.015**2, 0.06**2])[: len(rows), : len(rows)]
-            s = h @ track.covariance @ h.T + r
-            gain = track.covariance @ h.T @ np.linalg.inv(s)
+            s = h @ track.matrix @ h.T + r
+            gain = track.matrix @ h.T @ np.linalg.inv(s)
             off = np.array([0.1, 0.2][: len(rows)])
             after = update(track, seen)
-            assert after.mean == pytest.approx(track.mean + gain @ off)
-            assert after.covariance == pytest.approx(track.covariance - gain @ s @ gain.T)
+            assert after.mean == pytest.approx(np.array(track.mean) + gain @ off)
+            assert after.matrix == pytest.approx(track.matrix - gain @ s @ gain.T)
             assert seen.distance2 == pytest.approx(float(off @ np.linalg.inv(s) @ off))
             assert seen.log_volume_ratio == pytest.approx(math.log(np.linalg.det(s) / np.linalg.det(r)))
+
+
+def test_the_matrix_of_a_covariance_is_symmetric_and_in_the_order_of_the_mean() -> None:
+    track = predict(initiate(0.0, 0.3, 2.0, HERE, NOISE), 0.5, NOISE)
+    assert upper(track.matrix) == track.covariance

@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.follow.estimates import upper
 from tests.follow.tracks.test_scan_movers import FREE, GRID, HALF_VIEW, MOVERS, NOISE, person, walker
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Track
-from limo_hog.follow.tracks.legs import Returns
+from limo_hog.follow.tracks.legs import Returns, all_distances
 from limo_hog.follow.tracks.movers import Mover, is_in_view, named
 
 Place = tuple[float, float]
@@ -83,7 +84,7 @@ def test_what_a_scan_has_just_shown_is_felt_for_half_a_second() -> None:
 def test_it_is_given_up_after_half_a_second_in_the_lidars_sight_and_after_three_out_of_it(
     place: Place, seconds: float
 ) -> None:
-    track = Track(1.0, np.array([*place, 0.0, 0.0]), np.diag([0.01, 0.01, 0.01, 0.01]))
+    track = Track(1.0, (*place, 0.0, 0.0), upper(0.01 * np.eye(4)))
     one = replace(walker(None, *place), track=track)
     assert update((one,), 1.0 + seconds - 0.05) == (one,)
     assert update((one,), 1.0 + seconds + 0.05) == ()
@@ -102,9 +103,9 @@ def test_a_scan_counts_and_so_does_one_for_which_the_camera_looked_there() -> No
 def test_the_lidar_sees_to_either_side_of_straight_ahead_from_where_it_sits(pose: Odometry) -> None:
     x, y = pose.x + LIMO.lidar_x * math.cos(pose.yaw), pose.y + LIMO.lidar_x * math.sin(pose.yaw)
     for angle in (-1.95, -1.0, 0.0, 1.95, 2.05, -2.05, math.pi):
-        at = [x + 0.3 * math.cos(pose.yaw + angle), y + 0.3 * math.sin(pose.yaw + angle), 0.0, 0.0]
+        at = x + 0.3 * math.cos(pose.yaw + angle), y + 0.3 * math.sin(pose.yaw + angle), 0.0, 0.0
         returns = Returns(1.0, np.empty((0, 2)), pose)
-        assert is_in_view(Track(1.0, np.array(at), np.eye(4)), returns, 2.0, LIMO) == (abs(angle) < 2.0)
+        assert is_in_view(Track(1.0, at, upper(np.eye(4))), returns, 2.0, LIMO) == (abs(angle) < 2.0)
 
 
 @pytest.mark.parametrize("pose", POSES)
@@ -192,8 +193,9 @@ def test_a_person_is_continued_where_their_legs_are_wherever_the_robot_is(pose: 
 def test_a_return_may_be_of_the_legs_nearest_to_it_if_they_are_half_a_stride_off() -> None:
     movers = (walker(4, 2.0, 0.0), walker(9, 2.0, 0.5), walker(None, 2.0, 1.5))
     points = np.array([(2.0, -0.34), (2.0, -0.36), (2.0, 0.2), (2.0, 0.3), (2.0, 1.5)])
-    assert MOVERS._whose(movers, points, 1.0, NOISE).tolist() == [4, 0, 4, 9, 0]
-    assert MOVERS._whose(movers[2:], points, 1.0, NOISE).tolist() == [0] * 5
+    gaps = all_distances(points, [one.track for one in movers])
+    assert MOVERS._whose(movers, gaps).tolist() == [4, 0, 4, 9, 0]
+    assert MOVERS._whose(movers[2:], gaps[2:]).tolist() == [0] * 5
 
 
 def test_nothing_moves_or_has_left_before_the_ground_is_mapped() -> None:

@@ -127,8 +127,8 @@ def test_a_box_without_a_range_is_as_far_off_as_across_the_line_of_sight() -> No
 def test_a_new_person_without_a_range_may_be_anywhere_along_the_line_of_sight() -> None:
     person = initiate(1, replace(box(2.0), range=None), 0.0, POSE, NOISE, UnknownRange(3.0, 1.5))
     assert person.track.mean[:2] == pytest.approx([3.0, 0.0])
-    assert person.track.covariance[0, 0] == pytest.approx(1.5**2)
-    assert person.track.covariance[1, 1] == pytest.approx((3.0 * NOISE.bearing) ** 2)
+    assert person.track.matrix[0, 0] == pytest.approx(1.5**2)
+    assert person.track.matrix[1, 1] == pytest.approx((3.0 * NOISE.bearing) ** 2)
 
 
 def test_a_range_that_contradicts_the_size_of_the_box_moves_nobody() -> None:
@@ -214,7 +214,7 @@ def test_clothes_of_which_one_number_is_missing_are_unknown() -> None:
 
 def test_the_legs_in_the_scans_between_two_slow_frames_show_that_a_person_has_turned() -> None:
     # The person walked to the left at .6 m/s; after the frame at 0 s they turn and walk to the right as fast.
-    track = replace(kalman.initiate(0.0, 0.0, 2.0, POSE, NOISE), mean=np.array([2.0, 0.0, 0.0, 0.6]))
+    track = replace(kalman.initiate(0.0, 0.0, 2.0, POSE, NOISE), mean=(2.0, 0.0, 0.0, 0.6))
     tracks = Tracks(people=(replace(a_person(1, 2.0), track=track),), stamp=0.0, poses=(POSE,))
     between = tuple((scan_of([(2.0, -0.6 * t)], stamp=t), Odometry(t)) for t in (0.1, 0.2, 0.3))
     seen = replace(look(stamp=0.33), odometry=Odometry(0.33), between=between)
@@ -247,7 +247,7 @@ def test_a_box_is_as_high_as_the_person_to_within_35_hundredths() -> None:
 
 def test_an_unconfirmed_tracks_box_is_within_the_gate_of_18_and_a_certain_persons_within_half_a_metre() -> None:
     person = a_person(1, 4.0)
-    spread = math.sqrt(person.track.covariance[1, 1] / 16 + NOISE.bearing**2)
+    spread = math.sqrt(person.track.matrix[1, 1] / 16 + NOISE.bearing**2)
     for sigmas, fits in ((4.2, True), (4.3, False)):
         aside = box(4.0, sigmas * spread)
         assert (pairs((replace(person, confirmed=False),), aside) == {0: 0}) == fits

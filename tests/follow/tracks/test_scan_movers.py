@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from tests.follow.estimates import upper
 from tests.follow.views import look
 
 from limo_hog.follow.robot import LIMO
@@ -116,7 +117,7 @@ def test_what_the_camera_has_shown_for_long_is_counted() -> None:
 
 def person(number: int, x: float, y: float, stamp: float) -> Person:
     """Someone found by the camera at a stamp."""
-    track = Track(stamp, np.array([x, y, 0.0, 0.0]), np.diag([0.04, 0.04, 0.5, 0.5]))
+    track = Track(stamp, (x, y, 0.0, 0.0), upper(np.diag([0.04, 0.04, 0.5, 0.5])))
     return Person(number, track, stamp, 5.0, 400.0, 0.0, confirmed=True)
 
 
@@ -182,7 +183,7 @@ def test_legs_that_begin_to_walk_where_a_lost_person_can_be_are_theirs_unless_an
 
 def walker(number: int | None, x: float, y: float) -> Mover:
     """Legs that walk, of the person of a number."""
-    track = Track(1.0, np.array([x, y, 0.0, 0.0]), np.diag([0.01, 0.01, 0.1, 0.1]))
+    track = Track(1.0, (x, y, 0.0, 0.0), upper(np.diag([0.01, 0.01, 0.1, 0.1])))
     return Mover(track, (x - 1.0, y), 0.0, 1.0, left=True, scans=9, number=number, named=0.0)
 
 

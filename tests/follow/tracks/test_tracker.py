@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.follow.estimates import upper
 from tests.follow.tracks.test_people import IN_GREEN, IN_RED, NOISE, POSE, WINDOW, a_person, box
 from tests.follow.tracks.test_scan_movers import FREE, GRID, person, walker
 from tests.follow.views import boxes, flat, look, scan_of
@@ -121,7 +122,7 @@ def test_a_weak_box_says_nothing_against_a_person_who_is_known_and_something_aga
 
 def test_a_person_measured_again_after_a_second_begins_anew_without_a_velocity() -> None:
     for unseen_s, anew in ((0.9, False), (1.1, True)):
-        track = replace(a_person(1, 2.0).track, stamp=unseen_s, mean=np.array([2.0, 0.0, 0.5, 0.5]))
+        track = replace(a_person(1, 2.0).track, stamp=unseen_s, mean=(2.0, 0.0, 0.5, 0.5))
         corrected = TRACKER.correct(replace(a_person(1, 2.0), track=track), box(2.1, 0.05), POSE)
         fresh = kalman.initiate(unseen_s, 0.05, 2.1, POSE, NOISE)
         assert np.allclose(corrected.track.mean, fresh.mean) == anew
@@ -254,7 +255,7 @@ def test_the_legs_that_walk_are_where_an_unseen_person_is_and_not_one_who_was_fo
 
 
 def leg_track(x: float) -> Track:
-    return Track(1.0, np.array([x, 0.0, 0.0, 0.0]), np.diag([0.04, 0.04, 0.5, 0.5]))
+    return Track(1.0, (x, 0.0, 0.0, 0.0), upper(np.diag([0.04, 0.04, 0.5, 0.5])))
 
 
 def test_two_returns_within_half_a_stride_are_legs_and_a_wider_group_is_furniture() -> None:
@@ -277,7 +278,7 @@ def test_two_returns_within_half_a_stride_are_legs_and_a_wider_group_is_furnitur
 def test_the_legs_of_a_person_who_walks_are_where_the_person_was_a_twentieth_of_a_second_ago() -> None:
     legs = Legs()
     for speed in (0.0, 0.8, -0.8):
-        one = replace(leg_track(2.0), mean=np.array([2.0, 0.0, 0.0, speed]))
+        one = replace(leg_track(2.0), mean=(2.0, 0.0, 0.0, speed))
         trailing = -0.05 * speed
         returns = Returns(1.0, np.array([(2.0, trailing - 0.02), (2.0, trailing + 0.02)]), Odometry())
         corrected = legs.update(one, returns, NOISE)
@@ -326,7 +327,7 @@ def test_no_clothes_are_learnt_from_a_box_whose_patches_are_not_on_shirt_and_tro
 
 def test_a_box_outside_the_gate_moves_a_track_that_may_have_turned_and_stepped_aside() -> None:
     one, seen = a_person(1, 3.0), replace(box(3.0, 0.15), stands_out=1.0)
-    loose = one.track.covariance + np.diag([0.5**2, 0.5**2, 1.0, 1.0])
+    loose = upper(one.track.matrix + np.diag([0.5**2, 0.5**2, 1.0, 1.0]))
     fit = kalman.innovation(replace(one.track, covariance=loose), 0.15, 3.0, POSE, NOISE)
     expected = kalman.update(replace(one.track, covariance=loose), fit)
     corrected = TRACKER.correct(one, seen, POSE)

@@ -109,10 +109,12 @@ class Backing:
         followed
             float64 (1, 2) [m]: where the person followed is, who may have been taken for another; (0, 2) if unknown.
         """
+        # Of a few places, lists are faster than arrays.
+        own, legs = followed.tolist(), felt.tolist()
         left = [
             one
             for one in others
-            if now - one.at < self.remembers_s and (np.hypot(*(followed - (one.x, one.y)).T) > self.same).all()
+            if now - one.at < self.remembers_s and all(math.dist(place, (one.x, one.y)) > self.same for place in own)
         ]
         kept: list[Other] = []
         for x, y in seen.tolist():
@@ -121,12 +123,8 @@ class Backing:
                 left.remove(near)
             kept.append(Other(x, y, now))
         for one in left:
-            gaps = np.hypot(*(felt - (one.x, one.y)).T)
-            if len(gaps) and gaps.min() < self.same:
-                x, y = felt[int(np.argmin(gaps))].tolist()
-                kept.append(Other(x, y, now))
-            else:
-                kept.append(one)
+            gap, x, y = min(((math.dist((x, y), (one.x, one.y)), x, y) for x, y in legs), default=(math.inf, 0.0, 0.0))
+            kept.append(Other(x, y, now) if gap < self.same else one)
         return tuple(kept)
 
     def can_hold_other(self, others: tuple[Other, ...], places: Points, now: float) -> NDArray[np.bool_]:
@@ -134,7 +132,7 @@ class Backing:
         can = np.zeros(len(places), bool)
         for one in others:
             if now - one.at > self.unseen_s:
-                can |= np.hypot(*(places - (one.x, one.y)).T) < self._reach(one, now)
+                can |= np.hypot(places[:, 0] - one.x, places[:, 1] - one.y) < self._reach(one, now)
         return can
 
     def is_free_behind(
@@ -189,6 +187,8 @@ class Backing:
 
     def blind_limit(self, others: tuple[Other, ...], pose: Odometry, robot: RobotGeometry, now: float) -> float:
         """Return how fast to back onto unknown ground [m/s]."""
+        if all(now - one.at <= self.unseen_s for one in others):
+            return self.blind_speed
         behind = to_odometry(_places_behind(self.depths, robot), pose)
         return 0.0 if self.can_hold_other(others, behind, now).any() else self.blind_speed
 

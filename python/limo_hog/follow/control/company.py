@@ -50,14 +50,16 @@ class Walker:
         The estimate takes half a second to show it.
         """
         now = math.hypot(self.vx, self.vy)
-        share = max(speed / now, 1.0) if now > slowest else 1.0
-        return replace(self, vx=share * self.vx, vy=share * self.vy)
+        if not slowest < now < speed:
+            return self
+        return replace(self, vx=speed / now * self.vx, vy=speed / now * self.vy)
 
 
 def walker_of(track: Track, pose: Odometry, *, followed: bool = False, measured: bool = True) -> Walker:
     """Return a track in the odometry frame as a walker in the base frame of a robot at `pose`."""
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    x, y, vx, vy = (track.mean - (pose.x, pose.y, 0.0, 0.0)).tolist()
+    x, y, vx, vy = track.mean
+    x, y = x - pose.x, y - pose.y
     return Walker(cos * x + sin * y, cos * y - sin * x, cos * vx + sin * vy, cos * vy - sin * vx, followed, measured)
 
 
@@ -264,11 +266,15 @@ class Company:
         """
         steps, most = round(self.horizon_s / self.step_s), acceleration * self.step_s
         linear, angular, x, y, yaw = now.linear, now.angular, 0.0, 0.0, 0.0
+        drive_to, steady = max(wanted.linear, min(self.speeds)), None
         poses = []
         for step in range(steps):
             begun = linear, angular
             turn_to = wanted.angular if step < steps / 2 else 0.0
-            linear, angular = advanced(max(wanted.linear, min(self.speeds)), turn_to, linear, angular, most, robot)
+            if steady != turn_to:
+                linear, angular = advanced(drive_to, turn_to, linear, angular, most, robot)
+                # Wheels that have reached their speeds keep them.
+                steady = turn_to if (linear, angular) == begun else None
             turn = (begun[1] + angular) / 2 * self.step_s
             far = (begun[0] + linear) / 2 * self.step_s
             x, y = x + far * math.cos(yaw + turn / 2), y + far * math.sin(yaw + turn / 2)

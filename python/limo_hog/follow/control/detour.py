@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.clearance import Margin, Points, room_ahead
+from limo_hog.follow.sense.clearance import Margin, Points, rooms_ahead
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +102,11 @@ class Detour:
         # What is further off is in no direction's way.
         near = obstacles.compress(np.hypot(*obstacles.T) < reach + robot.half_length + self.margin.ahead, axis=0)
         detours = [self.step * index for index in range(-most, most + 1)]
-        for detour in sorted(detours, key=lambda detour: abs(detour) + self.preference * abs(detour - preferred)):
-            cos, sin = math.cos(bearing + detour), math.sin(bearing + detour)
-            if len(near) == 0 or room_ahead(near @ np.array([[cos, -sin], [sin, cos]]), self.margin, robot) >= reach:
-                return bearing + detour
+        detours.sort(key=lambda detour: abs(detour) + self.preference * abs(detour - preferred))
+        # Mostly the best is free: to look at it alone takes half of the time of all.
+        for some in (detours[:1], detours[1:]):
+            rooms = rooms_ahead(near, bearing + np.array(some), self.margin, robot)
+            free = (rooms >= reach).nonzero()[0]
+            if len(free):
+                return bearing + some[int(free[0])]
         return None

@@ -105,8 +105,8 @@ class Lookout:
 
     def begin(self, track: Track, number: int, grid: Grid, ground: Ground) -> Hunt:
         """Begin with the person as last measured."""
-        places = self.wandering.start(track.stamp, track.mean, track.covariance, number)
-        here = track.mean[None, :2]
+        places = self.wandering.start(track.stamp, track.mean, track.matrix, number)
+        here = np.array([track.mean[:2]])
         # Nobody is on the other side of a wall who was measured on this one.
         behind = ~grid.sees(ground, here, places.points)[0]
         places.points[behind] = here

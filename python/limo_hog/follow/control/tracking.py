@@ -140,10 +140,10 @@ class TrackingController:
         if lost_s <= self.tracker.scan_period_s:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
             known = person.track if person.confirmed and self._is_sure(person, choice) else state.known
-            state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None)
             speed = math.hypot(*person.track.mean[2:])
             share = self.brisk_share if speed > state.brisk else self.brisk_share / 100
-            state = replace(state, brisk=state.brisk + share * (speed - state.brisk))
+            brisk = state.brisk + share * (speed - state.brisk)
+            state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None, brisk=brisk)
         can_look = state.ground is not None and state.known is not None and person.confirmed
         if can_look and aim.hidden and state.ground is not None and state.hunt is None:
             # Behind another person one is hidden for a moment; waiting is better than driving round people.
@@ -195,20 +195,20 @@ class TrackingController:
     ) -> Decision[TrackingState]:
         """Replace a command by a way out of the way of people, where there is need, and by what the wheels can do."""
         state, twist, mode, reason = decision.state, decision.twist, decision.mode, decision.reason
-        wheels, acceleration = observation.odometry, state.acceleration
+        now, wheels, acceleration = observation.now, observation.odometry, state.acceleration
         if wheels is None:
             return decision
-        driven, pose = Twist(wheels.linear, wheels.angular), pose_at(state.tracks.poses, observation.now)
+        driven, pose = Twist(wheels.linear, wheels.angular), pose_at(state.tracks.poses, now)
         begun = None
         if state.way_out is not None:
             yaw, speed, since = state.way_out
-            begun = Way(wrap(yaw - pose.yaw), speed, observation.now - since)
+            begun = Way(wrap(yaw - pose.yaw), speed, now - since)
 
-        tracks, seen, own = self.tracker.around(state.tracks, person, observation.now, self.steering.coast_s)
-        felt = self.tracker.movers.felt(state.tracks.movers, observation.now)
-        lost_s = math.inf if person is None else observation.now - person.measured
-        followed = person.track.mean[None, :2] if person is not None and lost_s < self.backing.unseen_s else NO_POINTS
-        others = self.backing.remember(state.others, seen, felt, followed, observation.now)
+        tracks, seen, own = self.tracker.around(state.tracks, person, now, self.steering.coast_s)
+        felt = self.tracker.movers.felt(state.tracks.movers, now)
+        lost_s = math.inf if person is None else now - person.measured
+        followed = NO_POINTS if person is None or lost_s >= self.backing.unseen_s else np.array([person.track.mean[:2]])
+        others = self.backing.remember(state.others, seen, felt, followed, now)
 
         def may_back(poses: Poses) -> NDArray[np.bool_]:
             return self.backing.is_free_behind(poses, pose, self.grid, state.ground, others, self.robot)
@@ -221,17 +221,17 @@ class TrackingController:
             else walker_of(track, pose)
             for track in tracks
         ]
-        blind_speed = self.backing.blind_limit(others, pose, self.robot, observation.now)
+        blind_speed = self.backing.blind_limit(others, pose, self.robot, now)
         way = self.company.way_out(
             twist, driven, walkers, points, self.robot, begun, acceleration, may_back, blind_speed
         )
         if way is not None:
-            state = replace(state, gave_way_at=observation.now)
             twist, reason = self.company.command(way, acceleration, self.robot), "giving way to a person"
             mode = mode if mode in (Mode.LOST, Mode.SEARCH) else Mode.FOLLOW
         twist = self.wheels.within_reach(twist, driven, acceleration, state.tracks.period, self.robot)
-        way_out = None if way is None else (pose.yaw + way.turn, way.speed, observation.now - way.age)
-        state = replace(state, way_out=way_out, sent=twist, others=others)
+        way_out = None if way is None else (pose.yaw + way.turn, way.speed, now - way.age)
+        gave_way_at = state.gave_way_at if way is None else now
+        state = replace(state, way_out=way_out, gave_way_at=gave_way_at, sent=twist, others=others)
         return replace(decision, state=state, twist=twist, mode=mode, reason=reason)
 
     def _map(self, state: TrackingState, observation: Observation) -> TrackingState:
@@ -241,9 +241,8 @@ class TrackingController:
             return state
         half_view = min(-scan.angle_min, scan.angle_max)
         tracks = self.tracker.follow_movers(tracks, half_view, self.lookout.half_view, self.grid, state.ground)
-        state = replace(state, tracks=tracks)
         if state.ground is not None and scan.stamp < state.ground.stamp + self.grid.period_s:
-            return state
+            return replace(state, tracks=tracks)
         pose = pose_at(tracks.poses, scan.stamp)
         lately = observation.now - self.steering.coast_s
         known = [one.track.mean[:2] for one in tracks.people if one.confirmed and one.measured > lately]
@@ -252,7 +251,8 @@ class TrackingController:
         if observation.depth is not None:
             near = self.depth_grid.points(observation.depth, observation.focal_px, self.lookout.view, self.robot)
             depth_points = to_odometry(near, pose_at(tracks.poses, observation.stamp))
-        return replace(state, ground=self.grid.update(state.ground, scan, pose, people, depth_points, self.robot))
+        ground = self.grid.update(state.ground, scan, pose, people, depth_points, self.robot)
+        return replace(state, tracks=tracks, ground=ground)
 
     def _search(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
         tracks, choice = state.tracks, state.choice
@@ -324,38 +324,39 @@ class TrackingController:
         self, person: Person, keeps: float, points: Points, state: TrackingState, observation: Observation
     ) -> tuple[Aim, TrackingState]:
         """Return where the person is at the newest stamp and which way leads there, and the state with that way."""
-        now, poses = observation.now, state.tracks.poses
+        now, poses, ground = observation.now, state.tracks.poses, state.ground
         pose, track = pose_at(poses, now), predict(person.track, now, self.tracker.noise)
         bearing, distance = bearing_range(track, pose)
-        aim = Aim(bearing, distance, *rates(track, pose), heading=bearing, hidden=False)
+        bearing_rate, range_rate = rates(track, pose)
         if observation.scan is None or not person.confirmed:
-            return aim, state
+            return Aim(bearing, distance, bearing_rate, range_rate, heading=bearing, hidden=False), state
+        heading: float | None = bearing
         obstacles = self.detour.obstacles(points, bearing, distance)
         if distance - self.robot.camera_x > keeps - self.steering.distance_tolerance:
-            preferred = state.detour or self.detour.lean_s * aim.bearing_rate
+            preferred = state.detour or self.detour.lean_s * bearing_rate
             heading = self.detour.heading(obstacles, bearing, distance, preferred, self.robot)
-            aim = replace(aim, heading=heading)
-            if heading == bearing or state.ground is None or self._is_passing(state.ground, obstacles, aim, pose):
-                state = replace(state, way=NO_POINTS, way_at=-math.inf)
+            if heading == bearing or ground is None or self._is_passing(ground, obstacles, bearing, distance, pose):
+                state = replace(state, way=NO_POINTS, way_at=-math.inf) if state.way_at > -math.inf else state
             elif now - state.way_at >= self.lookout.replan_s:
-                way = self.lookout.router.way_towards(self.grid, state.ground, pose, track.mean[:2])
+                way = self.lookout.router.way_towards(self.grid, ground, pose, np.array(track.mean[:2]))
                 state = replace(state, way=way if len(way) > 1 else NO_POINTS, way_at=now)
             if len(state.way):
-                aim = replace(aim, heading=self._along(state.way, obstacles, pose))
+                heading = self._along(state.way, obstacles, pose)
         elif observation.remembered is not None:
             around = np.concatenate([points, observation.remembered])
-            aim = replace(aim, heading=self.backing.heading(bearing, around, self.robot))
-        return replace(aim, hidden=self.detour.hides(obstacles, bearing, distance)), state
+            heading = self.backing.heading(bearing, around, self.robot)
+        hidden = self.detour.hides(obstacles, bearing, distance)
+        return Aim(bearing, distance, bearing_rate, range_rate, heading, hidden), state
 
-    def _is_passing(self, ground: Ground, obstacles: Points, aim: Aim, pose: Odometry) -> bool:
+    def _is_passing(self, ground: Ground, obstacles: Points, bearing: float, distance: float, pose: Odometry) -> bool:
         """Whether only what came lately is in the direct way: that goes away as well, and needs no other way."""
         lasting = obstacles[self.grid.is_blocked(ground, to_odometry(obstacles, pose), lasting=True)]
-        reach = min(aim.distance - 2 * self.detour.person_radius, self.detour.look_ahead)
-        return self.detour.free(lasting, aim.bearing, 0.0, reach, self.robot, 0) is not None
+        reach = min(distance - 2 * self.detour.person_radius, self.detour.look_ahead)
+        return self.detour.free(lasting, bearing, 0.0, reach, self.robot, 0) is not None
 
-    def _hides(self, ground: Ground, pose: Odometry, place: Points) -> bool:
-        """Whether something that lasts is between the robot and a place (2,) in the odometry frame."""
-        return not self.grid.sees(ground, np.array([[pose.x, pose.y]]), place[None], lasting=True)[0, 0]
+    def _hides(self, ground: Ground, pose: Odometry, place: tuple[float, ...]) -> bool:
+        """Whether something that lasts is between the robot and a place x, y in the odometry frame."""
+        return not self.grid.sees(ground, np.array([[pose.x, pose.y]]), np.array([place]), lasting=True)[0, 0]
 
     def _keeps(self, person: Person, state: TrackingState, observation: Observation) -> float:
         """Return the distance to hold from the camera [m]: the target, but none from which a person is cut off."""

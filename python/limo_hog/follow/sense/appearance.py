@@ -107,10 +107,10 @@ class Appearance:
             return 0.0
         shirt, trousers = known.tolist()
         seen_shirt, seen_trousers = seen.tolist()
-        of_trousers = min(_chi_squared(trousers, seen_trousers), self.max_trousers)
-        cost = min(_chi_squared(shirt, seen_shirt), self.max_shirt) + of_trousers
+        of_trousers = min(chi_squared(trousers, seen_trousers), self.max_trousers)
+        cost = min(chi_squared(shirt, seen_shirt), self.max_shirt) + of_trousers
         if slips:
-            cost = min(cost, min(_chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers)
+            cost = min(cost, min(chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers)
         return cost
 
     def is_other(self, known: Clothes | None, seen: Clothes | None) -> bool:
@@ -121,12 +121,12 @@ class Appearance:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""
         most = self.max_shirt, self.max_trousers
         parts = zip(known.tolist(), seen.tolist(), most, strict=True)
-        same = np.array([_chi_squared(old, new) < limit for old, new, limit in parts])
+        same = np.array([chi_squared(old, new) < limit for old, new, limit in parts])
         moved: Clothes = known + self.rate * same[:, None] * (seen - known)
         return moved
 
 
-def _chi_squared(known: list[float], seen: list[float]) -> float:
+def chi_squared(known: list[float], seen: list[float]) -> float:
     """Return chi-squared of the three numbers of a shirt or of trousers."""
     (a, b, c), (x, y, z) = known, seen
     return (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2

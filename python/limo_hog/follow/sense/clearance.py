@@ -73,9 +73,11 @@ class DepthGrid:
         z = depth[self.step // 2 :: self.step, self.step // 2 :: self.step].astype(np.float64)
         with np.errstate(invalid="ignore"):
             above_floor = robot.camera_z - down * z
-            seen = np.flatnonzero((z > 0) & (z < reach) & (above_floor > self.floor))
+            (seen,) = ((z > 0) & (z < reach) & (above_floor > self.floor)).ravel().nonzero()
         ahead = z.ravel()[seen]
-        return np.stack([robot.camera_x + ahead, left[seen % z.shape[1]] * ahead], axis=1)
+        points = np.empty((len(seen), 2))
+        points[:, 0], points[:, 1] = robot.camera_x + ahead, left[seen % z.shape[1]] * ahead
+        return points
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +101,13 @@ def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
 
     Negative where a point ahead is too near already, inf where nothing is in the way.
     """
-    return float(rooms_ahead(points, np.zeros(1), margin, robot)[0])
+    x, aside = points[:, 0], np.abs(points[:, 1]) - robot.half_width
+    # Most points are not in the way; only the rest are worth a square root.
+    (near,) = ((x > 0) & (aside < margin.beside)).nonzero()
+    if len(near) == 0:
+        return math.inf
+    beside = np.maximum(aside[near], 0) / margin.beside
+    return float((x[near] - robot.half_length - margin.ahead * np.sqrt(1 - beside**2)).min())
 
 
 def rooms_ahead(

@@ -102,12 +102,9 @@ class Observation:
     @property
     def now(self) -> float:
         """The newest stamp of all sensors [s]: a camera frame may arrive late."""
-        stamps = [self.stamp]
-        if self.scan is not None:
-            stamps.append(self.scan.stamp)
-        if self.odometry is not None:
-            stamps.append(self.odometry.stamp)
-        return max(stamps)
+        scan, odometry = self.scan, self.odometry
+        newest = self.stamp if scan is None else max(self.stamp, scan.stamp)
+        return newest if odometry is None else max(newest, odometry.stamp)
 
 
 def observed(

@@ -194,9 +194,9 @@ class Grid:
 
     def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> NDArray[np.bool_]:
         """Return whether the cells of flat indices are occupied, bool of their shape; `lasting` as `is_blocked`."""
-        occupied = ground.occupied.ravel()[flat] > 0
+        occupied = ground.occupied.take(flat) > 0
         if lasting:
-            occupied &= ground.freed.ravel()[flat] < ground.stamp - self.lasts_s
+            occupied &= ground.freed.take(flat) < ground.stamp - self.lasts_s
         return np.asarray(occupied)
 
     def sees(

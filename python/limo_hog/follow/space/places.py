@@ -76,8 +76,8 @@ class Wandering:
     far: float = 4.0
     found: float = 0.15
 
-    def start(self, stamp: float, mean: NDArray[np.float64], covariance: NDArray[np.float64], seed: int) -> Places:
-        """Begin with a track: `mean` (4,) is x, y, vx, vy in the odometry frame, `covariance` (4, 4) its."""
+    def start(self, stamp: float, mean: tuple[float, ...], covariance: NDArray[np.float64], seed: int) -> Places:
+        """Begin with a track: `mean` is x, y, vx, vy in the odometry frame, `covariance` (4, 4) its."""
         random = np.random.default_rng([seed, 0])
         drawn = random.multivariate_normal(mean, covariance, self.count, method="cholesky")
         velocities = drawn[:, 2:]

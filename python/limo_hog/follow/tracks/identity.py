@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from limo_hog.follow.sense.appearance import Clothes
+from limo_hog.follow.sense.appearance import Clothes, chi_squared
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
 
@@ -157,7 +157,7 @@ class Identity:
 
     def begin(self, person: Person) -> Likeness:
         """Begin with a person who is followed from now on."""
-        x, y = person.track.mean[:2].tolist()
+        x, y, _, _ = person.track.mean
         traits = Traits(person.number, person.clothes, person.window)
         return Likeness(traits, (x, y), person.measured, ((person.number, 1.0 - self.passes),))
 
@@ -203,7 +203,7 @@ class Identity:
         for number, one in people.items():
             if number in chances:
                 continue
-            near = math.dist(one.track.mean[:2].tolist(), known.place) < self.reach + self.speed * lost_s
+            near = math.dist(one.track.mean[:2], known.place) < self.reach + self.speed * lost_s
             taken = share if near else 0.0
             gone = [other for other in chances if stamp - people[other].measured > self.unseen_s]
             absent = max(1.0 - sum(chances.values()), 0.0)
@@ -261,7 +261,7 @@ class Identity:
                 if traits is None or traits.clothes is None:
                     clothes += math.log(strange)
                 else:
-                    same = math.exp(-float(((traits.clothes[part] - person.worn[part]) ** 2).sum()) / 2)
+                    same = math.exp(-chi_squared(traits.clothes[part].tolist(), person.worn[part].tolist()) / 2)
                     clothes += math.log((1.0 - odd) * same + odd * strange)
         if person.tall is not None and traits is None:
             stature = math.log(self.strange_stature)
@@ -274,9 +274,9 @@ class Identity:
         """Learn from a box who looks how: of the person followed where that is sure, of others where they are not."""
         chance = known.of(person.number)
         if chance >= self.sure:
-            x, y = person.track.mean[:2].tolist()
-            known = replace(known, place=(x, y), at=person.measured)
-            return replace(known, traits=self._moved(known.traits, person)) if self._is_alone(person, tracks) else known
+            x, y, _, _ = person.track.mean
+            traits = self._moved(known.traits, person) if self._is_alone(person, tracks) else known.traits
+            return replace(known, place=(x, y), at=person.measured, traits=traits)
         if not person.confirmed or chance > 1.0 - self.sure:
             return known
         rest = [traits for traits in known.others if traits.number != person.number]

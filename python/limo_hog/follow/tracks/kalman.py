@@ -9,13 +9,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.sense.observation import Odometry
 
-Array = NDArray[np.float64]
+Mean: TypeAlias = tuple[float, float, float, float]
+"""x, y [m], and the velocities u, v along them [m/s]."""
+
+Covariance: TypeAlias = tuple[float, float, float, float, float, float, float, float, float, float]
+"""Of x, y, u, v the upper triangle, by rows: xx, xy, xu, xv, yy, yu, yv, uu, uv, vv."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +60,20 @@ class Track:
     stamp
         Time of the estimate [s].
     mean
-        float64 (4,): x, y [m], vx, vy [m/s] in the odometry frame.
+        x, y [m], vx, vy [m/s] in the odometry frame. Numbers: for four of them arrays cost several times as much.
     covariance
-        float64 (4, 4) of `mean`.
+        Of `mean`.
     """
 
     stamp: float
-    mean: Array
-    covariance: Array
+    mean: Mean
+    covariance: Covariance
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """The covariance as a matrix, float64 (4, 4)."""
+        xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = self.covariance
+        return np.array(((xx, xy, xu, xv), (xy, yy, yu, yv), (xu, yu, uu, uv), (xv, yv, uv, vv)))
 
 
 def initiate(stamp: float, bearing: float, distance: float, pose: Odometry, noise: Noise) -> Track:
@@ -71,16 +82,11 @@ def initiate(stamp: float, bearing: float, distance: float, pose: Odometry, nois
     x = pose.x + distance * math.cos(direction)
     y = pose.y + distance * math.sin(direction)
     # The position's covariance is the measurement's, turned from bearing and range into the odometry frame.
-    turn = np.array(
-        [
-            [math.cos(direction), -distance * math.sin(direction)],
-            [math.sin(direction), distance * math.cos(direction)],
-        ]
-    )
-    covariance = np.zeros((4, 4))
-    covariance[:2, :2] = (turn * (noise.range**2, noise.bearing**2)) @ turn.T
-    covariance[2, 2] = covariance[3, 3] = noise.velocity**2
-    return Track(stamp, np.array([x, y, 0.0, 0.0]), covariance)
+    cos, sin = math.cos(direction), math.sin(direction)
+    turn = np.array([[cos, -distance * sin], [sin, distance * cos]])
+    (xx, xy), (_, yy) = ((turn * (noise.range**2, noise.bearing**2)) @ turn.T).tolist()
+    moves = noise.velocity**2
+    return Track(stamp, (x, y, 0.0, 0.0), (xx, xy, 0.0, 0.0, yy, 0.0, 0.0, moves, 0.0, moves))
 
 
 def predict(track: Track, stamp: float, noise: Noise) -> Track:
@@ -89,16 +95,18 @@ def predict(track: Track, stamp: float, noise: Noise) -> Track:
     For an earlier stamp the mean moves back along the velocity and the covariance stays as it is.
     """
     dt = stamp - track.stamp
-    x, y, vx, vy = track.mean.tolist()
-    if dt <= 0:
-        return Track(stamp, np.array((x + dt * vx, y + dt * vy, vx, vy)), track.covariance)
+    if dt == 0:
+        return track
+    x, y, vx, vy = track.mean
+    if dt < 0:
+        return Track(stamp, (x + dt * vx, y + dt * vy, vx, vy), track.covariance)
     kept = math.exp(-dt / noise.persistence)
     far = noise.persistence * (1 - kept)
     q = noise.acceleration**2
     place, cross, speed = q * dt**3 / 3, q * dt**2 / 2, q * dt
-    # The products of 4 x 4 matrices, written out: in numpy their overhead was a sixth of the follower's time.
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = track.covariance.tolist()
-    covariance = _symmetric(
+    # The products of 4 x 4 matrices, written out.
+    xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = track.covariance
+    covariance = (
         xx + 2 * far * xu + far * far * uu + place,
         xy + far * (xv + yu) + far * far * uv,
         kept * (xu + far * uu) + cross,
@@ -110,26 +118,19 @@ def predict(track: Track, stamp: float, noise: Noise) -> Track:
         kept * kept * uv,
         kept * kept * vv + speed,
     )
-    return Track(stamp, np.array((x + far * vx, y + far * vy, kept * vx, kept * vy)), covariance)
-
-
-def _symmetric(
-    xx: float, xy: float, xu: float, xv: float, yy: float, yu: float, yv: float, uu: float, uv: float, vv: float
-) -> Array:
-    """Return the covariance of x, y and the velocities u, v along them, float64 (4, 4)."""
-    return np.array((xx, xy, xu, xv, xy, yy, yu, yv, xu, yu, uu, uv, xv, yv, uv, vv)).reshape(4, 4)
+    return Track(stamp, (x + far * vx, y + far * vy, kept * vx, kept * vy), covariance)
 
 
 def bearing_range(track: Track, pose: Odometry) -> tuple[float, float]:
     """Return bearing and distance of the track from the robot [rad, m]."""
-    x, y, _, _ = track.mean.tolist()
+    x, y, _, _ = track.mean
     dx, dy = x - pose.x, y - pose.y
     return wrap(math.atan2(dy, dx) - pose.yaw), math.hypot(dx, dy)
 
 
 def rates(track: Track, pose: Odometry) -> tuple[float, float]:
     """Return the rates of bearing and range due to the person's velocity alone [rad/s, m/s]."""
-    x, y, vx, vy = track.mean.tolist()
+    x, y, vx, vy = track.mean
     dx, dy = x - pose.x, y - pose.y
     distance = max(math.hypot(dx, dy), 1e-3)
     return (dx * vy - dy * vx) / distance**2, (dx * vx + dy * vy) / distance
@@ -181,13 +182,13 @@ class Innovation:
 
 def innovation(track: Track, bearing: float, distance: float | None, pose: Odometry, noise: Noise) -> Innovation:
     """Compare a measurement with the track at the same stamp; `distance` None measures the bearing alone."""
-    x, y, _, _ = track.mean.tolist()
+    x, y, _, _ = track.mean
     dx, dy = x - pose.x, y - pose.y
     expected = math.hypot(dx, dy)
     r2 = max(expected**2, 1e-6)
     r = math.sqrt(r2)
     (bx, by), (rx, ry) = by_bearing, by_range = (-dy / r2, dx / r2), (dx / r, dy / r)
-    (xx, xy, _, _), (_, yy, _, _), _, _ = track.covariance.tolist()
+    xx, xy, _, _, yy, *_ = track.covariance
     of_bearing, of_range = variances = noise.bearing**2, noise.range**2
     covariance = (
         bx * bx * xx + 2 * bx * by * xy + by * by * yy + of_bearing,
@@ -202,25 +203,49 @@ def innovation(track: Track, bearing: float, distance: float | None, pose: Odome
 def update(track: Track, measured: Innovation) -> Track:
     """Correct the track by a measurement."""
     (bx, by), (rx, ry), (a, b, d) = measured.by_bearing, measured.by_range, measured.covariance
-    rows = track.covariance.tolist()
+    xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = track.covariance
+    rows = ((xx, xy), (xy, yy), (xu, yu), (xv, yv))
     # Covariances of the state with bearing and range, and from these the gain.
-    bearing = [bx * row[0] + by * row[1] for row in rows]
+    bearing = [bx * of_x + by * of_y for of_x, of_y in rows]
     if measured.range is None:
         ranged, gain_range, further = [0.0] * 4, [0.0] * 4, 0.0
         gain_bearing = [of / a for of in bearing]
     else:
-        ranged, further = [rx * row[0] + ry * row[1] for row in rows], measured.range
+        ranged, further = [rx * of_x + ry * of_y for of_x, of_y in rows], measured.range
         det = a * d - b * b
         gain_bearing = [(d * one - b * other) / det for one, other in zip(bearing, ranged, strict=True)]
         gain_range = [(a * other - b * one) / det for one, other in zip(bearing, ranged, strict=True)]
-    mean = [
-        at + one * measured.bearing + other * further
-        for at, one, other in zip(track.mean.tolist(), gain_bearing, gain_range, strict=True)
-    ]
-    left = [
-        rows[i][j] - gain_bearing[i] * bearing[j] - gain_range[i] * ranged[j] for i in range(4) for j in range(i, 4)
-    ]
-    return Track(track.stamp, np.array(mean), _symmetric(*left))
+    (bx, by, bu, bv), (rx, ry, ru, rv) = bearing, ranged
+    (kx, ky, ku, kv), (lx, ly, lu, lv) = gain_bearing, gain_range
+    turned = measured.bearing
+    x, y, u, v = track.mean
+    mean = (
+        x + kx * turned + lx * further,
+        y + ky * turned + ly * further,
+        u + ku * turned + lu * further,
+        v + kv * turned + lv * further,
+    )
+    left = (
+        xx - kx * bx - lx * rx,
+        xy - kx * by - lx * ry,
+        xu - kx * bu - lx * ru,
+        xv - kx * bv - lx * rv,
+        yy - ky * by - ly * ry,
+        yu - ky * bu - ly * ru,
+        yv - ky * bv - ly * rv,
+        uu - ku * bu - lu * ru,
+        uv - ku * bv - lu * rv,
+        vv - kv * bv - lv * rv,
+    )
+    return Track(track.stamp, mean, left)
+
+
+def loosened(track: Track, place: float, speed: float) -> Track:
+    """Return the track with these standard deviations added to each part of its place and its velocity [m, m/s]."""
+    xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = track.covariance
+    place2, speed2 = place**2, speed**2
+    covariance = xx + place2, xy, xu, xv, yy + place2, yu, yv, uu + speed2, uv, vv + speed2
+    return Track(track.stamp, track.mean, covariance)
 
 
 def wrap(angle: float) -> float:

@@ -7,7 +7,7 @@ where a person is. It cannot tell a person from a chair, so it may continue a tr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,18 +85,26 @@ class Legs:
         `is_ground` tells of points (N, 2), odometry frame, which of them are on what is known to stand there: no legs.
         """
         track = predict(track, returns.stamp, noise)
-        pose = returns.pose
-        distance = bearing_range(track, pose)[1]
-        if distance > self.reach:
+        if bearing_range(track, returns.pose)[1] > self.reach:
             return None
-        legs = returns.points.compress(np.hypot(*(returns.points - track.mean[:2]).T) < self.radius, axis=0)
+        legs = returns.points.compress(distances(returns.points, track) < self.radius, axis=0)
         if is_ground is not None and len(legs):
             legs = legs[~is_ground(legs)]
+        return self.corrected(track, legs, returns.pose, noise)
+
+    def corrected(self, track: Track, legs: Points, pose: Odometry, noise: Noise) -> Track | None:
+        """Return the track corrected by the returns (N, 2) near it, odometry frame; None where these are no legs.
+
+        The track is predicted for the scan's stamp; `pose` is where the robot was then.
+        """
+        distance = bearing_range(track, pose)[1]
+        if len(legs) < self.fewest or distance > self.reach:
+            return None
         # Of a few points, lists are faster than arrays.
         xs, ys = legs.T.tolist()
-        if len(xs) < self.fewest or math.hypot(max(xs) - min(xs), max(ys) - min(ys)) > self.widest:
+        if math.hypot(max(xs) - min(xs), max(ys) - min(ys)) > self.widest:
             return None
-        vx, vy = track.mean[2:].tolist()
+        _, _, vx, vy = track.mean
         dx = sum(xs) / len(xs) + self.trail_s * vx - pose.x
         dy = sum(ys) / len(ys) + self.trail_s * vy - pose.y
         bearing = math.atan2(dy, dx) - pose.yaw
@@ -105,3 +113,15 @@ class Legs:
     def noise_at(self, distance: float, noise: Noise) -> Noise:
         """Return the noise with that of legs measured at a distance [m]."""
         return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma)
+
+
+def distances(points: Points, track: Track) -> NDArray[np.float64]:
+    """Return the distance from a track to each of (N, 2) points, odometry frame, float64 (N,) [m]."""
+    x, y, _, _ = track.mean
+    return np.asarray(np.hypot(points[:, 0] - x, points[:, 1] - y))
+
+
+def all_distances(points: Points, tracks: Sequence[Track]) -> NDArray[np.float64]:
+    """Return `distances` of M tracks at once, float64 (M, N) [m]."""
+    places = np.array([track.mean[:2] for track in tracks]).reshape(-1, 2, 1)
+    return np.asarray(np.hypot(points[:, 0] - places[:, 0], points[:, 1] - places[:, 1]))

@@ -20,7 +20,7 @@ from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise, Track
-from limo_hog.follow.tracks.legs import Legs, Returns
+from limo_hog.follow.tracks.legs import Legs, Returns, all_distances, distances
 from limo_hog.follow.tracks.person import Person
 
 
@@ -123,16 +123,18 @@ class Movers:
         if ground is not None:
             points = points[~grid.is_near_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
-        whose = self._whose(movers, points, returns.stamp, noise)
-        for mover in sorted(movers, key=lambda one: one.number is None):
-            own = np.full(len(points), True) if mover.number is None else whose == mover.number
-            track = self.legs.update(mover.track, replace(returns, points=points[own]), noise)
+        movers = tuple(sorted(movers, key=lambda one: one.number is None))
+        expected = [kalman.predict(one.track, returns.stamp, noise) for one in movers]
+        gaps = all_distances(points, expected)
+        whose, free, near = self._whose(movers, gaps), np.ones(len(points), bool), gaps < self.legs.radius
+        for index, mover in enumerate(movers):
+            own = free if mover.number is None else free & (whose == mover.number)
+            track = self.legs.corrected(expected[index], points[own & near[index]], returns.pose, noise)
             if track is not None:
                 shown = mover.shown + is_in_view(track, returns, camera, self.robot)
                 kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1, shown=shown))
-                rest = ~own | (np.hypot(*(points - track.mean[:2]).T) > self.legs.radius)
-                points, whose = points[rest], whose[rest]
-            elif returns.stamp - mover.felt < self._patience(mover, returns, half_view):
+                free &= ~own | (distances(points, track) > self.legs.radius)
+            elif returns.stamp - mover.felt < self._patience(expected[index], returns, half_view):
                 kept.append(mover)
         still = [index for index, one in enumerate(kept) if not one.left]
         if ground is not None and still:
@@ -142,11 +144,10 @@ class Movers:
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
             for index in np.array(still)[left].tolist():
                 kept[index] = replace(kept[index], left=True)
-        known = np.array([one.track.mean[:2] for one in kept]).reshape(-1, 2)
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
-        new = np.hypot(*(places[:, None] - known).transpose(2, 0, 1)).min(axis=1, initial=np.inf) > self.legs.radius
+        new = all_distances(places, [one.track for one in kept]).min(axis=0, initial=np.inf) > self.legs.radius
         begun = [self._begin(place, returns, noise) for place in places[new]]
         return (*kept, *begun)
 
@@ -217,26 +218,26 @@ class Movers:
         if not legs or returns.stamp <= person.felt:
             return person
         track, pose = kalman.predict(person.track, returns.stamp, noise), returns.pose
-        dx, dy = (legs[0].track.mean[:2] - (pose.x, pose.y)).tolist()
+        x, y, _, _ = legs[0].track.mean
+        dx, dy = x - pose.x, y - pose.y
         distance = math.hypot(dx, dy)
         noise = self.legs.noise_at(distance, noise)
         fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
-    def _whose(self, movers: tuple[Mover, ...], points: Points, stamp: float, noise: Noise) -> NDArray[np.int64]:
-        """Return for each of (N, 2) returns the number of the person whose legs it may be, the nearest; 0 for none."""
-        known = [one for one in movers if one.number is not None]
-        if not known:
-            return np.zeros(len(points), np.int64)
-        places = np.array([kalman.predict(one.track, stamp, noise).mean[:2] for one in known])
-        gaps = np.hypot(*(points[:, None] - places).transpose(2, 0, 1))
-        numbers = np.array([one.number for one in known])[gaps.argmin(axis=1)]
-        return np.where(gaps.min(axis=1) < self.legs.radius, numbers, 0)
+    def _whose(self, movers: tuple[Mover, ...], gaps: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return for each of N returns the number of the person whose legs it may be, the nearest; 0 for none.
 
-    def _patience(self, mover: Mover, returns: Returns, half_view: float) -> float:
-        if is_in_view(kalman.predict(mover.track, returns.stamp, Noise()), returns, half_view, self.robot):
-            return self.forget_s
-        return self.unseen_s
+        `gaps` are the distances from the M movers, float64 (M, N) [m]; those whose number is known come first.
+        """
+        numbers = np.array([one.number for one in movers if one.number is not None], np.int64)
+        if len(numbers) == 0:
+            return np.zeros(gaps.shape[1], np.int64)
+        gaps = gaps[: len(numbers)]
+        return np.where(gaps.min(axis=0) < self.legs.radius, numbers.take(gaps.argmin(axis=0)), 0)
+
+    def _patience(self, expected: Track, returns: Returns, half_view: float) -> float:
+        return self.forget_s if is_in_view(expected, returns, half_view, self.robot) else self.unseen_s
 
     def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
         """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
@@ -258,19 +259,22 @@ class Movers:
         points = returns.points
         if len(points) == 0:
             return points
-        begins = np.hypot(*np.diff(points, axis=0).T) > self.gap
-        group = np.concatenate([[0], np.cumsum(begins)])
-        first = np.concatenate([[0], np.flatnonzero(begins) + 1])
+        begins = np.ones(len(points), bool)
+        x, y = points.T
+        begins[1:] = np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]) > self.gap
+        group, (first,) = begins.cumsum() - 1, begins.nonzero()
         count = np.bincount(group)
-        middle = np.stack([np.bincount(group, weights=column) / count for column in points.T], axis=1)
-        wide = np.hypot(*(np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)).T)
-        far = np.hypot(*(points - (returns.pose.x, returns.pose.y)).T)
-        last = first + count - 1
-        hidden = np.zeros(len(first), bool)
-        hidden[1:] = far[last[:-1]] < far[first[1:]]
-        hidden[:-1] |= far[first[1:]] < far[last[:-1]]
-        near = np.hypot(*(middle - (returns.pose.x, returns.pose.y)).T) < self.legs.reach
-        return np.asarray(middle[~hidden & near & (count >= self.legs.fewest) & (wide < self.legs.widest)])
+        here, last = returns.pose, first + count - 1
+        begun, ended = (np.hypot(x[at] - here.x, y[at] - here.y) for at in (first[1:], last[:-1]))
+        legs = count >= self.legs.fewest
+        legs[1:] &= ended >= begun
+        legs[:-1] &= begun >= ended
+        wide = np.hypot(*(np.maximum.reduceat(column, first) - np.minimum.reduceat(column, first) for column in (x, y)))
+        legs &= wide < self.legs.widest
+        middle = np.empty((len(first), 2))
+        middle[:, 0], middle[:, 1] = np.bincount(group, x) / count, np.bincount(group, y) / count
+        near = np.hypot(middle[:, 0] - here.x, middle[:, 1] - here.y) < self.legs.reach
+        return np.asarray(middle[legs & near])
 
     def _begin(self, place: Points, returns: Returns, noise: Noise) -> Mover:
         pose = returns.pose

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from limo_hog.follow.sense.appearance import Clothes
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
@@ -110,7 +108,7 @@ def predict(person: Person, stamp: float, noise: Noise) -> Person:
 
 def separation(one: Person, other: Person) -> float:
     """Return the distance between two people [m]."""
-    return float(np.hypot(*(one.track.mean[:2] - other.track.mean[:2])))
+    return math.dist(one.track.mean[:2], other.track.mean[:2])
 
 
 def distance_to(person: Person, seen: Measurement, pose: Odometry) -> float:

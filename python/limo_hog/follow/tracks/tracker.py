@@ -213,9 +213,7 @@ class Tracker:
         fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
         strained = fit.distance2 > self.association.gate
         if strained:
-            place = self.association.same_place**2
-            loose = track.covariance + np.diag([place, place, self.turn_speed**2, self.turn_speed**2])
-            track = replace(track, covariance=loose)
+            track = kalman.loosened(track, self.association.same_place, self.turn_speed)
             fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
         return replace(
             self.existence.update(person, evidence, found=True),

@@ -130,9 +130,8 @@ class Backing:
     def can_hold_other(self, others: tuple[Other, ...], places: Points, now: float) -> NDArray[np.bool_]:
         """Return whether a person out of sight can be at each of (N, 2) places [m] in the odometry frame, bool (N,)."""
         can = np.zeros(len(places), bool)
-        for one in others:
-            if now - one.at > self.unseen_s:
-                can |= np.hypot(places[:, 0] - one.x, places[:, 1] - one.y) < self._reach(one, now)
+        for one in self._out_of_sight(others, now):
+            can |= np.hypot(places[:, 0] - one.x, places[:, 1] - one.y) < self._reach(one, now)
         return can
 
     def is_free_behind(
@@ -187,7 +186,7 @@ class Backing:
 
     def blind_limit(self, others: tuple[Other, ...], pose: Odometry, robot: RobotGeometry, now: float) -> float:
         """Return how fast to back onto unknown ground [m/s]."""
-        if all(now - one.at <= self.unseen_s for one in others):
+        if not self._out_of_sight(others, now):
             return self.blind_speed
         behind = to_odometry(_places_behind(self.depths, robot), pose)
         return 0.0 if self.can_hold_other(others, behind, now).any() else self.blind_speed
@@ -219,6 +218,9 @@ class Backing:
             return Twist(0.0, twist.angular), reason
         side = -1.0 if aim.bearing > 0 else 1.0
         return Twist(0.0, side * self.glance_turn), "looking behind before backing"
+
+    def _out_of_sight(self, others: tuple[Other, ...], now: float) -> list[Other]:
+        return [one for one in others if now - one.at > self.unseen_s]
 
     def _reach(self, one: Other, now: float) -> float:
         return self.same + self.walk * (now - one.at)

@@ -101,13 +101,10 @@ def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
 
     Negative where a point ahead is too near already, inf where nothing is in the way.
     """
-    x, aside = points[:, 0], np.abs(points[:, 1]) - robot.half_width
+    x, beside = points[:, 0], np.abs(points[:, 1]) - robot.half_width
     # Most points are not in the way; only the rest are worth a square root.
-    (near,) = ((x > 0) & (aside < margin.beside)).nonzero()
-    if len(near) == 0:
-        return math.inf
-    beside = np.maximum(aside[near], 0) / margin.beside
-    return float((x[near] - robot.half_length - margin.ahead * np.sqrt(1 - beside**2)).min())
+    (near,) = ((x > 0) & (beside < margin.beside)).nonzero()
+    return float(_room_to(x[near], beside[near], margin, robot).min(initial=math.inf))
 
 
 def rooms_ahead(
@@ -116,9 +113,17 @@ def rooms_ahead(
     """Return `room_ahead` of a robot that has turned to each of H headings [rad], float64 (H,)."""
     (x, y), cos, sin = points.T, np.cos(headings)[:, None], np.sin(headings)[:, None]
     ahead, aside = cos * x + sin * y, cos * y - sin * x
-    beside = np.maximum(np.abs(aside) - robot.half_width, 0) / margin.beside
-    gap = ahead - robot.half_length - margin.ahead * np.sqrt(np.maximum(1 - beside**2, 0))
-    return np.asarray(np.where((ahead > 0) & (beside < 1), gap, np.inf).min(axis=1, initial=np.inf))
+    beside = np.abs(aside) - robot.half_width
+    room = _room_to(ahead, beside, margin, robot)
+    return np.asarray(np.where((ahead > 0) & (beside < margin.beside), room, np.inf).min(axis=1, initial=np.inf))
+
+
+def _room_to(
+    ahead: NDArray[np.float64], beside: NDArray[np.float64], margin: Margin, robot: RobotGeometry
+) -> NDArray[np.float64]:
+    """Return how far the robot can drive before points so far ahead, and beside its outline, are too near [m]."""
+    share = np.maximum(beside, 0) / margin.beside
+    return np.asarray(ahead - robot.half_length - margin.ahead * np.sqrt(np.maximum(1 - share**2, 0)))
 
 
 def room_behind(points: Points, margin: Margin, robot: RobotGeometry) -> float:

@@ -198,8 +198,31 @@ def test_it_backs_straight_off_from_a_person_who_comes_straight_at_it_slowly() -
     assert way.speed < 0
 
 
-def test_to_lose_the_person_followed_from_the_image_costs_less_than_to_come_too_near_another() -> None:
-    assert COMPANY.away < min(COMPANY.clear, COMPANY.clear_other)
+def way_before(other: Walker, company: Company = COMPANY) -> Way:
+    """Return the way out before another person, where the one followed stands two metres ahead."""
+    people = [Walker(2.0, 0.0, 0.0, 0.0, followed=True), other]
+    way = company.way_out(STANDING, STANDING, people, NO_POINTS, LIMO, may_back=never)
+    assert way is not None
+    return way
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_of_ways_that_clear_another_it_takes_one_that_keeps_the_person_followed_in_the_image(side: float) -> None:
+    across = Walker(1.0, side, -0.5, -0.5 * side)
+    assert abs(way_before(across).turn) < LIMO.field_of_view / 2
+    assert abs(way_before(across, replace(COMPANY, away=0.0)).turn) > LIMO.field_of_view / 2
+
+
+def test_to_lose_the_person_followed_from_the_image_costs_less_than_to_be_walked_into() -> None:
+    straight = at_the_robot(1.4, 0.7)
+    assert abs(way_before(straight).turn) > LIMO.field_of_view / 2
+    assert abs(way_before(straight, replace(COMPANY, short=0.0)).turn) < LIMO.field_of_view / 2
+
+
+def test_as_near_as_two_decimetres_to_another_costs_as_much_as_to_lose_the_person_followed() -> None:
+    gap = 0.2
+    cost = COMPANY.wanted_other - gap + COMPANY.short * (COMPANY.clear_other - gap)
+    assert COMPANY.away == pytest.approx(cost)
 
 
 def test_a_twist_of_whole_numbers_leads_where_the_same_twist_of_floats_does() -> None:

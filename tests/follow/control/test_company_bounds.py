@@ -218,7 +218,7 @@ def test_it_backs_onto_unknown_ground_no_faster_than_it_may_blindly() -> None:
 
 
 def test_a_way_is_kept_for_eight_tenths_of_a_second_and_then_where_it_is_nearly_as_good() -> None:
-    walker = Walker(1.6, 0.0, -0.8, 0.1)
+    walker = Walker(1.6, 0.0, -0.8, 0.1, followed=True)
     fresh = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO)
     assert fresh is not None
     # Ahead to where the person comes is far worse.
@@ -228,6 +228,13 @@ def test_a_way_is_kept_for_eight_tenths_of_a_second_and_then_where_it_is_nearly_
         assert (way is worse) == kept
     mirrored = replace(fresh, turn=-fresh.turn, age=5.0)
     assert COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, mirrored) is mirrored
+
+
+def test_a_way_into_another_person_is_left_at_once_and_one_beside_them_is_not() -> None:
+    walker = Walker(1.6, 0.0, -0.8, 0.1)
+    into, beside = Way(0.0, 0.3, 0.3), Way(-1.1, 0.3, 0.3)
+    assert COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, into) is not into
+    assert COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO, beside) is beside
 
 
 def test_before_a_fast_person_a_way_goes_on_for_eight_tenths_of_a_second_though_the_command_seems_clear() -> None:

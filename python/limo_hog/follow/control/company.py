@@ -106,8 +106,12 @@ class Company:
     notice_other_s, clear_other
         The same of people who are not followed, who pass close by as people do [s, m]. Chosen: the time to stop or to
         turn aside; .2 m of clearance.
-    wanted
-        Of more distance than this nothing is gained [m]. Chosen: `clear`, and half a trunk.
+    wanted, wanted_other
+        Of more distance than this nothing is gained: where the person followed comes, and where only others come [m].
+        Chosen: `clear` and `clear_other`, and half a trunk.
+    short
+        How often a distance short of `clear_other` counts besides, where only others come [1]. Chosen with `away`:
+        without it, the robot would keep looking at the person followed while another walks into it.
     walls
         Distance kept from everything else [m]. Chosen: `Guard` keeps more ahead and behind, where it can.
     near, person_radius
@@ -125,14 +129,16 @@ class Company:
         What a change of speed by 1 m/s, and a turn by 2.5 rad, are worth [m]. Chosen: of ways that clear people alike,
         to within the error of their places, the easiest.
     settle_s, stay
-        A way is left for another only after so long [s], unless it costs `never`, and if the other is worth more by so
-        much [m]. Where the command seems clear again, a way before people faster than the robot is left only after so
-        long, and if they are measured. Standing is left at once. Measured: while the robot turns, which takes .8 s, a
-        person's velocity across their way strays by .4 m/s, and the sides would be taken in turns; chosen: less than
-        half of `wanted`.
+        A way is left for another only after so long [s], unless it costs `never` or leads into a person who is not
+        followed, and if the other is worth more by so much [m]. Where the command seems clear again, a way before
+        people faster than the robot is left only after so long, and if they are measured. Standing is left at once.
+        Measured: while the robot turns, which takes .8 s, a person's velocity across their way strays by .4 m/s, and
+        the sides would be taken in turns; chosen: less than half of `wanted`.
     away
         What a way costs on which the person followed is out of the image all the time [m], unless it is they who come.
-        Chosen: less than the clearance wanted.
+        Chosen: as much as to come as near as .2 m to another's axis; a trunk reaches .15 m. Measured in 63 development
+        runs of the crowd: the person is in view in 97 % of the frames; in 94 % with .2 m, without `short`, and with
+        `wanted` for others too. People come as near.
     half_view, unseen
         How far to either side the lidar looks [rad], and what a way costs on which nobody who comes is in its sight
         [m]. Chosen: the Limo's; the error of a place that is not measured for a second.
@@ -148,6 +154,8 @@ class Company:
     notice_other_s: float = bounded(1.5, 0, 10)
     clear_other: float = bounded(0.35, 0, 3)
     wanted: float = 0.8
+    wanted_other: float = 0.5
+    short: float = 2.0
     walls: float = 0.1
     near: float = 1.5
     person_radius: float = 0.45
@@ -159,7 +167,7 @@ class Company:
     ease: float = 0.06
     settle_s: float = 0.8
     stay: float = 0.35
-    away: float = 0.2
+    away: float = 0.6
     half_view: float = 2.0
     unseen: float = 0.1
 
@@ -233,10 +241,12 @@ class Company:
         near = near[gap > self.person_radius]
         speeds = np.array([way.speed for way in ways])
         effort = self.ease * (np.abs(speeds - now.linear) + 0.4 * np.abs([way.turn for way in ways]))
-        worth = np.minimum(gaps, self.wanted) @ self.weights - effort
-        worth -= self.unseen * self._unseen(poses, places[:, 0])
-        if not is_followed.any():
+        only_others = not is_followed.any()
+        worth = np.minimum(gaps, self.wanted_other if only_others else self.wanted) @ self.weights
+        if only_others:
+            worth += self.short * np.minimum(worth - self.clear_other, 0.0)
             worth -= self.away * self._away(poses, goal, robot)
+        worth -= effort + self.unseen * self._unseen(poses, places[:, 0])
         worth[self._room(poses, near, robot) < self.walls] -= self.never
         if may_back is not None:
             backward = np.flatnonzero(speeds < -blind_speed)

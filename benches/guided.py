@@ -1,7 +1,7 @@
 """The guided search beside the exact one: for each guide, how many pictures have the same rectangles, and how fast.
 
-`uv run python benches/guided.py [--every 4 ...] [--margin 0.5 ...] [--reach 1 ...]` reads every picture and every
-tenth frame of the videos in `../shared/data`; one thread, both searches in turn, least of two calls each. With
+`uv run python benches/guided.py [--halvings 3 ...] [--margin 0.75 ...] [--reach 0.75,1.25 ...]` reads every picture and
+every tenth frame of the videos in `../shared/data`; one thread, both searches in turn, least of two calls each. With
 `--labels FILE` it evaluates `PeopleDetector` with either search on labelled pictures instead.
 """
 
@@ -25,7 +25,7 @@ from limo_hog.learn.labels import choose
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 Hits = tuple[NDArray[np.int32], NDArray[np.float64]]
-Guide = tuple[int, float, int]
+Guide = tuple[int, float, tuple[float, float]]
 
 
 def pictures(step: int) -> Iterator[NDArray[np.uint8]]:
@@ -55,6 +55,12 @@ def searched(hog: _core.Hog, image: NDArray[np.uint8], group: float, guide: Guid
     return found, min(times)
 
 
+def pair(text: str) -> tuple[float, float]:
+    """Return two numbers with a comma between them."""
+    x, y = map(float, text.split(","))
+    return x, y
+
+
 def miss_rates(labels: Path) -> None:
     """Print the log-average miss rate, and the recall at .1 and 1 false positive an image, of either search.
 
@@ -75,9 +81,9 @@ def miss_rates(labels: Path) -> None:
 def main() -> None:
     """Measure every combination and print one line for each."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--every", type=int, nargs="+", default=[2, 3, 4, 5, 6])
-    parser.add_argument("--margin", type=float, nargs="+", default=[0.25, 0.5, 1.0])
-    parser.add_argument("--reach", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--halvings", type=int, nargs="+", default=[2, 3, 4])
+    parser.add_argument("--margin", type=float, nargs="+", default=[0.6, 0.75, 0.9])
+    parser.add_argument("--reach", type=pair, nargs="+", default=[(0.75, 1.25)], help="x,y [strides]")
     parser.add_argument("--step", type=int, default=1, help="read every so many pictures")
     parser.add_argument("--labels", type=Path, help="labelled pictures, in a format of `limo-hog evaluate`")
     options = parser.parse_args()
@@ -86,7 +92,7 @@ def main() -> None:
         return
     limo_hog.set_num_threads(1)
     hog = _core.Hog((64, 128), (16, 16), (8, 8), (8, 8), 9, -1.0, 0.2, True, 64, False, _core.default_people_detector())
-    guides: list[Guide] = list(itertools.product(options.every, options.margin, options.reach))
+    guides: list[Guide] = list(itertools.product(options.halvings, options.margin, options.reach))
     same, kept, seconds, count, hits = dict.fromkeys(guides, 0), dict.fromkeys(guides, 0), {}, 0, 0
     least: dict[Guide | None, float] = dict.fromkeys([None, *guides], 0.0)
     for image in pictures(options.step):
@@ -104,7 +110,8 @@ def main() -> None:
                 kept[guide] += len(every & {tuple(box) for box in boxes.tolist()})
     print(f"{count} pictures, {hits} hits")
     print(
-        "| every | margin | reach | same rectangles | hits kept | times faster than exact |\n|---|---|---|---|---|---|"
+        "| halvings | margin | reach | same rectangles | hits kept | times faster than exact |\n"
+        "|---|---|---|---|---|---|"
     )
     for guide in guides:
         ratio = least[None] / least[guide]

@@ -196,7 +196,7 @@ class Hog:
         group_threshold: float,
         mean_shift: bool,
         first_level: _Pair | None = None,
-        guide: tuple[int, float, int] | None = None,
+        guide: tuple[int, float, tuple[float, float]] | None = None,
         threads: int | None = None,
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Hits on all levels of a pyramid, grouped, and clipped to the image.
@@ -220,8 +220,10 @@ class Hog:
             Width and height [px]: the image is resized to this before all else, as `resize` does; boxes are in its
             pixels.
         guide
-            Search every guide[0]-th level whole, with the threshold lowered by guide[1], and the others only within
-            guide[2] windows of what was found: faster, and some hits may be missed. None: search all levels whole.
+            (halvings, margin, reach): search one level in 2 to the power of `halvings` whole, and those between only
+            within `reach` (x, y) [window strides] of what was found on the levels d before and behind, with the
+            threshold lowered by √d · `margin`, d being halved each time: faster, and some hits may be missed. None:
+            search all levels whole.
         threads
             How many share the work, at least 1; None: as `set_num_threads` says.
 

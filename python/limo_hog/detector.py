@@ -34,9 +34,10 @@ _NMS = {"overlap": 0.65, "iou": 0.3, "soft": 0.3, "group": None}
 _LARGE_WINDOW_FROM_PX = 64.0
 #: Hits that OpenCV's sample asks a group to have more than.
 _GROUP_THRESHOLD = 2
-#: Every how many levels one is searched whole, by how much the threshold is lowered there [SVM margin], and how many
-#: windows around are searched on the others; `benches/guided.py` measures others, docs/simd.md shows them.
-_GUIDES: dict[str, tuple[int, float, int] | None] = {"exact": None, "guided": (6, 1.0, 1)}
+#: How often the levels between two that are searched whole are halved, by how much the threshold is lowered for a
+#: neighbouring level [SVM margin], and how far around a place windows are searched [strides]. `benches/guided.py`
+#: measures others, docs/simd.md shows them.
+_GUIDES: dict[str, tuple[int, float, tuple[float, float]] | None] = {"exact": None, "guided": (3, 0.75, (0.75, 1.25))}
 #: More levels than a pyramid of the finest `scale` and the largest image can have.
 _LEVELS = 2048
 #: Bounds of arguments, so that no image grows, and no pyramid is cut, beyond what memory and `_LEVELS` hold.
@@ -81,9 +82,9 @@ class PeopleDetector:
     scale
         How much each level is smaller than the one before, 1.005 or more.
     search
-        "exact": all levels, every window. "guided": every sixth level, with a threshold lower by 1, and the levels
-        between only around what was found there: about twice as fast, and a raw hit in two hundred is missed
-        (docs/simd.md). Geometries without kernels are searched whole.
+        "exact": all levels, every window. "guided": every eighth level, and those between only around what was found
+        on the levels around them: about twice as fast, and a raw hit in two hundred is missed (docs/simd.md).
+        Geometries without kernels are searched whole.
 
     Raises
     ------

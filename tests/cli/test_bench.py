@@ -96,6 +96,6 @@ def test_a_guided_search_may_miss_what_the_exact_one_finds(
     assert (row["search"], row["rects_equal"]) == ("guided", True)
     assert row["ratio"] > 0
     monkeypatch.setattr(bench, "street", lambda *_: street(640, 480, 1))
-    monkeypatch.setitem(detector._GUIDES, "guided", (40, 0.0, 0))
+    monkeypatch.setitem(detector._GUIDES, "guided", (6, 0.0, (0.0, 0.0)))
     (row,) = _bench(capsys, *arguments)["rows"]
     assert row["rects_equal"] is False

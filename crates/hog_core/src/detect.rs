@@ -345,17 +345,18 @@ impl Hog {
             let regions = memory::collect(grids.iter().enumerate().map(whole))?;
             return fast::search(task(regions, threshold), how.threads, interrupt);
         };
-        let some = grids.iter().enumerate().filter(|&(level, _)| guide.is_whole(level));
-        let regions = memory::collect(some.map(whole))?;
-        let least = threshold - guide.margin;
-        let mut found = fast::search(task(regions, least), how.threads, interrupt)?;
-        let regions = guide.between(levels, &grids, &found, least, self.spec())?;
-        let between = fast::search(task(regions, threshold), how.threads, interrupt)?;
-        for (found, mut between) in found.iter_mut().zip(between) {
-            // Regions may share windows.
-            between.dedup();
-            if !between.is_empty() {
-                *found = between;
+        let mut found = memory::filled(grids.len(), Vec::new())?;
+        for step in guide.steps() {
+            let regions = guide.regions(step, levels, &grids, &found, threshold, self.spec())?;
+            // What is found here guides levels half as far off, those of the last step none.
+            let least = threshold - guide.lowered(step / 2);
+            let here = fast::search(task(regions, least), how.threads, interrupt)?;
+            for (found, mut here) in found.iter_mut().zip(here) {
+                // Regions may share windows; their scores differ by the order of their sums.
+                here.dedup_by_key(|&mut (x, y, _)| (x, y));
+                if !here.is_empty() {
+                    *found = here;
+                }
             }
         }
         Ok(found)

@@ -1,7 +1,9 @@
 //! A faster search that may miss some hits: a few levels are searched whole, those between them around what was found.
 //!
 //! A person's hits lie on several neighbouring levels, at nearly the same place in the image. So where nothing came near to
-//! the threshold on the levels around it, a level has rarely a hit. What is searched, is searched exactly.
+//! the threshold on the levels around it, a level has rarely a hit. The middle between two levels is searched around what
+//! these show; then the middles of the halves, and so on: the nearer a level is, the better it tells. What is searched, is
+//! searched exactly.
 
 use std::ops::Range;
 
@@ -15,38 +17,56 @@ use crate::pyramid::{Grid, Level};
 /// How the search is guided.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Guide {
-    /// Every how many levels one is searched whole; below 2 all are.
-    pub every: usize,
-    /// By how much the threshold is lowered there [SVM margin].
+    /// How often the levels between two that are searched whole are halved: of 2 to this power, one is.
+    pub halvings: u32,
+    /// By how much the threshold is lowered where the level next to one is looked at [SVM margin]; √d times as much
+    /// where it is the d-th: a person's scores fall the more the further off a level is.
     pub margin: f64,
-    /// How many windows around a place are searched on the levels between.
-    pub reach: usize,
+    /// How far around a place windows are searched along x and y, and at least the nearest one [window strides].
+    pub reach: (f64, f64),
 }
 
 impl Guide {
-    /// Whether this level is searched whole.
-    pub(crate) fn is_whole(&self, level: usize) -> bool {
-        self.every < 2 || level.is_multiple_of(self.every)
+    /// Every how many levels one is searched whole.
+    fn every(&self) -> usize {
+        1 << self.halvings.min(16)
     }
 
-    /// Where to search on the levels between those that were searched whole: around the windows `found` there whose
-    /// score is at least `least`.
-    pub(crate) fn between(
+    /// The distances of levels from those that guide them, in the order in which they are searched; the first is that of
+    /// the levels searched whole.
+    pub(crate) fn steps(&self) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(self.every()), |step| (*step > 1).then_some(step / 2))
+    }
+
+    /// By how much the threshold is lowered on levels that guide others `distance` off [SVM margin].
+    pub(crate) fn lowered(&self, distance: usize) -> f64 {
+        self.margin * (distance as f64).sqrt()
+    }
+
+    /// Where to search on the levels of a `step`: those of the first one whole, others around the windows `found` so far on
+    /// the levels a step before and behind.
+    pub(crate) fn regions(
         &self,
+        step: usize,
         levels: &[Level],
         grids: &[(Size, Grid)],
         found: &[Vec<Found>],
-        least: f64,
+        threshold: f64,
         spec: &HogSpec,
     ) -> Result<Vec<Region>> {
+        let (is_whole, least) = (step == self.every(), threshold - self.lowered(step));
         let mut regions = Vec::new();
         for (number, (level, (_, grid))) in levels.iter().zip(grids).enumerate() {
-            if self.is_whole(number) || grid.is_empty() {
+            let is_of_step = number % step == 0 && (is_whole || number % (2 * step) != 0);
+            if grid.is_empty() || !is_of_step {
                 continue;
             }
-            let before = number - number % self.every;
+            if is_whole {
+                memory::push(&mut regions, Region::whole(number, grid))?;
+                continue;
+            }
             let first = regions.len();
-            for guide in [before, before + self.every] {
+            for guide in [number - step, number + step] {
                 let (Some(guiding), Some((_, from)), Some(found)) =
                     (levels.get(guide), grids.get(guide), found.get(guide))
                 else {
@@ -54,47 +74,49 @@ impl Guide {
                 };
                 // (A search gives some windows more than those above its threshold: all that its prefilter let through.)
                 for &(x, y, _) in found.iter().filter(|&&(_, _, score)| score >= least) {
-                    let along = |at: usize, pads: [usize; 2], win: usize, stride: usize, windows: usize| {
+                    let place = |at: usize, pads: [usize; 2], win: usize, stride: usize| {
                         let half = win as f64 / 2.0;
                         let centre = (at as f64 - pads[0] as f64 + half) * guiding.scale;
-                        let at = centre / level.scale - half + pads[1] as f64;
-                        around((at / stride as f64).round(), self.reach, windows, stride)
+                        (centre / level.scale - half + pads[1] as f64) / stride as f64
                     };
-                    let pads = [from.pad.width, grid.pad.width];
-                    let x = along(x, pads, spec.win.width, grid.stride.width, grid.windows.width);
-                    let pads = [from.pad.height, grid.pad.height];
-                    let y = along(y, pads, spec.win.height, grid.stride.height, grid.windows.height);
+                    let Grid { pad, stride, windows, .. } = grid;
+                    let x = place(x, [from.pad.width, pad.width], spec.win.width, stride.width);
+                    let y = place(y, [from.pad.height, pad.height], spec.win.height, stride.height);
+                    let x = around(x, self.reach.0, windows.width, stride.width);
+                    let y = around(y, self.reach.1, windows.height, stride.height);
                     memory::push(&mut regions, Region { level: number, x, y })?;
                 }
             }
             merge(&mut regions, first, spec.win);
-            let whole = Region::whole(number, grid);
-            let cost: usize = regions[first..].iter().map(|region| cost(region, spec.win)).sum();
-            if cost >= grid.padded.area() {
+            let parts: usize = regions[first..].iter().map(|region| region_cost(region, spec.win)).sum();
+            if parts >= cost(grid.padded.width, grid.padded.height) {
                 regions.truncate(first);
-                memory::push(&mut regions, whole)?;
+                memory::push(&mut regions, Region::whole(number, grid))?;
             }
         }
         Ok(regions)
     }
 }
 
-/// The corners of the windows within `reach` of window `at` [px], as far as there are any.
-fn around(at: f64, reach: usize, windows: usize, stride: usize) -> Range<usize> {
+/// The corners of the windows within `reach` of place `at` [strides], as far as there are any; at least the nearest one's
+/// [px].
+fn around(at: f64, reach: f64, windows: usize, stride: usize) -> Range<usize> {
     let last = (windows - 1) as f64;
-    let (from, to) = ((at - reach as f64).clamp(0.0, last), (at + reach as f64).clamp(0.0, last));
+    let nearest = at.round();
+    let from = (at - reach).ceil().min(nearest).clamp(0.0, last);
+    let to = (at + reach).floor().max(nearest).clamp(0.0, last);
     from as usize * stride..to as usize * stride + 1
 }
 
 /// Makes one of two regions from `first` on, until no two cost less together.
 fn merge(regions: &mut Vec<Region>, first: usize, win: Size) {
-    regions[first..].sort_unstable_by_key(|region| (region.y.start, region.x.start));
+    regions[first..].sort_unstable_by_key(|Region { x, y, .. }| (y.start, x.start, y.end, x.end));
     let mut at = first;
     while at < regions.len() {
         let mut other = at + 1;
         while other < regions.len() {
             let both = union(&regions[at], &regions[other]);
-            if cost(&both, win) <= cost(&regions[at], win) + cost(&regions[other], win) {
+            if region_cost(&both, win) <= region_cost(&regions[at], win) + region_cost(&regions[other], win) {
                 regions[at] = both;
                 regions.swap_remove(other);
                 other = at + 1;
@@ -111,9 +133,21 @@ fn union(a: &Region, b: &Region) -> Region {
     Region { level: a.level, x: along(&a.x, &b.x), y: along(&a.y, &b.y) }
 }
 
-/// What a region costs: the pixels of its windows, in whole vectors of 16 cells, and a row of cells and of pixels more.
-fn cost(region: &Region, win: Size) -> usize {
-    (region.x.len() + win.width).next_multiple_of(128) * (region.y.len() + win.height + 16)
+/// What a region costs.
+fn region_cost(region: &Region, win: Size) -> usize {
+    cost(region.x.len() - 1 + win.width, region.y.len() - 1 + win.height)
+}
+
+/// What so many pixels cost: rows of whole vectors of 16 cells, of which half a one costs eleven twentieths, and a row of
+/// cells more. All backends reckon so, that they search the same windows.
+fn cost(width: usize, height: usize) -> usize {
+    let cells = width.div_ceil(8);
+    let rest = match cells % 16 {
+        0 => 0,
+        1..=8 => 11,
+        _ => 20,
+    };
+    (20 * (cells / 16) + rest) * (height + 8)
 }
 
 #[cfg(test)]
@@ -159,7 +193,7 @@ mod tests {
 
     #[test]
     fn two_regions_that_cost_less_together_become_one() {
-        for other in [(8, 0), (0, 8), (24, 16), (0, 160)] {
+        for other in [(8, 0), (0, 8), (24, 16), (0, 152)] {
             let mut regions = vec![region(0, 0), region(other.0, other.1)];
             merge(&mut regions, 0, WIN);
             assert_eq!(regions.len(), 1, "{other:?}");
@@ -167,41 +201,82 @@ mod tests {
     }
 
     #[test]
-    fn a_region_costs_the_pixels_of_its_windows_in_vectors_of_128_and_16_rows_more() {
-        let wide = Region { level: 1, x: 8..8 + 65, y: 0..9 };
-        assert_eq!(cost(&region(24, 40), WIN), 128 * (17 + 128 + 16));
-        assert_eq!(cost(&wide, WIN), 256 * (9 + 128 + 16));
+    fn a_region_costs_rows_of_vectors_of_16_cells_or_halves_and_a_row_of_cells_more() {
+        let region =
+            |columns: usize, rows: usize| Region { level: 1, x: 8..8 * columns + 1, y: 0..8 * rows - 7 };
+        // A window is 8 cells wide, so that nine side by side fill a vector.
+        for (columns, vectors) in [(1, 11), (2, 20), (9, 20), (10, 31), (17, 31), (18, 40), (25, 40)] {
+            assert_eq!(region_cost(&region(columns, 3), WIN), vectors * (8 * 2 + 128 + 8), "{columns}");
+        }
     }
 
     #[test]
-    fn windows_around_a_place_stay_on_the_level() {
-        assert_eq!(around(3.0, 1, 10, 8), 16..33);
-        assert_eq!(around(-5.0, 1, 10, 8), 0..1);
-        assert_eq!(around(12.0, 2, 10, 8), 72..73);
+    fn windows_around_a_place_are_within_reach_and_on_the_level() {
+        assert_eq!(around(3.0, 1.0, 10, 8), 16..33);
+        assert_eq!(around(3.3, 0.75, 10, 8), 24..33);
+        assert_eq!(around(3.1, 0.75, 10, 8), 24..25);
+        assert_eq!(around(-5.0, 1.0, 10, 8), 0..1);
+        assert_eq!(around(12.0, 2.0, 10, 8), 72..73);
+        // The nearest one always.
+        assert_eq!(around(3.4, 0.0, 10, 8), 24..25);
+        assert_eq!(around(3.6, f64::NEG_INFINITY, 10, 8), 32..33);
+        assert_eq!(around(3.6, f64::INFINITY, 10, 8), 0..73);
     }
 
     #[test]
-    fn only_windows_near_the_threshold_are_looked_around() {
+    fn levels_are_searched_by_halves_each_once_and_guided_by_those_before() {
+        let guide = Guide { halvings: 3, margin: 0.5, reach: (0.0, 0.0) };
+        assert_eq!(guide.steps().collect::<Vec<_>>(), [8, 4, 2, 1]);
+        // A level d off is looked at where the threshold is lowered by √d; the last ones guide none.
+        let lowered: Vec<_> = guide.steps().map(|step| guide.lowered(step / 2)).collect();
+        assert_eq!(lowered, [0.5 * 2.0, 0.5 * f64::sqrt(2.0), 0.5, 0.0]);
+
         let spec = HogSpec::new(&HogParams::default()).unwrap();
         let steps = Steps::new((8, 8), (0, 0), spec.cell, &spec).unwrap();
-        let levels = [1.0, 1.05].map(|scale| {
-            let size = Size::new((1280.0 / scale) as usize, (960.0 / scale) as usize);
-            Level { scale, size }
-        });
-        let grids = levels.each_ref().map(|level| (level.size, steps.grid(level.size, &spec)));
-        let guide = Guide { every: 2, margin: 0.25, reach: 1 };
-        // A search also gives windows that its prefilter let through.
-        let found = [vec![(400, 400, -0.2), (800, 400, -0.9)], Vec::new()];
-        let regions = guide.between(&levels, &grids, &found, -0.25, &spec).unwrap();
-        assert_eq!(regions.len(), 1);
-        assert!(regions[0].level == 1 && regions[0].x.contains(&384));
+        let levels = levels(Size::new(640, 480), 1.05, &spec, &Interrupt::NEVER).unwrap();
+        let grids: Vec<_> = levels.iter().map(|level| (level.size, steps.grid(level.size, &spec))).collect();
+        // Each level that was searched shows one window, in the middle.
+        let mut found = vec![Vec::new(); levels.len()];
+        let mut searched = Vec::new();
+        for step in guide.steps() {
+            let regions = guide.regions(step, &levels, &grids, &found, 0.0, &spec).unwrap();
+            for region in regions {
+                assert!(region.level.is_multiple_of(step), "{step}");
+                searched.push(region.level);
+                let middle = |windows: usize| windows / 2 * 8;
+                let windows = grids[region.level].1.windows;
+                found[region.level] = vec![(middle(windows.width), middle(windows.height), 1.0)];
+            }
+        }
+        searched.sort_unstable();
+        assert_eq!(searched, (0..levels.len()).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn only_windows_near_the_threshold_are_looked_around_nearer_the_nearer_the_level_is() {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let steps = Steps::new((8, 8), (0, 0), spec.cell, &spec).unwrap();
+        let levels = levels(Size::new(1280, 960), 1.05, &spec, &Interrupt::NEVER).unwrap();
+        let grids: Vec<_> = levels.iter().map(|level| (level.size, steps.grid(level.size, &spec))).collect();
+        let guide = Guide { halvings: 2, margin: 0.25, reach: (1.0, 1.0) };
+        let mut found = vec![Vec::new(); levels.len()];
+        found[0] = vec![(400, 400, -0.2), (800, 400, -0.3), (800, 800, -0.4)];
+        for (step, level, wanted) in [(2, 2, vec![(360, 360), (728, 360)]), (1, 1, vec![(384, 384)])] {
+            let regions = guide.regions(step, &levels, &grids, &found, 0.0, &spec).unwrap();
+            assert!(regions.iter().all(|region| region.level == level));
+            let is_around = |&(x, y): &(usize, usize)| {
+                regions.iter().any(|region| region.x.contains(&x) && region.y.contains(&y))
+            };
+            assert_eq!(regions.len(), wanted.len(), "{step}");
+            assert!(wanted.iter().all(is_around), "{step}");
+        }
     }
 
     #[test]
     fn the_level_between_is_searched_where_its_window_is_nearest_to_the_one_found() {
         let spec = HogSpec::new(&HogParams::default()).unwrap();
         let steps = Steps::new((8, 8), (16, 24), spec.cell, &spec).unwrap();
-        let guide = Guide { every: 2, margin: 0.0, reach: 0 };
+        let guide = Guide { halvings: 1, margin: 0.0, reach: (0.0, 0.0) };
         for step in [1.1, 1.6, 2.0] {
             let levels = levels(Size::new(640, 480), step, &spec, &Interrupt::NEVER).unwrap();
             let grids: Vec<_> =
@@ -215,7 +290,7 @@ mod tests {
             for (x, y) in [(0, 0), (304, 200), (600, 8), (160, 392)] {
                 let mut found = vec![Vec::new(); levels.len()];
                 found[0].push((x, y, 1.0));
-                let regions = guide.between(&levels, &grids, &found, 0.5, &spec).unwrap();
+                let regions = guide.regions(1, &levels, &grids, &found, 0.5, &spec).unwrap();
                 assert_eq!(regions.len(), 1);
                 let Region { level, x: across, y: down } = &regions[0];
                 assert_eq!((*level, across.len(), down.len()), (1, 1, 1));

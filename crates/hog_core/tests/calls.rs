@@ -310,18 +310,21 @@ fn a_guided_search_finds_nothing_new_and_misses_nothing_where_it_looks_everywher
     let (detector, picture) = (Detector::people(), Picture::new(400, 420, 3, 6));
     let all = guided(&detector, &picture, None, -1.2);
     assert!(all.len() > 20);
-    let everywhere = [(0, 0.0, 0), (1, 0.0, 0), (2, 1e9, 0), (2, 1e9, 50), (3, 1e9, 50), (5, 1e9, 50)];
-    for (every, margin, reach) in everywhere {
-        let found = guided(&detector, &picture, Some(Guide { every, margin, reach }), -1.2);
-        assert_eq!(found, all, "{every} {margin} {reach}");
+    let everywhere = [(0, 0.0, 0.0), (1, 1e9, 0.0), (1, 1e9, 50.0), (2, 1e9, 50.0), (99, 1e9, f64::INFINITY)];
+    for (halvings, margin, reach) in everywhere {
+        let found =
+            guided(&detector, &picture, Some(Guide { halvings, margin, reach: (reach, reach) }), -1.2);
+        assert_eq!(found, all, "{halvings} {margin} {reach}");
     }
-    for (every, margin, reach) in [(2, 0.0, 0), (2, 0.3, 1), (3, 0.0, 2), (4, 0.5, 3)] {
-        let found = guided(&detector, &picture, Some(Guide { every, margin, reach }), -1.2);
-        assert!(found.iter().all(|hit| all.contains(hit)), "{every} {margin} {reach}");
+    for (halvings, margin, reach) in [(1, 0.0, 0.0), (1, 0.3, 1.0), (2, 0.0, 2.0), (3, 0.5, 3.0)] {
+        let found =
+            guided(&detector, &picture, Some(Guide { halvings, margin, reach: (reach, reach) }), -1.2);
+        assert!(found.iter().all(|hit| all.contains(hit)), "{halvings} {margin} {reach}");
         assert!(2 * found.len() > all.len(), "{} of {}", found.len(), all.len());
     }
     // The levels between are searched around what was found on the others alone: where that is nothing, nowhere.
-    let nowhere = guided(&detector, &picture, Some(Guide { every: 2, margin: -1e9, reach: 50 }), -1.2);
+    let nowhere = Guide { halvings: 1, margin: -1e9, reach: (50.0, 50.0) };
+    let nowhere = guided(&detector, &picture, Some(nowhere), -1.2);
     assert!(nowhere.is_empty());
 }
 
@@ -333,9 +336,10 @@ fn a_guided_search_in_wide_padding_finds_nothing_new() {
         let all = guided_by(&detector, &picture, None, &search);
         // (Rectangles are cut to the image, so that a weight tells which window is meant.)
         assert!(all.len() > 20);
-        for (every, margin, reach) in [(2, 0.0, 0), (2, 0.1, 1), (3, 0.3, 0)] {
-            let found = guided_by(&detector, &picture, Some(Guide { every, margin, reach }), &search);
-            assert!(found.iter().all(|hit| all.contains(hit)), "{padding:?} {every} {margin} {reach}");
+        for (halvings, margin, reach) in [(1, 0.0, 0.0), (1, 0.1, 1.0), (2, 0.3, 0.0)] {
+            let guide = Guide { halvings, margin, reach: (reach, reach) };
+            let found = guided_by(&detector, &picture, Some(guide), &search);
+            assert!(found.iter().all(|hit| all.contains(hit)), "{padding:?} {halvings} {margin} {reach}");
             assert!(4 * found.len() > all.len(), "{} of {}", found.len(), all.len());
         }
     }
@@ -357,8 +361,8 @@ fn a_guided_search_at_either_edge_of_a_wide_image_finds_nothing_new() {
             let search = Search { hit_threshold: -3.0, padding, ..STEPS };
             let all = guided_by(&detector, &picture, None, &search);
             assert!(all.len() > 5, "{}", all.len());
-            let found =
-                guided_by(&detector, &picture, Some(Guide { every: 2, margin: 0.1, reach: 1 }), &search);
+            let guide = Guide { halvings: 1, margin: 0.1, reach: (1.0, 1.0) };
+            let found = guided_by(&detector, &picture, Some(guide), &search);
             // (Sums are in another order where a vector is not full.)
             let is_one = |hit: &(Rect, f64)| {
                 all.iter().any(|other| other.0 == hit.0 && (other.1 - hit.1).abs() <= detector.rounding())
@@ -371,14 +375,15 @@ fn a_guided_search_at_either_edge_of_a_wide_image_finds_nothing_new() {
 
 #[test]
 fn taps_are_those_of_the_formula() {
-    assert!(taps(1, 3).eq([Tap { first: 0, second: 0, weight: 0 }; 3]));
+    assert!(taps(1, 3, 0..3).eq([Tap { first: 0, second: 0, weight: 0 }; 3]));
     let tap = |first, second, weight| Tap { first, second, weight };
     // Centres of the halves: a quarter from each pixel's.
     let twice = [tap(0, 0, 0), tap(0, 1, 64), tap(0, 1, 192), tap(1, 2, 64), tap(1, 2, 192), tap(2, 2, 0)];
-    assert!(taps(3, 6).eq(twice));
-    assert!(taps(4, 2).eq([tap(0, 1, 128), tap(2, 3, 128)]));
-    assert!(taps(6, 2).eq([tap(1, 2, 0), tap(4, 5, 0)]));
-    assert!(taps(5, 5).eq((0..5).map(|i| if i < 4 { tap(i, i + 1, 0) } else { tap(4, 4, 0) })));
+    assert!(taps(3, 6, 0..6).eq(twice));
+    assert!(taps(4, 2, 0..2).eq([tap(0, 1, 128), tap(2, 3, 128)]));
+    assert!(taps(6, 2, 0..2).eq([tap(1, 2, 0), tap(4, 5, 0)]));
+    assert!(taps(6, 2, 1..2).eq([tap(4, 5, 0)]));
+    assert!(taps(5, 5, 0..5).eq((0..5).map(|i| if i < 4 { tap(i, i + 1, 0) } else { tap(4, 4, 0) })));
 }
 
 #[test]
@@ -389,8 +394,8 @@ fn enlarged_and_shrunk_images_are_those_of_the_taps_in_each_channel() {
         let picture = Picture::new(from.0, from.1, channels, 4);
         let found = resize(picture.view(), Size::new(to.0, to.1)).unwrap();
         let at = |x: usize, y: usize, c: usize| u32::from(picture.data[(y * from.0 + x) * channels + c]);
-        for (y, down) in taps(from.1, to.1).enumerate() {
-            for (x, across) in taps(from.0, to.0).enumerate() {
+        for (y, down) in taps(from.1, to.1, 0..to.1).enumerate() {
+            for (x, across) in taps(from.0, to.0, 0..to.0).enumerate() {
                 for c in 0..channels {
                     let row = |y| {
                         at(across.first, y, c) * (256 - across.weight)

@@ -113,6 +113,8 @@ pub(super) struct Band {
     columns: Columns,
     /// Which two rows of the image make a row of the level; none if the level is the image.
     down: Vec<Tap>,
+    /// The heights of the image and the level that these are of.
+    heights: (usize, usize),
 }
 
 impl Band {
@@ -150,11 +152,17 @@ impl Band {
         self.wanted = wanted;
         self.size = size;
         self.stride = self.plane * source.channels;
-        self.down.clear();
-        if size != source.size {
-            let widths = (source.size.width, size.width);
-            self.columns.fill(widths, self.made.clone(), group, reach)?;
-            memory::extend(&mut self.down, taps(source.size.height, size.height))?;
+        let heights = (source.size.height, size.height);
+        if size == source.size {
+            self.down.clear();
+        } else {
+            self.columns.fill((source.size.width, size.width), self.made.clone(), group, reach)?;
+            // The next tile is mostly of the same level.
+            if self.heights != heights || self.down.is_empty() {
+                self.down.clear();
+                memory::extend(&mut self.down, taps(heights.0, heights.1, 0..heights.1))?;
+                self.heights = heights;
+            }
         }
         Ok(())
     }

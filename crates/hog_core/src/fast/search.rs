@@ -84,7 +84,7 @@ pub(crate) fn search(task: Task, threads: usize, interrupt: &Interrupt) -> Resul
     together(&search, threads.min(bands), interrupt)?;
     let mut found = std::mem::take(&mut *lock(&search.found));
     for level in &mut found {
-        level.sort_unstable_by_key(|&(x, y, _)| (y, x));
+        level.sort_unstable_by(|a, b| (a.1, a.0).cmp(&(b.1, b.0)).then(a.2.total_cmp(&b.2)));
     }
     Ok(found)
 }

@@ -18,8 +18,8 @@ pub struct Tap {
     pub weight: u32,
 }
 
-/// The taps of OpenCV's INTER_LINEAR_EXACT from `from` pixels to `to`.
-pub fn taps(from: usize, to: usize) -> impl ExactSizeIterator<Item = Tap> + Clone {
+/// The taps of OpenCV's INTER_LINEAR_EXACT from `from` pixels to `to`, those of the pixels `wanted`.
+pub fn taps(from: usize, to: usize, wanted: Range<usize>) -> impl ExactSizeIterator<Item = Tap> + Clone {
     let step = 1.0 / (to as f64 / from as f64);
     let tap = move |index: usize| {
         let position = step * (index as f64 + 0.5) - 0.5;
@@ -33,7 +33,7 @@ pub fn taps(from: usize, to: usize) -> impl ExactSizeIterator<Item = Tap> + Clon
         let weight = ((position - first) * 256.0).round_ties_even() as u32;
         Tap { first: first as usize, second: first as usize + 1, weight }
     };
-    (0..to).map(tap)
+    wanted.map(tap)
 }
 
 /// Refuses sizes that no image can have.
@@ -63,8 +63,8 @@ pub(crate) fn resize_part(
     let channels = image.channels();
     check(size)?;
     let part = Size::new(columns.len(), rows.len());
-    let across = memory::collect(taps(image.width(), size.width).skip(columns.start).take(part.width))?;
-    let down = taps(image.height(), size.height).skip(rows.start).take(part.height);
+    let across = memory::collect(taps(image.width(), size.width, columns))?;
+    let down = taps(image.height(), size.height, rows);
     let shrink_row = |y: usize, out: &mut Vec<u32>| {
         let row = image.row(y);
         out.clear();

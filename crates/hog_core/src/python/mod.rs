@@ -244,7 +244,7 @@ impl Hog {
         group_threshold: f64,
         mean_shift: bool,
         first_level: Option<Pair>,
-        guide: Option<(usize, f64, usize)>,
+        guide: Option<(u32, f64, (f64, f64))>,
         threads: Option<usize>,
     ) -> PyResult<(Array2<'py, i32>, Array1<'py, f64>)> {
         let search = Search { hit_threshold, win_stride, padding };
@@ -254,7 +254,7 @@ impl Hog {
         } else {
             Grouping::Similar(group_threshold as i32)
         };
-        let guide = guide.map(|(every, margin, reach)| Guide { every, margin, reach });
+        let guide = guide.map(|(halvings, margin, reach)| Guide { halvings, margin, reach });
         let threads = at_work(threads.unwrap_or_else(self::threads));
         let find = |hog: &crate::Hog, view: ImageView, interrupt: &Interrupt| {
             hog.detect_multi_scale(view, &search, &pyramid, grouping, guide, threads, interrupt)

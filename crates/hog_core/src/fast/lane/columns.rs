@@ -38,7 +38,7 @@ impl Columns {
     ) -> Result<()> {
         let count = wanted.len();
         self.taps.clear();
-        memory::extend(&mut self.taps, taps(from, to).skip(wanted.start).take(count))?;
+        memory::extend(&mut self.taps, taps(from, to, wanted))?;
         let spanned = |taps: &[Tap]| match taps {
             [first, .., last] => last.second + 1 - first.first,
             _ => 2,

@@ -1,4 +1,4 @@
-"""A child forked while threads detect works: no lock of ours is waited for in it."""
+"""A child forked while threads detect and describe works: no lock of ours is waited for in it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,17 @@ FORKING = """
 threads, forks = {threads}, {forks}
 limo_hog.set_num_threads(threads)
 hog, image = armed(), people(96, 160)
-wanted = hog.detectMultiScale(image, -0.5, scale=1.2)
+crops = np.stack([image[:128, :64]] * 12)
+
+def answers():
+    return *hog.detectMultiScale(image, -0.5, scale=1.2), limo_hog.describe(crops)
+
+wanted = answers()
 stop = threading.Event()
 
 def busy():
     while not stop.is_set():
-        hog.detectMultiScale(image, -0.5, scale=1.2)
+        answers()
 
 for _ in range(4):
     threading.Thread(target=busy, daemon=True).start()
@@ -27,7 +32,7 @@ for number in range(forks):
     if child == 0:
         code = 1
         try:
-            found = hog.detectMultiScale(image, -0.5, scale=1.2)
+            found = answers()
             code = 0 if all(np.array_equal(a, b) for a, b in zip(found, wanted)) else 2
         finally:
             os._exit(code)
@@ -54,12 +59,12 @@ def assert_every_child_answers(threads: int, forks: int, timeout: float) -> None
 
 
 @pytest.mark.parametrize("threads", [0, 1])
-def test_a_child_forked_while_threads_detect_answers(threads: int) -> None:
+def test_a_child_forked_while_threads_detect_and_describe_answers(threads: int) -> None:
     assert_every_child_answers(threads, forks=200, timeout=280)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("threads", [0, 1])
-def test_five_thousand_children_forked_while_threads_detect_answer(threads: int) -> None:
+def test_five_thousand_children_forked_while_threads_detect_and_describe_answer(threads: int) -> None:
     assert_every_child_answers(threads, forks=5000, timeout=3500)

@@ -1,19 +1,20 @@
-//! Work on what the caller only borrowed: threads of one call, as those that stay from call to call may not borrow.
+//! Work on what the caller only borrowed, by the threads that stay from call to call.
+//!
+//! These live longer than what is borrowed, so its lifetime has to be hidden from the compiler: the one `unsafe` of this
+//! module.
+#![allow(unsafe_code, reason = "threads that stay are lent what does not")]
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-use std::thread::{self, Builder, Thread};
-use std::time::Duration;
+use std::mem;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 
-/// How often the calling thread looks for an interrupt while others finish.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+use super::team::{Shared, together};
 
 /// `work` of every item on up to `threads` threads; the first error ends it on all of them.
 ///
-/// Making a thread takes about 50 µs: items should be worth it. Threads that cannot be had are done without.
+/// Waking a thread takes about 10 µs: items should be worth it. Threads that cannot be had are done without.
 pub(crate) fn for_each<T: Send>(
     items: Vec<T>,
     threads: usize,
@@ -21,65 +22,42 @@ pub(crate) fn for_each<T: Send>(
     work: impl Fn(T, &Interrupt) -> Result<()> + Sync,
 ) -> Result<()> {
     let threads = threads.min(items.len());
-    let (queue, first, stopped) = (Mutex::new(items.into_iter()), Mutex::new(Ok(())), AtomicBool::new(false));
+    let queue = Mutex::new(items.into_iter());
     let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let end = |result: Result<()>| {
-        if result.is_err() {
-            let mut first = first.lock().unwrap_or_else(PoisonError::into_inner);
-            if first.is_ok() {
-                *first = result;
-            }
-            stopped.store(true, Ordering::Relaxed);
-        }
-    };
-    let take_part = |interrupt: Interrupt| {
+    let part = |interrupt: &Interrupt| {
         while let Some(item) = next() {
-            let result = interrupt.check().and_then(|()| work(item, &interrupt));
-            if result.is_err() {
-                return end(result);
-            }
+            interrupt.check()?;
+            work(item, interrupt)?;
         }
+        Ok(())
     };
-    let (helpers, caller) = (AtomicUsize::new(0), thread::current());
-    thread::scope(|scope| {
-        for _ in 1..threads {
-            helpers.fetch_add(1, Ordering::Relaxed);
-            let helper = || {
-                let _leaving = Leaving { helpers: &helpers, caller: &caller };
-                take_part(Interrupt::NEVER.or(&stopped));
-            };
-            if Builder::new().spawn_scoped(scope, helper).is_err() {
-                helpers.fetch_sub(1, Ordering::Relaxed);
-                break;
-            }
-        }
-        take_part(interrupt.or(&stopped));
-        while helpers.load(Ordering::Acquire) > 0 {
-            thread::park_timeout(LOOK_EVERY);
-            end(interrupt.check());
-        }
-    });
-    first.into_inner().unwrap_or_else(PoisonError::into_inner)
+    let part: &Part = &part;
+    // SAFETY: what `part` borrows outlives this function, and when `together` returns no helper holds it any more; nor does
+    // `together` unwind before that.
+    let part: &'static Part<'static> = unsafe { mem::transmute::<&Part, &'static Part<'static>>(part) };
+    together(&Arc::new(Borrowed(part)), threads, interrupt)
 }
 
-/// Tells the calling thread, when dropped, that a helper has ended.
-struct Leaving<'a> {
-    helpers: &'a AtomicUsize,
-    caller: &'a Thread,
-}
+/// A thread's part of the work.
+type Part<'a> = dyn Fn(&Interrupt) -> Result<()> + Sync + 'a;
 
-impl Drop for Leaving<'_> {
-    fn drop(&mut self) {
-        self.helpers.fetch_sub(1, Ordering::Release);
-        self.caller.unpark();
+struct Borrowed(&'static Part<'static>);
+
+impl Shared for Borrowed {
+    fn work(&self, interrupt: &Interrupt) -> Result<()> {
+        (self.0)(interrupt)
     }
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test may fail")]
+#[allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 mod tests {
     use super::*;
     use crate::error::HogError;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+    use std::thread;
+    use std::time::Duration;
 
     #[test]
     fn every_item_is_worked_on_once() {
@@ -92,6 +70,34 @@ mod tests {
             for_each(numbers.iter_mut().collect(), threads, &Interrupt::NEVER, work).unwrap();
             assert_eq!(numbers, [2; 100]);
         }
+    }
+
+    #[test]
+    fn no_helper_is_at_work_on_what_it_was_lent_when_the_caller_unwinds() {
+        let (caller, is_over) = (thread::current().id(), AtomicBool::new(false));
+        let (at_work, begun) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let ask =
+            || if begun.load(Ordering::SeqCst) > 0 { panic!("while a helper is at work") } else { false };
+        let work = |_: u8, interrupt: &Interrupt| {
+            if thread::current().id() == caller {
+                thread::sleep(Duration::from_millis(5));
+                return Ok(());
+            }
+            at_work.fetch_add(1, Ordering::SeqCst);
+            begun.fetch_add(1, Ordering::SeqCst);
+            while interrupt.check().is_ok() && !is_over.load(Ordering::SeqCst) {
+                thread::yield_now();
+            }
+            at_work.fetch_sub(1, Ordering::SeqCst);
+            Ok(())
+        };
+        // (Again, where the calling thread takes both items before a helper comes.)
+        let left = (0..100).find_map(|_| {
+            let all = || for_each(vec![0, 1], 2, &Interrupt::when(&ask), work);
+            catch_unwind(AssertUnwindSafe(all)).is_err().then(|| at_work.load(Ordering::SeqCst))
+        });
+        is_over.store(true, Ordering::SeqCst);
+        assert_eq!(left, Some(0));
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub(crate) trait Shared: Send + Sync + 'static {
 
 /// Does `work` on this thread and up to `threads` − 1 helpers. The first error ends it on all of them.
 ///
-/// Helpers that cannot be had are done without. When this returns, no helper holds `work` any more.
+/// Helpers that cannot be had are done without. When this returns or unwinds, no helper holds `work` any more.
 pub(crate) fn together<W: Shared>(work: &Arc<W>, threads: usize, interrupt: &Interrupt) -> Result<()> {
     if threads <= 1 {
         return work.work(interrupt);
@@ -47,9 +47,7 @@ pub(crate) fn together<W: Shared>(work: &Arc<W>, threads: usize, interrupt: &Int
         lock(&team.board).postings.retain(|posting| !Arc::ptr_eq(&posting.call, &call));
         while presence.helpers.load(Ordering::Acquire) > 0 {
             thread::park_timeout(LOOK_EVERY);
-            if let Err(error) = interrupt.check() {
-                call.end(Ok(Err(error)));
-            }
+            call.end(catch_unwind(AssertUnwindSafe(|| interrupt.check())));
         }
     }
     let outcome = std::mem::replace(&mut *lock(&call.outcome), Ok(Ok(())));

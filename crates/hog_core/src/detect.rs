@@ -340,11 +340,7 @@ impl Hog {
             threshold,
         };
         let threshold = how.search.hit_threshold;
-        let whole = |(level, (_, grid)): (usize, &(Size, Grid))| Region::whole(level, grid);
-        let Some(guide) = how.guide else {
-            let regions = memory::collect(grids.iter().enumerate().map(whole))?;
-            return fast::search(task(regions, threshold), how.threads, interrupt);
-        };
+        let guide = how.guide.unwrap_or_default();
         let mut found = memory::filled(grids.len(), Vec::new())?;
         for step in guide.steps() {
             let regions = guide.regions(step, levels, &grids, &found, threshold, self.spec())?;

@@ -14,8 +14,8 @@ use crate::memory;
 use crate::params::HogSpec;
 use crate::pyramid::{Grid, Level};
 
-/// How the search is guided.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How the search is guided; by default it is not: every level is searched whole.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Guide {
     /// How often the levels between two that are searched whole are halved: of 2 to this power, one is.
     pub halvings: u32,

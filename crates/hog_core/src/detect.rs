@@ -80,7 +80,8 @@ impl Hog {
         let plan = geometry.as_ref().zip(svm.as_ref());
         let plan = plan.and_then(|(geometry, svm)| fast::plan(backend, geometry, svm));
         let separable = svm.as_ref().map(|svm| separable::Plan::new(&spec, svm)).transpose()?.flatten();
-        let exact = Exact { tables: Tables::new(&spec)?, spec, svm, separable };
+        let exact =
+            Exact { tables: Tables::with_kernel(&spec, fast::row_kernel(backend))?, spec, svm, separable };
         Ok(Self { exact: Arc::new(exact), geometry, plan: plan.map(Arc::new), backend })
     }
 
@@ -118,7 +119,7 @@ impl Hog {
     ) -> Result<()> {
         let [left, top, ..] = borders;
         let padding = Padding { left, top, size: Self::gradient_size(image, borders)? };
-        fast::gradient(self.backend, image, padding, self.spec(), interrupt, out)
+        exact::gradient(image, padding, self.spec(), self.exact.tables.kernel, interrupt, out)
     }
 
     /// Elements of the descriptors of the windows at `locations` (of all windows if none are given).

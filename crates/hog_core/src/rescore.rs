@@ -74,7 +74,15 @@ impl Scorer<'_> {
             let level = LevelImage::new(image, *size)?;
             if let Some(plan) = self.separable {
                 let least = self.hit_threshold - plan.score_error_bound();
-                let found = separable::search(level.view()?, grid, self.spec, plan, least, interrupt)?;
+                let found = separable::search(
+                    level.view()?,
+                    grid,
+                    self.spec,
+                    self.tables.kernel,
+                    plan,
+                    least,
+                    interrupt,
+                )?;
                 return memory::collect(
                     self.rescored(level.view()?, *size, grid, found, interrupt)?
                         .iter()

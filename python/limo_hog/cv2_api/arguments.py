@@ -18,6 +18,7 @@ Pairs = Sequence[Pair] | NDArray[np.integer[Any]]
 #: The empty tuple that OpenCV returns in place of an empty array.
 Nothing = tuple[()]
 
+_UINT8 = np.dtype(np.uint8)
 _INT_MAX = 2**31 - 1
 _SHOWN = 60
 
@@ -37,7 +38,7 @@ def pixels(image: Any) -> NDArray[np.uint8]:
         raise ImageTypeError(f"an image is a uint8 numpy array; this is a {type(image).__name__}")
     if image.size == 0:
         raise ImageError(f"the image is empty: its shape is {image.shape}")
-    if image.dtype != np.uint8:
+    if image.dtype != _UINT8:
         raise ImageTypeError(
             f"the image's pixels are {image.dtype}; uint8 (0 to 255) is wanted: scale and astype(uint8)"
         )
@@ -76,13 +77,12 @@ def pair(name: str, value: Pair | None, default: tuple[int, int] = (0, 0)) -> tu
         # (An array of no dimensions has a `__len__` that raises.)
         if value is None or (hasattr(value, "__len__") and len(value) == 0):
             return default
-        x, y = value
-        found = operator.index(x), operator.index(y)
+        x, y = map(operator.index, value)
     except (TypeError, ValueError):
         raise ParameterTypeError(f"{name} is {shown(value)}; two integers (x, y) are wanted") from None
-    if max(map(abs, found)) > _INT_MAX:
-        raise ParameterError(f"{name} is {shown(found)}; at most {_INT_MAX} is allowed")
-    return found
+    if abs(x) > _INT_MAX or abs(y) > _INT_MAX:
+        raise ParameterError(f"{name} is {shown((x, y))}; at most {_INT_MAX} is allowed")
+    return x, y
 
 
 def places(name: str, value: Pairs | None) -> list[tuple[int, int]] | None:

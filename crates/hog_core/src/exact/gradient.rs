@@ -12,7 +12,7 @@ use crate::memory;
 use crate::params::HogSpec;
 
 use super::isa::{MulAdd, Work, run};
-use super::kernel::{Loops, RowKernel, RowVotes, Turn};
+use super::kernel::{RowKernel, RowVotes, Turn};
 use super::polar::polar;
 
 /// A pixel's two votes: `shares` for `bins`.
@@ -70,6 +70,7 @@ pub(super) fn votes(
     padding: Padding,
     region: Region,
     spec: &HogSpec,
+    kernel: &dyn RowKernel,
     interrupt: &Interrupt,
 ) -> Result<Votes> {
     let mut pixels = memory::with_room(region.width.saturating_mul(region.height))?;
@@ -77,7 +78,7 @@ pub(super) fn votes(
         let votes = row.shares.iter().zip(&*row.bins);
         pixels.extend(votes.map(|(&shares, &bins)| Vote { shares, bins }));
     };
-    each_row(image, padding, region, spec, interrupt, &mut put)?;
+    each_row(image, padding, region, spec, kernel, interrupt, &mut put)?;
     Ok(Votes { width: region.width, pixels })
 }
 
@@ -87,13 +88,14 @@ pub(crate) fn each_row(
     padding: Padding,
     region: Region,
     spec: &HogSpec,
+    kernel: &dyn RowKernel,
     interrupt: &Interrupt,
     put: &mut dyn FnMut(usize, &RowVotes),
 ) -> Result<()> {
     let mut shares = memory::filled(region.width, [0.0; 2])?;
     let mut bins = memory::filled(region.width, [0; 2])?;
     let row = RowVotes { shares: &mut shares, bins: &mut bins };
-    run(Rows::new(image, padding, region, spec, &Loops, interrupt, row, &mut |y, row| put(y, row))?)
+    run(Rows::new(image, padding, region, spec, kernel, interrupt, row, &mut |y, row| put(y, row))?)
 }
 
 /// The work of [`each_row`] and [`gradient`], and its memory.
@@ -188,9 +190,10 @@ struct Source<'a> {
     width: usize,
     left: i64,
     top: i64,
-    /// Columns that lie in the image, and where the others read.
+    /// Columns that lie in the image.
     inside: Range<usize>,
-    mirrored: Vec<(usize, usize)>,
+    /// Columns so far outside that what they mirror is no column of the region, and the pixels that they read.
+    beyond: Vec<(usize, usize)>,
 }
 
 impl<'a> Source<'a> {
@@ -200,13 +203,15 @@ impl<'a> Source<'a> {
         let within = |x: i64| x.clamp(0, width as i64) as usize;
         let inside = within(-left)..within(image.width() as i64 - left);
         let outside = (0..inside.start).chain(inside.end..width);
+        let beyond =
+            outside.filter(|&i| i + inside.len() <= inside.start || i + 1 >= inside.end + inside.len());
         Ok(Self {
             image,
             gamma_correction: spec.gamma_correction,
             width,
             left,
             top: region.y as i64 - 1 - padding.top,
-            mirrored: memory::collect(outside.map(|i| (i, reflect_101(left + i as i64, image.width()))))?,
+            beyond: memory::collect(beyond.map(|i| (i, reflect_101(left + i as i64, image.width()))))?,
             inside,
         })
     }
@@ -258,14 +263,12 @@ impl<'a> Source<'a> {
             }
         }
         for (c, plane) in out.chunks_exact_mut(*width).enumerate() {
-            for &(to, from) in &self.mirrored {
-                // Most have been made already.
-                let made = (from as i64 - self.left) as usize;
-                plane[to] = if self.inside.contains(&made) {
-                    plane[made]
-                } else {
-                    value(row[from * image.channels() + c])
-                };
+            let (left, rest) = plane.split_at_mut(self.inside.start);
+            let (made, right) = rest.split_at_mut(self.inside.len());
+            left.iter_mut().rev().zip(made.iter().skip(1)).for_each(|(to, from)| *to = *from);
+            right.iter_mut().zip(made.iter().rev().skip(1)).for_each(|(to, from)| *to = *from);
+            for &(to, from) in &self.beyond {
+                plane[to] = value(row[from * image.channels() + c]);
             }
         }
     }
@@ -353,6 +356,7 @@ fn byte(whole: f32) -> u8 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::kernel::Loops;
     use super::*;
     use crate::params::HogParams;
 
@@ -367,11 +371,10 @@ mod tests {
                 let Size { width, height } = padding.size;
                 let all = Region { x: 0, y: 0, width, height };
                 let never = &Interrupt::NEVER;
-                let whole = votes(image, padding, all, &spec, never).unwrap();
+                let whole = votes(image, padding, all, &spec, &Loops, never).unwrap();
                 for x in 0..width {
-                    let part =
-                        votes(image, padding, Region { x, y: 2, width: width - x, height: 2 }, &spec, never)
-                            .unwrap();
+                    let region = Region { x, y: 2, width: width - x, height: 2 };
+                    let part = votes(image, padding, region, &spec, &Loops, never).unwrap();
                     for (i, vote) in part.pixels.iter().enumerate() {
                         let there = whole.pixels[(2 + i / part.width) * width + x + i % part.width];
                         assert_eq!((vote.shares, vote.bins), (there.shares, there.bins));

@@ -1,5 +1,7 @@
 //! What kernels may do for the gradient's loops.
 
+use std::fmt::Debug;
+
 /// The votes of a row of pixels, or of more.
 pub struct RowVotes<'a> {
     /// What the two bins get: shares of the gradient's magnitude.
@@ -18,7 +20,7 @@ pub(crate) struct Turn {
 }
 
 /// Kernels that make parts of a row as the loops here would, to the last bit; what they leave is made by the loops.
-pub(crate) trait RowKernel {
+pub(crate) trait RowKernel: Debug + Sync {
     /// Makes votes of the first `columns` columns, where the lowest channel wins among equals and angles are rounded as
     /// OpenCV's vector code rounds them; gives how many it has made.
     ///
@@ -38,6 +40,7 @@ pub(crate) trait RowKernel {
 }
 
 /// No kernels: the loops make everything.
+#[derive(Debug)]
 pub(crate) struct Loops;
 
 impl RowKernel for Loops {

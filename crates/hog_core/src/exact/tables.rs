@@ -1,21 +1,31 @@
-//! Tables of a geometry: the value of each pixel after gamma correction, and its weight in each cell of a block.
+//! Tables of a geometry: the value of each pixel after gamma correction, and its weight in each cell of a block; and the
+//! kernels that help with its gradient.
 
 use crate::error::Result;
 use crate::geometry::Size;
 use crate::memory;
 use crate::params::HogSpec;
 
+use super::kernel::{Loops, RowKernel};
+
 /// The tables of one geometry.
 #[derive(Debug, Clone)]
 pub struct Tables {
+    /// Makes the votes of what it can of a row, to the same bits as the loops.
+    pub(crate) kernel: &'static dyn RowKernel,
     /// Which pixel of a block adds how much to which cell.
     pub(super) weights: BlockWeights,
 }
 
 impl Tables {
-    /// The tables of the geometry `spec`.
+    /// The tables of the geometry `spec`, without kernels.
     pub fn new(spec: &HogSpec) -> Result<Self> {
-        Ok(Self { weights: BlockWeights::new(spec.block, spec.cell, spec.sigma)? })
+        Self::with_kernel(spec, &Loops)
+    }
+
+    /// The tables of the geometry `spec`, and a kernel for its gradient.
+    pub(crate) fn with_kernel(spec: &HogSpec, kernel: &'static dyn RowKernel) -> Result<Self> {
+        Ok(Self { kernel, weights: BlockWeights::new(spec.block, spec.cell, spec.sigma)? })
     }
 }
 

@@ -49,7 +49,7 @@ impl<'a> BlockRows<'a> {
         for place in &mut places {
             *place = columns.partition_point(|column| column < place);
         }
-        let votes = votes(image, grid.padding(), grid.whole(), spec, interrupt)?;
+        let votes = votes(image, grid.padding(), grid.whole(), spec, tables.kernel, interrupt)?;
         Ok(Self { spec, tables, votes, columns, places, rows: BTreeMap::new() })
     }
 
@@ -163,7 +163,7 @@ impl<'a> Windows<'a> {
         let (x, width) = along(|place| place.0, spec.win.width);
         let (y, height) = along(|place| place.1, spec.win.height);
         let region = Region { x, y, width, height };
-        let votes = votes(image, padding, region, spec, interrupt)?;
+        let votes = votes(image, padding, region, spec, tables.kernel, interrupt)?;
         let firsts = memory::with_room(spec.blocks.area())?;
         let descriptor = memory::filled(spec.descriptor_len(), 0.0)?;
         Ok(Self { spec, tables, region, votes, firsts, descriptor })

@@ -1,10 +1,9 @@
 //! Which kernels serve a call: every entry to the fast path.
 
 use crate::error::Result;
-use crate::exact::{self, Loops, RowKernel, RowVotes, Svm};
-use crate::geometry::{Padding, Size};
+use crate::exact::{Loops, RowKernel, Svm};
+use crate::geometry::Size;
 use crate::image::ImageView;
-use crate::interrupt::Interrupt;
 use crate::params::HogSpec;
 use crate::pyramid::Grid;
 
@@ -124,23 +123,15 @@ pub(crate) fn resize_planes(
     on_lane(backend, Resize(source, resized, size))
 }
 
-/// [`exact::gradient`], by kernels where there are any.
-pub(crate) fn gradient(
-    backend: Backend,
-    image: ImageView,
-    padding: Padding,
-    spec: &HogSpec,
-    interrupt: &Interrupt,
-    out: RowVotes,
-) -> Result<()> {
-    let on = |kernel: &dyn RowKernel| exact::gradient(image, padding, spec, kernel, interrupt, out);
+/// The kernel for the gradient's loops.
+pub(crate) fn row_kernel(backend: Backend) -> &'static dyn RowKernel {
     match backend {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a backend is only chosen where it is available.
-        Backend::Avx512 => on(&Votes(unsafe { Avx512::new() })),
+        Backend::Avx512 => const { &Votes(unsafe { Avx512::new() }) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => on(&Votes(unsafe { Avx2::new() })),
-        _ => on(&Loops),
+        Backend::Avx2 => const { &Votes(unsafe { Avx2::new() }) },
+        _ => &Loops,
     }
 }

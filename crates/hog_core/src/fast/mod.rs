@@ -1,8 +1,8 @@
 //! The kernels: the exact path's pipeline on vectors of cells, for one instruction set each, and the crate's `unsafe`.
 //!
 //! `layout` and `lane` hold the constants and the vector that every kernel uses; `plan` holds a detector's constants; `rows`, `strip`
-//! and `score` are the stages, which `tile` composes; `search` shares tiles among threads; `describe` serves crops, `votes` the gradient alone; `dispatch` chooses the instruction
-//! set.
+//! and `score` are the stages, which `tile` composes; `search` shares tiles among threads; `describe` serves
+//! crops, `votes` the gradient alone; `dispatch` chooses the instruction set.
 //! docs/simd.md explains how they work.
 #![allow(unsafe_code, reason = "intrinsics, and pointers into rows that overlap")]
 
@@ -22,7 +22,7 @@ mod votes;
 
 pub use backend::Backend;
 pub(crate) use describe::{Crops, describe};
-pub(crate) use dispatch::{fill_planes, geometry, gradient, plan, resize_planes, serves};
+pub(crate) use dispatch::{fill_planes, geometry, plan, resize_planes, row_kernel, serves};
 pub(crate) use plan::{Geometry, Plan};
 pub(crate) use rows::Planes;
 pub(crate) use search::{Region, Task, search, trim};

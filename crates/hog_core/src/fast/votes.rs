@@ -1,6 +1,7 @@
 //! A row's gradients and votes with the exact path's roundings, by vectors: for `computeGradient`.
 
 use std::arch::x86_64::*;
+use std::fmt::Debug;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use crate::exact::{RowKernel, RowVotes, Turn, polar};
@@ -8,7 +9,7 @@ use crate::exact::{RowKernel, RowVotes, Turn, polar};
 use super::lane::{Kernel, Lane, avx2::Avx2, avx512::Avx512};
 
 /// What the votes need beyond a [`Lane`], where multiply-add is fused: without it OpenCV rounds otherwise.
-pub(super) trait VoteLane: Lane {
+pub(super) trait VoteLane: Lane + Debug + Sync {
     /// Writes the square root of each of `pixels`, and gives whether it has: where that is faster than the CPU's own.
     fn roots(self, pixels: &[u8], roots: &mut [f32]) -> bool;
     fn floor(self, x: Self::F) -> Self::F;
@@ -23,6 +24,7 @@ pub(super) trait VoteLane: Lane {
 }
 
 /// The kernels of an instruction set.
+#[derive(Debug)]
 pub(super) struct Votes<L>(pub L);
 
 impl<L: VoteLane> RowKernel for Votes<L> {

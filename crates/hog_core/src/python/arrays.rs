@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use numpy::{Element, PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::ndarray::{Dim, Dimension};
+use numpy::{Element, PyArray, PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -12,6 +13,7 @@ use crate::error::ImageError;
 use crate::{HogError, ImageView, memory};
 
 pub(super) type Array1<'py, T> = Bound<'py, PyArray1<T>>;
+type ArrayOf<'py, T, const N: usize> = Bound<'py, PyArray<T, Dim<[usize; N]>>>;
 
 /// Numbers as an array of numpy's.
 pub(super) fn array1<T: Element>(
@@ -22,23 +24,40 @@ pub(super) fn array1<T: Element>(
     Ok(PyArray1::from_vec(py, values))
 }
 
-/// `len` numbers of any value in memory of numpy's.
-pub(super) fn empty<T: Element>(py: Python<'_>, len: usize) -> PyResult<Array1<'_, T>> {
+/// Numbers of any value in memory of numpy's.
+pub(super) fn empty<T: Element, const N: usize>(
+    py: Python<'_>,
+    shape: [usize; N],
+) -> PyResult<ArrayOf<'_, T, N>>
+where
+    Dim<[usize; N]>: Dimension,
+{
     static EMPTY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    made(py, EMPTY.import(py, "numpy", "empty")?, len)
+    made(py, EMPTY.import(py, "numpy", "empty")?, shape)
 }
 
-/// `len` zeros in memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
-pub(super) fn zeros(py: Python<'_>, len: usize) -> PyResult<Array1<'_, f32>> {
+/// Zeros in memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
+pub(super) fn zeros<const N: usize>(py: Python<'_>, shape: [usize; N]) -> PyResult<ArrayOf<'_, f32, N>>
+where
+    Dim<[usize; N]>: Dimension,
+{
     static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    made(py, ZEROS.import(py, "numpy", "zeros")?, len)
+    made(py, ZEROS.import(py, "numpy", "zeros")?, shape)
 }
 
-/// `len` numbers as a function of numpy's makes them. (`PyArray1::zeros` would panic where there is no memory.)
-fn made<'py, T: Element>(py: Python<'py>, make: &Bound<'py, PyAny>, len: usize) -> PyResult<Array1<'py, T>> {
-    match make.call1((len, T::get_dtype(py))) {
+/// Numbers as a function of numpy's makes them. (`PyArray::zeros` would panic where there is no memory.)
+fn made<'py, T: Element, const N: usize>(
+    py: Python<'py>,
+    make: &Bound<'py, PyAny>,
+    shape: [usize; N],
+) -> PyResult<ArrayOf<'py, T, N>>
+where
+    Dim<[usize; N]>: Dimension,
+{
+    match make.call1((shape, T::get_dtype(py))) {
         Err(error) if error.is_instance_of::<PyMemoryError>(py) => {
-            Err(raised(py, &HogError::Memory { bytes: len.saturating_mul(size_of::<T>()) }))
+            let bytes = shape.iter().fold(size_of::<T>(), |bytes, &side| bytes.saturating_mul(side));
+            Err(raised(py, &HogError::Memory { bytes }))
         }
         array => Ok(array?.cast_into()?),
     }

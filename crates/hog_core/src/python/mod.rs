@@ -67,27 +67,36 @@ fn detached<R: Send>(
     py: Python<'_>,
     work: impl FnOnce(&Interrupt) -> crate::Result<R> + Send,
 ) -> PyResult<R> {
-    // Python handles signals in its main thread alone: any other would take the GIL for nothing.
-    let threading = py.import("threading")?;
-    let main = threading.call_method0("main_thread")?.getattr("ident")?;
-    let is_main = threading.call_method0("get_ident")?.eq(main)?;
     let (found, signal) = py.detach(|| {
         let (looked, signal) = (Cell::new(Instant::now()), Cell::new(None));
+        // Python handles signals in its main thread alone: any other would take the GIL for nothing, time and again.
+        let is_main = Cell::new(None);
         let ask = || {
-            if looked.get().elapsed() < LOOK_EVERY {
+            if is_main.get() == Some(false) || looked.get().elapsed() < LOOK_EVERY {
                 return false;
             }
-            let seen = Python::attach(|py| py.check_signals());
+            let seen = Python::attach(|py| {
+                if is_main.get().is_none() {
+                    is_main.set(Some(is_main_thread(py)?));
+                }
+                py.check_signals()
+            });
             looked.set(Instant::now());
             seen.map_err(|error| signal.set(Some(error))).is_err()
         };
-        let found = work(&if is_main { Interrupt::when(&ask) } else { Interrupt::NEVER });
+        let found = work(&Interrupt::when(&ask));
         (found, signal.take())
     });
     match signal {
         Some(error) => Err(error),
         None => found.map_err(|error| raised(py, &error)),
     }
+}
+
+fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
+    let threading = py.import("threading")?;
+    let main = threading.call_method0("main_thread")?.getattr("ident")?;
+    threading.call_method0("get_ident")?.eq(main)
 }
 
 /// A geometry with or without an SVM; immutable, so threads may share it.
@@ -160,16 +169,16 @@ impl Hog {
         let view = pixels.view().map_err(raise)?;
         let size = crate::Hog::gradient_size(view, padding).map_err(raise)?;
         // Every number is written: zeros would be written twice.
-        let shares = empty::<f32>(py, 2 * size.area())?;
-        let bins = empty::<u8>(py, 2 * size.area())?;
+        let shape = [size.height, size.width, 2];
+        let (shares, bins) = (empty(py, shape)?, empty(py, shape)?);
         let (mut of_shares, mut of_bins) = (shares.readwrite(), bins.readwrite());
         let out = RowVotes {
             shares: of_shares.as_slice_mut()?.as_chunks_mut().0,
             bins: of_bins.as_slice_mut()?.as_chunks_mut().0,
         };
         detached(py, |interrupt| self.inner.gradient(view, padding, interrupt, out))?;
-        let shape = [size.height, size.width, 2];
-        Ok((shares.reshape(shape)?, bins.reshape(shape)?))
+        drop((of_shares, of_bins));
+        Ok((shares, bins))
     }
 
     fn compute<'py>(
@@ -185,7 +194,7 @@ impl Hog {
         let pixels = Pixels::new(py, &image)?;
         let (view, locations) = (pixels.view().map_err(raise)?, locations.as_deref());
         let len = self.inner.compute_len(view, &search, locations).map_err(raise)?;
-        let descriptors = zeros(py, len)?;
+        let descriptors = zeros(py, [len])?;
         let mut out = descriptors.readwrite();
         let out = out.as_slice_mut()?;
         detached(py, |interrupt| self.inner.compute(view, &search, locations, interrupt, out))?;
@@ -207,11 +216,11 @@ impl Hog {
         };
         let elements = spec.descriptor_len();
         let data = contiguous(py, &crops)?;
-        let descriptors = zeros(py, count.saturating_mul(elements))?;
+        let descriptors = zeros(py, [count, elements])?;
         let mut out = descriptors.readwrite();
         let out = out.as_slice_mut()?;
         detached(py, |interrupt| self.inner.describe(&data, channels, at_work(threads()), interrupt, out))?;
-        descriptors.reshape([count, elements])
+        Ok(descriptors)
     }
 
     fn detect<'py>(

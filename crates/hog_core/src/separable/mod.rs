@@ -26,6 +26,7 @@ pub(crate) fn search(
     image: ImageView,
     grid: &Grid,
     spec: &HogSpec,
+    kernel: &dyn exact::RowKernel,
     plan: &Plan,
     least: f64,
     interrupt: &Interrupt,
@@ -44,7 +45,7 @@ pub(crate) fn search(
             lattice.add_row(y, votes, &mut scores);
         }
     };
-    exact::each_row(image, grid.padding(), grid.whole(), spec, interrupt, &mut add)?;
+    exact::each_row(image, grid.padding(), grid.whole(), spec, kernel, interrupt, &mut add)?;
     for lattice in &mut lattices {
         lattice.end(&mut scores);
     }

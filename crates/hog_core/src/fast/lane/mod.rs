@@ -12,13 +12,13 @@ macro_rules! isa {
 macro_rules! token {
     ($name:ident, $features:literal) => {
         #[doc = concat!("Proof that the CPU has ", $features, ".")]
-        #[derive(Clone, Copy)]
+        #[derive(Debug, Clone, Copy)]
         pub(in crate::fast) struct $name(());
 
         impl $name {
             #[doc = concat!("# Safety\nThe CPU has ", $features, ".")]
             #[inline(always)]
-            pub(in crate::fast) unsafe fn new() -> Self {
+            pub(in crate::fast) const unsafe fn new() -> Self {
                 Self(())
             }
         }

@@ -53,7 +53,7 @@ fn threads_that_lend_their_crops_to_the_same_helpers_get_the_descriptors_of_each
         for seed in 0..4u32 {
             let describe = &describe;
             scope.spawn(move || {
-                let crops: Vec<u8> = (0..20 * 64 * 128).map(|i| (i * (i / 71 + seed) >> 5) as u8).collect();
+                let crops: Vec<u8> = (0..20 * 64 * 128).map(|i| ((i * (i / 71 + seed)) >> 5) as u8).collect();
                 let wanted = describe(&crops, 1);
                 for threads in [2, 3, 2, 4] {
                     assert_eq!(describe(&crops, threads), wanted);

@@ -13,7 +13,6 @@ use crate::error::ImageError;
 use crate::{HogError, ImageView, memory};
 
 pub(super) type Array1<'py, T> = Bound<'py, PyArray1<T>>;
-type ArrayOf<'py, T, const N: usize> = Bound<'py, PyArray<T, Dim<[usize; N]>>>;
 
 /// Numbers as an array of numpy's.
 pub(super) fn array1<T: Element>(
@@ -24,37 +23,17 @@ pub(super) fn array1<T: Element>(
     Ok(PyArray1::from_vec(py, values))
 }
 
-/// Numbers of any value in memory of numpy's.
+/// Numbers of any value in memory of numpy's, which asks for large pages: small ones take longer to come than to be
+/// filled. (`PyArray::new` would panic where there is no memory.)
 pub(super) fn empty<T: Element, const N: usize>(
     py: Python<'_>,
     shape: [usize; N],
-) -> PyResult<ArrayOf<'_, T, N>>
+) -> PyResult<Bound<'_, PyArray<T, Dim<[usize; N]>>>>
 where
     Dim<[usize; N]>: Dimension,
 {
     static EMPTY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    made(py, EMPTY.import(py, "numpy", "empty")?, shape)
-}
-
-/// Zeros in memory of numpy's, which asks for large pages: small ones take longer to come than to be filled.
-pub(super) fn zeros<const N: usize>(py: Python<'_>, shape: [usize; N]) -> PyResult<ArrayOf<'_, f32, N>>
-where
-    Dim<[usize; N]>: Dimension,
-{
-    static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    made(py, ZEROS.import(py, "numpy", "zeros")?, shape)
-}
-
-/// Numbers as a function of numpy's makes them. (`PyArray::zeros` would panic where there is no memory.)
-fn made<'py, T: Element, const N: usize>(
-    py: Python<'py>,
-    make: &Bound<'py, PyAny>,
-    shape: [usize; N],
-) -> PyResult<ArrayOf<'py, T, N>>
-where
-    Dim<[usize; N]>: Dimension,
-{
-    match make.call1((shape, T::get_dtype(py))) {
+    match EMPTY.import(py, "numpy", "empty")?.call1((shape, T::get_dtype(py))) {
         Err(error) if error.is_instance_of::<PyMemoryError>(py) => {
             let bytes = shape.iter().fold(size_of::<T>(), |bytes, &side| bytes.saturating_mul(side));
             Err(raised(py, &HogError::Memory { bytes }))

@@ -15,7 +15,7 @@ use numpy::{
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 
-use self::arrays::{Array1, Pixels, array1, contiguous, empty, zeros};
+use self::arrays::{Array1, Pixels, array1, contiguous, empty};
 use self::errors::{raised, raised_as};
 use crate::error::{ImageError, ParameterError};
 use crate::exact::RowVotes;
@@ -168,7 +168,7 @@ impl Hog {
         let pixels = Pixels::new(py, &image)?;
         let view = pixels.view().map_err(raise)?;
         let size = crate::Hog::gradient_size(view, padding).map_err(raise)?;
-        // Every number is written: zeros would be written twice.
+        // Every number is written, here and below: zeros would be written twice.
         let shape = [size.height, size.width, 2];
         let (shares, bins) = (empty(py, shape)?, empty(py, shape)?);
         let (mut of_shares, mut of_bins) = (shares.readwrite(), bins.readwrite());
@@ -194,7 +194,7 @@ impl Hog {
         let pixels = Pixels::new(py, &image)?;
         let (view, locations) = (pixels.view().map_err(raise)?, locations.as_deref());
         let len = self.inner.compute_len(view, &search, locations).map_err(raise)?;
-        let descriptors = zeros(py, [len])?;
+        let descriptors = empty(py, [len])?;
         let mut out = descriptors.readwrite();
         let out = out.as_slice_mut()?;
         detached(py, |interrupt| self.inner.compute(view, &search, locations, interrupt, out))?;
@@ -216,7 +216,7 @@ impl Hog {
         };
         let elements = spec.descriptor_len();
         let data = contiguous(py, &crops)?;
-        let descriptors = zeros(py, [count, elements])?;
+        let descriptors = empty(py, [count, elements])?;
         let mut out = descriptors.readwrite();
         let out = out.as_slice_mut()?;
         detached(py, |interrupt| self.inner.describe(&data, channels, at_work(threads()), interrupt, out))?;

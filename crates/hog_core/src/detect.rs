@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::error::{BackendError, ParameterError, Result};
 use crate::exact::{self, RowVotes, Svm, Tables};
-use crate::fast::{self, Backend, Found, Plan, Planes, Region};
+use crate::fast::{self, Backend, Found, Plan, Planes, Region, Thresholds};
 use crate::geometry::{Padding, Rect, Size};
 use crate::group::{Candidate, clip, group_candidates, mean_shift};
 use crate::guided::Guide;
@@ -332,15 +332,15 @@ impl Hog {
         how: &How,
         interrupt: &Interrupt,
     ) -> Result<Vec<Vec<Found>>> {
-        let task = |regions: Vec<Region>, threshold: f64| fast::Task {
+        let threshold = how.search.hit_threshold;
+        let task = |regions: Vec<Region>, guide: f64| fast::Task {
             backend: self.backend,
             plan: Arc::clone(plan),
             planes: Arc::clone(planes),
             levels: Arc::clone(&grids),
             regions,
-            threshold,
+            thresholds: Thresholds { hit: threshold, guide },
         };
-        let threshold = how.search.hit_threshold;
         let guide = how.guide.unwrap_or_default();
         let mut found = memory::filled(grids.len(), Vec::new())?;
         for step in guide.steps() {

@@ -25,5 +25,6 @@ pub(crate) use describe::{Crops, describe};
 pub(crate) use dispatch::{fill_planes, geometry, plan, resize_planes, row_kernel, serves};
 pub(crate) use plan::{Geometry, Plan};
 pub(crate) use rows::Planes;
+pub(crate) use score::Thresholds;
 pub(crate) use search::{Region, Task, search, trim};
 pub(crate) use tile::Found;

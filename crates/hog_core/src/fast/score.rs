@@ -10,6 +10,19 @@ use super::lane::{Kernel, Lane};
 use super::layout::{ACROSS, BLOCK, ROWS, WORDS};
 use super::plan::Plan;
 
+/// From which scores on windows are found.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Thresholds {
+    /// Every window that scores at least this is found.
+    pub hit: f64,
+    /// And those that score at least this, but for one in very many: where they only tell where else to look.
+    pub guide: f64,
+}
+
+/// The prefilter's errors beyond this part of their bound are not seen: of 9,595 windows of photographs the largest was .035 of it and
+/// the standard deviation .008, with sums of 16 bits and of 32.
+const LIKELY: f64 = 0.1;
+
 /// The windows of a band and the blocks they are made of.
 pub(super) struct WindowGrid<'a> {
     pub plan: &'a Plan,
@@ -38,8 +51,8 @@ impl WindowGrid<'_> {
     }
 }
 
-/// Adds (x, y, score) to `found` for every window whose exact score may be at least `threshold`, row by row, and for
-/// some others.
+/// Adds (x, y, score) to `found` for every window whose exact score may reach the `thresholds`, row by row, and for some
+/// others.
 ///
 /// # Safety
 /// `blocks` and `bytes` hold the blocks of all windows, and `lanes` is at least `width` rounded up to 32 plus the
@@ -47,7 +60,7 @@ impl WindowGrid<'_> {
 pub(super) unsafe fn score<L: Lane>(
     l: L,
     windows: &WindowGrid,
-    threshold: f64,
+    thresholds: Thresholds,
     interrupt: &Interrupt,
     masks: &mut Vec<u32>,
     found: &mut Vec<(usize, usize, f64)>,
@@ -56,7 +69,10 @@ pub(super) unsafe fn score<L: Lane>(
     let groups = windows.width.div_ceil(L::LANES);
     masks.clear();
     memory::resize(masks, groups * windows.height, u32::MAX)?;
-    let least = (threshold - plan.bias - plan.score_error_bound - plan.prefilter.bound) / plan.prefilter.unit;
+    let Thresholds { hit, guide } = thresholds;
+    let bound = plan.prefilter.bound;
+    let least = (hit - plan.score_error_bound - bound).min(guide - LIKELY * bound);
+    let least = (least - plan.bias) / plan.prefilter.unit;
     let least = least.floor().clamp(f64::from(i32::MIN), f64::from(i32::MAX)) as i32;
     if L::PREFILTER_VECTORS > 0 {
         for top in (0..windows.height).step_by(ROWS) {

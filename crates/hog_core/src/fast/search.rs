@@ -19,6 +19,7 @@ use super::dispatch::{OnLane, on_lane};
 use super::lane::Lane;
 use super::plan::Plan;
 use super::rows::Planes;
+use super::score::Thresholds;
 use super::tile::{self, Blocks, COLUMNS_MAX, Context, Found, Scratch, Tile};
 
 /// Scratch memory, one per thread at work.
@@ -42,7 +43,7 @@ pub(crate) struct Task {
     /// The size and the windows of each level.
     pub levels: Arc<Vec<(Size, Grid)>>,
     pub regions: Vec<Region>,
-    pub threshold: f64,
+    pub thresholds: Thresholds,
 }
 
 /// A part of a level: the windows whose corners lie in it.
@@ -61,7 +62,7 @@ impl Region {
     }
 }
 
-/// For each level of `task`, every window of its regions whose exact score may be at least the threshold, row by row.
+/// For each level of `task`, every window of its regions whose exact score may reach the thresholds, row by row.
 pub(crate) fn search(task: Task, threads: usize, interrupt: &Interrupt) -> Result<Vec<Vec<Found>>> {
     let mut tiles = Vec::new();
     for region in &task.regions {
@@ -236,10 +237,10 @@ impl OnLane for Bands<'_> {
 
     fn run<L: Lane>(self, l: L) -> Result<()> {
         let Self { search, run, scratch, interrupt } = self;
-        let Task { plan, planes, levels, threshold, .. } = &search.task;
+        let Task { plan, planes, levels, thresholds, .. } = &search.task;
         let tile = &search.tiles[run.tile];
         let (size, grid) = &levels[tile.level];
-        let context = Context { plan, source: planes, size: *size, grid, threshold: *threshold };
+        let context = Context { plan, source: planes, size: *size, grid, thresholds: *thresholds };
         scratch.found.clear();
         tile::begin(l, &context, tile, scratch)?;
         let mut last: Option<(usize, Arc<Blocks>)> = None;
@@ -286,4 +287,56 @@ fn give(blocks: Arc<Blocks>) {
 /// The lock, which another thread of this call holds for a moment.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may fail")]
+mod tests {
+    use super::super::dispatch::{fill_planes, geometry, plan};
+    use super::*;
+    use crate::exact::Svm;
+    use crate::image::ImageView;
+    use crate::model;
+    use crate::params::{HogParams, HogSpec};
+    use crate::pyramid::Steps;
+
+    /// The windows of squares of noise that a search with these thresholds finds.
+    fn found(backend: Backend, thresholds: Thresholds) -> Vec<Found> {
+        let spec = HogSpec::new(&HogParams::default()).unwrap();
+        let size = Size::new(320, 240);
+        let noise = |i: usize| ((i * i * 2_654_435_761) >> 7) as u8;
+        let pixel = |i: usize| noise(i / 320 / 12 * 27 + i % 320 / 12) / 2 + noise(i) / 4;
+        let pixels: Vec<u8> = (0..size.area()).map(pixel).collect();
+        let mut planes = Planes::default();
+        fill_planes(backend, &mut planes, ImageView::new(&pixels, 320, 240, 1, 320).unwrap()).unwrap();
+        let geometry = geometry(backend, &spec).unwrap();
+        let svm = Svm::new(model::default_people(), &spec).unwrap();
+        let grid = Steps::new((8, 8), (8, 8), spec.cell, &spec).unwrap().grid(size, &spec);
+        let task = Task {
+            backend,
+            plan: Arc::new(plan(backend, &geometry, &svm).unwrap()),
+            planes: Arc::new(planes),
+            levels: Arc::new(vec![(size, grid)]),
+            regions: vec![Region::whole(0, &grid)],
+            thresholds,
+        };
+        search(task, 1, &Interrupt::NEVER).unwrap().remove(0)
+    }
+
+    #[test]
+    fn windows_that_only_guide_are_found_although_the_prefilter_may_be_further_off() {
+        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+            let all = found(backend, Thresholds { hit: f64::NEG_INFINITY, guide: f64::NEG_INFINITY });
+            assert_eq!(all.len(), 35 * 17);
+            let mut scores: Vec<f64> = all.iter().map(|&(_, _, score)| score).collect();
+            scores.sort_unstable_by(f64::total_cmp);
+            for guide in scores.iter().copied().step_by(31) {
+                let some = found(backend, Thresholds { hit: f64::INFINITY, guide });
+                let wanted = || all.iter().filter(|&&(_, _, score)| score >= guide);
+                assert!(wanted().all(|window| some.contains(window)), "{backend:?} {guide}");
+                // The scalar kernels have no prefilter.
+                assert!(some.len() < wanted().count() + 60 || some.len() == all.len(), "{}", some.len());
+            }
+        }
+    }
 }

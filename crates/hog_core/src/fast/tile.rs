@@ -12,7 +12,7 @@ use super::lane::Lane;
 use super::layout::{BAND, BLOCK, CARRY, CELL, WORDS};
 use super::plan::Plan;
 use super::rows::{Band, Planes};
-use super::score::{WindowGrid, score};
+use super::score::{Thresholds, WindowGrid, score};
 use super::strip::{Job, ROOM, strip};
 
 /// Rows of blocks that are made, scored and handed on together, unless a window needs more.
@@ -44,7 +44,7 @@ pub(super) struct Context<'a> {
     pub source: &'a Planes,
     pub size: Size,
     pub grid: &'a Grid,
-    pub threshold: f64,
+    pub thresholds: Thresholds,
 }
 
 impl Tile {
@@ -230,7 +230,7 @@ pub(super) fn make<L: Lane>(
     Ok(())
 }
 
-/// Adds to `scratch.found` the windows of band `index` whose exact score may be at least the threshold. They begin in
+/// Adds to `scratch.found` the windows of band `index` whose exact score may reach the thresholds. They begin in
 /// `own` and end in `next`, the blocks of the band below, if there is one.
 pub(super) fn score_band<L: Lane>(
     l: L,
@@ -241,7 +241,7 @@ pub(super) fn score_band<L: Lane>(
     scratch: &mut Scratch,
     interrupt: &Interrupt,
 ) -> Result<()> {
-    let Context { plan, grid, threshold, .. } = *context;
+    let Context { plan, grid, thresholds, .. } = *context;
     let rows = Tile::band_rows(plan);
     let top = index * rows;
     let height = tile.rows.len().saturating_sub(top).min(rows);
@@ -260,7 +260,7 @@ pub(super) fn score_band<L: Lane>(
     };
     let before = scratch.found.len();
     // SAFETY: the blocks of all windows were made, those beyond the band's in the next one; `lanes` is as wide as wanted.
-    unsafe { score(l, &windows, threshold, interrupt, &mut scratch.masks, &mut scratch.found) }?;
+    unsafe { score(l, &windows, thresholds, interrupt, &mut scratch.masks, &mut scratch.found) }?;
     let (left, top) = (tile.origin.0 + 8 * tile.columns.start, tile.origin.1 + 8 * (tile.rows.start + top));
     let mut kept = before;
     for index in before..scratch.found.len() {

@@ -75,14 +75,15 @@ fn detached<R: Send>(
             if is_main.get() == Some(false) || looked.get().elapsed() < LOOK_EVERY {
                 return false;
             }
-            let seen = Python::attach(|py| {
+            // (An interpreter that is ending cannot be had; nor does it wait for this thread.)
+            let seen = Python::try_attach(|py| {
                 if is_main.get().is_none() {
                     is_main.set(Some(is_main_thread(py)?));
                 }
                 py.check_signals()
             });
             looked.set(Instant::now());
-            seen.map_err(|error| signal.set(Some(error))).is_err()
+            seen.is_some_and(|seen| seen.map_err(|error| signal.set(Some(error))).is_err())
         };
         let found = work(&Interrupt::when(&ask));
         (found, signal.take())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,6 +80,34 @@ def test_a_person_is_no_part_of_the_ground_and_what_moved_away_is_forgotten() ->
     assert not GRID.is_blocked(ground, at((WALL_X, 1.5)))[0]
 
 
+@pytest.mark.parametrize("began", [0.0, 1.7e9])
+def test_what_came_in_is_told_from_what_lasts_on_any_clock(began: float) -> None:
+    free = Scan(began, np.full(292, np.inf, np.float32), -2.0, 2.0, 0.12, 8.0)
+    ground, wall = GRID.update(None, free, HERE, NO_POINTS, NO_POINTS), at((WALL_X, 0.5))
+    for seconds in np.arange(0.5, GRID.lasts_s + 0.5, 0.5).tolist():
+        ground = GRID.update(ground, wall_scan(stamp=began + seconds), HERE, NO_POINTS, NO_POINTS)
+    assert GRID.is_blocked(ground, wall).all()
+    assert not GRID.is_blocked(ground, wall, lasting=True).any()
+    ground = GRID.update(ground, wall_scan(stamp=began + GRID.lasts_s + 0.5), HERE, NO_POINTS, NO_POINTS)
+    assert GRID.is_blocked(ground, wall, lasting=True).all()
+
+
+@pytest.mark.parametrize("began", [0.0, 1.7e9])
+def test_when_ground_was_free_is_known_to_the_scan_on_any_clock(began: float) -> None:
+    ground = None
+    for seconds in (0.0, 0.25, 40.0):
+        ground = GRID.update(ground, wall_scan(stamp=began + seconds), HERE, NO_POINTS, NO_POINTS)
+    assert ground is not None
+    before, behind = at((1.5, 0.5)), at((2.6, 0.5))
+    assert GRID.is_free_since(ground, before, began + 39.75).all()
+    assert not GRID.is_free_since(ground, before, began + 40.0).any()
+    assert not GRID.is_free_since(ground, behind, -np.inf).any()
+    turned = replace(HERE, yaw=math.pi)
+    ground = GRID.update(ground, wall_scan(turned, began + 50.0), turned, NO_POINTS, NO_POINTS)
+    assert GRID.is_free_since(ground, before, began + 39.75).all()
+    assert not GRID.is_free_since(ground, before, began + 40.25).any()
+
+
 def test_depth_fills_what_is_above_or_below_the_lidar() -> None:
     table = at((1.0, 0.0), (1.0, 0.05))
     ground = None
@@ -140,16 +169,25 @@ def test_a_person_walks_on_where_they_went_and_not_through_walls() -> None:
 
 def test_no_person_is_where_beams_pass() -> None:
     points = at((1.0, 0.5), (1.75, 0.5), (1.9, 0.5), (2.5, 0.5), (3.0, -2.0), (-1.0, 0.0))
-    passed = WANDERING.looked_through(points, wall_scan(), HERE)
+    passed = WANDERING.looked_through(points, wall_scan(), HERE, LIMO)
     assert passed.tolist() == [True, True, False, False, True, False]
+
+
+def test_beams_begin_where_the_robots_lidar_is() -> None:
+    # A lidar .6 m further ahead measures the same ranges of a wall that is .6 m further away.
+    points = at((1.75, 0.5), (2.35, 0.5))
+    for ahead, passes in ((0.0, [True, False]), (0.6, [True, True])):
+        robot = replace(LIMO, lidar_x=LIMO.lidar_x + ahead)
+        assert WANDERING.looked_through(points, wall_scan(), HERE, robot).tolist() == passes
 
 
 def test_what_is_seen_to_be_empty_leaves_the_other_places() -> None:
     both = Places(0.0, at((1.0, 0.5), (3.0, 0.5)), np.zeros((2, 2)))
-    left = WANDERING.look(both, wall_scan(), np.zeros(2, bool), HERE)
+    left = WANDERING.look(both, wall_scan(), np.zeros(2, bool), HERE, LIMO)
     assert left is not None
     assert left.points.tolist() == [[3.0, 0.5], [3.0, 0.5]]
-    assert WANDERING.look(Places(0.0, at((1.0, 0.5)), np.zeros((1, 2))), wall_scan(), np.zeros(1, bool), HERE) is None
+    near = Places(0.0, at((1.0, 0.5)), np.zeros((1, 2)))
+    assert WANDERING.look(near, wall_scan(), np.zeros(1, bool), HERE, LIMO) is None
 
 
 def test_the_same_is_drawn_from_the_same() -> None:

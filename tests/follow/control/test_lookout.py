@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tests.follow.views import scan
 
 from limo_hog.follow.control.lookout import Hunt, Lookout
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
@@ -40,7 +41,7 @@ def hunt_for(points: Points, planned: float) -> Hunt:
 def test_no_person_is_where_the_camera_shows_none() -> None:
     sure = Lookout(wandering=Wandering(found=1.0))
     around = np.array([(r * np.cos(a), r * np.sin(a)) for r in (1.0, 3.3, 3.7, 4.5) for a in np.arange(-3, 3.1, 0.3)])
-    after = sure.step(hunt_for(around, NOW), BLIND, NOW, HERE, GRID, free_ground())
+    after = sure.step(hunt_for(around, NOW), BLIND, NOW, HERE, GRID, free_ground(), LIMO)
     left = {tuple(one) for one in after.places.points.tolist()}
     shown = (np.abs(np.arctan2(around[:, 1], around[:, 0])) < 0.5) & (np.hypot(*around.T) < 3.5)
     assert shown.any()
@@ -68,7 +69,7 @@ class Counted(Grid):
 @pytest.mark.parametrize("count", [1, 40, 150, 1000])
 def test_as_many_places_are_compared_however_large_the_room_and_many_the_guesses(count: int) -> None:
     grid = Counted()
-    hunt = LOOKOUT.step(hunt_for(np.full((count, 2), 1.5), -np.inf), BLIND, NOW, HERE, grid, free_ground())
+    hunt = LOOKOUT.step(hunt_for(np.full((count, 2), 1.5), -np.inf), BLIND, NOW, HERE, grid, free_ground(), LIMO)
     origins, places = grid.asked[-1]
     assert hunt.planned == NOW
     assert LOOKOUT.candidates <= origins <= 2 * LOOKOUT.candidates + 1
@@ -80,8 +81,8 @@ def test_a_place_that_is_driven_to_is_kept_until_another_is_half_as_good_again()
     for more, kept in ((1.3, True), (2.0, False)):
         few, many = np.full((24, 2), (0.0, 4.5)), np.full((round(24 * more), 2), (0.0, -4.5))
         hunt = hunt_for(np.concatenate([few, many]), -np.inf)
-        fresh = lookout.step(hunt, BLIND, NOW, HERE, GRID, free_ground())
+        fresh = lookout.step(hunt, BLIND, NOW, HERE, GRID, free_ground(), LIMO)
         assert fresh.way[-1, 1] < 0
         mirrored = fresh.way * (1.0, -1.0)
-        after = lookout.step(replace(hunt, way=mirrored), BLIND, NOW, HERE, GRID, free_ground())
+        after = lookout.step(replace(hunt, way=mirrored), BLIND, NOW, HERE, GRID, free_ground(), LIMO)
         assert (after.way[-1, 1] > 0) == kept

@@ -118,7 +118,7 @@ def test_it_drives_around_what_stands_on_the_way_and_turns_where_nothing_is_free
 
 
 def planned(points: list[tuple[float, float]], lookout: Lookout = LOOKOUT, at: float = -math.inf) -> Hunt:
-    return lookout.step(hunt_for(np.array(points), at), BLIND, NOW, HERE, GRID, free_ground())
+    return lookout.step(hunt_for(np.array(points), at), BLIND, NOW, HERE, GRID, free_ground(), LIMO)
 
 
 def test_where_all_the_places_are_in_sight_it_turns_to_their_middle_and_stays() -> None:
@@ -161,12 +161,12 @@ def test_where_no_place_is_left_it_begins_anywhere_or_turns_on(place: tuple[floa
     # The beams pass there: the person is not there.
     clear = replace(BLIND, ranges=np.full(292, 8.0, np.float32))
     hunt = hunt_for(np.full((150, 2), place), -np.inf)
-    after = LOOKOUT.step(hunt, clear, NOW, HERE, GRID, free_ground())
+    after = LOOKOUT.step(hunt, clear, NOW, HERE, GRID, free_ground(), LIMO)
     assert after.planned == NOW
     assert len(after.places.points) == 150
     assert not np.array_equal(after.places.points, hunt.places.points)
     nowhere = replace(GRID.start(HERE), stamp=NOW)
-    turned = LOOKOUT.step(replace(hunt, facing=(1.0, 1.0)), clear, NOW, HERE, GRID, nowhere)
+    turned = LOOKOUT.step(replace(hunt, facing=(1.0, 1.0)), clear, NOW, HERE, GRID, nowhere, LIMO)
     assert (turned.facing, len(turned.way), turned.planned) == (None, 0, NOW)
     assert turned.places is hunt.places
 
@@ -196,7 +196,7 @@ def test_the_places_walk_on_to_the_present_in_steps_of_a_fifth_of_a_second() -> 
 
     hunt = hunt_for(np.full((10, 2), (1.0, 1.0)), NOW)
     hunt = replace(hunt, places=replace(hunt.places, stamp=NOW - 0.5))
-    after = Lookout(wandering=Noted()).step(hunt, BLIND, NOW, HERE, GRID, free_ground())
+    after = Lookout(wandering=Noted()).step(hunt, BLIND, NOW, HERE, GRID, free_ground(), LIMO)
     assert steps == pytest.approx([NOW - 0.3, NOW - 0.1, NOW])
     assert after.places.stamp == NOW
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -271,6 +272,20 @@ BAD = {
     "the camera's": replace(look(), depth=np.ones((2, 2), np.float32)),
     "scan is empty": replace(look(), scan=scan(np.empty(0, np.float32))),
     "no valid range": replace(look(), scan=scan(np.full(292, np.nan, np.float32))),
+    **{
+        f"no valid range from {least} to {most} m": replace(
+            look(), scan=replace(scan(np.full(292, value, np.float32)), range_min=least, range_max=most)
+        )
+        for value, least, most in (
+            *((0.0, 0.12, 8.0), (-1.0, 0.12, 7.0), (-np.inf, 0.12, 6.0)),
+            *((2.0, math.nan, 8.0), (2.0, 0.12, math.nan), (2.0, 8.0, 0.12)),
+        )
+    },
+    **{
+        f"the scan's angles, {least} to {most} rad": replace(look(), scan=replace(scan(), angle_min=least, angle_max=most))
+        for least, most in ((math.nan, 2.0), (-2.0, math.nan), (-2.0, math.inf), (-math.inf, 2.0), (2.0, -2.0), (1.0, 1.0))
+    },
+    "the scan's stamp is nan": replace(look(), scan=scan(stamp=math.nan)),
     "outside the 640x480 image": look(boxes((700, 10, 64, 128))),
     "box (10, 10, 0, 128)": look(boxes((10, 10, 0, 128))),
     "do not belong together": replace(look(boxes((10, 10, 64, 128))), clothes=np.zeros((2, 2, 3))),
@@ -324,6 +339,18 @@ def test_between_frames_a_newer_scan_stops_the_last_command() -> None:
     state = guard.step(replace(look(), scan=scan()), guard.start()).state
     assert guard.recheck(0.1, scan(stamp=0.1), None, state).twist.linear == 0.5
     assert guard.recheck(0.1, scan_of([(0.6, 0.0)], 0.1), None, state).twist.linear == 0
+
+
+@pytest.mark.parametrize("why", [why for why in BAD if BAD[why].scan is not None])
+def test_between_frames_a_bad_scan_stops_the_robot_and_is_not_remembered(why: str) -> None:
+    guard = ahead()
+    state = guard.step(replace(look(), scan=scan(), odometry=Odometry()), guard.start()).state
+    bad = guard.recheck(0.1, BAD[why].scan, Odometry(0.1), state)
+    assert bad.twist == Twist()
+    assert bad.mode is Mode.BLOCKED
+    assert why in bad.reason
+    assert bad.state == state
+    assert guard.recheck(0.2, scan(stamp=0.2), Odometry(0.2), bad.state).twist.linear == 0.5
 
 
 @pytest.mark.parametrize("began", [0.0, 1.7e9])

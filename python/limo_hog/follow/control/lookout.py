@@ -112,7 +112,9 @@ class Lookout:
         places.points[behind] = here
         return Hunt(track, places)
 
-    def step(self, hunt: Hunt, scan: Scan, now: float, pose: Odometry, grid: Grid, ground: Ground) -> Hunt:
+    def step(
+        self, hunt: Hunt, scan: Scan, now: float, pose: Odometry, grid: Grid, ground: Ground, robot: RobotGeometry
+    ) -> Hunt:
         """Let the person walk on in mind, remove what is seen to be empty, and choose a way where one is due."""
         places = hunt.places
         while now - places.stamp > 1e-6:
@@ -121,7 +123,7 @@ class Lookout:
         ahead = from_odometry(places.points, pose)
         off, far = np.arctan2(ahead[:, 1], ahead[:, 0]), np.hypot(*ahead.T)
         shown = (np.abs(off) < self.half_view) & (far < self.view) & grid.sees(ground, here, places.points)[0]
-        places_left = self.wandering.look(places, scan, shown, pose)
+        places_left = self.wandering.look(places, scan, shown, pose, robot)
         if places_left is None:
             places_left = self._anywhere(hunt, now, grid, ground)
         if places_left is None:

@@ -313,7 +313,7 @@ class TrackingController:
         now = observation.now
         pose = pose_at(state.tracks.poses, now)
         hunt = state.hunt or self.lookout.begin(known, state.choice.number or 0, self.grid, ground)
-        hunt = self.lookout.step(hunt, scan, now, pose, self.grid, ground)
+        hunt = self.lookout.step(hunt, scan, now, pose, self.grid, ground, self.robot)
         points, turn = scan_points(scan, self.robot), Twist(0.0, state.side * self.search.rate)
         twist, reason = self.lookout.command(hunt, pose, points, self.detour, self.robot, turn)
         places, way = self.lookout.ways(hunt, pose)

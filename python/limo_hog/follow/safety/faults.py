@@ -26,7 +26,7 @@ def find_fault(observation: Observation, last_stamp: float | None) -> str:
         return f"the frame's stamp is {observation.stamp}, not a time"
     if last_stamp is not None and observation.stamp < last_stamp:
         return f"time runs backwards: a frame of {observation.stamp:.3f} s after one of {last_stamp:.3f} s"
-    return _boxes(observation) or _depth(observation) or _scan(observation.scan) or _odometry(observation.odometry)
+    return _boxes(observation) or _depth(observation) or scan_fault(observation.scan) or _odometry(observation.odometry)
 
 
 def _boxes(observation: Observation) -> str:
@@ -65,13 +65,21 @@ def _depth(observation: Observation) -> str:
     return ""
 
 
-def _scan(scan: Scan | None) -> str:
+def scan_fault(scan: Scan | None) -> str:
+    """Return what is wrong with a scan, in one line; "" if nothing is, or if there is none.
+
+    A range below `range_min` is no measurement, inf is a beam that met nothing (REP-117, sensor_msgs/LaserScan).
+    """
     if scan is None:
         return ""
     if scan.ranges.size == 0:
         return "the scan is empty"
-    if np.isnan(scan.ranges).all():
-        return "the scan has no valid range"
+    if not math.isfinite(scan.stamp):
+        return f"the scan's stamp is {scan.stamp}, not a time"
+    if not -math.inf < scan.angle_min < scan.angle_max < math.inf:
+        return f"the scan's angles, {scan.angle_min} to {scan.angle_max} rad, do not go from right to left"
+    if not scan.range_min < scan.range_max or not (scan.ranges >= scan.range_min).any():
+        return f"the scan has no valid range from {scan.range_min} to {scan.range_max} m"
     return ""
 
 

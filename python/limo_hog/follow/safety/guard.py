@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.safety.faults import find_fault
+from limo_hog.follow.safety.faults import find_fault, scan_fault
 from limo_hog.follow.safety.unseen import Look, room_seen_behind
 from limo_hog.follow.sense.clearance import (
     NO_POINTS,
@@ -170,6 +170,8 @@ class Guard(Generic[S]):
         age = now - state.newest_stamp
         if age > self.max_age_s:
             return Decision(Twist(), state, Mode.BLOCKED, f"no camera frame for {age:.1f} s")
+        if fault := scan_fault(scan):
+            return Decision(Twist(), state, Mode.BLOCKED, fault)
         proposed = replace(state.proposed, target=None, region=None)
         return self._limited(proposed, self._remember(state, scan, odometry), scan, odometry, now)
 

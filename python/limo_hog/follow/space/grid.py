@@ -32,17 +32,18 @@ class Ground:
     occupied
         float32 (N, N): log-odds of each cell's being occupied; rows along x, columns along y.
     seen
-        float32 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never.
+        float64 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never. On a robot times count
+        from 1970: in float32 they would be two minutes apart.
     freed
-        float32 (N, N): when each cell was last seen to be free [s]; -inf for never.
+        float64 (N, N): when each cell was last seen to be free [s]; -inf for never.
     stamp
         Of the last scan [s].
     """
 
     corner: tuple[int, int]
     occupied: NDArray[np.float32]
-    seen: NDArray[np.float32]
-    freed: NDArray[np.float32]
+    seen: NDArray[np.float64]
+    freed: NDArray[np.float64]
     stamp: float = -math.inf
 
 
@@ -94,7 +95,7 @@ class Grid:
     def start(self, pose: Odometry) -> Ground:
         """Return ground of which nothing is known, around the robot."""
         shape = self.cells, self.cells
-        never = np.full(shape, -np.inf, np.float32)
+        never = np.full(shape, -np.inf)
         return Ground(self._corner(pose), np.zeros(shape, np.float32), never, never.copy())
 
     def update(
@@ -138,12 +139,12 @@ class Grid:
         under = np.array([pose.x, pose.y]) + _square(self.own_radius, self.cell)
         passed = self._passed(ground, at, directions[:: self.every], clear[:: self.every])
         cleared, filled = self._mask(passed, self.flat(ground, under)), self._mask(self.flat(ground, ends))
-        before, stamp = ground.occupied, np.float32(scan.stamp)
+        before = ground.occupied
         lower = np.maximum(before - np.float32(self.free), np.float32(self.lowest))
         higher = np.minimum(before + np.float32(self.hit), np.float32(self.highest))
         occupied = np.where(filled, higher, np.where(cleared, lower, before))
-        seen = np.where(cleared | filled, stamp, ground.seen)
-        freed = np.where(cleared & (occupied <= 0), stamp, ground.freed)
+        seen = np.where(cleared | filled, scan.stamp, ground.seen)
+        freed = np.where(cleared & (occupied <= 0), scan.stamp, ground.freed)
         return Ground(ground.corner, occupied, seen, freed, scan.stamp)
 
     def index(self, ground: Ground, points: Points) -> tuple[Cells, NDArray[np.bool_]]:

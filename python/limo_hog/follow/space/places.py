@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import LIMO, RobotGeometry
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.space.grid import Grid, Ground
@@ -112,7 +112,7 @@ class Wandering:
         return Places(stamp, points, velocities, places.seed + 1)
 
     def look(
-        self, places: Places, scan: Scan, shown: NDArray[np.bool_], pose: Odometry, robot: RobotGeometry = LIMO
+        self, places: Places, scan: Scan, shown: NDArray[np.bool_], pose: Odometry, robot: RobotGeometry
     ) -> Places | None:
         """Remove places where the person was not found, in favour of the others; None where no place is left.
 
@@ -139,7 +139,7 @@ class Wandering:
         return Places(places.stamp, places.points[chosen], places.velocities[chosen], places.seed)
 
     def looked_through(
-        self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry = LIMO
+        self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry
     ) -> NDArray[np.bool_]:
         """Return for each point, bool (N,), whether all beams near it pass."""
         x, y = pose.x + robot.lidar_x * math.cos(pose.yaw), pose.y + robot.lidar_x * math.sin(pose.yaw)

@@ -120,7 +120,7 @@ def test_the_ground_behind_a_pose_is_up_to_three_decimetres_behind_its_outline(y
         [pose[:2] + (0.145 + far) * back + 0.11 * share * side for far in (0.1, 0.2, 0.3) for share in (-1, 0, 1)]
     )
     ground = GRID.start(HERE)
-    freed = np.full((GRID.cells, GRID.cells), -np.inf, np.float32)
+    freed = np.full((GRID.cells, GRID.cells), -np.inf)
     rows, columns = GRID.index(ground, behind)[0].T
     freed[rows, columns] = np.inf
     assert BACKING.is_free_behind(pose, HERE, GRID, replace(ground, freed=freed), (), LIMO)

@@ -282,8 +282,12 @@ BAD = {
         )
     },
     **{
-        f"the scan's angles, {least} to {most} rad": replace(look(), scan=replace(scan(), angle_min=least, angle_max=most))
-        for least, most in ((math.nan, 2.0), (-2.0, math.nan), (-2.0, math.inf), (-math.inf, 2.0), (2.0, -2.0), (1.0, 1.0))
+        f"the scan's angles, {least} to {most} rad": replace(look(), scan=turned)
+        for least, most in (
+            *((math.nan, 2.0), (-2.0, math.nan), (-2.0, math.inf), (-math.inf, 2.0)),
+            *((2.0, -2.0), (1.0, 1.0)),
+        )
+        for turned in [replace(scan(), angle_min=least, angle_max=most)]
     },
     "the scan's stamp is nan": replace(look(), scan=scan(stamp=math.nan)),
     "outside the 640x480 image": look(boxes((700, 10, 64, 128))),

@@ -6,7 +6,6 @@ where they can have come to by now, ground counts as free for a shorter time.
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.clearance import Margin, Points, rooms_ahead, to_odometry
+from limo_hog.follow.sense.clearance import Margin, Points, places_behind, rooms_ahead, to_odometry
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.twist import Twist
@@ -149,7 +148,7 @@ class Backing:
         """
         if ground is None:
             return np.ones(poses.shape[:-1], bool)
-        behind = _places_behind(self.depths, robot)
+        behind = places_behind(self.depths, robot)
         cos, sin = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
         x = poses[..., 0, None] + behind[:, 0] * cos - behind[:, 1] * sin
         y = poses[..., 1, None] + behind[:, 0] * sin + behind[:, 1] * cos
@@ -182,13 +181,13 @@ class Backing:
         """Whether the map shows something that lasts close behind: `Guard` remembers for a shorter time."""
         if ground is None:
             return False
-        return bool(grid.is_blocked(ground, to_odometry(_places_behind(self.depths, robot), pose), lasting=True).any())
+        return bool(grid.is_blocked(ground, to_odometry(places_behind(self.depths, robot), pose), lasting=True).any())
 
     def blind_limit(self, others: tuple[Other, ...], pose: Odometry, robot: RobotGeometry, now: float) -> float:
         """Return how fast to back onto unknown ground [m/s]."""
         if not self._out_of_sight(others, now):
             return self.blind_speed
-        behind = to_odometry(_places_behind(self.depths, robot), pose)
+        behind = to_odometry(places_behind(self.depths, robot), pose)
         return 0.0 if self.can_hold_other(others, behind, now).any() else self.blind_speed
 
     def blindly(
@@ -228,12 +227,3 @@ class Backing:
     def _gap(self, one: Other, x: float, y: float, now: float) -> float:
         """Return how much further off a place is than a person can have walked [m]."""
         return math.hypot(x - one.x, y - one.y) - self._reach(one, now)
-
-
-@functools.lru_cache(maxsize=4)
-def _places_behind(depths: tuple[float, ...], robot: RobotGeometry) -> Points:
-    """Return places so far behind the robot's outline, float64 (N, 2) [m] in the base frame, read only."""
-    far, side = np.meshgrid(depths, (-robot.half_width, 0.0, robot.half_width))
-    places: Points = np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
-    places.flags.writeable = False
-    return places

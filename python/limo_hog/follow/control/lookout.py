@@ -106,7 +106,7 @@ class Lookout:
     def begin(self, track: Track, number: int, grid: Grid, ground: Ground) -> Hunt:
         """Begin with the person as last measured."""
         places = self.wandering.start(track.stamp, track.mean, track.matrix, number)
-        here = np.array([track.mean[:2]])
+        here = np.array([track.place])
         # Nobody is on the other side of a wall who was measured on this one.
         behind = ~grid.sees(ground, here, places.points)[0]
         places.points[behind] = here
@@ -202,7 +202,7 @@ class Lookout:
         reach = 1.0 + self.wandering.walk * (now - hunt.track.stamp)
         cells = np.argwhere((ground.occupied <= 0) & (ground.seen < now - 2.0) & np.isfinite(ground.seen))
         points = grid.middle_of(ground, cells)
-        points = points[np.hypot(*(points - hunt.track.mean[:2]).T) < reach]
+        points = points[np.hypot(*(points - hunt.track.place).T) < reach]
         if len(points) == 0:
             return None
         count, random = self.wandering.count, np.random.default_rng([hunt.places.seed, 3])

@@ -148,7 +148,7 @@ class TrackingController:
         if can_look and aim.hidden and state.ground is not None and state.hunt is None:
             # Behind another person one is hidden for a moment; waiting is better than driving round people.
             pose = pose_at(state.tracks.poses, observation.now)
-            can_look = self._hides(state.ground, pose, person.track.mean[:2])
+            can_look = self._hides(state.ground, pose, person.track.place)
         patience = self.lookout.after_s if can_look else self.tracker.forget_s if aim.hidden else self.search.after_s
         if observation.now - state.gave_way_at < self.tracker.movers.unseen_s:
             # It turned away from a person who walks on where nothing looks; it turns to them before it looks round.
@@ -207,7 +207,7 @@ class TrackingController:
         tracks, seen, own = self.tracker.around(state.tracks, person, now, self.steering.coast_s)
         felt = self.tracker.movers.felt(state.tracks.movers, now)
         lost_s = math.inf if person is None else now - person.measured
-        followed = NO_POINTS if person is None or lost_s >= self.backing.unseen_s else np.array([person.track.mean[:2]])
+        followed = NO_POINTS if person is None or lost_s >= self.backing.unseen_s else np.array([person.track.place])
         others = self.backing.remember(state.others, seen, felt, followed, now)
 
         def may_back(poses: Poses) -> NDArray[np.bool_]:
@@ -245,7 +245,7 @@ class TrackingController:
             return replace(state, tracks=tracks)
         pose = pose_at(tracks.poses, scan.stamp)
         lately = observation.now - self.steering.coast_s
-        known = [one.track.mean[:2] for one in tracks.people if one.confirmed and one.measured > lately]
+        known = [one.track.place for one in tracks.people if one.confirmed and one.measured > lately]
         people = np.array(known).reshape(-1, 2)
         depth_points = NO_POINTS
         if observation.depth is not None:
@@ -285,7 +285,7 @@ class TrackingController:
         tracks = self.tracker.may_be(state.choice.number, state.tracks, now)
         if known is not None:
             reach = self.tracker.association.same_place + self.lookout.wandering.walk * (now - known.stamp)
-            tracks = [one for one in tracks if math.dist(one.mean[:2], known.mean[:2]) < reach]
+            tracks = [one for one in tracks if math.dist(one.place, known.place) < reach]
         return min((bearing_range(one, pose)[0] for one in tracks), key=abs, default=None)
 
     def _look_at(self, state: TrackingState, observation: Observation) -> Decision[TrackingState]:
@@ -338,7 +338,7 @@ class TrackingController:
             if heading == bearing or ground is None or self._is_passing(ground, obstacles, bearing, distance, pose):
                 state = replace(state, way=NO_POINTS, way_at=-math.inf) if state.way_at > -math.inf else state
             elif now - state.way_at >= self.lookout.replan_s:
-                way = self.lookout.router.way_towards(self.grid, ground, pose, np.array(track.mean[:2]))
+                way = self.lookout.router.way_towards(self.grid, ground, pose, np.array(track.place))
                 state = replace(state, way=way if len(way) > 1 else NO_POINTS, way_at=now)
             if len(state.way):
                 heading = self._along(state.way, obstacles, pose)
@@ -369,7 +369,7 @@ class TrackingController:
         keeps = max(self.target_distance, least - self.robot.camera_x, notice_s * state.brisk)
         if keeps > self.near_hiding and state.ground is not None:
             pose = pose_at(state.tracks.poses, observation.now)
-            soon = predict(person.track, observation.now + self.foresight_s, self.tracker.noise).mean[:2]
+            soon = predict(person.track, observation.now + self.foresight_s, self.tracker.noise).place
             if self._hides(state.ground, pose, soon):
                 return self.near_hiding
         return keeps

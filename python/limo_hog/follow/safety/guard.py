@@ -85,13 +85,13 @@ class Guard(Generic[S]):
     depth_reach
         Depth further than this from the margin's end is not looked at [m]. Computed: with 1.0 m of room .88 m/s are
         allowed, more than any controller drives.
-    memory_s, memory_radius
-        Returns count for the space behind the robot for so long, if they were so near [s, m]. Chosen: as
-        `look_memory_s`; further than the radius the robot never backs off at once.
+    memory_radius
+        Returns count for the space behind the robot for `memory_s`, if they were so near [m]. Chosen: further than
+        this the robot never backs off at once.
     look_every_s
         A scan is kept for the ground it shows to be free when the last one kept is so old [s]. Chosen: at .6 m/s the
         robot is less than its own length further.
-    look_memory_s, unseen_speed
+    memory_s, unseen_speed
         Highest speed backwards onto ground that was not seen to be free within so long [s, m/s]. Chosen: a person
         turns back in a corridor that the robot entered 40 s ago; from .2 m/s the robot stops within .09 m. To stand
         would be run into: with 0 `two_people` ends with a person at .5 m.
@@ -118,7 +118,6 @@ class Guard(Generic[S]):
     memory_s: float = 60.0
     memory_radius: float = 1.5
     look_every_s: float = 0.5
-    look_memory_s: float = 60.0
     unseen_speed: float = 0.2
     max_backward: float = 0.6
     max_blind: float = 0.4
@@ -239,11 +238,8 @@ class Guard(Generic[S]):
 
     def _looked(self, looks: tuple[Look, ...], scan: Scan, pose: Odometry) -> tuple[Look, ...]:
         young = looks
-        if (
-            looks
-            and not 0 <= scan.stamp - looks[-1].scan.stamp <= scan.stamp - looks[0].scan.stamp < self.look_memory_s
-        ):
-            young = tuple(look for look in looks if 0 <= scan.stamp - look.scan.stamp < self.look_memory_s)
+        if looks and not 0 <= scan.stamp - looks[-1].scan.stamp <= scan.stamp - looks[0].scan.stamp < self.memory_s:
+            young = tuple(look for look in looks if 0 <= scan.stamp - look.scan.stamp < self.memory_s)
         if young and scan.stamp - young[-1].scan.stamp < self.look_every_s:
             return young
         return (*young, Look(scan, pose))

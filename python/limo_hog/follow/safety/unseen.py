@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.clearance import Points, to_odometry
+from limo_hog.follow.sense.clearance import Points, places_behind, to_odometry
 from limo_hog.follow.sense.observation import Odometry, Scan
 
 #: Ground is looked at so far behind the outline, in such steps [m]. Chosen: from .6 m/s the robot stops within .51 m.
 FARTHEST, STEP = 0.6, 0.1
+_DEPTHS = tuple(np.arange(STEP, FARTHEST + 1e-9, STEP).tolist())
 #: A beam must reach further than the ground it shows to be free by this [m]. Chosen: three standard deviations and more
 #: of the lidar's .01 m.
 BEYOND = 0.05
@@ -43,19 +43,9 @@ def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry
     """
     if not looks:
         return 0.0
-    depths, places = _places_behind(robot)
-    seen = _were_free(to_odometry(places, pose), looks, robot).any(axis=0)
-    unseen = ~seen.reshape(len(depths), -1).all(axis=1)
-    return float(depths[int(np.argmax(unseen))] - STEP) if unseen.any() else FARTHEST
-
-
-@functools.lru_cache(maxsize=4)
-def _places_behind(robot: RobotGeometry) -> tuple[NDArray[np.float64], Points]:
-    """Return the depths behind the outline, float64 (D,) [m], and places at each, (D · 3, 2), in the base frame."""
-    depths = np.arange(STEP, FARTHEST + 1e-9, STEP)
-    across = np.array([-robot.half_width, 0.0, robot.half_width])
-    x, y = np.meshgrid(-robot.half_length - depths, across, indexing="ij")
-    return depths, np.stack([x.ravel(), y.ravel()], axis=1)
+    places = to_odometry(places_behind(_DEPTHS, robot), pose)
+    unseen = ~_were_free(places, looks, robot).any(axis=0).reshape(len(_DEPTHS), -1).all(axis=1)
+    return _DEPTHS[int(np.argmax(unseen))] - STEP if unseen.any() else FARTHEST
 
 
 def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> NDArray[np.bool_]:

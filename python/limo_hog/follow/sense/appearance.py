@@ -113,10 +113,6 @@ class Appearance:
             cost = min(cost, min(chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers)
         return cost
 
-    def is_other(self, known: Clothes | None, seen: Clothes | None) -> bool:
-        """Whether clothes are clearly not the known ones."""
-        return self.cost(known, seen, slips=False) > self.other
-
     def learn(self, known: Clothes, seen: Clothes) -> Clothes:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""
         most = self.max_shirt, self.max_trousers

@@ -29,6 +29,20 @@ def beam_directions(angle_min: float, angle_max: float, count: int) -> Points:
     return directions
 
 
+def lidar_at(pose: Odometry, robot: RobotGeometry) -> tuple[float, float]:
+    """Return where the lidar of a robot at `pose` is, x and y [m] in the odometry frame."""
+    return pose.x + robot.lidar_x * math.cos(pose.yaw), pose.y + robot.lidar_x * math.sin(pose.yaw)
+
+
+@functools.lru_cache(maxsize=8)
+def places_behind(depths: tuple[float, ...], robot: RobotGeometry) -> Points:
+    """Return three places across the robot at each of D depths behind its outline [m], (D · 3, 2), read only."""
+    far, side = np.meshgrid(depths, (-robot.half_width, 0.0, robot.half_width), indexing="ij")
+    places: Points = np.stack([-robot.half_length - far.ravel(), side.ravel()], axis=1)
+    places.flags.writeable = False
+    return places
+
+
 @functools.lru_cache(maxsize=8)
 def scan_points(scan: Scan, robot: RobotGeometry) -> Points:
     """Return the valid returns of a scan, read only: controller, tracker and `Guard` all ask for them."""

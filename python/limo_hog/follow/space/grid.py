@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.sense.clearance import Points, beam_directions, to_odometry
+from limo_hog.follow.sense.clearance import Points, beam_directions, lidar_at, to_odometry
 from limo_hog.follow.sense.observation import Odometry, Scan
 
 Cells = NDArray[np.int64]
@@ -124,7 +124,7 @@ class Grid:
         """
         ground = self._moved(ground or self.start(pose), pose)
         ranges = scan.ranges.astype(np.float64)
-        at = np.array([pose.x + robot.lidar_x * math.cos(pose.yaw), pose.y + robot.lidar_x * math.sin(pose.yaw)])
+        at = np.array(lidar_at(pose, robot))
         returned = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
         # A beam that hits nothing is free as far as it reaches; one that is no number says nothing.
         clear = np.where(np.isnan(ranges) | (ranges < scan.range_min), 0.0, np.minimum(ranges, scan.range_max))

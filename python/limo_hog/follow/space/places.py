@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.space.grid import Grid, Ground
 
@@ -138,11 +138,9 @@ class Wandering:
         chosen = np.concatenate([left, left[random.integers(len(left), size=(~kept).sum())]])
         return Places(places.stamp, places.points[chosen], places.velocities[chosen], places.seed)
 
-    def looked_through(
-        self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry
-    ) -> NDArray[np.bool_]:
+    def looked_through(self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry) -> NDArray[np.bool_]:
         """Return for each point, bool (N,), whether all beams near it pass."""
-        x, y = pose.x + robot.lidar_x * math.cos(pose.yaw), pose.y + robot.lidar_x * math.sin(pose.yaw)
+        x, y = lidar_at(pose, robot)
         dx, dy = points[:, 0] - x, points[:, 1] - y
         distance = np.maximum(np.hypot(dx, dy), 0.05)
         angle = np.remainder(np.arctan2(dy, dx) - pose.yaw + math.pi, math.tau) - math.pi

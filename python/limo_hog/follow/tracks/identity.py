@@ -203,7 +203,7 @@ class Identity:
         for number, one in people.items():
             if number in chances:
                 continue
-            near = math.dist(one.track.mean[:2], known.place) < self.reach + self.speed * lost_s
+            near = math.dist(one.track.place, known.place) < self.reach + self.speed * lost_s
             taken = share if near else 0.0
             gone = [other for other in chances if stamp - people[other].measured > self.unseen_s]
             absent = max(1.0 - sum(chances.values()), 0.0)
@@ -231,8 +231,7 @@ class Identity:
         legs = [one for one in tracks.movers if one.number == person.number and one.felt - one.named >= self.legs_s]
         others = [one for one in tracks.movers if one.left and one.number != person.number]
         return any(
-            all(math.dist(own.track.mean[:2], other.track.mean[:2]) > self.legs_apart for other in others)
-            for own in legs
+            all(math.dist(own.track.place, other.track.place) > self.legs_apart for other in others) for own in legs
         )
 
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:

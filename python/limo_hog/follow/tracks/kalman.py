@@ -70,6 +70,11 @@ class Track:
     covariance: Covariance
 
     @property
+    def place(self) -> tuple[float, float]:
+        """X and y [m] in the odometry frame."""
+        return self.mean[:2]
+
+    @property
     def matrix(self) -> NDArray[np.float64]:
         """The covariance as a matrix, float64 (4, 4)."""
         xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = self.covariance

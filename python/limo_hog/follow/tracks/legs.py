@@ -123,5 +123,5 @@ def distances(points: Points, track: Track) -> NDArray[np.float64]:
 
 def all_distances(points: Points, tracks: Sequence[Track]) -> NDArray[np.float64]:
     """Return `distances` of M tracks at once, float64 (M, N) [m]."""
-    places = np.array([track.mean[:2] for track in tracks]).reshape(-1, 2, 1)
+    places = np.array([track.place for track in tracks]).reshape(-1, 2, 1)
     return np.asarray(np.hypot(points[:, 0] - places[:, 0], points[:, 1] - places[:, 1]))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
@@ -156,12 +156,12 @@ class Movers:
         return [
             one
             for one in movers
-            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
+            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.place, one.began) > self.least_way
         ]
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
-        places = [one.track.mean[:2] for one in movers if now - one.felt < self.forget_s]
+        places = [one.track.place for one in movers if now - one.felt < self.forget_s]
         return np.array(places).reshape(-1, 2)
 
     def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
@@ -169,7 +169,7 @@ class Movers:
         pairs = []
         for who, person in enumerate(seen):
             for which, mover in enumerate(movers):
-                gap = math.dist(person.track.mean[:2], mover.track.mean[:2])
+                gap = math.dist(person.track.place, mover.track.place)
                 if mover.felt == stamp and gap < self.beside:
                     taken = self.taken if mover.number not in (None, person.number) else 0.0
                     pairs.append((gap + taken, who, which))
@@ -199,7 +199,7 @@ class Movers:
         pairs: set[tuple[int, int]] = set()
         if len(moving) < 2 or not people:
             return pairs
-        places = [kalman.predict(one.track, people[0].track.stamp, noise).mean[:2] for one in moving]
+        places = [kalman.predict(one.track, people[0].track.stamp, noise).place for one in moving]
         for which, seen in enumerate(boxes):
             if seen.range is None:
                 continue
@@ -242,7 +242,7 @@ class Movers:
     def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
         """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
         pose, points = returns.pose, returns.points
-        x, y = pose.x + self.robot.lidar_x * math.cos(pose.yaw), pose.y + self.robot.lidar_x * math.sin(pose.yaw)
+        x, y = lidar_at(pose, self.robot)
         (ends, far), (to, near) = (
             (np.arctan2(at[:, 1] - y, at[:, 0] - x), np.hypot(at[:, 0] - x, at[:, 1] - y)) for at in (points, places)
         )
@@ -294,6 +294,5 @@ def named(mover: Mover, number: int, stamp: float) -> Mover:
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry) -> bool:
     """Whether the lidar looked at a track's place, `half_view` [rad] to either side of straight ahead."""
     pose = returns.pose
-    x = pose.x + robot.lidar_x * math.cos(pose.yaw)
-    y = pose.y + robot.lidar_x * math.sin(pose.yaw)
+    x, y = lidar_at(pose, robot)
     return abs(kalman.wrap(math.atan2(track.mean[1] - y, track.mean[0] - x) - pose.yaw)) < half_view

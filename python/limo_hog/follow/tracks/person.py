@@ -108,7 +108,7 @@ def predict(person: Person, stamp: float, noise: Noise) -> Person:
 
 def separation(one: Person, other: Person) -> float:
     """Return the distance between two people [m]."""
-    return math.dist(one.track.mean[:2], other.track.mean[:2])
+    return math.dist(one.track.place, other.track.place)
 
 
 def distance_to(person: Person, seen: Measurement, pose: Odometry) -> float:

@@ -329,24 +329,24 @@ class Tracker:
             if one.confirmed and now - one.measured <= lately_s:
                 people[one.number] = kalman.predict(one.track, now, self.noise)
         own = None if followed is None else people.get(followed.number)
-        others = [track.mean[:2] for track in people.values() if track is not own]
-        places, nameless = [track.mean[:2] for track in people.values()], []
+        others = [track.place for track in people.values() if track is not own]
+        places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)
             if mover.number in people or any(
-                math.dist(track.mean[:2], place) <= self.association.same_place for place in places
+                math.dist(track.place, place) <= self.association.same_place for place in places
             ):
                 continue
             nameless.append(track)
             may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))
             if now - mover.felt <= lately_s and not may_be_own:
-                others.append(track.mean[:2])
+                others.append(track.place)
         return [*people.values(), *nameless], np.array(others).reshape(-1, 2), own
 
     def _is_near(self, person: Person, track: Track) -> bool:
         """Whether what moves in the scan can be a person's legs, where they have not been measured for some time."""
         reach = self.association.same_place + self.walk * (track.stamp - person.measured)
-        return math.dist(person.track.mean[:2], track.mean[:2]) < reach
+        return math.dist(person.track.place, track.place) < reach
 
     def may_be(self, number: int | None, tracks: Tracks, now: float) -> list[Track]:
         """Return what moves in the scan and may be the person of a number, or one not shown yet, as of `now` [s]."""

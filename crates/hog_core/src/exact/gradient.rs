@@ -1,6 +1,6 @@
 //! Stage 1: gamma, derivative, strongest channel, angle, and the two orientation votes of each pixel.
 //!
-//! The scalar form, equal to OpenCV 4.14's `computeGradient` to the last bit.
+//! Equal to OpenCV 4.14's `computeGradient` to the last bit, by loops and, where the CPU has them, by kernels.
 
 use std::ops::Range;
 
@@ -358,26 +358,30 @@ fn byte(whole: f32) -> u8 {
 mod tests {
     use super::super::kernel::Loops;
     use super::*;
+    use crate::fast::{Backend, row_kernel};
     use crate::params::HogParams;
 
     #[test]
-    fn a_region_votes_as_it_does_in_the_whole_image_also_beyond_a_narrow_one() {
+    fn a_region_votes_as_it_does_in_the_whole_image_by_loops_and_by_every_kernel() {
         let spec = HogSpec::new(&HogParams::default()).unwrap();
-        let data: Vec<u8> = (0..300).map(|i| (i * i % 251) as u8).collect();
-        for channels in [1, 3] {
-            for (width, height) in [(1, 1), (1, 9), (5, 3), (20, 5)] {
+        let data: Vec<u8> = (0..3 * 1030 * 2).map(|i| (i * i % 251) as u8).collect();
+        let available = Backend::ALL.into_iter().filter(|backend| backend.is_available());
+        let kernels = std::iter::once(&Loops as &dyn RowKernel).chain(available.map(row_kernel));
+        for (kernel, channels) in kernels.flat_map(|kernel| [(kernel, 1), (kernel, 3)]) {
+            for (width, height, step) in [(1, 1, 1), (1, 9, 1), (5, 3, 1), (20, 5, 1), (1030, 2, 97)] {
                 let image = ImageView::new(&data, width, height, channels, width * channels).unwrap();
                 let padding = Padding { left: 12, top: 3, size: Size::new(width + 30, height + 6) };
                 let Size { width, height } = padding.size;
                 let all = Region { x: 0, y: 0, width, height };
                 let never = &Interrupt::NEVER;
                 let whole = votes(image, padding, all, &spec, &Loops, never).unwrap();
-                for x in 0..width {
+                for x in (0..width).step_by(step) {
                     let region = Region { x, y: 2, width: width - x, height: 2 };
-                    let part = votes(image, padding, region, &spec, &Loops, never).unwrap();
+                    let part = votes(image, padding, region, &spec, kernel, never).unwrap();
                     for (i, vote) in part.pixels.iter().enumerate() {
                         let there = whole.pixels[(2 + i / part.width) * width + x + i % part.width];
-                        assert_eq!((vote.shares, vote.bins), (there.shares, there.bins));
+                        let at = (width, x, i % part.width);
+                        assert_eq!((vote.shares, vote.bins), (there.shares, there.bins), "{kernel:?} {at:?}");
                     }
                 }
             }

@@ -1,7 +1,7 @@
 //! The exact path's loops, left to the compiler to vectorise, compiled for the vectors that this CPU has.
 //!
 //! OpenCV fuses multiply and add where the CPU can, so this path must do so too, and that is a property of the CPU at
-//! hand: the one call of a function that enables AVX2 and FMA is the only `unsafe` outside `fast/`.
+//! hand: the one call of a function that enables AVX2 and FMA is `unsafe`.
 #![allow(
     unsafe_code,
     reason = "a function that enables an instruction set may only be called where the CPU has it"

@@ -1,6 +1,7 @@
 //! What kernels may do for the gradient's loops.
 
 use std::fmt::Debug;
+use std::panic::RefUnwindSafe;
 
 /// The votes of a row of pixels, or of more.
 pub struct RowVotes<'a> {
@@ -20,7 +21,7 @@ pub(crate) struct Turn {
 }
 
 /// Kernels that make parts of a row as the loops here would, to the last bit; what they leave is made by the loops.
-pub(crate) trait RowKernel: Debug + Sync {
+pub(crate) trait RowKernel: Debug + Sync + RefUnwindSafe {
     /// Makes votes of the first `columns` columns, where the lowest channel wins among equals and angles are rounded as
     /// OpenCV's vector code rounds them; gives how many it has made.
     ///

@@ -1,8 +1,8 @@
-//! The kernels: the exact path's pipeline on vectors of cells, for one instruction set each, and the crate's `unsafe`.
+//! The kernels: the exact path's pipeline on vectors of cells, for one instruction set each, and nearly all of the crate's `unsafe`.
 //!
 //! `layout` and `lane` hold the constants and the vector that every kernel uses; `plan` holds a detector's constants; `rows`, `strip`
 //! and `score` are the stages, which `tile` composes; `search` shares tiles among threads; `describe` serves
-//! crops, `votes` the gradient alone; `dispatch` chooses the instruction set.
+//! crops, `votes` the exact path's gradients; `dispatch` chooses the instruction set.
 //! docs/simd.md explains how they work.
 #![allow(unsafe_code, reason = "intrinsics, and pointers into rows that overlap")]
 

@@ -62,7 +62,7 @@ impl Region {
     }
 }
 
-/// For each level of `task`, every window of its regions whose exact score may reach the thresholds, row by row.
+/// For each level of `task`, every window of its regions that may be a hit and nearly every one that guides, row by row.
 pub(crate) fn search(task: Task, threads: usize, interrupt: &Interrupt) -> Result<Vec<Vec<Found>>> {
     let mut tiles = Vec::new();
     for region in &task.regions {
@@ -334,8 +334,9 @@ mod tests {
                 let some = found(backend, Thresholds { hit: f64::INFINITY, guide });
                 let wanted = || all.iter().filter(|&&(_, _, score)| score >= guide);
                 assert!(wanted().all(|window| some.contains(window)), "{backend:?} {guide}");
-                // The scalar kernels have no prefilter.
-                assert!(some.len() < wanted().count() + 60 || some.len() == all.len(), "{}", some.len());
+                // The scalar kernels have no prefilter. With their whole bound the others let in up to 430 more.
+                let most = if backend == Backend::Scalar { all.len() } else { wanted().count() + 90 };
+                assert!(some.len() <= most, "{backend:?} {guide}: {} of {most}", some.len());
             }
         }
     }

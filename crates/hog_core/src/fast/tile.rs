@@ -230,8 +230,8 @@ pub(super) fn make<L: Lane>(
     Ok(())
 }
 
-/// Adds to `scratch.found` the windows of band `index` whose exact score may reach the thresholds. They begin in
-/// `own` and end in `next`, the blocks of the band below, if there is one.
+/// Adds to `scratch.found` the windows of band `index` that may be hits and nearly all that guide. They begin in `own` and
+/// end in `next`, the blocks of the band below, if there is one.
 pub(super) fn score_band<L: Lane>(
     l: L,
     context: &Context,

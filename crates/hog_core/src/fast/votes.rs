@@ -1,7 +1,8 @@
-//! A row's gradients and votes with the exact path's roundings, by vectors: for `computeGradient`.
+//! A row's gradients and votes with the exact path's roundings, by vectors: for all that computes gradients as OpenCV does.
 
 use std::arch::x86_64::*;
 use std::fmt::Debug;
+use std::panic::RefUnwindSafe;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use crate::exact::{RowKernel, RowVotes, Turn, polar};
@@ -9,7 +10,7 @@ use crate::exact::{RowKernel, RowVotes, Turn, polar};
 use super::lane::{Kernel, Lane, avx2::Avx2, avx512::Avx512};
 
 /// What the votes need beyond a [`Lane`], where multiply-add is fused: without it OpenCV rounds otherwise.
-pub(super) trait VoteLane: Lane + Debug + Sync {
+pub(super) trait VoteLane: Lane + Debug + Sync + RefUnwindSafe {
     /// Writes the square root of each of `pixels`, and gives whether it has: where that is faster than the CPU's own.
     fn roots(self, pixels: &[u8], roots: &mut [f32]) -> bool;
     fn floor(self, x: Self::F) -> Self::F;

@@ -178,7 +178,6 @@ impl Hog {
             bins: of_bins.as_slice_mut()?.as_chunks_mut().0,
         };
         detached(py, |interrupt| self.inner.gradient(view, padding, interrupt, out))?;
-        drop((of_shares, of_bins));
         Ok((shares, bins))
     }
 

@@ -32,8 +32,7 @@ pub(crate) fn for_each<T: Send>(
         Ok(())
     };
     let part: &Part = &part;
-    // SAFETY: what `part` borrows outlives this function, and when `together` returns no helper holds it any more; nor does
-    // `together` unwind before that.
+    // SAFETY: what `part` borrows lives until `together` has returned or unwound, and by then no helper holds it any more.
     let part: &'static Part<'static> = unsafe { mem::transmute::<&Part, &'static Part<'static>>(part) };
     together(&Arc::new(Borrowed(part)), threads, interrupt)
 }

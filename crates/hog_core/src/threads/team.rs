@@ -80,6 +80,9 @@ impl Call {
         let mut first = lock(&self.outcome);
         if matches!(*first, Ok(Ok(()))) {
             *first = outcome;
+        } else {
+            // What a panic carries may panic when it is dropped, and nothing may unwind from here while helpers work.
+            std::mem::forget(outcome);
         }
         self.stopped.store(true, Ordering::Relaxed);
     }

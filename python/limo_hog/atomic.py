@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+#: Longest name of a file [bytes] on Linux's and macOS's file systems.
+_LONGEST_NAME = 255
+
+
+def is_stream(path: Path) -> bool:
+    """Say whether a name is a pipe's or a device's: what is written there is no file, and replaces none."""
+    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def part_of(path: Path) -> Path:
     """Return the name a file has while it is written: hidden, beside it, with the same suffix.
+
+    A pipe or a device is written to under its own name.
 
     Raises
     ------
@@ -19,7 +30,13 @@ def part_of(path: Path) -> Path:
     """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    return path.with_name(f".{path.stem}.part{path.suffix}")
+    if is_stream(path):
+        return path
+    name = f".{path.stem}.part{path.suffix}"
+    if len(os.fsencode(name)) > _LONGEST_NAME:
+        digest = hashlib.sha256(os.fsencode(path.name)).hexdigest()[:32]
+        name = f".{digest}.part{path.suffix[:16]}"
+    return path.with_name(name)
 
 
 @contextmanager
@@ -37,7 +54,7 @@ def about(path: Path) -> Iterator[None]:
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a name to write to, and rename it to `path` when all went well; else nothing is left behind.
 
-    Folders are made as needed.
+    Folders are made as needed. A pipe or a device stays what it is: the name is its own.
 
     Raises
     ------
@@ -45,16 +62,32 @@ def whole_file(path: Path) -> Iterator[Path]:
         The file cannot be written; it names `path`.
     """
     part = part_of(path)
+    if part == path:
+        yield path
+        return
     with about(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     try:
         yield part
         part.replace(path)
     except BaseException as error:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()
         if isinstance(error, OSError) and str(error.filename) == str(part):
             raise _named(error, path) from error
         raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write text as UTF-8; bytes of a file's name that are no UTF-8 are written as they are.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; it names `path`.
+    """
+    with whole_file(path) as part, about(path):
+        part.write_text(text, "utf-8", "surrogateescape")
 
 
 def _named(error: OSError, path: Path) -> OSError:

@@ -271,9 +271,12 @@ class PeopleDetector:
         zoom = self._zoom
         width, height = (max(1, round(side * zoom)) for side in image.shape[1::-1])
         if width * height > _MOST_PIXELS:
+            came, limit = f"{image.shape[1]} x {image.shape[0]} px", f"at most {_MOST_PIXELS} pixels are allowed"
+            if self.min_height is None:
+                raise ImageError(f"the image is {came}; {limit}: make it smaller")
             raise ImageError(
-                f"the image, {image.shape[1]} x {image.shape[0]} px, would be {width} x {height} px to find people of "
-                f"{self.min_height:g} px; at most {_MOST_PIXELS} pixels are allowed: raise min_height"
+                f"the image, {came}, would be {width} x {height} px to find people of {self.min_height:g} px; {limit}: "
+                "raise min_height"
             )
         return width, height
 

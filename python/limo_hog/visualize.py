@@ -44,7 +44,8 @@ def visualize(hog: HOGDescriptor, values: ArrayLike, *, zoom: int = 4) -> NDArra
         raise DetectorSizeError(
             f"there are {came} values; a window of this geometry has {size}, or {size + 1} with bias"
         )
-    if not 1 <= integer("zoom", zoom, 4) <= 64:
+    zoom = integer("zoom", zoom, 4)
+    if not 1 <= zoom <= 64:
         raise ParameterError(f"zoom is {zoom}; 1 to 64 is wanted")
     histograms = _histograms(hog, numbers[:size])
     strokes = _strokes(hog, zoom)

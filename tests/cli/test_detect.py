@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -145,6 +147,36 @@ def test_overlapping_hits_leave_only_the_best(pictures: Path, capsys: pytest.Cap
     assert few["boxes"][0] == raw.boxes[0].tolist()
 
 
+def test_a_picture_is_searched_once_however_its_name_is_spelled(
+    pictures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    film_of(Path("film.mp4"), frames=2)
+    Path("link").symlink_to("in")
+    Path("in", "z.png").symlink_to("a.png")
+    inputs = ["in/a.png", str(pictures / "a.png"), "in/deep/../a.png", "film.mp4", "link/a.png", "./in/../film.mp4"]
+    assert main(["detect", *inputs, "in/z.png", "--json", "-", "--out", "out"]) == 0
+    results = lines_of(capsys.readouterr().out)
+    # A link is a picture of another name.
+    assert [(r["source"], r["frame"]) for r in results] == [
+        ("in/a.png", 0),
+        ("film.mp4", 0),
+        ("film.mp4", 1),
+        ("in/z.png", 0),
+    ]
+    copies = sorted(str(path.relative_to("out")) for path in Path("out").rglob("*.*"))
+    assert copies == ["film.mp4", "in/a.png", "in/z.png"]
+
+
+def test_copies_of_pictures_above_the_current_folder_lie_below_out(
+    pictures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(pictures / "deep")
+    assert main(["detect", "../a.png", "b.png", "--out", str(tmp_path / "out")]) == 0
+    copies = [path.relative_to(tmp_path) for path in tmp_path.rglob("*.png") if pictures not in path.parents]
+    assert sorted(map(str, copies)) == ["out/a.png", "out/deep/b.png"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -226,6 +258,17 @@ def test_results_are_a_table_and_coco_too(pictures: Path, tmp_path: Path) -> Non
     # An earlier run's results are in the tables, too.
     assert main(["detect", str(pictures), str(film), *asked, "--resume"]) == 0
     assert json.loads(files["coco"].read_text()) == coco
+
+
+def test_a_name_that_is_no_text_is_printed_escaped_and_stands_in_the_table_as_it_is(tmp_path: Path) -> None:
+    name = b"caf\xe9.png"
+    write_image(tmp_path / os.fsdecode(name), PICTURE)
+    command = [str(LIMO_HOG), "detect", os.fsdecode(name), "--csv", "found.csv"]
+    strict = {**os.environ, "PYTHONIOENCODING": "utf-8:strict"}
+    done = subprocess.run(command, cwd=tmp_path, env=strict, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.split()[0]) == (0, r"caf\udce9.png"), done.stderr
+    lines = (tmp_path / "found.csv").read_bytes().splitlines()
+    assert len(lines) > 1 and all(line.startswith(name + b",0,192,256,") for line in lines[1:])
 
 
 def test_tables_to_standard_output_and_of_half_a_run_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

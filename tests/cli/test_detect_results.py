@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
+import stat
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -48,6 +51,57 @@ def test_copies_that_are_there_are_not_made_again(pictures: Path, tmp_path: Path
     again = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
     assert again.keys() == made.keys()
     assert [path for path in made if made[path] != again[path]] == [gone]
+
+
+def test_resuming_gives_a_whole_copy_of_a_video_the_lines_it_lacks(tmp_path: Path) -> None:
+    film, out, file = tmp_path / "film.mp4", tmp_path / "out", tmp_path / "found.json"
+    film_of(film)
+    assert main(["detect", str(film), "--out", str(out)]) == 0
+    made = (out / "film.mp4").stat().st_mtime_ns
+    arguments = ["detect", str(film), "--out", str(out), "--json", str(file), "--resume"]
+    assert main(arguments) == 0
+    lines = file.read_text().splitlines(keepends=True)
+    assert [r["frame"] for r in lines_of("".join(lines))] == list(range(12))
+    # As a killed run leaves it.
+    file.write_text("".join(lines[:5]))
+    assert main(arguments) == 0
+    assert [r["frame"] for r in lines_of(file.read_text())] == list(range(12))
+    assert (out / "film.mp4").stat().st_mtime_ns == made
+
+
+def test_resuming_makes_a_copy_that_is_gone_and_no_second_line(pictures: Path, tmp_path: Path) -> None:
+    out, file = tmp_path / "out", tmp_path / "found.json"
+    arguments = ["detect", str(pictures), "--out", str(out), "--json", str(file), "--resume"]
+    assert main(arguments) == 0
+    before = file.read_text()
+    (out / "a.png").unlink()
+    assert main(arguments) == 0
+    assert (out / "a.png").exists()
+    assert file.read_text() == before
+
+
+def test_results_go_through_a_pipe_which_keeps_nothing_to_go_on_from(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipe, came = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: came.append(pipe.read_text()), daemon=True)
+    reader.start()
+    assert main(["detect", str(pictures), "--json", str(pipe)]) == 0
+    reader.join(10)
+    assert [Path(r["source"]).name for r in lines_of(came[0])] == ["a.png", "c.png", "b.png"]
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in", "pipe"]
+    assert main(["detect", str(pictures), "--json", str(pipe), "--resume"]) == 2
+    assert "--json FILE or --out DIR" in capsys.readouterr().err
+
+
+def test_results_to_the_null_device_leave_it_a_device(pictures: Path, tmp_path: Path) -> None:
+    null = tmp_path / "null"
+    null.symlink_to("/dev/null")
+    for table in ("--json", "--csv", "--coco"):
+        assert main(["detect", str(pictures), table, str(null)]) == 0
+        assert stat.S_ISCHR(null.stat().st_mode)
 
 
 def test_the_files_of_an_earlier_run_are_replaced_only_when_asked(
@@ -108,6 +162,37 @@ def test_resuming_from_another_file_leaves_it_alone(
     assert main(["detect", str(pictures), "--json", str(file), "--resume"]) == 1
     assert "not the JSON lines of an earlier run" in capsys.readouterr().err
     assert file.read_text() == "my notes\n"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"boxes": 5},
+        {"boxes": [5]},
+        {"boxes": [[1, 2, 3]]},
+        {"boxes": [["1", 2, 3, 4]]},
+        {"scores": ["high"]},
+        {"scores": []},
+        {"source": []},
+        {"frame": "0"},
+        {"width": None},
+        {"parameters": 7},
+    ],
+)
+def test_a_line_with_a_value_of_another_kind_is_not_gone_on_from(
+    change: dict[str, object], pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, table = tmp_path / "found.json", tmp_path / "found.csv"
+    arguments = ["detect", str(pictures / "a.png"), "--json", str(file), "--csv", str(table)]
+    assert main(arguments) == 0
+    (line,) = lines_of(file.read_text())
+    kept = {"boxes": [[1, 2, 3, 4]], "scores": [0.5]}
+    file.write_text(json.dumps(line | kept | change) + "\n")
+    capsys.readouterr()
+    assert main([*arguments, "--resume"]) == 1
+    assert "found.json: not the JSON lines of an earlier run: line 1 is another" in capsys.readouterr().err
+    file.write_text(json.dumps(line | kept) + "\n")
+    assert main([*arguments, "--resume"]) == 0
 
 
 def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:

@@ -31,14 +31,23 @@ WRONG_ARGUMENTS = [
     ("detect a.jpg --resume", "give one of them"),
     ("detect a.jpg --resume --overwrite --json x", "not allowed with argument --resume"),
     ("detect a.jpg --csv -", "standard output is for --json -"),
+    ("detect a.jpg --csv t --coco ./t", "--json, --csv and --coco name the same file twice"),
+    ("detect a.jpg --json t --csv t", "--json, --csv and --coco name the same file twice"),
     ("detect a.jpg --json folder", "'folder' is a folder"),
     ("detect a.jpg --json there.txt", "there.txt would be overwritten: --overwrite replaces it"),
     ("detect a.jpg --outt found", "did you mean --out?"),
     ("detect a.jpg --model nobody.yml", "the path of a model file is wanted"),
     ("bench --size 640", "'640' is no size; wanted is WIDTHxHEIGHT such as 640x480"),
     ("bench --size 0x480", "'0x480' is no size"),
+    ("bench --size 200x60", "a picture of 200x60 is smaller than the detector's window; 64x128 or more is wanted"),
+    ("bench --size 63x128", "a picture of 63x128 is smaller than the detector's window"),
+    ("bench --image a.jpg --size 64x127", "a picture of 64x127 is smaller than the detector's window"),
+    ("bench --image tiny.png", "a picture of 200x60 is smaller than the detector's window"),
     ("bench --channels rgb", "invalid choice: 'rgb' (choose from"),
     ("bench --threads many", "'many' is no number of threads"),
+    ("train crops --out m.yml --object-box 0 0 1 1.1", "'1.1' is no share; wanted is a number from 0 to 1"),
+    ("train crops --out m.yml --held-out 1", "'1' is no share; wanted is a number from 0 to 0.99"),
+    ("evaluate opencv there.txt --json folder", "'folder' is a folder"),
     ("follow --controller fast", "invalid choice: 'fast' (choose from"),
     ("follow --target 100", "'100' is no distance in metres; wanted is a number from 0.1 to 8"),
     ("follow --seconds -5", "'-5' is no duration in seconds"),
@@ -54,10 +63,37 @@ WRONG_ARGUMENTS = [
         "score --controller zigzag",
         "'zigzag' is no controller; wanted is one of approach, proxemic, tracking, pursuit, ppo",
     ),
-    ("arena", "give --ros2, --view, --video or --record"),
+    ("score --scenario here/same.toml there/same.toml", "there/same.toml: is called 'same', as here/same.toml is"),
+    ("score --scenario named.toml empty", "empty: is called 'empty', as named.toml is; give it another name"),
+    ("score --scenario empty empty", "empty: is called 'empty', as empty is"),
+    ("arena", "give --ros2, --view, --video, --record or --rerun"),
+    (
+        "arena --video a.mp4 --plot a.png --seconds 0.2",
+        "--plot a.png: an arena has no run to draw; use it with follow or run",
+    ),
     ("run", "the following arguments are required: NODE.py"),
-    ("run node.py --real --json card.json", "a script on the network is not scored"),
+    ("run node.py --real --json card.json", "--json and --real: a script on the network is not scored"),
+    ("run node.py --real --view", "--view and --real: a script on the network is not watched"),
+    ("run node.py --real --video a.mp4", "--video and --real: a script on the network is not watched"),
+    ("run node.py --real --record a.mcap", "--record and --real: a script on the network is not watched"),
+    ("run node.py --real --plot a.png", "--plot and --real: a script on the network is not watched"),
+    ("run node.py --real --rerun a.rrd", "--rerun and --real: a script on the network is not watched"),
+    (
+        "run a.launch.py speed:=1 --real",
+        "speed:=1 and --real: a launch file's arguments; a node's come after --ros-args",
+    ),
     ("workshop", "the following arguments are required: new|check|solution"),
+    ("workshop check node.py --hint -1", "'-1' is no count; wanted is a whole number from 1 on"),
+    ("workshop check node.py --json folder", "'folder' is a folder"),
+    ("workshop check node.py --gradescope folder", "'folder' is a folder"),
+    ("workshop grade nofolder", "nofolder: no such folder"),
+    ("workshop grade node.py", "node.py: no such folder"),
+    ("workshop grade folder", "folder: no Python file in it"),
+    ("workshop grade folder --csv folder", "'folder' is a folder"),
+    ("workshop grade folder --seconds -1", "'-1' is no duration in seconds"),
+    ("workshop grade folder --seconds nan", "'nan' is no duration in seconds"),
+    ("workshop grade folder --memory 0", "'0' is no count"),
+    ("workshop grade folder --memory -5", "'-5' is no count"),
     ("workshop new there.txt", "there.txt is there already; give another name"),
     ("replay", "the following arguments are required: FILE"),
     ("topic", "the following arguments are required"),
@@ -78,6 +114,7 @@ IMPOSSIBLE = [
     ("workshop check none.py", "none.py: no such file"),
     ("replay none.mcap", "none.mcap"),
     ("replay there.txt", "there.txt"),
+    ("replay .", ".: no ROS 2 recording that can be read, or cut off: "),
 ]
 
 
@@ -86,9 +123,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A working directory with a picture, a node, a text and a folder."""
     monkeypatch.chdir(tmp_path)
     cv2.imwrite("a.jpg", np.zeros((200, 200, 3), np.uint8))
+    cv2.imwrite("tiny.png", np.zeros((60, 200, 3), np.uint8))
     Path("there.txt").write_text("text")
     Path("node.py").write_text("")
     Path("folder").mkdir()
+    for place in ("here", "there"):
+        Path(place).mkdir()
+        Path(place, "same.toml").write_text("")
+    Path("named.toml").write_text("name = 'empty'")
 
 
 @pytest.mark.parametrize(("typed", "told"), WRONG_ARGUMENTS)
@@ -127,6 +169,7 @@ MISSING = [
     ("cv2", "replay a.mcap --detector cv2", "needs OpenCV: pip install 'limo-hog[cv]'"),
     ("av", "follow --video a.mp4", "writing H.264 video needs PyAV: pip install 'limo-hog[video]'"),
     ("matplotlib", "follow --plot a.png", "--plot needs matplotlib: pip install 'limo-hog[plot]'"),
+    ("rerun", "arena --rerun a.rrd", "--rerun needs the Rerun SDK: pip install 'limo-hog[viz]'"),
     ("rerun", "follow --rerun a.rrd", "--rerun needs the Rerun SDK: pip install 'limo-hog[viz]'"),
     ("rosbags", "follow --record a.mcap", "pip install 'limo-hog[record]'"),
     ("rosbags", "run node.py", "limo-hog run needs rosbags: pip install 'limo-hog[record]'"),

@@ -118,11 +118,14 @@ def test_pictures_may_lie_elsewhere(folder: Path, tmp_path_factory: pytest.TempP
         ("x.json", '{"a.png": [[1, 2, 3]]}', "neither COCO labels nor"),
         ("x.json", '{"a.png": [[1, 2, 3, NaN]]}', "finite numbers are wanted"),
         ("x.json", "{", "neither COCO labels nor"),
+        ("x.json", '{"images": [], "annotations": [1]}', "neither COCO labels nor"),
+        ("x.json", f'{{"a.png": [[1, 2, 3, {10**400}]]}}', "neither COCO labels nor"),
         ("x.json", "{}", "names no picture"),
         ("x.xml", "<html/>", r"its outermost tag is <html>; wanted is VOC's"),
         ("x.xml", "<annotation", "wanted is VOC's"),
         ("x.xml", "<annotation><filename>a.png</filename><object/></annotation>", "has no <bndbox/xmin>"),
         ("x.xml", "<dataset><image file='a.png'><box/></image></dataset>", "wanted is VOC's"),
+        ("x.xml", '<?xml version="1.0" encoding="foo"?><annotation/>', "x.xml: unknown encoding: foo; wanted is VOC's"),
         ("x.csv", "a,b", "holds no labels; wanted is a folder of VOC"),
         ("labels/a.txt", "person 1 2", r"lines of label, centre x"),
         ("labels/a.txt", "0 .5 .5 nan .5", "finite numbers are wanted"),
@@ -135,6 +138,13 @@ def test_other_files_are_refused_in_one_line(name: str, text: str, complaint: st
     with pytest.raises(LabelError, match=complaint) as raised:
         read_labels(folder if name.startswith("labels") else path)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("name", ["a.txt", "classes.txt"])
+def test_yolo_text_in_another_encoding_is_named(name: str, folder: Path) -> None:
+    (_yolo(folder) / "labels" / name).write_bytes("Fußgänger".encode("latin-1"))
+    with pytest.raises(LabelError, match=rf"{name} is no text in UTF-8.*save it as UTF-8"):
+        read_labels(folder)
 
 
 def test_a_folder_without_labels_says_what_is_wanted(folder: Path) -> None:
@@ -160,6 +170,12 @@ def test_one_label_is_chosen_and_the_others_are_left_out() -> None:
         choose(pictures, "cow")
     with pytest.raises(LabelError, match="no labelled box in 1 pictures"):
         choose([Picture(Path("a.png"), ())], None)
+
+
+def test_labels_of_nothing_but_boxes_without_area_are_refused() -> None:
+    pictures = [Picture(Path("a.png"), (Box("", 2, 2, 0, 5), Box("", 2, 2, 5, 5, ignored=True)))]
+    with pytest.raises(LabelError, match="none of the 1 labelled boxes has an area"):
+        choose(pictures, None)
 
 
 def test_boxes_without_area_or_outside_are_left_out_with_a_warning() -> None:

@@ -97,6 +97,8 @@ def test_the_same_command_writes_the_same_bytes(trained: Path, bollards: Path, t
         (["{data}", "--label", "cow"], 1, "no box has the label 'cow'"),
         (["{data}", "--window", "60x60"], 2, "multiples of 8"),
         (["{data}", "--object-box", ".5", ".1", ".6", ".5"], 2, "inside of the crop"),
+        # The whole crop may be the object.
+        (["{crops}", "--object-box", "0", "0", "1", "1"], 1, "there are crops only"),
         (["{data}", "--resume"], 1, "no stopped run to resume"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -75,6 +76,30 @@ def test_a_run_of_other_data_is_not_resumed(data: TrainingData, tmp_path: Path) 
         State.load(path, "")
 
 
+def test_a_damaged_state_is_told_as_one(data: TrainingData, tmp_path: Path) -> None:
+    path, mark = tmp_path / "state.npz", fingerprint(data, SMALL)
+    State(mark, [np.ones(50)], [], [{"round": 0}]).save(path)
+    whole, rng = path.read_bytes(), np.random.default_rng(0)
+    refused = 0
+    for number in range(400):
+        damaged = bytearray(whole)
+        if number % 2:
+            damaged[rng.integers(len(whole))] ^= 1 << rng.integers(8)
+        else:
+            del damaged[rng.integers(len(whole)) :]
+        path.write_bytes(damaged)
+        try:
+            State.load(path, mark)
+        except ResumeError as error:
+            refused += "not the state of a stopped run" in str(error)
+    # Some bits say nothing: when a part was packed, by which system.
+    assert refused > 300
+    with path.open("wb") as file:
+        np.save(file, np.ones(3))
+    with pytest.raises(ResumeError, match="not the state of a stopped run"):
+        State.load(path, mark)
+
+
 def test_labels_choose_the_window_and_pictures_are_held_out(data: TrainingData, bollards: Path) -> None:
     width, height = data.shape.size
     assert width % 8 == height % 8 == 0
@@ -86,6 +111,16 @@ def test_labels_choose_the_window_and_pictures_are_held_out(data: TrainingData, 
     assert held.isdisjoint(data.negatives.paths)
     assert len(held | set(data.negatives.paths)) == 20
     assert data.min_height <= 70
+
+
+def test_nothing_is_held_out_where_no_object_can_be(bollards: Path, tmp_path: Path) -> None:
+    labels = json.loads((bollards / "boxes.json").read_text())
+    first = next(name for name, boxes in labels.items() if boxes)
+    (tmp_path / "boxes.json").write_text(json.dumps({name: labels[name] if name == first else [] for name in labels}))
+    with pytest.warns(LabelWarning, match="objects only"):
+        data = gather(Wanted((tmp_path / "boxes.json",), pictures=bollards))
+    assert data.validation == ()
+    assert len(data.negatives.paths) == 20
 
 
 def test_negatives_of_labelled_pictures_are_clear_of_the_objects(data: TrainingData) -> None:

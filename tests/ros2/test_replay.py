@@ -18,6 +18,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Mode, Observation, Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.bag import Record, bag_writer
+from limo_hog.ros2.findings import stamped_twist
 from limo_hog.ros2.messages import MessageError
 from limo_hog.ros2.replay import replay
 from limo_hog.ros2.senses import Senses, picture_of
@@ -120,6 +121,20 @@ def frames(count: int) -> Iterator[Record]:
     yield Record(names.CAMERA_INFO, 0.0, messages.camera_info(0.0, 64, 48, 50.0))
     for k in range(count):
         yield Record(names.IMAGE, 0.1 * k, messages.image(0.1 * k, PICTURE))
+
+
+def stamped(stamp: float, command: Twist) -> Record:
+    return Record(names.COMMAND, stamp, stamped_twist(stamp, command))
+
+
+@pytest.mark.parametrize("kind", ["Twist", "TwistStamped"])
+def test_the_recorded_command_is_what_drove_the_robot_of_either_type_and_no_other_twist(kind: str) -> None:
+    drove = Twist(0.3, -0.2)
+    planned = Record("/cmd_vel_nav", 1.01, messages.twist(Twist(9.0, 9.0)))
+    sent = Record(names.COMMAND, 1.02, messages.twist(drove)) if kind == "Twist" else stamped(1.02, drove)
+    first, *rest = records()
+    done = list(replay([first, rest[0], planned, sent], Driver(), Empty()))
+    assert [frame.recorded_twist for frame in done] == [drove]
 
 
 def test_a_detector_that_raises_is_a_fault_of_that_frame_and_the_replay_goes_on() -> None:

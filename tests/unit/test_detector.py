@@ -133,6 +133,8 @@ def test_images_of_any_size_are_searched(shape: tuple[int, ...]) -> None:
 def test_an_image_that_would_be_enlarged_beyond_memory_is_refused() -> None:
     with pytest.raises(limo_hog.ImageError, match=r"6000 x 4000 px, would be 74880 x 49920 px.*raise min_height"):
         PeopleDetector(min_height=8).detect(np.broadcast_to(np.uint8(0), (4000, 6000)))
+    with pytest.raises(limo_hog.ImageError, match=r"the image is 20000 x 20000 px; at most 268435456 pixels"):
+        PeopleDetector(min_height=None).detect(np.broadcast_to(np.uint8(0), (20000, 20000)))
 
 
 # One box a person.

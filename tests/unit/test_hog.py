@@ -152,6 +152,8 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
         TypeError,
         "useMeanshiftGrouping is",
     ),
+    (lambda: untyped.HOGDescriptor(""), ValueError, "filename is empty"),
+    (lambda: people().save(""), ValueError, "filename is empty"),
     (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(36)), ValueError, "there are 36 values"),
     (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(3780), zoom=0), ValueError, "zoom is 0"),
     (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(3780), zoom=10**400), ValueError, "zoom is 1000"),
@@ -207,6 +209,9 @@ def test_a_picture_of_a_detector_tells_for_from_against() -> None:
         picture = visualize(hog, np.full(3781, float(sign))).astype(int)
         assert picture[..., strong].sum() > picture[..., weak].sum()
     assert visualize(hog, np.zeros(3780)).sum() == 0
+    # None stands for the default, as for every other argument.
+    unset: Any = None
+    np.testing.assert_array_equal(visualize(hog, np.ones(3780), zoom=unset), visualize(hog, np.ones(3780)))
 
 
 def test_opencv_4_keeps_its_own_names(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -69,6 +69,11 @@ def test_a_file_that_is_no_picture_is_named(tmp_path: Path) -> None:
         PeopleDetector().detect(tmp_path)
 
 
+def test_an_empty_name_is_told_as_one() -> None:
+    with pytest.raises(ImageError, match="the name of the picture is empty"):
+        PeopleDetector().detect("")
+
+
 @pytest.mark.parametrize("name", ["a\0b.jpg", "\ud800.jpg"])
 def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
     with pytest.raises(ImageError, match="is no file's name"):

@@ -62,6 +62,13 @@ def test_an_input_that_stands_for_nothing_is_named(name: str, tmp_path: Path) ->
         find_sources(str(tmp_path / name))
 
 
+def test_an_empty_name_does_not_stand_for_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_image(Path("a.png"), np.zeros((8, 8, 3), np.uint8))
+    with pytest.raises(ReadError, match="the name of an input is empty"):
+        find_sources("")
+
+
 def test_an_image_is_read_as_opencv_reads_it(tmp_path: Path) -> None:
     picture = np.random.default_rng(0).integers(0, 256, (31, 47, 3), dtype=np.uint8)
     path = tmp_path / "noise.jpg"
@@ -118,8 +125,9 @@ def test_a_file_that_is_no_video_is_named(content: bytes, said: str, tmp_path: P
         pass
 
 
-def test_a_camera_that_is_not_there_is_named() -> None:
-    with pytest.raises(ReadError, match="97: no camera"), open_video(find_sources("97")[0]):
+@pytest.mark.parametrize("index", ["97", "99999999999999999999"])
+def test_a_camera_that_is_not_there_is_named(index: str) -> None:
+    with pytest.raises(ReadError, match=f"^{index}: no camera"), open_video(find_sources(index)[0]):
         pass
 
 

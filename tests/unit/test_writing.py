@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import errno
+import os
+import stat
 import sys
+import threading
 from pathlib import Path
 
 import av
@@ -11,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 
-from limo_hog.atomic import about, whole_file
+from limo_hog.atomic import about, part_of, whole_file, write_text
 from limo_hog.extras import MissingExtraError
 from limo_hog.imaging.writing import WriteError, video_writer, write_image
 
@@ -76,6 +79,49 @@ def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:
         with pytest.raises(IsADirectoryError) as caught, whole_file(folder):
             pass
         assert caught.value.filename == str(folder)
+
+
+def test_what_is_written_to_a_pipe_comes_out_of_it_and_it_stays_a_pipe(tmp_path: Path) -> None:
+    pipe, came = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: came.append(pipe.read_text()), daemon=True)
+    reader.start()
+    write_text(pipe, "text")
+    reader.join(10)
+    assert came == ["text"]
+    assert stat.S_ISFIFO(pipe.stat().st_mode) and list(tmp_path.iterdir()) == [pipe]
+
+
+def test_a_device_stays_a_device_also_where_writing_fails(tmp_path: Path) -> None:
+    # By links: what went wrong here would replace them, not the devices.
+    null, full = tmp_path / "null", tmp_path / "full"
+    for link in (null, full):
+        link.symlink_to(f"/dev/{link.name}")
+    write_text(null, "text")
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        write_text(full, "text")
+    assert caught.value.filename == str(full)
+    assert all(stat.S_ISCHR(link.stat().st_mode) for link in (null, full))
+    assert sorted(tmp_path.iterdir()) == [full, null]
+
+
+@pytest.mark.parametrize("letter", ["a", "ä", "人"])
+def test_a_name_as_long_as_a_file_system_allows_can_be_written(letter: str, tmp_path: Path) -> None:
+    for suffix in (".csv", f".{'x' * 240}"):
+        longest = letter * ((255 - len(suffix)) // len(letter.encode()))
+        first, other = (tmp_path / f"{longest[:-1]}{last}{suffix}" for last in "12")
+        for path in (first, other):
+            write_text(path, path.name)
+            assert path.read_text() == path.name
+        assert part_of(first) != part_of(other)
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_a_name_that_is_too_long_is_the_one_that_the_error_tells(tmp_path: Path) -> None:
+    path = tmp_path / f"{'a' * 256}.csv"
+    with pytest.raises(OSError, match="File name too long") as caught:
+        write_text(path, "")
+    assert caught.value.filename == str(path)
 
 
 @pytest.mark.parametrize(("width", "height"), [(64, 48), (63, 47)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import time
 from pathlib import Path
 
@@ -25,7 +26,7 @@ REASONS = {"loop": "more than 12 s", "exit": "exit code 0", "child": "more than 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_node_ends_within_its_limits_and_gets_no_points(tmp_path: Path, name: str) -> None:
     (tmp_path / "node.py").write_text(HOSTILE[name])
-    (graded,) = grade(nodes_in(tmp_path), limits=Limits(seconds=60.0 if name == "memory" else 12.0))
+    (graded,) = grade(nodes_in(tmp_path), 1, limits=Limits(seconds=60.0 if name == "memory" else 12.0))
     if name == "memory":
         assert graded.result is not None
         assert graded.result["points"] == 0
@@ -48,6 +49,22 @@ def test_a_folder_becomes_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert rows[1]["first_mistake"].startswith("the camera image is shown: ")
     assert "os._exit" in rows[2]["first_mistake"]
     assert "3 files" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system binds no process to a core")
+def test_where_one_core_may_be_used_one_node_runs_at_a_time(tmp_path: Path) -> None:
+    log = tmp_path / "log.txt"
+    busy = f"def note(word):\n    with open({str(log)!r}, 'a') as log:\n        log.write(f'{{word}} ')\n"
+    busy += "note('begun')\nsum(range(40_000_000))\nnote('ended')\nimport os\nos._exit(0)\n"
+    for name in ("amy", "bob"):
+        (tmp_path / f"{name}.py").write_text(busy)
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(allowed)})
+    try:
+        assert main(["workshop", "grade", str(tmp_path), "--csv", str(tmp_path / "points.csv")]) == 0
+    finally:
+        os.sched_setaffinity(0, allowed)
+    assert log.read_text().split() == ["begun", "ended"] * 2
 
 
 def test_a_folder_without_nodes_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -89,6 +90,9 @@ LASER = (
     .replace("import Image", "import Image, LaserScan")
 )
 
+#: Drives until the chair's legs, ahead or beside, are a quarter of a metre from the lidar.
+LATE = LASER.replace("< 0.4", "< 0.8").replace("> 0.5", "> 0.25")
+
 DONE = {"a": SLOW, "b": MERGED, "c": OTHER, "d": TRACKED, "e": LASER}
 #: What the workshop's model solution, which does none of them, is told.
 MISSED = {
@@ -119,6 +123,17 @@ def test_the_workshops_solution_is_told_what_is_missing(tmp_path: Path, task: st
     name, said = MISSED[task]
     assert verdicts[name].holds is False
     assert said in verdicts[name].evidence
+
+
+@pytest.mark.parametrize("node", ["in time", "late"])
+def test_the_way_driven_and_the_way_left_add_up_to_the_chair(tmp_path: Path, node: str) -> None:
+    verdicts = check(written(tmp_path, LASER if node == "in time" else LATE), "stretch e")
+    (stops,) = (verdict for verdict in verdicts if verdict.checkpoint == "the robot stops before the chair")
+    driven, left = map(float, re.findall(r"(\d\.\d\d) m", stops.evidence)[:2])
+    # The seat's edge is at 1.5 - 0.17 m, the robot's front at 0.145 m when it starts, and the person straight ahead.
+    assert driven + left == pytest.approx(1.5 - 0.17 - 0.145, abs=0.02)
+    assert stops.holds is (node == "in time")
+    assert ("wanted are at least 0.2 m" in stops.evidence) is (node == "late")
 
 
 @pytest.mark.parametrize("task", DONE)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -10,9 +13,12 @@ import pytest
 
 import limo_hog
 from limo_hog.cli.main import main
-from limo_sim.workshop import NODES, solution, template
+from limo_sim.workshop import solution, template
 from limo_sim.workshop.check import Verdict, check
 from limo_sim.workshop.report import by_task, total
+
+#: The workshop's two nodes: the follower of tasks 1 to 4, and the sequel that keeps a distance.
+NODES = ("follower", "proxemic")
 
 DETECT = "boxes, weights = self.hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)"
 HALF = DETECT.replace("(image,", "(cv2.resize(image, (0, 0), fx=0.5, fy=0.5),")
@@ -323,6 +329,18 @@ def test_the_command_line_writes_checks_and_refuses(
     assert (results["score"], results["max_score"]) == (0, 100)
     assert sum(test["max_score"] for test in results["tests"]) == 100
     assert {test["status"] for test in results["tests"]} == {"failed"}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows limits no file's size")
+def test_a_template_that_does_not_fit_on_the_disk_leaves_no_file(tmp_path: Path) -> None:
+    code = (
+        "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); "
+        "from limo_hog.cli.main import main; sys.exit(main(['workshop', 'new']))"
+    )
+    command = [sys.executable, "-B", "-c", code]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    assert (done.returncode, done.stderr) == (1, "limo-hog: follower.py: File too large\n")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_points_add_up_by_task(tmp_path: Path) -> None:

@@ -18,10 +18,11 @@ from rich.table import Table
 import limo_hog
 from limo_hog.cli.support.arguments import output_file, size, threads
 from limo_hog.cli.support.environment import cores, environment
-from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.cli.support.race import Rounds, Timing, race
 from limo_hog.cli.support.scene import street
+from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import LimoHogError
 
@@ -108,17 +109,35 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _picture(size: tuple[int, int] | None, channels: int, path: Path | None) -> Image:
+    """Return the picture of a row.
+
+    Raises
+    ------
+    UsageError
+        It is smaller than the detector's window: OpenCV 4 crashes on such pictures.
+    """
     if path is None:
         width, height = size or SIZES[0]
+        _refuse_less_than_a_window(width, height)
         return street(width, height, channels)
     from limo_hog.imaging.reading import Kind, Source, read_image
 
     image = read_image(Source(str(path), path, Kind.IMAGE))
+    _refuse_less_than_a_window(*(size or image.shape[1::-1]))
     import cv2
 
     if size is not None:
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
     return image if channels == 3 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
+
+
+def _refuse_less_than_a_window(width: int, height: int) -> None:
+    least = Geometry().winSize
+    if width < least[0] or height < least[1]:
+        raise UsageError(
+            f"a picture of {width}x{height} is smaller than the detector's window; {least[0]}x{least[1]} or more is "
+            "wanted"
+        )
 
 
 def _opencv() -> Any:

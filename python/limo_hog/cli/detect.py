@@ -9,6 +9,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from limo_hog.atomic import is_stream
 from limo_hog.cli.support.arguments import count, number, output_file, threads
 from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.cli.support.results import json_lines, refuse_to_overwrite, write_coco, write_csv
@@ -95,7 +96,9 @@ def _score(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """Search all inputs and return 1 if some could not be read, else 0."""
-    if args.resume and args.json in (None, STDOUT) and args.out is None:
+    # Standard output, a pipe or a device holds nothing to go on from.
+    kept = args.json not in (None, STDOUT) and not is_stream(Path(args.json))
+    if args.resume and not kept and args.out is None:
         raise UsageError("--resume goes on from what --json FILE or --out DIR holds: give one of them")
     try:
         detector = PeopleDetector(
@@ -110,9 +113,12 @@ def run(args: argparse.Namespace) -> int:
     except ParameterError as error:
         raise UsageError(str(error)) from error
     tables = {Path(name): write for name, write in ((args.csv, write_csv), (args.coco, write_coco)) if name}
+    files = [Path(name).resolve() for name in (args.json, args.csv, args.coco) if name not in (None, STDOUT)]
+    if len(set(files)) < len(files):
+        raise UsageError("--json, --csv and --coco name the same file twice: give each a file of its own")
     if any(name == STDOUT for name in (args.csv, args.coco)):
         raise UsageError("--csv and --coco want a file's name; standard output is for --json -")
-    if args.resume and tables and args.json in (None, STDOUT):
+    if args.resume and tables and not kept:
         raise UsageError("--resume with --csv or --coco takes the earlier results from --json FILE: give it")
     if not args.resume and not args.overwrite:
         refuse_to_overwrite(tables)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import number
+from limo_hog.cli.support.arguments import number, output_file
 from limo_hog.cli.support.output import STDOUT, write_json
 
 if TYPE_CHECKING:
@@ -45,7 +45,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="where the curve ends: no surer hit is left out (%(default)s)",
     )
     parser.add_argument("--report", type=Path, metavar="DIR", help="write a page with the curve and the worst mistakes")
-    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - is standard output")
+    parser.add_argument(
+        "--json", type=output_file, metavar="FILE", help="write the figures as JSON; - is standard output"
+    )
 
 
 def _min_height(text: str) -> float | None:

@@ -50,7 +50,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--object-box",
-        type=_share,
+        type=_side,
         nargs=4,
         metavar=("X", "Y", "W", "H"),
         help="where the object stands in a crop, as shares of it (0.2 0.1 0.6 0.78, a person)",
@@ -65,6 +65,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def _share(text: str) -> float:
     return number(text, 0, 0.99, "share")
+
+
+def _side(text: str) -> float:
+    return number(text, 0, 1, "share")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -49,13 +49,15 @@ def load(filename: str | os.PathLike[str], name: str = "") -> tuple[Geometry, li
 
     Raises
     ------
+    ParameterError
+        The file's name is empty.
     OSError
         The file cannot be read.
     ModelFormatError
         It is not one of OpenCV's files, or has no such object, or that is no HOG detector, or its block is far larger
         than its coefficients justify.
     """
-    path = Path(filename)
+    path = _path(filename)
     try:
         objects = _parse(_text(path).lstrip("\ufeff \t\r\n"))
         geometry, svm = _from_entries(_chosen(objects, name))
@@ -91,11 +93,11 @@ def save(filename: str | os.PathLike[str], geometry: Geometry, svm: NDArray[np.f
     Raises
     ------
     ParameterError
-        `name` is not a letter or `_` followed by letters, digits, `-` and `_`.
+        `name` is not a letter or `_` followed by letters, digits, `-` and `_`; or the file's name is empty.
     OSError
         The file cannot be written; no part of it is left behind.
     """
-    path = Path(filename)
+    path = _path(filename)
     zipped = path.suffix == ".gz"
     plain = path.with_suffix("") if zipped else path
     if name and not re.fullmatch(r"[A-Za-z_][\w-]*", name, re.ASCII):
@@ -105,6 +107,12 @@ def save(filename: str | os.PathLike[str], geometry: Geometry, svm: NDArray[np.f
         raise FileNotFoundError(f"{path} cannot be saved: there is no directory {path.parent}")
     with whole_file(path) as part:
         part.write_bytes(gzip.compress(text.encode()) if zipped else text.encode())
+
+
+def _path(filename: str | os.PathLike[str]) -> Path:
+    if not os.fspath(filename):
+        raise ParameterError("filename is empty; a file's name is wanted")
+    return Path(filename)
 
 
 def _chosen(objects: dict[str, Entries], name: str) -> Entries:

@@ -37,6 +37,8 @@ def as_array(image: Any) -> Any:
         The file cannot be read.
     """
     if isinstance(image, (str, os.PathLike)):
+        if not os.fspath(image):
+            raise ImageError("the name of the picture is empty; a file's name is wanted")
         try:
             return _read(Path(image))
         except ValueError as error:

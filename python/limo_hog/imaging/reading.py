@@ -64,6 +64,8 @@ def find_sources(name: str) -> list[Source]:
     ReadError
         If it stands for nothing.
     """
+    if not name:
+        raise ReadError("the name of an input is empty; a file, folder, glob, camera or address is wanted")
     path = Path(name)
     if "://" in name:
         try:
@@ -175,7 +177,11 @@ def open_video(source: Source) -> Iterator[Video]:
         OpenCV cannot read it.
     """
     if source.kind is Kind.CAMERA:
-        capture, wanted = cv2.VideoCapture(int(source.name)), "no camera with this index"
+        wanted = "no camera with this index"
+        try:
+            capture = cv2.VideoCapture(int(source.name))
+        except (cv2.error, ValueError) as error:  # the index is no integer of 32 bits, or one of thousands of digits
+            raise ReadError(f"{source.name}: {wanted}") from error
     elif source.kind is Kind.STREAM:
         limits = (cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, cv2.CAP_PROP_READ_TIMEOUT_MSEC)
         timeouts = [word for limit in limits for word in (limit, 1000 * STREAM_TIMEOUT_S)]

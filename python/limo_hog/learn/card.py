@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.atomic import about, whole_file
+from limo_hog.atomic import write_text
 from limo_hog.cv2_api import model_files
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
@@ -48,8 +48,7 @@ def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShap
         A file cannot be written; no part of it is left behind.
     """
     model_files.save(path, Geometry(winSize=shape.size), coefficients.astype(np.float32))
-    with whole_file(card_path(path)) as part, about(card_path(path)):
-        part.write_text(json.dumps(card, indent=2) + "\n", "utf-8")
+    write_text(card_path(path), json.dumps(card, indent=2) + "\n")
 
 
 def measure(done: Round, data: TrainingData, workers: int, final: bool) -> dict[str, Any]:

@@ -129,7 +129,7 @@ def _json(source: Path) -> Iterator[_Named]:
                 yield str(name), tuple(_box("", box) for box in boxes)
         else:
             raise TypeError(f"it holds a {type(data).__name__}")  # noqa: TRY301 - one place words all that is wrong
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
         raise LabelError(f"{source} holds neither COCO labels nor {{picture: [[x, y, w, h]]}}: {error!r}") from error
 
 
@@ -158,7 +158,7 @@ def _xml(source: Path) -> Iterator[_Named]:
         if reader is None:
             raise ValueError(f"its outermost tag is <{root.tag}>")  # noqa: TRY301 - one place words all that is wrong
         yield from reader(root)
-    except (ElementTree.ParseError, ValueError, KeyError) as error:
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
         wanted = "VOC's <annotation>, CVAT's <annotations> or imglab's <dataset>"
         raise LabelError(f"{source}: {error}; wanted is {wanted}") from error
 
@@ -217,11 +217,11 @@ def _yolo(folder: Path, pictures: Path | None) -> list[Picture]:
     if not any(text.is_file() for text in texts.values()):
         raise LabelError(f"{folder} holds no labels; wanted is {_WANTED}")
     names = next((path for path in (labels / "classes.txt", folder / "classes.txt") if path.is_file()), None)
-    classes = names.read_text("utf-8").split("\n") if names else []
+    classes = _utf8(names).split("\n") if names else []
     read = []
     for path, text in texts.items():
         # A picture without a file has no object.
-        lines = text.read_text("utf-8").splitlines() if text.is_file() else []
+        lines = _utf8(text).splitlines() if text.is_file() else []
         height, width = Picture(path, ()).read().shape[:2] if lines else (0, 0)
         try:
             boxes = tuple(_yolo_box(line.split(), classes, width, height) for line in lines if line.strip())
@@ -230,6 +230,13 @@ def _yolo(folder: Path, pictures: Path | None) -> list[Picture]:
             raise LabelError(f"{text}: {error}; {wanted}") from error
         read.append(Picture(path, boxes))
     return read
+
+
+def _utf8(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise LabelError(f"{path} is no text in UTF-8: {error}; save it as UTF-8") from error
 
 
 def _yolo_box(words: list[str], classes: list[str], width: int, height: int) -> Box:

@@ -74,7 +74,7 @@ def choose(pictures: Sequence[Picture], label: str | None) -> list[Picture]:
     Raises
     ------
     LabelError
-        There is no box, none of this label, or several labels to choose from.
+        There is no box, none of this label or only some without area, or several labels to choose from.
 
     Warns
     -----
@@ -99,6 +99,8 @@ def choose(pictures: Sequence[Picture], label: str | None) -> list[Picture]:
         whole = [box for box in boxes if box.width > 0 and box.height > 0]
         empty += len(boxes) - len(whole)
         chosen.append(Picture(picture.path, tuple(whole)))
+    if not len(sizes_of(chosen)):
+        raise LabelError(f"none of the {counts[label]} labelled boxes has an area; at least one that has is wanted")
     if empty:
         warnings.warn(f"{empty} boxes without area are left out", LabelWarning, stacklevel=2)
     return chosen

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog import _core
+from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.exceptions import ImageError
 from limo_hog.imaging.reading import ReadError
 from limo_hog.learn.labels import LabelWarning
@@ -106,7 +107,7 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], workers: int
 def hog_of(shape: WindowShape, coefficients: NDArray[np.float64] | None = None) -> _core.Hog:
     """Make the descriptor of a window, OpenCV's default in all but its size; with an SVM, a detector."""
     svm = None if coefficients is None else coefficients.astype(np.float32)
-    return _core.Hog(shape.size, (16, 16), (8, 8), (8, 8), 9, -1.0, 0.2, True, 64, False, svm)
+    return Geometry(winSize=shape.size).compiled(svm)
 
 
 def describe(hog: _core.Hog, crops: Sequence[NDArray[np.uint8]]) -> NDArray[np.float32]:

@@ -164,7 +164,10 @@ def _clean(pictures: Sequence[Picture], label: str | None) -> list[Picture]:
 
 
 def _held_out(pictures: list[Picture], share: float, seed: int) -> tuple[list[Picture], list[Picture]]:
-    """Part pictures at random; those with an object are parted on their own, so that both parts have some."""
+    """Part pictures at random; those with an object are parted on their own, so that both parts have some.
+
+    Where there are too few of them to hold one out, nothing is held out: no figure can be measured without an object.
+    """
     rng = np.random.default_rng([seed, 4])
     held: set[int] = set()
     for holding in (True, False):
@@ -172,6 +175,8 @@ def _held_out(pictures: list[Picture], share: float, seed: int) -> tuple[list[Pi
         count = min(round(share * len(numbers)), len(numbers) - 1)
         if count > 0:
             held.update(rng.choice(numbers, count, replace=False).tolist())
+        if not held:
+            break
     rest = [picture for i, picture in enumerate(pictures) if i not in held]
     return rest, [pictures[i] for i in sorted(held)]
 

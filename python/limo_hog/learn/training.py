@@ -158,10 +158,11 @@ class State:
         if not path.is_file():
             raise ResumeError(f"{path}: there is no stopped run to resume; leave out --resume")
         try:
-            with np.load(path) as packed:
+            with np.load(io.BytesIO(path.read_bytes())) as packed:
                 known, coefficients, rows = (packed[key] for key in ("fingerprint", "coefficients", "mined"))
                 records = json.loads(str(packed["records"]))
-        except (ValueError, KeyError, OSError, EOFError) as error:
+        # Damaged bytes in other libraries' parsers: whatever they raise, the file is why.
+        except Exception as error:
             raise ResumeError(f"{path}: not the state of a stopped run: {error}") from error
         if str(known) != fingerprint:
             raise ResumeError(f"{path}: the stopped run had other data or options; resume with the same, or start anew")

@@ -109,11 +109,12 @@ def read_bag(path: Path) -> Iterator[Record]:
             topic, nanoseconds, message = next(messages)
         except StopIteration:
             return
-        except OSError as error:
-            error.filename = error.filename or str(path)
-            raise
         # Foreign bytes in other libraries' parsers: whatever they raise, the file is why.
         except Exception as error:
+            # The system's errors have a number; rosbags raises a FileNotFoundError of its own without.
+            if isinstance(error, OSError) and error.errno is not None:
+                error.filename = error.filename or str(path)
+                raise
             why = " ".join(str(error).split()) or type(error).__name__
             raise BagError(f"{path}: no ROS 2 recording that can be read, or cut off: {why[:200]}") from error
         yield Record(topic, nanoseconds * 1e-9, message)

@@ -70,7 +70,10 @@ def camera_topic(bus: Bus) -> str:
         return offered(names.IMAGE, found) or offered(names.IMAGE_COMPRESSED, found)
 
     if not either(bus.topics(SILENT_AFTER, enough=either)):
-        raise SilentRobotError(f"no publisher of {names.IMAGE} in ROS domain {bus.domain} within {SILENT_AFTER:g} s")
+        raise SilentRobotError(
+            f"no publisher of {names.IMAGE} or {names.IMAGE_COMPRESSED} in ROS domain {bus.domain} "
+            f"within {SILENT_AFTER:g} s"
+        )
     # Of a camera that offers both, either topic may be discovered first.
     found = bus.topics(0.5, enough=lambda found: offered(names.IMAGE, found))
     return names.IMAGE if offered(names.IMAGE, found) else names.IMAGE_COMPRESSED
@@ -138,7 +141,8 @@ def drive(
     SilentRobotError
         If there is no camera, or no image comes for 10 s.
     """
-    inputs = Inputs(bus, camera_topic(bus))
+    camera = camera_topic(bus)
+    inputs = Inputs(bus, camera)
     commands, findings = Commands(bus) if moves else None, Findings(bus)
     follower = Follower(controller, detector)
     senses, report = inputs.senses, Report()
@@ -161,9 +165,7 @@ def drive(
                 decision = follower.recheck(stamp + came - heard, senses.scan, senses.odometry)
             else:
                 if came - heard > SILENT_AFTER:
-                    raise SilentRobotError(
-                        f"no image on {names.IMAGE} in ROS domain {bus.domain} for {SILENT_AFTER:g} s"
-                    )
+                    raise SilentRobotError(f"no image on {camera} in ROS domain {bus.domain} for {SILENT_AFTER:g} s")
                 continue
             if commands is not None:
                 commands.publish(stamp + came - heard, decision.twist)

@@ -17,7 +17,7 @@ from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import Record, to_detections
-from limo_hog.ros2.names import DETECTIONS_TYPE, IMAGE
+from limo_hog.ros2.names import COMMAND, DETECTIONS_TYPE, IMAGE, STAMPED_COMMAND_TYPE, TYPES
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
 
 S = TypeVar("S")
@@ -81,11 +81,11 @@ def replay(
     for topic, time, message in records:
         topics.add(topic)
         kind = message.__msgtype__
-        is_image, is_command = topic == image_topic, kind == "geometry_msgs/msg/Twist"
-        if waiting is not None and (is_image or is_command):
-            yield work(messages.to_twist(message) if is_command else None)
+        is_image, command = topic == image_topic, _command(topic, message)
+        if waiting is not None and (is_image or command is not None):
+            yield work(command)
             waiting, recorded, frames = None, None, frames + 1
-        elif is_command:
+        elif command is not None:
             follower.recheck(time, senses.scan, senses.odometry)
         if is_image:
             waiting = message
@@ -99,3 +99,12 @@ def replay(
     if not frames:
         there = ", ".join(sorted(topics)) or "nothing"
         raise ReplayError(f"no images on {image_topic}; the recording holds {there}")
+
+
+def _command(topic: str, message: Any) -> Twist | None:
+    """Return the command that drives the robot, of either type; None of any other message."""
+    if topic == COMMAND and message.__msgtype__ == TYPES[COMMAND]:
+        return messages.to_twist(message)
+    if topic == COMMAND and message.__msgtype__ == STAMPED_COMMAND_TYPE:
+        return messages.to_twist(message.twist)
+    return None

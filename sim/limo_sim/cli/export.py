@@ -32,7 +32,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--scenario", default="workshop", metavar="NAME|FILE.toml", help="the scenario to look at (%(default)s)"
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="a new or empty folder")
-    parser.add_argument("--format", choices=("coco",), default="coco", help="of the labels (%(default)s)")
     parser.add_argument("--frames", type=count, default=150, metavar="N", help="how many pictures (%(default)s)")
     parser.add_argument(
         "--every", type=seconds, default=1.0, metavar="S", help="simulated time between two (%(default)s)"
@@ -43,7 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Write the pictures, then the labels: of those written, if it is stopped."""
-    from limo_hog.atomic import about, whole_file
+    from limo_hog.atomic import about, write_text
     from limo_sim.run.catalogue import load
     from limo_sim.run.export import labelled_frames, labels_of
     from limo_sim.run.provenance import code_version, scenario_hash
@@ -73,9 +72,8 @@ def run(args: argparse.Namespace) -> int:
             about_all = {"scenario": scenario.name, "scenario_hash": scenario_hash(scenario), "seed": args.seed}
             categories = [{"id": i, "name": label} for i, label in enumerate(labels, 1)]
             data = {"info": {**about_all, "code_version": code_version()}, "categories": categories}
-            path = folder / "coco.json"
-            with whole_file(path) as part, about(path):
-                part.write_text(json.dumps({**data, "images": images, "annotations": annotations}) + "\n", "utf-8")
+            text = json.dumps({**data, "images": images, "annotations": annotations}) + "\n"
+            write_text(folder / "coco.json", text)
     return 0
 
 

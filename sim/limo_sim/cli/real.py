@@ -20,6 +20,13 @@ def run_real(args: argparse.Namespace) -> int:
     """Run the arena beside the script until its time is up; no score card, since its detections are not known."""
     if args.json:
         raise UsageError("--json and --real: a script on the network is not scored")
+    for name in ("view", "video", "record", "plot", "rerun"):
+        if getattr(args, name):
+            raise UsageError(
+                f"--{name} and --real: a script on the network is not watched; use `limo-hog arena --ros2`"
+            )
+    if args.words:
+        raise UsageError(f"{args.words[0]} and --real: a launch file's arguments; a node's come after --ros-args")
     if importlib.util.find_spec("rclpy") is None:
         raise MissingExtraError("limo-hog run --real needs ROS 2's rclpy: source /opt/ros/DISTRO/setup.bash first")
     if not args.node.is_file():

@@ -134,8 +134,13 @@ def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
         scenarios = args.scenario or Scenario.names()
     else:
         scenarios = [str(suite.path(entry)) for entry in suite.scenarios]
+    # The table and the score cards know a scenario by the name it gives itself.
+    called: dict[str, str] = {}
     for name in scenarios:
-        load(name)
+        title = load(name).name
+        if title in called:
+            raise UsageError(f"{name}: is called {title!r}, as {called[title]} is; give it another name")
+        called[title] = name
     detector_named(args.detector)
     for name in args.controller:
         controller_of(name, args.target)

@@ -47,7 +47,7 @@ def add_watching(parser: argparse.ArgumentParser) -> None:
         "--plot",
         type=file_ending(".png", ".svg", ".pdf"),
         metavar="FILE.png",
-        help="draw path, pixel error, distance and speed in one figure",
+        help="draw path, pixel error, distance and speed in one figure (not with arena)",
     )
     group.add_argument("--rerun", type=file_ending(".rrd"), metavar="FILE.rrd", help="log the run for the Rerun viewer")
 

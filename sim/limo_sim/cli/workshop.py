@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.atomic import whole_file
+from limo_hog.atomic import whole_file, write_text
+from limo_hog.cli.support.arguments import count, output_file, seconds
+from limo_hog.cli.support.environment import cores
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
@@ -46,16 +48,23 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             one.add_argument(
                 "--hint",
                 nargs="?",
-                type=int,
+                type=count,
                 const=1,
                 default=0,
                 metavar="N",
                 help="show N hints for the first checkpoint that does not hold (1)",
             )
-            one.add_argument("--json", metavar="FILE", help="write points and evidence as JSON; - is standard output")
+            one.add_argument(
+                "--json",
+                type=output_file,
+                metavar="FILE",
+                help="write points and evidence as JSON; - is standard output",
+            )
             one.add_argument("--html", metavar="FILE", help="write a report with the node's pictures as one page")
             one.add_argument("--stretch", choices=tuple("abcde"), help="a stretch task instead of tasks 1 to 4")
-            one.add_argument("--gradescope", metavar="FILE", help="write results.json for a Gradescope autograder")
+            one.add_argument(
+                "--gradescope", type=output_file, metavar="FILE", help="write results.json for a Gradescope autograder"
+            )
         if action == "new":
             one.add_argument(
                 "--notebook", action="store_true", help="a Jupyter notebook, FILE.ipynb, instead of FILE.py"
@@ -64,9 +73,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     words = "check every node in a folder, each in a process of its own, and write a table of points"
     one = actions.add_parser("grade", help=words, description=words.capitalize() + ".")
     one.add_argument("folder", metavar="FOLDER", type=Path, help="its .py files, and those of the folders in it")
-    one.add_argument("--csv", metavar="FILE", default=STDOUT, help="where the table goes (-: standard output)")
-    one.add_argument("--seconds", type=float, default=100.0, metavar="S", help="wall time of a node (100)")
-    one.add_argument("--memory", type=int, default=4000, metavar="MB", help="memory of a node, not on Windows (4000)")
+    one.add_argument(
+        "--csv", type=output_file, metavar="FILE", default=STDOUT, help="where the table goes (-: standard output)"
+    )
+    one.add_argument("--seconds", type=seconds, default=100.0, metavar="S", help="wall time of a node (100)")
+    one.add_argument("--memory", type=count, default=4000, metavar="MB", help="memory of a node, not on Windows (4000)")
     one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
     one.add_argument("--stretch", choices=tuple("abcde"), help="a stretch task instead of tasks 1 to 4")
 
@@ -90,8 +101,7 @@ def run(args: argparse.Namespace) -> int:
         examination = examine(args.file, node)
         verdicts = examination.verdicts
         if args.html:
-            with whole_file(Path(args.html)) as part:
-                part.write_text(to_html(args.file, node, examination), encoding="utf-8")
+            write_text(Path(args.html), to_html(args.file, node, examination))
         if args.json:
             write_json(args.json, to_json(args.file, node, verdicts))
         if args.gradescope:
@@ -116,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     if path.exists():
         raise UsageError(f"{path} is there already; give another name")
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
     how = "open it in Jupyter" if as_notebook else f"try it: limo-hog run {path}"
     print(f"{path} is written; {how}", file=sys.stderr)
     return 0
@@ -125,12 +135,14 @@ def run(args: argparse.Namespace) -> int:
 def _grade(args: argparse.Namespace, node: str) -> int:
     with needed(by="limo-hog workshop", what="rosbags", install="'limo-hog[record]'"):
         from limo_sim.workshop.grade import Limits, grade, nodes_in, write_csv
+    if not args.folder.is_dir():
+        raise UsageError(f"{args.folder}: no such folder; wanted is one with the nodes' .py files")
     files = nodes_in(args.folder)
     if not files:
         raise UsageError(f"{args.folder}: no Python file in it, nor in the folders in it")
     with progress("files") as bar:
         task = bar.add_task("graded", total=len(files))
-        grades = grade(files, node, Limits(args.seconds, args.memory), lambda _: bar.advance(task))
+        grades = grade(files, cores(), node, Limits(args.seconds, args.memory), lambda _: bar.advance(task))
     if args.csv == STDOUT:
         write_csv(grades, args.folder, sys.stdout)
     else:

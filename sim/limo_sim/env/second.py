@@ -247,17 +247,15 @@ def _space(observe: str) -> spaces.Space[Any]:
     )
 
 
-def _reward(
-    seen: Glimpse | None, touched_person: int, touched_wall: int, weights: Shaping = SHAPING
-) -> dict[str, float]:
+def _reward(seen: Glimpse | None, touched_person: int, touched_wall: int) -> dict[str, float]:
     """Return the parts of a reward that depend on the arena; `None` stands for a person who is not there."""
     follow = visible = 0.0
     if seen is not None:
-        error = abs(seen.surface - weights.target_m)
+        error = abs(seen.surface - SHAPING.target_m)
         facing = (1.0 + math.cos(seen.bearing)) / 2
-        follow = weights.follow * facing / (1.0 + error / weights.halving_m)
-        visible = weights.visible * seen.visible
-    contact = -weights.person_contact * touched_person - weights.wall_contact * touched_wall
+        follow = SHAPING.follow * facing / (1.0 + error / SHAPING.halving_m)
+        visible = SHAPING.visible * seen.visible
+    contact = -SHAPING.person_contact * touched_person - SHAPING.wall_contact * touched_wall
     return {"follow": follow, "visible": visible, "contact": contact}
 
 

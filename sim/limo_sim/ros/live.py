@@ -10,6 +10,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
+from limo_sim.ros.lockstep.calls import PUBLISHED
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import FrameRecord, Moment, Step
 from limo_sim.world.scenario import Scenario
@@ -59,8 +60,9 @@ def run_live(
         from limo_sim.ros.outlet import Outlet
 
         outlet = Outlet(arena)
-        spoken = [topic for topic in names.TYPES if topic not in (names.COMMAND, names.ANNOTATED)]
-        writers = {topic: bus.publisher(topic, names.TYPES[topic], kept=topic == names.TF_STATIC) for topic in spoken}
+        writers = {
+            topic: bus.publisher(topic, names.TYPES[topic], kept=topic == names.TF_STATIC) for topic in PUBLISHED
+        }
         commands = [bus.subscription(names.COMMAND, kind) for kind in (names.TYPES[names.COMMAND], _STAMPED)]
     twist, shown = Twist(), -1.0
     began = time.monotonic()

@@ -72,8 +72,11 @@ class Wandering:
     ahead: float = 0.6
 
 
+WANDERING = Wandering()
+
+
 def labelled_frames(
-    scenario: Scenario, seed: int, count: int, every_s: float, wandering: Wandering | None = None
+    scenario: Scenario, seed: int, count: int, every_s: float
 ) -> Iterator[tuple[Frame, tuple[Thing, ...]]]:
     """Take `count` pictures, one every `every_s` seconds of the arena, while the robot wanders.
 
@@ -82,7 +85,6 @@ def labelled_frames(
     frame, things
         A frame, and all of which a part lies within the image, hidden or not.
     """
-    wandering = wandering or Wandering()
     arena = Arena(scenario, seed)
     random = np.random.default_rng([seed, WANDERING_STREAM])
     labels = labels_of(scenario)
@@ -90,11 +92,11 @@ def labelled_frames(
     turn, turning, leg_ends, next_s = 0.0, False, 0.0, 0.0
     while count > 0:
         if arena.time >= leg_ends:
-            turn, leg_ends = float(random.uniform(-wandering.turn, wandering.turn)), arena.time + wandering.leg_s
-        free = _free_ahead(arena.scan(), wandering.ahead)
-        turning = free < (wandering.clear if turning else wandering.keep)
-        away = wandering.turn_away if turn >= 0 else -wandering.turn_away
-        arena.command(Twist(0.0, away) if turning else Twist(wandering.speed, turn))
+            turn, leg_ends = float(random.uniform(-WANDERING.turn, WANDERING.turn)), arena.time + WANDERING.leg_s
+        free = _free_ahead(arena.scan(), WANDERING.ahead)
+        turning = free < (WANDERING.clear if turning else WANDERING.keep)
+        away = WANDERING.turn_away if turn >= 0 else -WANDERING.turn_away
+        arena.command(Twist(0.0, away) if turning else Twist(WANDERING.speed, turn))
         for _ in range(steps):
             arena.step()
         if arena.time >= next_s:

@@ -165,7 +165,14 @@ class Renderer:
             return 0.0, None
         box = within[0], within[1], within[2] - within[0], within[3] - within[1]
         share = visible / inside * _share_inside(bounds)
-        return share, box if self._lens.is_plain else self._lens.box(box)
+        return self._through_lens(share, box)
+
+    def _through_lens(self, share: float, box: tuple[int, int, int, int]) -> Seen:
+        """Return a visible share and the image of a box; what the lens moves out of the image is not visible."""
+        if self._lens.is_plain:
+            return share, box
+        bent = self._lens.box(box)
+        return (0.0, None) if bent is None else (share, bent)
 
     def _picture(self, past: Past, age: float) -> U8:
         """Draw the scene as it was some seconds before the stamp, without noise."""
@@ -212,7 +219,7 @@ class Renderer:
             visible = np.count_nonzero(self._owner[top:bottom, left:right] == index)
             share = min(visible / area, 1.0) if area else 0.0
             box = left, top, right - left, bottom - top
-            seen[index] = share, box if self._lens.is_plain else self._lens.box(box)
+            seen[index] = self._through_lens(share, box)
         return depth, seen
 
     def _shade_floor(self, room: U8, depth: F32, at: tuple[float, float], radius: float) -> None:

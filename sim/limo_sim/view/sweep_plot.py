@@ -58,7 +58,6 @@ def plot(summaries: Sequence[Summary], path: Path) -> None:
         axes.spines[["top", "right", "left"]].set_visible(False)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=len(controllers), frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as part, about(path):
         figure.savefig(part)
 

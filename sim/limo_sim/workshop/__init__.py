@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-#: The workshop's two nodes: the follower of tasks 1 to 4, and the sequel that keeps a distance.
-NODES = ("follower", "proxemic")
-
 _START, _END = "# >>> ", "# <<<"
 _BLANKS = {"1": "picture = image.copy()", "2": "boxes, weights = [], []", "3": "cx = None"}
 

@@ -57,12 +57,12 @@ class Examination:
     takes: list[Take]
 
 
-def check(script: Path, node: str = "follower", patience: float = 20.0) -> list[Verdict]:
+def check(script: Path, node: str = "follower") -> list[Verdict]:
     """Return the verdicts of `examine`."""
-    return examine(script, node, patience).verdicts
+    return examine(script, node).verdicts
 
 
-def examine(script: Path, node: str = "follower", patience: float = 20.0) -> Examination:
+def examine(script: Path, node: str = "follower") -> Examination:
     """Try a node in an exercise's scenes, and if all checkpoints hold there, with a walking person for 20 s.
 
     The points of all verdicts add up to 100. A node that raises or hangs has one more verdict, the first, that says so.
@@ -72,7 +72,7 @@ def examine(script: Path, node: str = "follower", patience: float = 20.0) -> Exa
     takes: list[Take] = []
     fault: Verdict | None = None
     for scene in exercise.scenes:
-        takes.append(play(script, scene, patience))
+        takes.append(play(script, scene))
         fault = _fault(script, takes[-1])
         if fault is not None:
             break

@@ -22,6 +22,7 @@ from typing import Any, TextIO
 import cv2
 
 import limo_hog
+from limo_hog.atomic import write_text
 from limo_sim.workshop.check import check
 from limo_sim.workshop.report import to_json
 
@@ -58,11 +59,12 @@ def nodes_in(folder: Path) -> list[Path]:
 
 def grade(
     files: Sequence[Path],
+    workers: int,
     node: str = "follower",
     limits: Limits | None = None,
     done: Callable[[Grade], None] = lambda _: None,
 ) -> list[Grade]:
-    """Check each file in a process of its own, as many at once as there are processors; `done` hears of each."""
+    """Check each file in a process of its own, `workers` of them at once; `done` hears of each."""
     limits = limits or Limits()
 
     def one(file: Path) -> Grade:
@@ -70,7 +72,7 @@ def grade(
         done(graded)
         return graded
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(one, files))
 
 
@@ -143,9 +145,7 @@ def _main(file: str, node: str, result: str, memory_mb: str) -> None:
     vars(cv2)["HOGDescriptor"] = limo_hog.HOGDescriptor
     script = Path(file)
     found = json.dumps(to_json(script, node, check(script, node)))
-    part = Path(f"{result}.part")
-    part.write_text(found, encoding="utf-8")
-    part.replace(result)
+    write_text(Path(result), found)
 
 
 if __name__ == "__main__":

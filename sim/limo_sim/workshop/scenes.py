@@ -100,7 +100,7 @@ class Take:
         return self.outcome.world.calls if self.outcome is not None else Calls()
 
 
-def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
+def play(script: Path, scene: Scene) -> Take:
     """Run a node in a scene and note its outputs for each frame."""
     take = Take(scene)
     worlds: list[World] = []
@@ -136,7 +136,6 @@ def play(script: Path, scene: Scene, patience: float = 20.0) -> Take:
         arguments=("--ros-args", *scene.arguments),
         log=lambda _time, _level, name, message: None if name == LOGGER else said.append(message),
         watch=watch,
-        patience=patience,
         made=worlds.append,
     )
     return take

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.ros2 import names
-from limo_sim.run.score import score
 from limo_sim.workshop import checkpoints as points
 from limo_sim.workshop.checkpoints import CLEAR_ERROR, RED, RIGHT_LINES, SILENCE, Checkpoint, Picture
 from limo_sim.workshop.mistakes import Finding
 from limo_sim.workshop.scenes import AHEAD, LEFT, NOBODY, RIGHT, TWO, Look, Scene, Take, standing
+from limo_sim.world.furniture import distance_to
 from limo_sim.world.scenario import Furniture, Person, Scenario
 
 #: Overlap of a drawn box with a person's outline from which it is on that person. Measured: HOG's boxes, which have a
 #: margin, have .3 to .4 (intersection over union), and less than .05 with the other person.
 ON_PERSON = 0.2
-#: The lidar's plane is this clear before the robot [m]: the task's half metre less the time of a scan and of braking.
+#: Wanted between the robot and the chair [m]: the task's half metre, which is from the lidar to the chair's legs, less
+#: the time of a scan and of braking.
 LEAST_CLEARANCE = 0.2
 
 
@@ -317,10 +320,23 @@ def stops(takes: Sequence[Take]) -> Finding:
         return Finding(None, "not tried: the robot does not drive towards the chair")
     if episode.contacts.wall:
         return Finding(False, f"the robot drives {way:.2f} m and into the chair")
-    room = score(episode).clearance_min_m or 0.0
+    room = min(_room(step.truth.robot) for step in episode.steps)
+    said = f"the robot drives {way:.2f} m and stops {room:.2f} m before the chair"
     if room < LEAST_CLEARANCE:
-        return Finding(False, f"the robot stops {room:.2f} m before the chair; wanted are {LEAST_CLEARANCE} m")
-    return Finding(True, f"the robot drives {way:.2f} m and stops {room:.2f} m before the chair")
+        return Finding(False, f"{said}; wanted are at least {LEAST_CLEARANCE} m")
+    return Finding(True, said)
+
+
+def _room(robot: tuple[float, float, float]) -> float:
+    """Return the distance from the chair to the nearest of the robot's corners, its pose being x, y, yaw [m]."""
+    x, y, yaw = robot
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    (chair,) = CHAIR.scenario.furniture
+    return min(
+        distance_to(chair.footprint, x + cos * ahead - sin * left, y + sin * ahead + cos * left)
+        for ahead in (-LIMO.half_length, LIMO.half_length)
+        for left in (-LIMO.half_width, LIMO.half_width)
+    )
 
 
 def drives_freely(takes: Sequence[Take]) -> Finding:

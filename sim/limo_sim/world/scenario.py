@@ -298,11 +298,14 @@ class Scenario:
                 known = ", ".join(Scenario.names())
                 raise ScenarioError(f"unknown scenario {name_or_path}: want one of {known}, or a .toml file")
         try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
+            text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
-        except tomllib.TOMLDecodeError as error:
-            raise ScenarioError(f"{path}: not TOML: {error}") from error
+        try:
+            table = tomllib.loads(text)
+        # Beside its own error, which is a ValueError: numbers of thousands of digits, lists within hundreds of lists.
+        except (ValueError, RecursionError) as error:
+            raise ScenarioError(f"{path}: not TOML that can be read: {error}") from error
         where = f"{path.name}: "
         groups = build(_Groups, {"groups": table.pop("groups", [])}, where).groups
         scenario = build(Scenario, {"name": path.stem, **table}, where)

@@ -92,6 +92,9 @@ def build(kind: type[T], table: Any, where: str) -> T:
 
 
 def _convert(hint: Any, value: Any, where: str) -> Any:
+    # TOML promises no more, a float has no place for it, and Python does not even print the largest.
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise ScenarioError(f"{where}: got a whole number of more than 64 bits, want a smaller one")
     if dataclasses.is_dataclass(hint):
         return build(hint, value, f"{where}.")  # type: ignore[arg-type]
     if get_origin(hint) is tuple:

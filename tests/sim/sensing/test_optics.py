@@ -62,6 +62,21 @@ def test_the_true_box_goes_round_the_bent_silhouette(k1: float) -> None:
         assert -1 <= outside <= 9
 
 
+@pytest.mark.parametrize(("x", "y"), [(1.7, 1.26), (2.5, 1.7), (2.5, 1.8), (3.5, 2.4)])
+def test_what_the_lens_moves_out_of_the_image_is_not_visible(x: float, y: float) -> None:
+    people, pillar = (Person(route=((x, y, 3600.0),)),), (Furniture("pillar", x, -y),)
+    scenario = Scenario(depth=Depth(noise=0.0, invalid=0.0), camera=Camera(k1=0.3, k2=0.1))
+    there = Arena(dataclasses.replace(scenario, people=people, furniture=pillar), 0)
+    assert np.array_equal(there.frame().depth, Arena(scenario, 0).frame().depth, equal_nan=True)
+    plain = Arena(Scenario(people=people, furniture=pillar), 0)
+    for arena, within in ((plain, True), (there, False)):
+        person = arena.frame().truth.people[0]
+        assert person is not None
+        for visible, box in ((person.visible, person.box), *arena.furniture_in_frame()):
+            assert bool(visible > 0.0) is within
+            assert (box is not None) is within
+
+
 def turned(camera: Camera, rate: float) -> Frame:
     """Return a frame taken while the robot turns, by which time it looks straight ahead again."""
     scenario = dataclasses.replace(POST, camera=dataclasses.replace(camera, noise=0.0, rate_hz=50.0))

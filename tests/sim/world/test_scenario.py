@@ -66,6 +66,13 @@ def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
         ("[camera]\nrate_hz = -10", "mine.toml: camera.rate_hz: got -10.0, want a number in 0.5 … 50"),
         ("[camera]\nrate_hz = nan", "mine.toml: camera.rate_hz: got nan, want a number in 0.5 … 50"),
         ("[camera]\nrate_hz = 'fast'", "mine.toml: camera.rate_hz: got 'fast', want a number"),
+        *(
+            (f"[{table}]\n{key} = {number}", f"mine.toml: {table}.{key}: got a whole number of more than 64 bits")
+            for table, key in (("camera", "rate_hz"), ("walls_texture", "seed"))
+            for number in ("9" * 400, f"0x{'f' * 5000}")
+        ),
+        (f"[camera]\nrate_hz = {'9' * 5000}", "mine.toml: not TOML that can be read: "),
+        (f"summary = {'[' * 5000}{']' * 5000}", "mine.toml: not TOML that can be read: "),
         ("[camera]\nrate_hz = true", "mine.toml: camera.rate_hz: got True, want a number"),
         ("[camera]\ndrop_probability = 1.5", "mine.toml: camera.drop_probability: got 1.5, want a number in 0 … 1"),
         ("camera = 3", "mine.toml: camera: got 3, want a table"),

@@ -6,7 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-from limo_hog.atomic import about, whole_file
+from limo_hog.atomic import write_text
 from limo_hog.exceptions import LimoHogError
 
 #: The file name that stands for standard output.
@@ -29,8 +29,13 @@ def write_json(target: str, value: object) -> None:
     if target == STDOUT:
         sys.stdout.write(text)
         return
-    with whole_file(Path(target)) as part, about(Path(target)):
-        part.write_text(text)
+    write_text(Path(target), text)
+
+
+def printable(text: str) -> str:
+    """Return text that standard output can show: characters that its encoding lacks are escaped."""
+    encoding = sys.stdout.encoding or "utf-8"
+    return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def one_line(error: Exception) -> str:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import limo_hog
 from limo_hog.cli.support.environment import cores
-from limo_hog.cli.support.output import UsageError, one_line
+from limo_hog.cli.support.output import UsageError, one_line, printable
 from limo_hog.cli.support.results import Result, Results, refuse_to_overwrite
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ImageError
@@ -99,8 +99,11 @@ class Run:
             Copies would overwrite files.
         """
         # A picture that two inputs name is searched once.
-        named = dict.fromkeys(source for name in self._args.inputs for source in self._expand(name, stack))
-        self._sources = list(named)
+        named: dict[object, Source] = {}
+        for name in self._args.inputs:
+            for source in self._expand(name, stack):
+                named.setdefault(_identity(source), source)
+        self._sources = list(named.values())
         if self._args.out is not None:
             self._copies = _copies(self._sources, self._args.out, self._args.format)
             own = {source.path.resolve() for source in self._sources}
@@ -165,24 +168,27 @@ class Run:
         new = [source for source in sources if not self._is_done(source)]
         self.known += len(sources) - len(new)
         for found in in_order(work, new, self._workers):
-            if isinstance(found, Found):
-                self._keep(found)
-            else:
+            if isinstance(found, str):
                 self._fail(found)
+            elif found.frame not in self._done_of(found.source):
+                self._keep(found)
             self._advance()
 
     def _look_at_video(self, source: Source) -> None:
         copy = self._copies.get(source)
         if self._args.resume and copy is not None and copy.exists():
-            self.known += 1
-            return
+            if self._done is None:
+                self.known += 1
+                return
+            # The copy is whole; frames may lack their line.
+            copy = None
         with ExitStack() as stack:
             try:
                 video = stack.enter_context(open_video(source))
             except (ReadError, OSError) as error:
                 self._fail(one_line(error))
                 return
-            every, done = self._args.every, (self._done or {}).get(source.name, set())
+            every, done = self._args.every, self._done_of(source.name)
             write = copy and stack.enter_context(video_writer(copy, video.fps / every))
             # An annotated copy always starts at the first frame.
             skip = set() if write else done
@@ -225,8 +231,12 @@ class Run:
     def _is_done(self, source: Source) -> bool:
         if not self._args.resume:
             return False
-        written = self._done is None or 0 in self._done.get(source.name, ())
+        written = self._done is None or 0 in self._done_of(source.name)
         return written and (source not in self._copies or self._copies[source].exists())
+
+    def _done_of(self, name: str) -> set[int]:
+        """Return the frames of a source that an earlier run has done."""
+        return (self._done or {}).get(name, set())
 
     def _expect(self, pictures: int) -> None:
         if self._bar and self._task is not None:
@@ -246,7 +256,7 @@ class Run:
         self._ms += found.ms
         if self._args.json is None and self._args.out is None:
             where = f"{found.source}:{found.frame}" if found.frame else found.source
-            print(f"{where}  {len(found.scores)} people ", *(f"{score:.2f}" for score in found.scores))
+            print(f"{printable(where)}  {len(found.scores)} people ", *(f"{score:.2f}" for score in found.scores))
 
     def _fail(self, line: str) -> None:
         self.failed += 1
@@ -257,12 +267,22 @@ class Run:
             print(line, file=sys.stderr)
 
 
+def _identity(source: Source) -> object:
+    """Return what two spellings of one picture or video file have in common; a link to it is one of its own."""
+    if source.kind in (Kind.IMAGE, Kind.VIDEO):
+        return source.path.parent.resolve() / source.path.name, source.kind
+    return source
+
+
 def _copies(sources: list[Source], folder: Path, wanted: str | None) -> dict[Source, Path]:
     """Name each source's annotated copy: its place below what all sources have in common, in `folder`.
 
     Images are of the `wanted` format, or else JPEG where the source is, and PNG where not.
     """
-    folders = {source: source.path.absolute().parent for source in sources if source.name != STDIN}
+    # Without `..`, which would lead out of `folder`.
+    folders = {
+        source: Path(os.path.normpath(source.path.absolute().parent)) for source in sources if source.name != STDIN
+    }
     root = os.path.commonpath(folders.values()) if folders else ""
     names: dict[Source, Path] = {}
     for source in sources:

@@ -11,12 +11,22 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from limo_hog.atomic import about, part_of, whole_file
+from limo_hog.atomic import about, is_stream, part_of, write_text
 from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.exceptions import LimoHogError
 
 #: One line: source, frame, width, height, boxes, scores, ms, parameters.
 Result = dict[str, Any]
+#: What of a line is read back.
+_KINDS = {
+    "source": str,
+    "frame": int,
+    "width": int,
+    "height": int,
+    "boxes": list,
+    "scores": list,
+    "parameters": dict,
+}
 
 
 class ResumeError(LimoHogError):
@@ -38,14 +48,14 @@ class Results(NamedTuple):
 
 
 def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
-    """Refuse to replace files that exist.
+    """Refuse to replace files that exist; what is written to a pipe or a device replaces nothing.
 
     Raises
     ------
     UsageError
         One of them exists; `resume` is the hint to the alternative of overwriting.
     """
-    there = [path for path in paths if path.exists()]
+    there = [path for path in paths if path.exists() and not is_stream(path)]
     if there:
         more = f" and {len(there) - 1} more" if len(there) > 1 else ""
         raise UsageError(f"{there[0]}{more} would be overwritten: --overwrite replaces it{resume}")
@@ -56,7 +66,7 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
     """Open a file (or "-", or nothing) for one JSON object a line; each gets the run's `parameters`.
 
     The file gets its name at the end, or when the run is stopped: with every line written so far, and no half line.
-    A killed run leaves the unfinished file beside it, which can be resumed, too.
+    A killed run leaves the unfinished file beside it, which can be resumed, too. A pipe or a device keeps nothing.
 
     Raises
     ------
@@ -72,29 +82,32 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
         return
     path = Path(target)
     part = part_of(path)
+    kept = part != path
     if not resume and not overwrite:
         refuse_to_overwrite([path, part], ", --resume goes on from it")
-    earlier = _continue(path, part, parameters) if resume else []
+    earlier = None if not kept else _continue(path, part, parameters) if resume else []
     with about(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        opened = part.open("ab" if resume else "wb", buffering=0)
+        opened = part.open("ab" if kept and resume else "wb", buffering=0)
     with opened as file:
-        whole = file.tell()
+        whole = file.tell() if kept else 0
 
         def write(result: Result) -> None:
             nonlocal whole
-            data = json.dumps(result | {"parameters": parameters}).encode() + b"\n"
+            line = json.dumps(result | {"parameters": parameters}).encode() + b"\n"
+            written = 0
             with about(path):
-                while data:
-                    data = data[file.write(data) :]
-            whole = file.tell()
+                while written < len(line):
+                    written += file.write(line[written:])
+            whole += len(line)
 
         try:
             yield Results(write, earlier)
         finally:
-            # A full disk may have taken half a line.
-            file.truncate(whole)
-            part.replace(path)
+            if kept:
+                # A full disk may have taken half a line.
+                file.truncate(whole)
+                part.replace(path)
 
 
 def _drop(_: Result) -> None:
@@ -110,20 +123,32 @@ def _continue(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result
     whole = text.rfind(b"\n") + 1
     try:
         results = [json.loads(line) for line in text[:whole].splitlines()]
-        made_with = [(result["source"], result["frame"], result["parameters"])[2] for result in results]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise ResumeError(f"{path}: not the JSON lines of an earlier run") from error
-    for earlier in made_with:
-        if earlier != parameters:
-            raise ResumeError(f"{path} was made with other parameters: {_difference(earlier, parameters)}")
+    for number, result in enumerate(results, 1):
+        if not _is_result(result):
+            raise ResumeError(f"{path}: not the JSON lines of an earlier run: line {number} is another")
+        if result["parameters"] != parameters:
+            different = _difference(result["parameters"], parameters)
+            raise ResumeError(f"{path} was made with other parameters: {different}")
     found.replace(part)
     with part.open("rb+") as file:
         file.truncate(whole)
     return results
 
 
-def _difference(earlier: Any, now: dict[str, Any]) -> str:
-    was = earlier if isinstance(earlier, dict) else {}
+def _is_result(line: Any) -> bool:
+    """Say whether a line read back is a result whole enough to go on from and to make tables of."""
+    return (
+        isinstance(line, dict)
+        and all(isinstance(line.get(name), kind) for name, kind in _KINDS.items())
+        and len(line["boxes"]) == len(line["scores"])
+        and all(isinstance(box, list) and len(box) == 4 for box in line["boxes"])
+        and all(isinstance(number, (int, float)) for numbers in (*line["boxes"], line["scores"]) for number in numbers)
+    )
+
+
+def _difference(was: dict[str, Any], now: dict[str, Any]) -> str:
     names = [name for name in {**now, **was} if was.get(name) != now.get(name)]
     return ", ".join(f"{name} {was.get(name)}, now {now.get(name)}" for name in names)
 
@@ -137,7 +162,7 @@ def write_csv(path: Path, results: Iterable[Result]) -> None:
         about_picture = [result[name] for name in ("source", "frame", "width", "height")]
         for box, score in zip(result["boxes"], result["scores"], strict=True):
             table.writerow((*about_picture, *box, score))
-    _write(path, text.getvalue())
+    write_text(path, text.getvalue())
 
 
 def write_coco(path: Path, results: Iterable[Result]) -> None:
@@ -151,9 +176,4 @@ def write_coco(path: Path, results: Iterable[Result]) -> None:
             annotation = {"id": len(annotations) + 1, "image_id": number, "category_id": 1, "bbox": box}
             annotations.append({**annotation, "area": box[2] * box[3], "iscrowd": 0, "score": score})
     categories = [{"id": 1, "name": "person"}]
-    _write(path, json.dumps({"images": images, "annotations": annotations, "categories": categories}) + "\n")
-
-
-def _write(path: Path, text: str) -> None:
-    with whole_file(path) as part, about(path):
-        part.write_text(text, "utf-8")
+    write_text(path, json.dumps({"images": images, "annotations": annotations, "categories": categories}) + "\n")

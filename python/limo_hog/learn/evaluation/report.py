@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limo_hog.atomic import about, whole_file
+from limo_hog.atomic import about, whole_file, write_text
 from limo_hog.extras import needed
 from limo_hog.imaging.writing import write_image
 from limo_hog.learn.evaluation.mistakes import draw_sheet, worst_mistakes
@@ -50,15 +50,10 @@ def write_report(
     figures["mistakes"] = [
         {"kind": m.kind, "picture": str(m.path), "box": list(m.box), "score": m.score} for m in mistakes
     ]
-    _write(folder / "figures.json", json.dumps(figures, indent=2) + "\n")
+    write_text(folder / "figures.json", json.dumps(figures, indent=2) + "\n")
     page = folder / "index.html"
-    _write(page, _page(figures["pictures"], figures["objects"], evaluations, how, bool(mistakes)))
+    write_text(page, _page(figures["pictures"], figures["objects"], evaluations, how, bool(mistakes)))
     return page
-
-
-def _write(path: Path, text: str) -> None:
-    with whole_file(path) as part, about(path):
-        part.write_text(text, "utf-8")
 
 
 def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:

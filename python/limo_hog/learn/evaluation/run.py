@@ -22,7 +22,7 @@ from limo_hog.learn.evaluation.curve import (
     figures,
     threshold_at,
 )
-from limo_hog.learn.labels import Picture, inside
+from limo_hog.learn.labels import LabelError, Picture, inside, sizes_of
 
 
 class Detector(Protocol):
@@ -144,6 +144,8 @@ def evaluate(
 
     Raises
     ------
+    LabelError
+        No labelled box lies in its picture.
     ReadError, OSError
         A picture cannot be read: figures over the rest would be those of another set.
     """
@@ -161,6 +163,8 @@ def evaluate(
             times[i].append(ms)
             found[i].append((detections.person_boxes.astype(np.float64), detections.scores))
         done()
+    if not len(sizes_of(used)):
+        raise LabelError(f"no labelled box lies inside of its picture, in {len(used)} pictures; at least one is wanted")
     labelled = [picture.arrays() for picture in used]
     return used, [
         _evaluation(rival.name, hits, labelled, float(np.median(ms)), how)

@@ -64,11 +64,10 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class Callback:
-    """When a callback began [s], how long it slept [s of simulated time], and how long it took [s of wall time]."""
+    """When a callback began, and how long it slept [s of simulated time]."""
 
     time: float
     slept: float
-    worked: float
 
 
 @dataclass

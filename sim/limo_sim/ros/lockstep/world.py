@@ -53,7 +53,7 @@ class World:
     asked
         Types and shapes of the images given to the detector, as "uint8 (480, 640, 3)", each once.
     callbacks
-        How long each callback took.
+        How long each callback slept.
     parameters
         The newest values of the nodes' parameters, by name.
     fault
@@ -174,7 +174,7 @@ class World:
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Call back into the script; an exception is kept in `fault`."""
-        began, since = time.perf_counter(), self.time
+        since = self.time
         try:
             function(*arguments)
         except (RunOver, ThreadEnded, SystemExit):
@@ -184,7 +184,7 @@ class World:
             raise
         finally:
             if self._keep:
-                self.callbacks.append(Callback(since, self.time - since, time.perf_counter() - began))
+                self.callbacks.append(Callback(since, self.time - since))
 
     def show(self, window: str, picture: NDArray[np.uint8]) -> None:
         """Keep the newest picture of a window."""

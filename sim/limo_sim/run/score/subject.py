@@ -76,7 +76,9 @@ class Subject:
 
     def _add_frame(self, step: Step, seen: Truth, found: bool, targeted: bool) -> None:
         person = of(seen, self._index)
-        visible = person is not None and person.visible >= self._criteria.in_view
+        # A person of whom anything is visible has a box.
+        box = person.box if person is not None and person.visible >= self._criteria.in_view else None
+        visible = box is not None
         if found:
             if self._stamp is None:
                 self.first_detection = seen.stamp
@@ -86,10 +88,10 @@ class Subject:
         if self.frames or visible:
             self.frames += 1
             self.last_in_view = visible
-        if visible and person is not None:
+        if box is not None:
             self.in_view += 1
             self.detected += found
-            self.pixel_errors.append(_pixel_error(person))
+            self.pixel_errors.append(abs(box[0] + box[2] / 2 - WIDTH / 2))
             if self._seen_at is not None:
                 self.longest_unseen = max(self.longest_unseen, step.time - self._seen_at)
             self._seen_at = step.time
@@ -163,8 +165,3 @@ class Mean:
 def of(truth: Truth, index: int) -> PersonTruth | None:
     """Return a person; None where there is none, or not yet."""
     return truth.people[index] if index < len(truth.people) else None
-
-
-def _pixel_error(person: PersonTruth) -> float:
-    """Return how far the middle of the person's box is from the image's [px]."""
-    return 0.0 if person.box is None else abs(person.box[0] + person.box[2] / 2 - WIDTH / 2)

@@ -123,7 +123,8 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
         "[metrics.md](metrics.md) defines every figure and gives the names other benchmarks have for it.",
         "",
         "```",
-        f"limo-hog score --suite {suite.name} --seeds {args.seeds} --controller tracking approach --against approach",
+        f"limo-hog score --suite {suite.name} --seeds {args.seeds} "
+        "--controller approach proxemic pursuit ppo tracking --against tracking",
         "```",
         "",
         f"{shown_for(args.seeds)} Means over {len(groups)} scenarios of {suite.seconds:g} s; detector `hog`; "

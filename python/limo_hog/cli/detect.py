@@ -41,7 +41,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--model",
         default="opencv",
         metavar="NAME|FILE",
-        help="opencv, daimler, or a trained model's file (%(default)s)",
+        help="opencv, daimler, limo, or a trained model's file (%(default)s)",
     )
     parser.add_argument(
         "--search",

@@ -83,9 +83,7 @@ class Detections:
         """
         if self.calibration is None:
             raise HogError("the model has no calibration, so its margins stand for no probabilities: use scores")
-        slope, offset = self.calibration
-        probabilities: NDArray[np.float64] = 0.5 + 0.5 * np.tanh(0.5 * (slope * self.scores + offset))
-        return probabilities
+        return self.calibration.probabilities(self.scores)
 
     def draw(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Draw the people's boxes and scores into a copy of the image.

@@ -37,6 +37,10 @@ class Calibration(NamedTuple):
     slope: float
     offset: float
 
+    def probabilities(self, margins: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the probability of each of (N,) SVM margins, float64 (N,); none overflows."""
+        return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (self.slope * margins + self.offset)))
+
 
 #: The person box of OpenCV's models; at IoU 0.5 the best of a grid on three sets of street photographs.
 PERSON_BOX = PersonBox()

@@ -73,7 +73,7 @@ def measure(done: Round, data: TrainingData, workers: int, final: bool) -> dict[
 def _measured(evaluation: Evaluation, data: TrainingData) -> dict[str, Any]:
     outcomes = evaluation.outcomes
     calibration = calibrate(outcomes.scores, outcomes.right)
-    probabilities = _probabilities(calibration, outcomes.scores)
+    probabilities = calibration.probabilities(outcomes.scores)
     figures = {name: round(value, 4) for name, value in evaluation.figures._asdict().items()}
     return {
         "threshold": _rounded(evaluation.threshold_01),
@@ -148,11 +148,6 @@ def calibrate(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Calibrat
         if float(np.abs(size * step).max()) < _SETTLED:
             break
     return Calibration(round(float(found[0]), 4), round(float(found[1]), 4))
-
-
-def _probabilities(calibration: Calibration, scores: NDArray[np.float64]) -> NDArray[np.float64]:
-    probabilities: NDArray[np.float64] = 1 / (1 + np.exp(-(calibration.slope * scores + calibration.offset)))
-    return probabilities
 
 
 def calibration_error(probabilities: NDArray[np.float64], right: NDArray[np.bool_]) -> float:

@@ -12,6 +12,7 @@ import pytest
 from limo_hog.follow import ApproachController
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.cli.real import run_real
+from limo_sim.cli.run import add_parser
 from limo_sim.env import LimoFollow
 from limo_sim.ros.live import run_live
 from limo_sim.ros.script import run_script
@@ -93,6 +94,8 @@ def test_a_node_on_the_network_is_refused_before_it_starts(
     file = tmp_path / "unkind.toml"
     file.write_text(UNKIND_TOML, encoding="utf-8")
     monkeypatch.setattr("importlib.util.find_spec", lambda _: object())
-    args = argparse.Namespace(node=node, json=None, scenario=str(file), seconds=1.0, seed=0, ros_args=[])
+    parser = argparse.ArgumentParser()
+    add_parser(parser.add_subparsers())
+    args = parser.parse_args(["run", str(node), "--real", "--scenario", str(file), "--seconds", "1"])
     with pytest.raises(ScenarioError, match="detector: a node brings its own"):
         run_real(args)

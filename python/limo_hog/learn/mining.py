@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +25,8 @@ from limo_hog.learn.windows import (
     random_boxes,
     read_gray,
 )
+from limo_hog.parallel import in_order
 from limo_hog.suppression import intersection_over_union, nms
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
-#: Jobs that are under way at once, for each core: enough that none waits, few enough to hold their pictures.
-_AHEAD = 4
 
 
 @dataclass(frozen=True)
@@ -86,22 +80,6 @@ class Negatives:
 
     paths: tuple[Path, ...]
     objects: dict[Path, NDArray[np.float64]] = field(default_factory=dict)
-
-
-def in_order(work: Callable[[Item], Result], items: Iterable[Item], workers: int) -> Iterator[Result]:
-    """Do `work` on several cores and yield its results in the items' order, with few of them waiting at a time."""
-    with ThreadPoolExecutor(workers) as pool:
-        waiting = []
-        try:
-            for item in items:
-                waiting.append(pool.submit(work, item))
-                if len(waiting) >= _AHEAD * workers:
-                    yield waiting.pop(0).result()
-            while waiting:
-                yield waiting.pop(0).result()
-        finally:
-            for job in waiting:
-                job.cancel()
 
 
 def hog_of(shape: WindowShape, coefficients: NDArray[np.float64] | None = None) -> _core.Hog:

@@ -6,14 +6,13 @@ import argparse
 import os
 import sys
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections import Counter
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -37,28 +36,12 @@ from limo_hog.imaging.reading import (
     standard_input,
 )
 from limo_hog.imaging.writing import video_writer, write_image
+from limo_hog.parallel import in_order
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
 Image = NDArray[np.uint8]
-Item = TypeVar("Item")
-Answer = TypeVar("Answer")
-
-
-def in_order(work: Callable[[Item], Answer], items: Iterable[Item], workers: int) -> Iterator[Answer]:
-    """Map like `map`, on several threads, with at most 2 × `workers` items in flight."""
-    with ThreadPoolExecutor(workers) as pool:
-        pending: deque[Future[Answer]] = deque()
-        try:
-            for item in items:
-                pending.append(pool.submit(work, item))
-                if len(pending) > 2 * workers:
-                    yield pending.popleft().result()
-            while pending:
-                yield pending.popleft().result()
-        finally:
-            pool.shutdown(cancel_futures=True)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,68 @@
+"""Work on several threads gives results in order, holds few of them, and stops when it should."""
+
+from __future__ import annotations
+
+import random
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from limo_hog.parallel import in_order
+
+
+def test_results_come_in_the_order_of_their_items_whatever_each_takes() -> None:
+    naps = random.Random(5)
+
+    def work(item: int) -> int:
+        time.sleep(naps.random() / 200)
+        return item * item
+
+    assert list(in_order(work, range(100), 4)) == [item * item for item in range(100)]
+
+
+def test_nothing_comes_of_no_items() -> None:
+    assert list(in_order(abs, iter(()), 3)) == []
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_no_more_items_are_taken_ahead_than_twice_the_threads(threads: int) -> None:
+    taken: list[int] = []
+
+    def items() -> Iterator[int]:
+        for item in range(50):
+            taken.append(item)
+            yield item
+
+    for result in in_order(abs, items(), threads):
+        assert len(taken) - result <= 2 * threads + 1
+    assert len(taken) == 50
+
+
+def test_what_work_raises_is_raised_at_its_items_turn() -> None:
+    def work(item: int) -> int:
+        if item == 2:
+            raise ValueError("the third item")
+        return item
+
+    results = in_order(work, range(100), 2)
+    assert [next(results), next(results)] == [0, 1]
+    with pytest.raises(ValueError, match="the third item"):
+        next(results)
+
+
+def test_a_caller_who_stops_begins_nothing_more_and_leaves_no_thread() -> None:
+    begun: list[int] = []
+
+    def work(item: int) -> int:
+        begun.append(item)
+        time.sleep(0.05)
+        return item
+
+    before = set(threading.enumerate())
+    results = in_order(work, range(1000), 2)
+    next(results)
+    results.close()  # type: ignore[attr-defined]
+    assert len(begun) <= 6
+    assert not [thread for thread in threading.enumerate() if thread not in before and "limo-hog" in thread.name]

@@ -29,6 +29,7 @@ from limo_hog import PeopleDetector
 from limo_hog.atomic import whole_file
 from limo_hog.detections import Detections
 from limo_hog.follow.sense.detectors import Detector, detector_named
+from limo_hog.suppression import intersection_over_union
 from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FIT_FILE, Curve, FaultyDetector
 from limo_sim.run.matching import CRITERIA, NO_PERSON, person_of
@@ -160,10 +161,8 @@ def photographed(data: Path, frames: Path, detector: Detector) -> tuple[list[Sig
                 if shown[index] >= CRITERIA.in_view
             ]
             megapixels += sized.shape[0] * sized.shape[1] / 1e6
-            false += sum(
-                person == NO_PERSON and all(iou(box, other * size) < APART for other in boxes)
-                for box, person in zip(found, on, strict=True)
-            )
+            apart = (intersection_over_union(found, boxes * size) < APART).all(axis=1)
+            false += int((apart & (np.array(on) == NO_PERSON)).sum())
     return sightings, false, megapixels
 
 
@@ -251,13 +250,6 @@ def in_view(boxes: NDArray[np.float64]) -> list[float]:
 def person_at(box: NDArray[np.float64]) -> PersonTruth:
     """Return a person with this box; where the person stands is not known."""
     return PersonTruth(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, tuple(float(value) for value in box))
-
-
-def iou(one: NDArray[Any], other: NDArray[Any]) -> float:
-    """Return the intersection over union of two boxes."""
-    size = [min(one[i] + one[i + 2], other[i] + other[i + 2]) - max(one[i], other[i]) for i in (0, 1)]
-    shared = max(size[0], 0.0) * max(size[1], 0.0)
-    return float(shared / (one[2] * one[3] + other[2] * other[3] - shared))
 
 
 def arena_views(heights: Sequence[float]) -> Iterator[Scenario]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.ros2 import names
+from limo_hog.suppression import intersection_over_union
 from limo_sim.workshop import checkpoints as points
 from limo_sim.workshop.checkpoints import CLEAR_ERROR, RED, RIGHT_LINES, SILENCE, Checkpoint, Picture
 from limo_sim.workshop.mistakes import Finding
@@ -95,9 +96,7 @@ def _overlap(box: NDArray[np.int32], look: Look, index: int) -> bool:
     person = look.truth.people[index] if index < len(look.truth.people) else None
     if person is None or person.box is None:
         return False
-    (ax, ay, aw, ah), (bx, by, bw, bh) = box.tolist(), person.box
-    shared = max(min(ax + aw, bx + bw) - max(ax, bx), 0) * max(min(ay + ah, by + bh) - max(ay, by), 0)
-    return bool(shared / (aw * ah + bw * bh - shared) >= ON_PERSON)
+    return bool(intersection_over_union(box[None], np.array([person.box])).item() >= ON_PERSON)
 
 
 # A: slow down

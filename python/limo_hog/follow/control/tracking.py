@@ -206,15 +206,15 @@ class TrackingController:
 
         tracks, seen, own = self.tracker.around(state.tracks, person, now, self.steering.coast_s)
         felt = self.tracker.movers.felt(state.tracks.movers, now)
-        lost_s = math.inf if person is None else now - person.measured
-        followed = NO_POINTS if person is None or lost_s >= self.backing.unseen_s else np.array([person.track.place])
+        age_s = math.inf if person is None else now - person.measured
+        followed = NO_POINTS if person is None or age_s >= self.backing.unseen_s else np.array([person.track.place])
         others = self.backing.remember(state.others, seen, felt, followed, now)
 
         def may_back(poses: Poses) -> NDArray[np.bool_]:
             return self.backing.is_free_behind(poses, pose, self.grid, state.ground, others, self.robot)
 
         walkers = [
-            walker_of(track, pose, followed=True, measured=lost_s <= self.tracker.scan_period_s).at_least(
+            walker_of(track, pose, followed=True, measured=age_s <= self.tracker.scan_period_s).at_least(
                 state.brisk, self.company.slowest
             )
             if track is own

@@ -15,7 +15,7 @@ from limo_hog.learn.evaluation.run import Evaluation
 from limo_hog.learn.labels import Picture
 
 #: Mistakes on a sheet, a row of it, and a tile's size [px].
-COUNT, _COLUMNS, _TILE = 24, 8, (180, 270)
+_COUNT, _COLUMNS, _TILE = 24, 8, (180, 270)
 #: The height of what a tile shows, in heights of the box.
 _SURROUNDINGS = 1.8
 
@@ -40,7 +40,7 @@ class Mistake:
     score: float | None
 
 
-def worst_mistakes(evaluation: Evaluation, pictures: Sequence[Picture], count: int = COUNT) -> list[Mistake]:
+def worst_mistakes(evaluation: Evaluation, pictures: Sequence[Picture]) -> list[Mistake]:
     """Return the surest false alarms and the tallest people missed at 1 FPPI, half of each as far as there are."""
     alarms: list[Mistake] = []
     missed: list[Mistake] = []
@@ -54,8 +54,8 @@ def worst_mistakes(evaluation: Evaluation, pictures: Sequence[Picture], count: i
                 missed.append(Mistake("missed", picture.path, (box.x, box.y, box.width, box.height), None))
     alarms.sort(key=lambda mistake: -(mistake.score or 0.0))
     missed.sort(key=lambda mistake: -mistake.box[3])
-    of_missed = min(len(missed), max(count // 2, count - len(alarms)))
-    return alarms[: count - of_missed] + missed[:of_missed]
+    of_missed = min(len(missed), max(_COUNT // 2, _COUNT - len(alarms)))
+    return alarms[: _COUNT - of_missed] + missed[:of_missed]
 
 
 def draw_sheet(mistakes: Sequence[Mistake]) -> NDArray[np.uint8]:

@@ -38,7 +38,10 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "score": (
         [f"{SIM}/run/score/*.py", f"{SIM}/run/matching.py"],
-        [f"tests/sim/run/test_{name}.py" for name in ("score", "score_bounds", "score_sweep")],
+        [
+            f"tests/sim/run/test_{name}.py"
+            for name in ("matching", "score", "score_bounds", "score_losses", "score_sweep")
+        ],
     ),
     "control": (
         [f"{FOLLOW}/control/*.py", f"{FOLLOW}/twist.py", f"{FOLLOW}/zones.py"],
@@ -49,14 +52,20 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "tracks": (
         [f"{FOLLOW}/tracks/*.py"],
-        ["tests/follow/tracks", "tests/follow/control/test_tracking.py"],
+        [
+            "tests/follow/tracks",
+            *(f"tests/follow/control/test_{name}.py" for name in ("tracking", "tracking_identity")),
+        ],
     ),
     "sense": (
         [f"{FOLLOW}/sense/{name}.py" for name in ("appearance", "measurement", "ranging", "region", "visibility")],
         [
             *(f"tests/follow/sense/test_{name}.py" for name in ("appearance", "region", "ranging")),
             "tests/follow/tracks",
-            *(f"tests/follow/control/test_{name}.py" for name in ("workshop_controllers", "tracking")),
+            *(
+                f"tests/follow/control/test_{name}.py"
+                for name in ("workshop_controllers", "tracking", "tracking_identity")
+            ),
             "tests/follow/test_pipeline.py",
         ],
     ),

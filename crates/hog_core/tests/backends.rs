@@ -6,7 +6,7 @@ mod common;
 use common::{Detector, Picture, assert_same, available, reached_by};
 use hog_core::group::{Candidate, clip, group_candidates, mean_shift};
 use hog_core::pyramid::{Pyramid, levels, resize, to_image};
-use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size, model};
+use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
 use proptest::prelude::*;
 
 const ALL_WINDOWS: f64 = -1e9;
@@ -392,10 +392,4 @@ fn a_threshold_that_is_no_number_has_no_hits_and_minus_infinity_has_all() {
             assert_eq!(hog.detect(picture.view(), &search, None, &Interrupt::NEVER).unwrap().len(), count);
         }
     }
-}
-
-#[test]
-fn the_models_fit_their_geometries() {
-    assert_eq!(Detector::people().spec().descriptor_len() + 1, model::default_people().len());
-    assert_eq!(Detector::daimler().spec().descriptor_len() + 1, model::daimler_people().len());
 }

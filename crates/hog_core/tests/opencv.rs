@@ -7,7 +7,7 @@ use common::{Detector, Gradient, Picture, available};
 use hog_core::exact::Svm;
 use hog_core::group::{Candidate, group_rectangles, mean_shift};
 use hog_core::pyramid::Pyramid;
-use hog_core::{Backend, Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, Search};
+use hog_core::{Backend, Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, Search, model};
 
 fn rect([x, y, width, height]: [i32; 4]) -> Rect {
     Rect { x, y, width, height }
@@ -352,4 +352,10 @@ fn the_score_counts_every_element_also_of_blocks_whose_length_is_no_multiple_of_
         let score = Svm::new(&weights, &spec).unwrap().score(values.chunks_exact(spec.block_len));
         assert_eq!(score, f64::from(wanted));
     }
+}
+
+#[test]
+fn the_models_fit_their_geometries() {
+    assert_eq!(Detector::people().spec().descriptor_len() + 1, model::default_people().len());
+    assert_eq!(Detector::daimler().spec().descriptor_len() + 1, model::daimler_people().len());
 }

@@ -381,27 +381,3 @@ def test_before_the_first_frame_and_after_a_fault_a_recheck_stands() -> None:
     assert guard.recheck(0.0, scan(), None, guard.start()).twist == Twist()
     faulty = guard.step(replace(look(), fault="dark"), guard.start())
     assert guard.recheck(0.1, scan(stamp=0.1), None, faulty.state).reason == "no usable camera frame"
-
-
-def looks_after(*stamps: float) -> list[float]:
-    """Return the stamps of the scans that are kept for the ground they show to be free."""
-    guard = ahead()
-    state = guard.start()
-    for stamp in stamps:
-        view = replace(look(stamp=stamp), scan=scan(stamp=stamp), odometry=Odometry(stamp))
-        state = guard.step(view, state).state
-    return [one.scan.stamp for one in state.looks]
-
-
-def test_a_scan_every_half_second_is_kept_for_a_minute() -> None:
-    assert looks_after(*(0.125 * step for step in range(12))) == [0.0, 0.5, 1.0]
-    assert looks_after(0.0, 10.0, 59.75) == [0.0, 10.0, 59.75]
-    assert looks_after(0.0, 10.0, 60.0) == [10.0, 60.0]
-    assert looks_after(0.0, 100.0) == [100.0]
-
-
-def test_a_scan_that_is_older_than_those_kept_begins_anew() -> None:
-    guard = ahead()
-    state = guard.step(replace(look(stamp=5.0), scan=scan(stamp=5.0), odometry=Odometry(5.0)), guard.start()).state
-    late = replace(look(stamp=5.1), scan=scan(stamp=4.8), odometry=Odometry(5.1))
-    assert [one.scan.stamp for one in guard.step(late, state).state.looks] == [4.8]

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import cmath
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.follow.safety.test_safety import ahead
+from tests.follow.views import look, scan
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.safety.unseen import Look, _were_free, room_seen_behind
@@ -81,3 +84,27 @@ def test_ground_just_half_a_step_from_the_outline_was_not_covered() -> None:
     for x, y in ((length, 0.0), (-length, 0.0), (0.0, width), (0.0, -width)):
         places = np.array([(x, y), (x * (1 - 1e-9), y * (1 - 1e-9))])
         assert _were_free(places, [blind], LIMO).tolist() == [[False, True]]
+
+
+def looks_after(*stamps: float) -> list[float]:
+    """Return the stamps of the scans that are kept for the ground they show to be free."""
+    guard = ahead()
+    state = guard.start()
+    for stamp in stamps:
+        view = replace(look(stamp=stamp), scan=scan(stamp=stamp), odometry=Odometry(stamp))
+        state = guard.step(view, state).state
+    return [one.scan.stamp for one in state.looks]
+
+
+def test_a_scan_every_half_second_is_kept_for_a_minute() -> None:
+    assert looks_after(*(0.125 * step for step in range(12))) == [0.0, 0.5, 1.0]
+    assert looks_after(0.0, 10.0, 59.75) == [0.0, 10.0, 59.75]
+    assert looks_after(0.0, 10.0, 60.0) == [10.0, 60.0]
+    assert looks_after(0.0, 100.0) == [100.0]
+
+
+def test_a_scan_that_is_older_than_those_kept_begins_anew() -> None:
+    guard = ahead()
+    state = guard.step(replace(look(stamp=5.0), scan=scan(stamp=5.0), odometry=Odometry(5.0)), guard.start()).state
+    late = replace(look(stamp=5.1), scan=scan(stamp=4.8), odometry=Odometry(5.1))
+    assert [one.scan.stamp for one in guard.step(late, state).state.looks] == [4.8]

@@ -14,7 +14,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.twist import Twist
 from limo_sim.run.episode import Episode, FrameRecord, Step
-from limo_sim.run.matching import Criteria, on_person
+from limo_sim.run.matching import Criteria
 from limo_sim.run.score import ScoreCard, Scorer, score
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
@@ -315,61 +315,6 @@ def test_the_shares_of_modes_and_reasons_add_up_to_one_however_short_the_log() -
         assert result.modes["follow"] == result.reasons["because"] == 1.0
 
 
-@pytest.mark.parametrize(("searched", "found_again"), [(3.0, 1.0), (3.25, 0.0)])
-def test_a_search_of_up_to_three_seconds_counts_as_found_again(searched: float, found_again: float) -> None:
-    # Times whose sums are exact.
-    times = [0.0, *np.arange(0.25, searched, 0.25), searched]
-    steps = [replace(step(0, person(), boxes=[ON], target=0), time=time) for time in times]
-    empty = [replace(one, decision=replace(one.decision, target=None)) for one in steps[1:-1]]
-    result = card(steps[0], *empty, steps[-1])
-    assert (result.lost, result.found_again) == (1, found_again)
-
-
-def test_the_longest_gap_is_between_two_detections_of_the_subject() -> None:
-    seen = {0, 1, 5, 7}
-    steps = [step(k, person(), boxes=[ON] if k in seen else [OFF], target=0 if k in seen else None) for k in range(9)]
-    assert card(*steps).longest_gap_s == pytest.approx(0.4)
-
-
-@pytest.mark.parametrize(("missed", "lost"), [(4, 0), (6, 1)])
-def test_a_subject_who_is_missed_for_half_a_second_is_lost(missed: int, lost: int) -> None:
-    followed = [step(k, person(), boxes=[ON], target=0) for k in range(3)]
-    # one period passes anyway between two frames
-    gone = [step(k, person()) for k in range(3, 3 + missed - 1)]
-    again = [step(k, person(), boxes=[ON], target=0) for k in range(2 + missed, 6 + missed)]
-    assert card(*followed, *gone, *again).lost == lost
-
-
-def test_a_subject_who_is_never_found_again_is_lost_once() -> None:
-    followed = [step(k, person(), boxes=[ON], target=0) for k in range(3)]
-    result = card(*followed, *(step(k, person()) for k in range(3, 50)))
-    assert (result.lost, result.found_again) == (1, 0.0)
-
-
-def test_a_loss_is_counted_without_the_time_behind_a_pillar() -> None:
-    followed = [step(k, person(), boxes=[ON], target=0) for k in range(3)]
-    hidden = [step(k, person(visible=0.0)) for k in range(3, 50)]
-    again = [step(50, person(), boxes=[ON], target=0)]
-    result = card(*followed, *hidden, *again)
-    assert result.lost == 1
-    assert result.found_again == 1.0
-    away = [step(k, person(visible=0.0, box=None)) for k in range(3, 50)]
-    assert card(*followed, *away, *again).found_again == 0.0
-
-
-def test_the_time_to_find_the_subject_again_is_the_mean_over_the_losses() -> None:
-    steps, number = [], 0
-    for gone in (10, 20):
-        steps += [step(number + k, person(), boxes=[ON], target=0) for k in range(3)]
-        steps += [step(number + 3 + k, person()) for k in range(gone - 1)]
-        number += 2 + gone
-    steps += [step(number + k, person(), boxes=[ON], target=0) for k in range(3)]
-    assert card(*steps).time_to_find_again_s == pytest.approx((1.0 + 2.0) / 2)
-    never = [step(k, person(), boxes=[ON], target=0) for k in range(3)]
-    assert card(*never).time_to_find_again_s is None
-    assert card(*never, *(step(k, person()) for k in range(3, 53))).time_to_find_again_s == pytest.approx(5.0)
-
-
 def test_intrusions_are_those_of_the_nearest_of_all_people() -> None:
     far, near, absent = person(4.0), replace(other_person(), distance=0.9), None
     result = card(step(0, far, near), step(1, far, absent), step(2, person(0.3), near), step(3, absent, absent))
@@ -405,51 +350,3 @@ def test_a_run_fails_only_beyond_the_time_unseen_that_the_criteria_allow() -> No
     steps = [step(k, person(visible=float(not 5 < k < 10))) for k in range(11)]
     episode = replace(episode, seconds=1.1, steps=tuple(steps))
     assert score(episode, Criteria(unseen_s=0.5)).success is True
-
-
-def test_a_box_is_on_a_person_of_its_size_and_place() -> None:
-    assert on_person(np.array(ON, np.int32), person())
-    assert not on_person(np.array(OFF, np.int32), person())
-    assert not on_person(np.array([0, 0, 320, 480], np.int32), person())
-    assert not on_person(np.array(ON, np.int32), person(box=None))
-
-
-@pytest.mark.parametrize(
-    ("column", "row", "height", "on"),
-    [
-        (330, 160, 160, True),
-        # the silhouette is 60 px wide from 300 on: a quarter of it more on either side
-        (285, 160, 160, True),
-        (284, 160, 160, False),
-        (375, 160, 160, True),
-        (376, 160, 160, False),
-        # 120 px high from 100 on
-        (330, 100, 160, True),
-        (330, 99, 160, False),
-        (330, 220, 160, True),
-        (330, 221, 160, False),
-        (330, 160, 72, True),
-        (330, 160, 70, False),
-        (330, 160, 300, True),
-        (330, 160, 302, False),
-    ],
-)
-def test_the_middle_of_a_box_and_its_height_decide_whom_it_is_on(column: int, row: int, height: int, on: bool) -> None:
-    box = np.array([column - 40, row - height // 2, 80, height], np.int32)
-    assert on_person(box, person()) is on
-
-
-def test_a_box_on_two_people_is_on_the_one_in_view_then_on_the_nearer_one() -> None:
-    left, right = person(box=(300, 100, 60, 120)), person(box=(320, 100, 60, 120))
-    box = [[285 + 15, 90, 80, 160]]  # its middle, 340, is 10 px from the left one's and 10 from the right one's
-
-    def subject(one: PersonTruth, other: PersonTruth, shift: int) -> float | None:
-        moved = [[box[0][0] + shift, *box[0][1:]]]
-        return card(
-            step(0, replace(one, distance=1.0), replace(other, distance=2.0), boxes=moved, target=0)
-        ).distance_mean_m
-
-    assert subject(left, right, -4) == 1.0
-    assert subject(left, right, 4) == 2.0
-    assert subject(replace(left, visible=0.3), right, -4) == 2.0
-    assert subject(left, replace(right, visible=0.3), 4) == 1.0

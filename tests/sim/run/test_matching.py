@@ -1,0 +1,60 @@
+"""A box is on a person of its place and size."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.sim.run.test_score import OFF, ON, card, person, step
+
+from limo_sim.run.matching import on_person
+from limo_sim.world.truth import PersonTruth
+
+
+def test_a_box_is_on_a_person_of_its_size_and_place() -> None:
+    assert on_person(np.array(ON, np.int32), person())
+    assert not on_person(np.array(OFF, np.int32), person())
+    assert not on_person(np.array([0, 0, 320, 480], np.int32), person())
+    assert not on_person(np.array(ON, np.int32), person(box=None))
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "height", "on"),
+    [
+        (330, 160, 160, True),
+        # the silhouette is 60 px wide from 300 on: a quarter of it more on either side
+        (285, 160, 160, True),
+        (284, 160, 160, False),
+        (375, 160, 160, True),
+        (376, 160, 160, False),
+        # 120 px high from 100 on
+        (330, 100, 160, True),
+        (330, 99, 160, False),
+        (330, 220, 160, True),
+        (330, 221, 160, False),
+        (330, 160, 72, True),
+        (330, 160, 70, False),
+        (330, 160, 300, True),
+        (330, 160, 302, False),
+    ],
+)
+def test_the_middle_of_a_box_and_its_height_decide_whom_it_is_on(column: int, row: int, height: int, on: bool) -> None:
+    box = np.array([column - 40, row - height // 2, 80, height], np.int32)
+    assert on_person(box, person()) is on
+
+
+def test_a_box_on_two_people_is_on_the_one_in_view_then_on_the_nearer_one() -> None:
+    left, right = person(box=(300, 100, 60, 120)), person(box=(320, 100, 60, 120))
+    box = [[285 + 15, 90, 80, 160]]  # its middle, 340, is 10 px from the left one's and 10 from the right one's
+
+    def subject(one: PersonTruth, other: PersonTruth, shift: int) -> float | None:
+        moved = [[box[0][0] + shift, *box[0][1:]]]
+        return card(
+            step(0, replace(one, distance=1.0), replace(other, distance=2.0), boxes=moved, target=0)
+        ).distance_mean_m
+
+    assert subject(left, right, -4) == 1.0
+    assert subject(left, right, 4) == 2.0
+    assert subject(replace(left, visible=0.3), right, -4) == 2.0
+    assert subject(left, replace(right, visible=0.3), 4) == 1.0

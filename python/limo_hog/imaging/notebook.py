@@ -1,4 +1,4 @@
-"""Detections as Jupyter shows them: a small picture, and a table."""
+"""Pictures in HTML, and detections as Jupyter shows them: a small picture, and a table."""
 
 from __future__ import annotations
 
@@ -21,11 +21,16 @@ def reduced(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:
     return blocks.mean(axis=(1, 3)).astype(np.uint8), n
 
 
+def data_uri(jpeg: bytes) -> str:
+    """Return the bytes of a JPEG file as an address that an HTML page holds itself."""
+    return f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"
+
+
 def shown(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]], jpeg: bytes | None) -> str:
     """Return HTML: the picture, the caption, and the first rows of the table."""
     parts = []
     if jpeg is not None:
-        parts.append(f'<img alt="" src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}">')
+        parts.append(f'<img alt="" src="{data_uri(jpeg)}">')
     left_out = f", the best {ROWS} here" if len(rows) > ROWS else ""
     parts.append(f"<p>{html.escape(caption)}{left_out}</p>")
     if rows:

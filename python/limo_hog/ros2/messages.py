@@ -189,12 +189,10 @@ def pixels_of(message: Any) -> NDArray[Any]:
 
 def compressed_image(stamp: float, pixels: NDArray[np.uint8], quality: int = 90) -> CompressedImage:
     """Return a JPEG of uint8 (H, W, 3) BGR, as image_transport's "compressed" topics carry; needs OpenCV."""
-    with needed(by="a compressed image", what="OpenCV", install="'limo-hog[cv]'"):
-        import cv2
-    data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
-    return CompressedImage(
-        header=_header(stamp, CAMERA_FRAME), format="bgr8; jpeg compressed bgr8", data=data.reshape(-1)
-    )
+    from limo_hog.imaging.writing import jpeg  # imported here: other messages need no OpenCV
+
+    data = np.frombuffer(jpeg(pixels, quality), np.uint8)
+    return CompressedImage(header=_header(stamp, CAMERA_FRAME), format="bgr8; jpeg compressed bgr8", data=data)
 
 
 def decompressed(message: Any) -> NDArray[np.uint8]:

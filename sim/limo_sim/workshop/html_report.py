@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from html import escape
 from pathlib import Path
 
@@ -10,6 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.imaging.notebook import data_uri
+from limo_hog.imaging.writing import jpeg
 from limo_sim.workshop.check import Examination, Verdict
 from limo_sim.workshop.checkpoints import command_of, task_name
 from limo_sim.workshop.exercises import EXERCISES
@@ -127,5 +128,4 @@ def _picture(look: Look) -> tuple[str, str]:
         return "", name
     height = max(round(picture.shape[0] * _WIDTH / picture.shape[1]), 1)
     small = cv2.resize(picture, (_WIDTH * 2, height * 2), interpolation=cv2.INTER_AREA)
-    data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1]
-    return f"data:image/jpeg;base64,{base64.b64encode(data.tobytes()).decode()}", f"window “{name}”"
+    return data_uri(jpeg(small.astype(np.uint8, copy=False))), f"window “{name}”"

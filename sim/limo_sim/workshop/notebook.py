@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
+from limo_hog.imaging.notebook import data_uri
+from limo_hog.imaging.writing import jpeg
 from limo_sim.ros.script import run_script, score_of
 from limo_sim.run.catalogue import load
 from limo_sim.workshop import template
@@ -121,12 +118,7 @@ def run(file: str | Path, scenario: str = "workshop", seconds: float = 10.0, see
     text = "\n".join(line for line in said if line)
     pictures = "".join(
         f'<figure style="display: inline-block; margin: 0 1rem 0 0"><img alt="{escape(name, quote=True)}" width="480" '
-        f'src="{_data(picture)}"><figcaption>{escape(name)}</figcaption></figure>'
+        f'src="{data_uri(jpeg(picture))}"><figcaption>{escape(name)}</figcaption></figure>'
         for name, picture in outcome.world.windows.items()
     )
     return Shown(text, f"{pictures}<pre>{escape(text)}</pre>")
-
-
-def _data(picture: NDArray[np.uint8]) -> str:
-    jpeg = cv2.imencode(".jpg", picture)[1].tobytes()
-    return f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"

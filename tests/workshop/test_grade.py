@@ -13,7 +13,7 @@ from limo_hog.cli.main import main
 from limo_sim.workshop import solution, template
 from limo_sim.workshop.grade import Limits, grade, nodes_in
 
-LOOP = "while True:\n    try:\n        while True: pass\n    except BaseException: pass\n"
+LOOP = "while True:\n    try:\n        n = 0\n        while True: n += 1\n    except BaseException: pass\n"
 HOSTILE = {
     "loop": LOOP,
     "exit": "import os\nos._exit(0)\n",

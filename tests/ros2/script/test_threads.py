@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import time
+
 import pytest
 
 from ..conftest import Run
@@ -90,6 +96,38 @@ def test_an_endless_loop_in_a_thread_is_stopped(run: Run) -> None:
     text += "threading.Thread(target=loop).start()\npub.publish(Twist())\n"
     text += "try:\n    rclpy.spin(n)\nfinally:\n    over.append(1)"
     assert "hung" in run(text, patience=0.5).failure
+
+
+#: Waits for ever beside other threads, as a script beside OpenCV's.
+WAITS = """
+import threading, time
+from limo_sim.ros.lockstep.patience import HungError, Patience
+for _ in range(30):
+    threading.Thread(target=time.sleep, args=(1000,), daemon=True).start()
+try:
+    with Patience(0.5).watching():
+        print("waits", flush=True)
+        threading.Event().wait()
+except HungError:
+    print("hung")
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are sent as POSIX has them")
+def test_a_wait_that_was_stopped_beyond_its_time_is_interrupted_when_it_goes_on() -> None:
+    # (A signal that comes meanwhile goes to any of the threads: the main thread missed nine in ten.)
+    for _ in range(3):
+        process = subprocess.Popen([sys.executable, "-c", WAITS], stdout=subprocess.PIPE, text=True)
+        with process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "waits\n"
+            process.send_signal(signal.SIGSTOP)
+            time.sleep(0.7)
+            process.send_signal(signal.SIGCONT)
+            try:
+                assert process.communicate(timeout=20)[0] == "hung\n"
+            finally:
+                process.kill()
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+#: How often the timer goes off until the script is interrupted [s]. The system may give a signal to any thread, such as
+#: one of OpenCV's after Ctrl-Z and `fg`: a main thread that waits does not notice it. Chosen: soon for a person.
+_AGAIN_S = 0.1
+
 
 class HungError(BaseException):
     """The script hangs; not an Exception, so that `except Exception` in a script does not hide it."""
@@ -40,7 +44,7 @@ class Patience:
             yield
             return
         handler = signal.signal(signal.SIGALRM, self._alarm)
-        left = signal.setitimer(signal.ITIMER_REAL, self.seconds)[0]
+        left = signal.setitimer(signal.ITIMER_REAL, self.seconds, _AGAIN_S)[0]
         self._running = True
         try:
             yield
@@ -61,7 +65,8 @@ class Patience:
         """Start the timer again: simulated time has passed."""
         self.passing()
         if self._running:
-            signal.setitimer(signal.ITIMER_REAL, self.seconds)
+            signal.setitimer(signal.ITIMER_REAL, self.seconds, _AGAIN_S)
 
     def _alarm(self, _signal: int, _frame: FrameType | None) -> None:
+        signal.setitimer(signal.ITIMER_REAL, 0)
         raise HungError(f"no simulated time has passed for {self.seconds:g} s: a loop or a call that never ends")

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Detector, Picture, assert_same, available, reached_by};
+use common::{Detector, PADDED, Picture, assert_same, available, reached_by};
 use hog_core::group::{Candidate, clip, group_candidates, mean_shift};
 use hog_core::pyramid::{Pyramid, levels, resize, to_image};
 use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
@@ -41,8 +41,6 @@ fn compare(detector: &Detector, size: (usize, usize), channels: usize, search: S
     }
 }
 
-const STEPS: Search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (4, 4) };
-
 /// `cases`, unless PROPTEST_CASES says otherwise.
 fn cases(cases: u32) -> ProptestConfig {
     let config = ProptestConfig::default();
@@ -71,23 +69,23 @@ proptest! {
 #[test]
 fn every_width_up_to_200_is_served() {
     for width in 1..=200 {
-        compare(&Detector::daimler(), (width, 97), 1, STEPS, width as u32);
+        compare(&Detector::daimler(), (width, 97), 1, PADDED, width as u32);
     }
 }
 
 #[test]
 fn every_height_up_to_200_is_served() {
     for height in 1..=200 {
-        compare(&Detector::daimler(), (61, height), 3, STEPS, height as u32);
+        compare(&Detector::daimler(), (61, height), 3, PADDED, height as u32);
     }
 }
 
 #[test]
 fn images_that_are_made_in_several_bands_are_scored_alike() {
     // A band is 384 KB of pixels: 272 rows of the gray image, 128 and 160 of those in colour.
-    compare(&Detector::people(), (1100, 620), 1, STEPS, 1);
-    compare(&Detector::people(), (650, 410), 3, STEPS, 2);
-    compare(&Detector::daimler(), (501, 330), 3, Search { win_stride: (4, 12), ..STEPS }, 3);
+    compare(&Detector::people(), (1100, 620), 1, PADDED, 1);
+    compare(&Detector::people(), (650, 410), 3, PADDED, 2);
+    compare(&Detector::daimler(), (501, 330), 3, Search { win_stride: (4, 12), ..PADDED }, 3);
 }
 
 #[test]
@@ -96,7 +94,7 @@ fn a_window_as_large_as_the_kernels_serve_is_scored_alike() {
     for l2_hys_threshold in [1.0, 0.2, 0.05] {
         let params = HogParams { win_size: (168, 168), l2_hys_threshold, ..HogParams::default() };
         let coefficients = (0..36 * 400).map(|i| ((i * i % 511) as f32 - 255.0) / 4e3).collect();
-        compare(&Detector { params, coefficients }, (200, 190), 3, STEPS, 4);
+        compare(&Detector { params, coefficients }, (200, 190), 3, PADDED, 4);
     }
 }
 
@@ -108,9 +106,9 @@ fn a_detector_that_is_a_windows_own_descriptor_is_scored_alike() {
         let params = HogParams::default();
         let hog = Hog::new(&params, None).unwrap();
         let mut own = vec![0.0; 3780];
-        hog.compute(picture.view(), &STEPS, Some(&[(16, 24)]), &Interrupt::NEVER, &mut own).unwrap();
+        hog.compute(picture.view(), &PADDED, Some(&[(16, 24)]), &Interrupt::NEVER, &mut own).unwrap();
         let coefficients = own.iter().map(|x| scale * x).collect();
-        compare(&Detector { params, coefficients }, (150, 200), 3, STEPS, seed);
+        compare(&Detector { params, coefficients }, (150, 200), 3, PADDED, seed);
     }
 }
 
@@ -144,8 +142,8 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
         let picture = Picture::new(size.0, size.1, channels, 5);
         let (image, mut detector) = (picture.view(), Detector::people());
         // A bias that lets a few windows in a hundred score more than 0.
-        detector.coefficients[3780] -= reached_by(&detector.every_window(image, &STEPS), 0.03) as f32;
-        let search = STEPS;
+        detector.coefficients[3780] -= reached_by(&detector.every_window(image, &PADDED), 0.03) as f32;
+        let search = PADDED;
         let candidates = candidates(&detector, image, &search, 1.1);
         let inside = |found| clip(found, size.0 as i32, size.1 as i32);
         let every = inside(group_candidates(&candidates, 0, &Interrupt::NEVER).unwrap());
@@ -199,8 +197,8 @@ fn a_search_at_another_size_is_that_of_the_resized_image_on_every_backend() {
         let resized = resize(picture.view(), size).unwrap();
         let resized =
             ImageView::new(&resized, size.width, size.height, channels, size.width * channels).unwrap();
-        detector.coefficients[3780] -= reached_by(&detector.every_window(resized, &STEPS), 0.03) as f32;
-        let wanted = candidates(&detector, resized, &STEPS, PYRAMID.scale);
+        detector.coefficients[3780] -= reached_by(&detector.every_window(resized, &PADDED), 0.03) as f32;
+        let wanted = candidates(&detector, resized, &PADDED, PYRAMID.scale);
         let wanted = group_candidates(&wanted, 0, &Interrupt::NEVER).unwrap();
         let wanted = clip(wanted, size.width as i32, size.height as i32);
         assert!(wanted.len() > 5);
@@ -209,7 +207,7 @@ fn a_search_at_another_size_is_that_of_the_resized_image_on_every_backend() {
         for backend in available() {
             let hog = hog(&detector, backend);
             let search = |image, pyramid, grouping| {
-                hog.detect_multi_scale(image, &STEPS, pyramid, grouping, None, 1, &Interrupt::NEVER).unwrap()
+                hog.detect_multi_scale(image, &PADDED, pyramid, grouping, None, 1, &Interrupt::NEVER).unwrap()
             };
             let found = search(picture.view(), &pyramid, Grouping::Similar(0));
             assert_eq!(rects(&found), rects(&wanted), "{}", backend.name());
@@ -225,14 +223,14 @@ fn a_window_at_the_threshold_is_decided_on_the_resized_image() {
     let resized = resize(picture.view(), size).unwrap();
     let resized = ImageView::new(&resized, size.width, size.height, 3, size.width * 3).unwrap();
     // Two levels, the second of which is resized twice; on either most windows are far from the threshold.
-    let all = Search { hit_threshold: ALL_WINDOWS, ..STEPS };
+    let all = Search { hit_threshold: ALL_WINDOWS, ..PADDED };
     let every = candidates(&detector, resized, &all, 1.2);
     let pyramid = Pyramid { first: Some(size), scale: 1.2 };
     for backend in available() {
         let hog = hog(&detector, backend);
         for &Candidate { weight: hit_threshold, .. } in every.iter().filter(|one| one.scale > 1.0) {
             let wanted = every.iter().filter(|one| one.weight >= hit_threshold).count();
-            let (search, all) = (Search { hit_threshold, ..STEPS }, Grouping::Similar(0));
+            let (search, all) = (Search { hit_threshold, ..PADDED }, Grouping::Similar(0));
             let found = hog
                 .detect_multi_scale(picture.view(), &search, &pyramid, all, None, 1, &Interrupt::NEVER)
                 .unwrap();
@@ -331,8 +329,8 @@ fn a_window_asked_for_by_its_place_weighs_what_the_exact_path_says() {
 #[test]
 fn common_geometries_without_kernels_find_what_the_exact_path_finds() {
     let people = Detector::people();
-    compare(&people, (131, 170), 3, Search { win_stride: (5, 3), ..STEPS }, 6);
-    compare(&people, (131, 170), 1, Search { win_stride: (6, 8), ..STEPS }, 6);
+    compare(&people, (131, 170), 3, Search { win_stride: (5, 3), ..PADDED }, 6);
+    compare(&people, (131, 170), 1, Search { win_stride: (6, 8), ..PADDED }, 6);
     let bins = |nbins, signed_gradient| HogParams { nbins, signed_gradient, ..HogParams::default() };
     for params in [
         square(48, 8, 4, 4),
@@ -347,7 +345,7 @@ fn common_geometries_without_kernels_find_what_the_exact_path_finds() {
         bins(1, false),
     ] {
         for channels in [1, 3] {
-            let search = Search { win_stride: (8, 4), ..STEPS };
+            let search = Search { win_stride: (8, 4), ..PADDED };
             compare(&of_geometry(params.clone()), (150, 140), channels, search, 7);
         }
     }

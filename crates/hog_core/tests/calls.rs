@@ -5,13 +5,11 @@ mod common;
 
 use std::cell::Cell;
 
-use common::{Detector, Picture, assert_same, available, reached_by};
+use common::{Detector, Picture, STEPS, assert_same, available, reached_by};
 use hog_core::exact::{RowVotes, Svm, Tables, scores};
 use hog_core::group::{Candidate, group_candidates, group_rectangles, mean_shift};
 use hog_core::pyramid::{Pyramid, Tap, resize, taps};
 use hog_core::{Grouping, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
-
-const STEPS: Search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (0, 0) };
 
 /// The descriptor of one crop by the exact path.
 fn descriptor(hog: &Hog, crop: &[u8], channels: usize) -> Vec<f32> {

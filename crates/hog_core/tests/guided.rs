@@ -3,11 +3,13 @@
 
 mod common;
 
-use common::{Detector, Picture};
+use common::{Detector, Picture, STEPS};
 use hog_core::pyramid::Pyramid;
 use hog_core::{Grouping, Guide, Hog, Interrupt, Rect, Search};
 
-const STEPS: Search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (0, 0) };
+fn guide(halvings: u32, margin: f64, reach: f64) -> Option<Guide> {
+    Some(Guide { halvings, margin, reach: (reach, reach) })
+}
 
 fn guided(detector: &Detector, picture: &Picture, guide: Option<Guide>, threshold: f64) -> Vec<(Rect, f64)> {
     guided_by(detector, picture, guide, &Search { hit_threshold: threshold, ..STEPS })
@@ -40,19 +42,16 @@ fn a_guided_search_finds_nothing_new_and_misses_nothing_where_it_looks_everywher
     assert!(all.len() > 20);
     let everywhere = [(0, 0.0, 0.0), (1, 1e9, 0.0), (1, 1e9, 50.0), (2, 1e9, 50.0), (99, 1e9, f64::INFINITY)];
     for (halvings, margin, reach) in everywhere {
-        let found =
-            guided(&detector, &picture, Some(Guide { halvings, margin, reach: (reach, reach) }), -1.2);
+        let found = guided(&detector, &picture, guide(halvings, margin, reach), -1.2);
         assert_eq!(found, all, "{halvings} {margin} {reach}");
     }
     for (halvings, margin, reach) in [(1, 0.0, 0.0), (1, 0.3, 1.0), (2, 0.0, 2.0), (3, 0.5, 3.0)] {
-        let found =
-            guided(&detector, &picture, Some(Guide { halvings, margin, reach: (reach, reach) }), -1.2);
+        let found = guided(&detector, &picture, guide(halvings, margin, reach), -1.2);
         assert!(found.iter().all(|hit| all.contains(hit)), "{halvings} {margin} {reach}");
         assert!(2 * found.len() > all.len(), "{} of {}", found.len(), all.len());
     }
     // The levels between are searched around what was found on the others alone: where that is nothing, nowhere.
-    let nowhere = Guide { halvings: 1, margin: -1e9, reach: (50.0, 50.0) };
-    let nowhere = guided(&detector, &picture, Some(nowhere), -1.2);
+    let nowhere = guided(&detector, &picture, guide(1, -1e9, 50.0), -1.2);
     let whole: Vec<_> = (0..20).step_by(2).map(|level| (64.0 * 1.1f64.powi(level)).round() as i32).collect();
     let wanted: Vec<_> = all.into_iter().filter(|(rect, _)| whole.contains(&rect.width)).collect();
     assert!(wanted.len() > 5);
@@ -68,8 +67,7 @@ fn a_guided_search_in_wide_padding_finds_nothing_new() {
         // (Rectangles are cut to the image, so that a weight tells which window is meant.)
         assert!(all.len() > 20);
         for (halvings, margin, reach) in [(1, 0.0, 0.0), (1, 0.1, 1.0), (2, 0.3, 0.0)] {
-            let guide = Guide { halvings, margin, reach: (reach, reach) };
-            let found = guided_by(&detector, &picture, Some(guide), &search);
+            let found = guided_by(&detector, &picture, guide(halvings, margin, reach), &search);
             assert!(found.iter().all(|hit| all.contains(hit)), "{padding:?} {halvings} {margin} {reach}");
             assert!(4 * found.len() > all.len(), "{} of {}", found.len(), all.len());
         }
@@ -92,8 +90,7 @@ fn a_guided_search_at_either_edge_of_a_wide_image_finds_nothing_new() {
             let search = Search { hit_threshold: -3.0, padding, ..STEPS };
             let all = guided_by(&detector, &picture, None, &search);
             assert!(all.len() > 5, "{}", all.len());
-            let guide = Guide { halvings: 1, margin: 0.1, reach: (1.0, 1.0) };
-            let found = guided_by(&detector, &picture, Some(guide), &search);
+            let found = guided_by(&detector, &picture, guide(1, 0.1, 1.0), &search);
             // (Sums are in another order where a vector is not full.)
             let is_one = |hit: &(Rect, f64)| {
                 all.iter().any(|other| other.0 == hit.0 && (other.1 - hit.1).abs() <= detector.rounding())

@@ -3,17 +3,15 @@
 
 mod common;
 
-use common::{Detector, Gradient, Picture, available};
+use common::{Detector, Gradient, PADDED, Picture, available};
 use hog_core::exact::Svm;
 use hog_core::group::{Candidate, group_rectangles, mean_shift};
 use hog_core::pyramid::Pyramid;
-use hog_core::{Backend, Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, Search, model};
+use hog_core::{Backend, Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, model};
 
 fn rect([x, y, width, height]: [i32; 4]) -> Rect {
     Rect { x, y, width, height }
 }
-
-const STEPS: Search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (4, 4) };
 
 /// Asserts that both hold the same rectangles, with weights as near as single precision sums in any order are.
 fn assert_found(found: &[(Rect, f64)], wanted: &[([i32; 4], f64)]) {
@@ -34,7 +32,7 @@ fn a_search_finds_what_opencv_finds_grouped_by_similarity_and_by_mean_shift() {
         let search = |grouping| {
             hog.detect_multi_scale(
                 picture.view(),
-                &STEPS,
+                &PADDED,
                 &Pyramid { first: None, scale: 1.1 },
                 grouping,
                 None,

@@ -131,7 +131,7 @@ def exchange(seconds: float, hertz: float) -> tuple[int, int, float]:
     """Send images to another process; returns how many were sent and came, and the 95 % latency [s]."""
     count = int(seconds * hertz)
     command = [sys.executable, "-c", RECEIVER, str(seconds + 20), str(count)]
-    receiver = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ))
+    receiver = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert receiver.stdout is not None
     assert receiver.stdout.readline() == "ready\n"
     publisher = dds.Bus().publisher(names.IMAGE, names.TYPES[names.IMAGE])
@@ -290,7 +290,6 @@ def test_two_processes_close_the_loop(capsys: pytest.CaptureFixture[str]) -> Non
     arena = subprocess.Popen(
         [*command, "arena", "--ros2", "--scenario", "followable", "--seconds", "30"],
         stderr=subprocess.DEVNULL,
-        env=dict(os.environ),
     )
     bus = dds.Bus()
     bus.topics(20.0, enough=lambda found: names.IMAGE in found)

@@ -5,6 +5,11 @@ use hog_core::exact::{self, RowVotes, Svm, Tables};
 use hog_core::pyramid::{Grid, Steps};
 use hog_core::{Backend, Hit, Hog, HogParams, HogSpec, ImageView, Interrupt, Search, Size, model};
 
+/// Windows every 8 px inside of the image.
+pub const STEPS: Search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (0, 0) };
+/// Those of OpenCV's samples, 4 px beyond its edges too.
+pub const PADDED: Search = Search { padding: (4, 4), ..STEPS };
+
 /// The backends of this CPU.
 pub fn available() -> impl Iterator<Item = Backend> {
     Backend::ALL.into_iter().filter(|backend| backend.is_available())

@@ -44,7 +44,7 @@ class Patience:
             yield
             return
         handler = signal.signal(signal.SIGALRM, self._alarm)
-        left = signal.setitimer(signal.ITIMER_REAL, self.seconds, _AGAIN_S)[0]
+        left = self._start()
         self._running = True
         try:
             yield
@@ -65,7 +65,11 @@ class Patience:
         """Start the timer again: simulated time has passed."""
         self.passing()
         if self._running:
-            signal.setitimer(signal.ITIMER_REAL, self.seconds, _AGAIN_S)
+            self._start()
+
+    def _start(self) -> float:
+        """Start the timer; return what was left of the one before [s]."""
+        return signal.setitimer(signal.ITIMER_REAL, self.seconds, _AGAIN_S)[0]
 
     def _alarm(self, _signal: int, _frame: FrameType | None) -> None:
         signal.setitimer(signal.ITIMER_REAL, 0)

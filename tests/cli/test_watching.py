@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
-from tests.sim.stalled import stalled
+from tests.sim.view.stalled import stalled
 
 from limo_hog.cli.main import main
 from limo_hog.extras import MissingExtraError, needed

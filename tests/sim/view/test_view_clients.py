@@ -15,7 +15,7 @@ from typing import Any
 import aiohttp
 import numpy as np
 import pytest
-from tests.sim.stalled import HANDSHAKE, stalled
+from tests.sim.view.stalled import HANDSHAKE, stalled
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named

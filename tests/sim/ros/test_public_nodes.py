@@ -10,7 +10,7 @@ import pytest
 from limo_sim.ros.script import Outcome, run_script
 from limo_sim.world.scenario import Scenario
 
-from ..conftest import NOBODY, STANDING
+from tests.sim.ros.conftest import NOBODY, STANDING
 
 NODES = Path(__file__).parent / "nodes"
 

@@ -20,7 +20,7 @@ from limo_sim.run.episode import Moment
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Person
 
-from ..conftest import NOBODY, STANDING, Run, node
+from tests.sim.ros.conftest import NOBODY, STANDING, Run, node
 
 DRIVE = "twist = Twist(); twist.linear.x = 0.2; self.pub.publish(twist)"
 

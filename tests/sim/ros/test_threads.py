@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from ..conftest import Run
+from tests.sim.ros.conftest import Run
 
 NODE = "import threading, time\nrclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\n"
 SERVICE = "from std_srvs.srv import Trigger\n"

@@ -10,7 +10,7 @@ from typing import Any
 
 import aiohttp
 import pytest
-from tests.sim.chromium import CHROMIUM, Tab, chromium, open_tab
+from tests.sim.view.chromium import CHROMIUM, Tab, chromium, open_tab
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
@@ -21,7 +21,7 @@ from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
 
-PICTURES = Path(__file__).parents[2] / "out" / "view"
+PICTURES = Path(__file__).parents[3] / "out" / "view"
 SECONDS = 90.0  # at twice real time: longer than the browser takes to start and look
 SCENARIO = Scenario.load("workshop")
 

@@ -8,7 +8,7 @@ from limo_hog.ros2 import names
 from limo_sim.cli.card import picture
 from limo_sim.ros.script import score_of
 
-from ..conftest import STANDING, Run, node
+from tests.sim.ros.conftest import STANDING, Run, node
 
 SAY = "self.get_logger().info(str(%s))"
 ZERO = "self.pub.publish(Twist())"

@@ -9,7 +9,7 @@ import pytest
 from limo_hog.cli.main import main
 from limo_sim.ros.script import Outcome, run_script
 
-from ..conftest import NOBODY
+from tests.sim.ros.conftest import NOBODY
 
 TALKER = """
 import rclpy

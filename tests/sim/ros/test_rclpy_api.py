@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ..conftest import Run
+from tests.sim.ros.conftest import Run
 
 RECORDS = Path(__file__).parent / "rclpy_api"
 

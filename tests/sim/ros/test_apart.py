@@ -23,8 +23,8 @@ from limo_sim.run.episode import Moment
 from limo_sim.run.score import Scorer
 from limo_sim.world.scenario import Scenario
 
-from ..conftest import HEAD, STANDING, node
-from .test_run import DRIVE, FOLLOW
+from tests.sim.ros.conftest import HEAD, STANDING, node
+from tests.sim.ros.test_run import DRIVE, FOLLOW
 
 #: Drives for ten images, then does something else.
 THEN = f"self.n = getattr(self, 'n', 0) + 1\nif self.n < 10:\n    {DRIVE}\n    return\n"

@@ -13,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tests.sim.ros.conftest import HEAD, STANDING, node
+from tests.sim.ros.test_run import DRIVE, FOLLOW
 
 from limo_hog.cli.main import main
 from limo_sim.ros import apart
@@ -22,9 +24,6 @@ from limo_sim.ros.script import Ended, run_script, score_of
 from limo_sim.run.episode import Moment
 from limo_sim.run.score import Scorer
 from limo_sim.world.scenario import Scenario
-
-from tests.sim.ros.conftest import HEAD, STANDING, node
-from tests.sim.ros.test_run import DRIVE, FOLLOW
 
 #: Drives for ten images, then does something else.
 THEN = f"self.n = getattr(self, 'n', 0) + 1\nif self.n < 10:\n    {DRIVE}\n    return\n"

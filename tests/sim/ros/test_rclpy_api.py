@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from tests.sim.ros.conftest import Run
 
 RECORDS = Path(__file__).parent / "rclpy_api"

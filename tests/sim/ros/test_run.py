@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.sim.ros.conftest import NOBODY, STANDING, Run, node
 
 from limo_hog.cli.main import main
 from limo_hog.ros2 import names
@@ -19,8 +20,6 @@ from limo_sim.ros.script import run_script, score_of
 from limo_sim.run.episode import Moment
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Person
-
-from tests.sim.ros.conftest import NOBODY, STANDING, Run, node
 
 DRIVE = "twist = Twist(); twist.linear.x = 0.2; self.pub.publish(twist)"
 

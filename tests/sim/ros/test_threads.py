@@ -9,7 +9,6 @@ import sys
 import time
 
 import pytest
-
 from tests.sim.ros.conftest import Run
 
 NODE = "import threading, time\nrclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\n"

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from tests.sim.ros.conftest import STANDING, Run, node
 
 from limo_hog.ros2 import names
 from limo_sim.cli.card import picture
 from limo_sim.ros.script import score_of
-
-from tests.sim.ros.conftest import STANDING, Run, node
 
 SAY = "self.get_logger().info(str(%s))"
 ZERO = "self.pub.publish(Twist())"

@@ -31,7 +31,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow.sense.detectors import Detector, detector_named
 from limo_hog.suppression import intersection_over_union
 from limo_sim.run.arena import Arena
-from limo_sim.run.detector_faults import FIT_FILE, Curve, FaultyDetector
+from limo_sim.run.detector_faults import FIT_FILE, Curve, FaultySearch
 from limo_sim.run.matching import CRITERIA, NO_PERSON, person_of
 from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import DetectorFaults, Person, Room, Scenario
@@ -293,13 +293,13 @@ def plain(frames: Sequence[tuple[Truth, Detections]]) -> Iterator[Sighting]:
 
 def with_model(frames: Sequence[tuple[Truth, Detections]], model: str, seed: int) -> Iterator[Sighting]:
     """Yield the same with a scenario's `[detector] model` on."""
-    detector = Again()
-    faulty = FaultyDetector(detector, DetectorFaults(model=model), 10.0, 1, seed)
+    detector, newest = Again(), frames[0][0]
+    scenario = Scenario(name=model, people=(Person(),), detector=DetectorFaults(model=model))
+    search = FaultySearch(scenario, seed, lambda: newest)
     changed = []
     for truth, found in frames:
-        detector.found = found
-        faulty.face(truth, None)
-        changed.append((truth, faulty.detect(np.zeros((HEIGHT, WIDTH, 3), np.uint8))))
+        detector.found, newest = found, truth
+        changed.append((truth, search(detector, np.zeros((HEIGHT, WIDTH, 3), np.uint8), None)))
     return plain(changed)
 
 

@@ -13,7 +13,7 @@ import dataclasses
 import itertools
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -25,9 +25,10 @@ import limo_hog
 from limo_hog.follow import controller_named, detector_named
 from limo_hog.follow.safety.guard import Guard
 from limo_sim.run.catalogue import load
-from limo_sim.run.episode import Episode, run_episode
+from limo_sim.run.episode import run_episode, score
+from limo_sim.run.log import Step
 from limo_sim.run.matching import CRITERIA
-from limo_sim.run.score import score
+from limo_sim.run.score import Scorer
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.variants import of_run
 
@@ -43,6 +44,7 @@ def play(kind: str, controller: str, seed: int, seconds: float, target: float | 
     """Play one run and return its figures."""
     name = KINDS.get(kind, kind)
     scenario = dataclasses.replace(of_run(load(name), seed), name=kind)
+    steps: list[Step] = []
     with timed() as spent:
         episode = run_episode(
             scenario,
@@ -51,10 +53,14 @@ def play(kind: str, controller: str, seed: int, seconds: float, target: float | 
             seconds,
             seed,
             names=(controller, "hog"),
+            watch=lambda step: steps.append(step.bare()),
         )
-    card = score(episode, dataclasses.replace(CRITERIA, found_within_s=FOUND_WITHIN_S)).to_json()
-    own, pushed = contacts_by(episode)
-    people = [person for step in episode.steps for person in step.truth.people if person]
+    scorer = Scorer(episode.scenario, dataclasses.replace(CRITERIA, found_within_s=FOUND_WITHIN_S))
+    for step in steps:
+        scorer.add(step)
+    card = score(dataclasses.replace(episode, scorer=scorer)).to_json()
+    own, pushed = contacts_by(steps)
+    people = [person for step in steps for person in step.truth.people if person]
     return card | {
         "kind": kind,
         "starts": card["path_m"] > 0.1,
@@ -82,16 +88,15 @@ def timed() -> Iterator[list[float]]:
         yield spent
 
 
-def contacts_by(episode: Episode) -> tuple[int, int]:
+def contacts_by(steps: Sequence[Step]) -> tuple[int, int]:
     """Return how many contacts with people began while the robot drove at the person, and how many while it did not."""
     own = other = 0
-    steps = episode.steps
     for before, after in itertools.pairwise(steps):
         if after.truth.contacts.person == before.truth.contacts.person:
             continue
         (x0, y0, _), (x1, y1, _) = before.truth.robot, after.truth.robot
         near = min((person for person in after.truth.people if person), key=lambda one: one.distance)
-        dt = max(after.time - before.time, 1e-3)
+        dt = max(after.log.time - before.log.time, 1e-3)
         towards = ((x1 - x0) * (near.x - x0) + (y1 - y0) * (near.y - y0)) / dt / max(near.distance, 1e-3)
         if towards > OWN_SPEED:
             own += 1

@@ -24,7 +24,8 @@ from tests.sim.chromium import CHROMIUM, chromium, open_tab
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
 from limo_sim.run.arena import Arena
-from limo_sim.run.episode import Moment, run_episode
+from limo_sim.run.episode import run_episode
+from limo_sim.run.log import Step
 from limo_sim.sensing.camera import CameraPose
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.view.pace import Pace
@@ -104,13 +105,12 @@ def gait() -> NDArray[np.uint8]:
 
 def followed() -> NDArray[np.uint8]:
     """Return a frame of a run as `limo-hog follow --video` shows it."""
-    seen: list[Moment] = []
+    seen: list[Step] = []
     controller = controller_named("tracking", None)
     detector = PeopleDetector(min_height=None, nms="group")
     run_episode(Scenario.load("workshop"), controller, detector, 14.0, 0, watch=seen.append)
-    moment = next(one for one in reversed(seen) if one.frame is not None and one.step.decision.target is not None)
-    assert moment.frame is not None
-    return annotated(moment.frame, moment.step)
+    logs = [step.log for step in seen if step.log.frame is not None and step.log.decision.target is not None]
+    return annotated(logs[-1])
 
 
 def of_the_workshop() -> NDArray[np.uint8]:
@@ -134,9 +134,9 @@ def live_page() -> NDArray[np.uint8]:
     with View(scenario, controller, pace=Pace(2)) as page, tempfile.TemporaryDirectory() as folder:
         there, picture = threading.Event(), Path(folder) / "page.png"
 
-        def watch(moment: Moment) -> None:
-            page.watch(moment)
-            if moment.step.time >= shown and not there.is_set():
+        def watch(step: Step) -> None:
+            page.watch(step)
+            if step.log.time >= shown and not there.is_set():
                 there.set()
                 page.pace.pause()
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from limo_sim.run.arena import Arena
-    from limo_sim.run.episode import Episode, run_episode
-    from limo_sim.run.score import ScoreCard, score
+    from limo_sim.run.episode import Episode, run_episode, score
+    from limo_sim.run.score import ScoreCard
     from limo_sim.world.scenario import Scenario
 
 __all__ = ["Arena", "Episode", "Scenario", "ScoreCard", "run_episode", "score"]
@@ -20,7 +20,7 @@ _MODULES = {
     "Scenario": "world.scenario",
     "ScoreCard": "run.score",
     "run_episode": "run.episode",
-    "score": "run.score",
+    "score": "run.episode",
 }
 
 

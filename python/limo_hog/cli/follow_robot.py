@@ -6,7 +6,6 @@ import argparse
 import statistics
 import sys
 import time
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from limo_hog.cli.support.arguments import add_follower, output_file, seconds
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
-from limo_hog.follow.decision import Decision
+from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.ros2.dds import Bus
 from limo_hog.ros2.follower import drive
@@ -48,7 +47,8 @@ def run(args: argparse.Namespace) -> int:
         task = bar.add_task("search", total=args.seconds)
         began = time.monotonic()
 
-        def watch(decision: Decision[Any]) -> None:
+        def watch(log: FrameLog) -> None:
+            decision = log.decision
             bar.update(
                 task, completed=time.monotonic() - began, description=f"{decision.mode.value}: {decision.reason}"
             )

@@ -63,9 +63,9 @@ def run(args: argparse.Namespace) -> int:
         def draw(frame: Replayed) -> NDArray[np.uint8]:
             from limo_hog.imaging.drawing import annotate
 
-            found, target = frame.sighting.detections, frame.sighting.decision.target
+            found, target = frame.log.detections, frame.log.decision.target
             labels = [f"{score:.1f}" for score in found.scores]
-            return annotate(frame.image, found.boxes, labels, target, f"{frame.stamp:.1f} s")
+            return annotate(frame.frame.image, found.boxes, labels, target, f"{frame.frame.stamp:.1f} s")
 
         for frame in replay(read_bag(args.file), controller, detector, args.image or IMAGE):
             frames.append(_compared(frame))
@@ -88,11 +88,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _compared(frame: Replayed) -> dict[str, Any]:
-    found, twist = frame.sighting.detections, frame.sighting.decision.twist
+    found, twist = frame.log.detections, frame.log.decision.twist
     row: dict[str, Any] = {
         "found": len(found) > 0,
-        "failure": frame.sighting.failure,
-        "detect_ms": frame.sighting.detect_ms,
+        "failure": frame.log.failure,
+        "detect_ms": frame.log.detect_ms,
         "same": None,
         "linear": None,
         "angular": None,

@@ -7,10 +7,10 @@ from limo_hog.follow.control.distance import ProxemicController
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.decision import Controller, Decision, Mode
-from limo_hog.follow.pipeline import Follower, Sensors, Sighting
+from limo_hog.follow.pipeline import Follower, FrameLog
 from limo_hog.follow.safety.guard import Guard
 from limo_hog.follow.sense.detectors import Detector, detector_named
-from limo_hog.follow.sense.observation import Observation, Odometry, Scan
+from limo_hog.follow.sense.observation import Frame, Observation, Odometry, Scan, Sensors
 from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.sense.region import Region
 from limo_hog.follow.twist import Twist
@@ -23,6 +23,8 @@ __all__ = [
     "Decision",
     "Detector",
     "Follower",
+    "Frame",
+    "FrameLog",
     "Guard",
     "Mode",
     "Observation",
@@ -31,7 +33,6 @@ __all__ = [
     "Region",
     "Scan",
     "Sensors",
-    "Sighting",
     "TrackingController",
     "Twist",
     "Zone",

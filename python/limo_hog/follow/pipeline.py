@@ -1,9 +1,10 @@
-"""The follower's loop, once: detect, observe, decide, limit the command. Arena, robot and replay are adapters to it."""
+"""The follower's loop: detect, observe, decide, limit the command. Arena, robot and recording are adapters to it."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -13,48 +14,39 @@ from limo_hog.detections import Detections
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.safety.guard import Guard
 from limo_hog.follow.sense.detectors import Detector, detect_in
-from limo_hog.follow.sense.observation import Odometry, Scan, observed
+from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors, observed
 from limo_hog.follow.sense.region import Region
 
 S = TypeVar("S")
 
+#: How `Follower` searches a region of an image, or all of it where that is None.
+Search = Callable[[Detector, NDArray[np.uint8], Region | None], Detections]
+
 #: A command is sent at least this often [s]: the period of the workshop's camera, a fifth of the robot's watchdog.
 CONTROL_PERIOD = 0.1
+#: A period may be this much shorter [s]: half of the arena's step, since its times are sums of steps.
+_SLACK = 0.01
 
 #: So many scans between two camera images are kept at most [1]. Chosen: a second of the Limo's lidar.
 _SCANS_BETWEEN = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Sensors:
-    """What the robot's sensors say at the time of one camera image.
+class FrameLog:
+    """One control period: what was sensed, found and commanded.
 
     Attributes
     ----------
-    focal_px
-        Focal length of the camera [px].
-    depth
-        float32 (H, W) [m] of the same view; None without one.
-    scan, odometry
-        The newest readings; None without a lidar, without wheel encoders.
-    """
-
-    focal_px: float
-    depth: NDArray[np.float32] | None = None
-    scan: Scan | None = None
-    odometry: Odometry | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Sighting:
-    """What the follower made of one camera image.
-
-    Attributes
-    ----------
+    time
+        When the command was decided, on the clock of the sensors' stamps [s].
     decision
         The command and the reason for it; its `target` is an index into `detections`.
+    sensors
+        The readings that it is based on.
+    frame
+        The camera image that was worked on; None in a period without a new one.
     detections
-        What was found in the image, best first; empty where the detector failed.
+        What was found in the image, best first; empty without one, and where the detector failed.
     region
         Part of the image that was searched; None where all of it was.
     failure
@@ -63,20 +55,48 @@ class Sighting:
         Wall time of the detection [ms].
     """
 
+    time: float
     decision: Decision[None]
-    detections: Detections
-    region: Region | None
-    failure: str
-    detect_ms: float
+    sensors: Sensors
+    frame: Frame | None = None
+    detections: Detections = field(default_factory=Detections.none)
+    region: Region | None = None
+    failure: str = ""
+    detect_ms: float = 0.0
+
+
+class Periods:
+    """Says when a control period begins: with each new camera image, and `CONTROL_PERIOD` after the last began."""
+
+    def __init__(self) -> None:
+        self._began: float | None = None
+        self._last: object = None
+
+    def begins(self, now: float, frame: object) -> tuple[bool, bool]:
+        """Return whether a control period begins now, and whether it has a new camera image.
+
+        Parameters
+        ----------
+        now
+            Time on the clock of the sensors' stamps [s]; a clock that was set back begins a period.
+        frame
+            The newest camera image: new if it is another object than the last. None without one.
+        """
+        new = frame is not None and frame is not self._last
+        if not new and self._began is not None and 0 <= now - self._began <= CONTROL_PERIOD - _SLACK:
+            return False, False
+        self._began = now
+        if new:
+            self._last = frame
+        return True, new
 
 
 class Follower(Generic[S]):
     """A detector and a controller behind the safety layer, fed with one stream of camera images.
 
-    The controllers and the guard are pure functions of observation and state. This object is where their state is
-    kept between two images, together with the region to search next: every adapter would otherwise carry both, which
-    is how three copies of the loop came to differ. State therefore stays inside, and the decisions handed out hold
-    none, so that a log of decisions does not keep every scan in memory.
+    The controllers and the guard are pure functions of observation and state. This object keeps their state between two
+    control periods, and the region to search next. The decisions that it logs hold no state, so that a list of logs
+    does not keep every scan in memory.
 
     Parameters
     ----------
@@ -84,63 +104,55 @@ class Follower(Generic[S]):
         Steers by what the detector finds; `Guard` limits its commands.
     detector
         Finds people in uint8 (H, W, 3) BGR images. If it raises, the robot stops and the decision says so.
+    search
+        Applies the detector to a region of an image.
     """
 
-    def __init__(self, controller: Controller[S], detector: Detector) -> None:
+    def __init__(self, controller: Controller[S], detector: Detector, search: Search = detect_in) -> None:
         self._guard = Guard(controller)
-        self._detector = detector
+        self._detector, self._search = detector, search
         self._state = self._guard.start()
         self._region: Region | None = None
         self._between: tuple[tuple[Scan, Odometry], ...] = ()
+        self._periods = Periods()
 
-    def see(self, stamp: float, image: NDArray[np.uint8], sensors: Sensors) -> Sighting:
-        """Detect people in a camera image and decide what to do.
-
-        Parameters
-        ----------
-        stamp
-            When the image was taken [s].
-        image
-            uint8 (H, W, 3) BGR or (H, W).
-        sensors
-            The other sensors' readings.
-        """
-        region = self._region
-        began = time.perf_counter()
-        try:
-            detections, failure = detect_in(self._detector, image, region), ""
-        except Exception as error:  # whatever a detector raises, the robot must stop and the loop must go on
-            detections, failure = Detections.none(), f"the detector failed: {error}"
-        detect_ms = 1e3 * (time.perf_counter() - began)
-        observation = observed(
-            stamp,
-            image,
-            sensors.focal_px,
-            detections,
-            region,
-            sensors.depth,
-            sensors.scan,
-            sensors.odometry,
-            failure,
-            self._between,
-        )
-        self._between = ()
-        decision = self._guard.step(observation, self._state)
-        self._state, self._region = decision.state, decision.region
-        return Sighting(replace(decision, state=None), detections, region, failure, detect_ms)  # type: ignore[arg-type]
-
-    def recheck(self, now: float, scan: Scan | None, odometry: Odometry | None) -> Decision[None]:
-        """Check the last command against a newer scan, for a control period without a camera image.
+    def tick(self, now: float, frame: Frame | None, sensors: Sensors) -> FrameLog | None:
+        """Decide what to do now; None while the last control period lasts.
 
         Parameters
         ----------
         now
             Time on the clock of the sensors' stamps [s].
-        scan, odometry
-            The newest readings.
+        frame
+            The newest camera image: a new one is searched for people, without one the last command is checked against
+            the newest scan. None without any.
+        sensors
+            The newest readings of the other sensors.
         """
-        if scan is not None and odometry is not None:
-            self._between = (*self._between[1 - _SCANS_BETWEEN :], (scan, odometry))
-        decision = self._guard.recheck(now, scan, odometry, self._state)
+        begins, new = self._periods.begins(now, frame)
+        if not begins:
+            return None
+        return self._see(now, frame, sensors) if frame is not None and new else self._recheck(now, sensors)
+
+    def _see(self, now: float, frame: Frame, sensors: Sensors) -> FrameLog:
+        region = self._region
+        began = time.perf_counter()
+        try:
+            detections, failure = self._search(self._detector, frame.image, region), ""
+        except Exception as error:  # whatever a detector raises, the robot must stop and the loop must go on
+            detections, failure = Detections.none(), f"the detector failed: {error}"
+        detect_ms = 1e3 * (time.perf_counter() - began)
+        observation = observed(frame, sensors, detections, region, failure, self._between)
+        self._between = ()
+        decision = self._guard.step(observation, self._state)
+        self._state, self._region = decision.state, decision.region
+        told: Decision[None] = replace(decision, state=None)  # type: ignore[arg-type, assignment]
+        return FrameLog(now, told, sensors, frame, detections, region, failure, detect_ms)
+
+    def _recheck(self, now: float, sensors: Sensors) -> FrameLog:
+        if sensors.scan is not None and sensors.odometry is not None:
+            self._between = (*self._between[1 - _SCANS_BETWEEN :], (sensors.scan, sensors.odometry))
+        decision = self._guard.recheck(now, sensors.scan, sensors.odometry, self._state)
         self._state = decision.state
-        return replace(decision, state=None)  # type: ignore[arg-type, return-value]
+        told: Decision[None] = replace(decision, state=None)  # type: ignore[arg-type, assignment]
+        return FrameLog(now, told, sensors)

@@ -7,13 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow.decision import Controller, Decision
-from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower
+from limo_hog.follow.decision import Controller
+from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, FrameLog
 from limo_hog.follow.sense.detectors import Detector
+from limo_hog.follow.sense.observation import Frame
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.dds import Bus, Endpoints
@@ -52,6 +50,15 @@ class Report:
     dropped: int = 0
     answer_ms: list[float] = field(default_factory=list)
     modes: dict[str, int] = field(default_factory=dict)
+
+    def add(self, log: FrameLog, answer_ms: float) -> None:
+        """Count a control period whose command was sent `answer_ms` after its image came [ms]."""
+        mode = log.decision.mode.value
+        self.modes[mode] = self.modes.get(mode, 0) + 1
+        if log.frame is not None:
+            self.frames += 1
+            self.found += len(log.detections) > 0
+            self.answer_ms.append(answer_ms)
 
 
 def camera_topic(bus: Bus) -> str:
@@ -102,8 +109,8 @@ class Inputs:
         """How many messages could not be read, or contradicted themselves."""
         return self._unreadable + sum(reader.dropped for reader in (self._camera, *self._others))
 
-    def newest(self) -> tuple[float, NDArray[np.uint8]] | None:
-        """Take in what has come; returns the newest image's stamp [s] and BGR pixels, if there is a new one."""
+    def newest(self) -> Frame | None:
+        """Take in what has come; returns the newest camera image, if there is a new one."""
         for reader in self._others:
             for message in reader.take():
                 self._read(self.senses.take, message)
@@ -111,7 +118,7 @@ class Inputs:
         for message in reversed(self._camera.take()):
             picture = self._read(picture_of, message)
             if picture is not None:
-                return messages.to_seconds(message.header.stamp), picture
+                return self.senses.frame(messages.to_seconds(message.header.stamp), picture)
         return None
 
     def _read(self, read: Callable[[Any], Any], message: Any) -> Any:
@@ -128,7 +135,7 @@ def drive(
     controller: Controller[S],
     detector: Detector,
     seconds: float,
-    watch: Callable[[Decision[Any]], None] | None = None,
+    watch: Callable[[FrameLog], None] | None = None,
     *,
     moves: bool = True,
 ) -> Report:
@@ -145,38 +152,32 @@ def drive(
     inputs = Inputs(bus, camera)
     commands, findings = Commands(bus) if moves else None, Findings(bus)
     follower = Follower(controller, detector)
-    senses, report = inputs.senses, Report()
-    began = heard = commanded = time.monotonic()
+    report = Report()
+    began = heard = time.monotonic()
     stamp = 0.0
     try:
         while time.monotonic() - began < seconds:
             bus.wait(CONTROL_PERIOD / 2)
             came = time.monotonic()
-            newest = inputs.newest()
-            if newest is not None:
-                heard = came
-                stamp, picture = newest
-                sighting = follower.see(stamp, picture, senses.at(stamp, picture))
-                decision = sighting.decision
-                report.frames += 1
-                report.found += len(sighting.detections) > 0
-            elif report.frames and came - commanded > CONTROL_PERIOD:
-                # The robot's clock, by the last image's stamp and the time since on this machine's clock.
-                decision = follower.recheck(stamp + came - heard, senses.scan, senses.odometry)
-            else:
-                if came - heard > SILENT_AFTER:
-                    raise SilentRobotError(f"no image on {camera} in ROS domain {bus.domain} for {SILENT_AFTER:g} s")
+            frame = inputs.newest()
+            if frame is not None:
+                heard, stamp = came, frame.stamp
+            elif came - heard > SILENT_AFTER:
+                raise SilentRobotError(f"no image on {camera} in ROS domain {bus.domain} for {SILENT_AFTER:g} s")
+            elif not report.frames:
+                continue
+            # The robot's clock, by the last image's stamp and the time since on this machine's clock.
+            now = stamp + came - heard
+            log = follower.tick(now, frame, inputs.senses.sensors)
+            if log is None:
                 continue
             if commands is not None:
-                commands.publish(stamp + came - heard, decision.twist)
-            commanded = time.monotonic()
+                commands.publish(now, log.decision.twist)
+            report.add(log, 1e3 * (time.monotonic() - came))
             report.dropped = inputs.dropped
-            report.modes[decision.mode.value] = report.modes.get(decision.mode.value, 0) + 1
-            if newest is not None:
-                report.answer_ms.append(1e3 * (commanded - came))
-                findings.publish(stamp, senses.newest(stamp), picture, sighting)
+            findings.publish(log, inputs.senses.newest(stamp))
             if watch is not None:
-                watch(decision)
+                watch(log)
     finally:
         if commands is not None:
             commands.publish(stamp, Twist())

@@ -5,10 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from limo_hog.follow.pipeline import Sighting
+from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.twist import Twist
 from limo_hog.imaging.drawing import annotate
 from limo_hog.ros2 import findings, messages, names
@@ -51,21 +48,11 @@ class Findings:
         self._publishers = {topic: bus.publisher(topic, kind) for topic, kind in names.FINDINGS.items()}
         self._frames = bus.publisher(names.TF, names.TYPES[names.TF], depth=100)
 
-    def publish(self, stamp: float, now: float, picture: NDArray[np.uint8], sighting: Sighting) -> None:
-        """Send what was found.
-
-        Parameters
-        ----------
-        stamp
-            Of the image [s].
-        now
-            The newest stamp of any sensor [s]: people's positions are as of then.
-        picture
-            uint8 (H, W, 3) BGR.
-        sighting
-            What the follower made of it.
-        """
-        found, belief = sighting.detections, sighting.decision.belief
+    def publish(self, log: FrameLog, now: float) -> None:
+        """Send what was found in a frame; people's positions are as of `now`, the newest stamp of any sensor [s]."""
+        if log.frame is None:
+            return
+        stamp, found, belief = log.frame.stamp, log.detections, log.decision.belief
         ids = {one.box: one.number for one in belief.people if one.box is not None}
         self._send(names.DETECTIONS, lambda: findings.detections_message(stamp, found, messages.CAMERA_FRAME, ids))
         self._send(names.PEOPLE, lambda: findings.people_message(now, belief.people))
@@ -76,7 +63,7 @@ class Findings:
             self._frames.publish(findings.person_frames(now, belief.people, belief.followed))
         if self._annotated.has_readers:
             labels = [f"{score:.1f}" for score in found.scores]
-            drawn = annotate(picture, found.boxes, labels, sighting.decision.target, sighting.decision.reason)
+            drawn = annotate(log.frame.image, found.boxes, labels, log.decision.target, log.decision.reason)
             self._annotated.publish(messages.image(stamp, drawn))
 
     def _send(self, topic: str, make: Any) -> None:

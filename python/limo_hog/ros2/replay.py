@@ -6,14 +6,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller
-from limo_hog.follow.pipeline import Follower, Sighting
+from limo_hog.follow.pipeline import Follower, FrameLog
 from limo_hog.follow.sense.detectors import Detector
+from limo_hog.follow.sense.observation import Frame
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import Record, to_detections
@@ -33,19 +31,16 @@ class Replayed:
 
     Attributes
     ----------
-    stamp
-        Of the frame [s].
-    image
-        uint8 (H, W, 3) BGR.
-    sighting
+    frame
+        What the camera saw.
+    log
         What is found and decided now.
     recorded, recorded_twist
         What was found and commanded then; None where that was not recorded.
     """
 
-    stamp: float
-    image: NDArray[np.uint8]
-    sighting: Sighting
+    frame: Frame
+    log: FrameLog
     recorded: Detections | None
     recorded_twist: Twist | None
 
@@ -72,21 +67,24 @@ def replay(
     topics: set[str] = set()
     frames = 0
 
-    def work(twist: Twist | None) -> Replayed:
+    def work(now: float, twist: Twist | None) -> Replayed:
         if senses.focal_px is None:
             raise ReplayError("no camera info before the first image: its focal length is needed")
-        stamp, image = messages.to_seconds(waiting.header.stamp), picture_of(waiting)
-        return Replayed(stamp, image, follower.see(stamp, image, senses.at(stamp, image)), recorded, twist)
+        frame = senses.frame(messages.to_seconds(waiting.header.stamp), picture_of(waiting))
+        log = follower.tick(now, frame, senses.sensors)
+        if log is None:
+            raise RuntimeError("a new frame begins a control period")
+        return Replayed(frame, log, recorded, twist)
 
     for topic, time, message in records:
         topics.add(topic)
         kind = message.__msgtype__
         is_image, command = topic == image_topic, _command(topic, message)
         if waiting is not None and (is_image or command is not None):
-            yield work(command)
+            yield work(time, command)
             waiting, recorded, frames = None, None, frames + 1
         elif command is not None:
-            follower.recheck(time, senses.scan, senses.odometry)
+            follower.tick(time, None, senses.sensors)
         if is_image:
             waiting = message
         elif kind == DETECTIONS_TYPE:
@@ -94,7 +92,7 @@ def replay(
         elif kind != "sensor_msgs/msg/Image" or message.encoding in DEPTH_ENCODINGS:
             senses.take(message)
     if waiting is not None:
-        yield work(None)
+        yield work(time, None)
         frames += 1
     if not frames:
         there = ", ".join(sorted(topics)) or "nothing"

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.pipeline import Sensors
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors
 from limo_hog.ros2 import messages
 from limo_hog.ros2.messages import MessageError
 
@@ -68,21 +67,20 @@ class Senses:
         others = [reading.stamp for reading in (self.scan, self.odometry) if reading is not None]
         return max([stamp, *others])
 
-    def at(self, stamp: float, image: NDArray[np.uint8]) -> Sensors:
-        """Return what belongs to a camera image.
+    @property
+    def sensors(self) -> Sensors:
+        """The newest scan and odometry."""
+        return Sensors(self.scan, self.odometry)
 
-        Parameters
-        ----------
-        stamp
-            When it was taken [s]. The depth image whose stamp is nearest goes with it, if it is of the same size
-            and its stamp differs by at most `SLOP`.
-        image
-            uint8 (H, W, 3) or (H, W).
+    def frame(self, stamp: float, image: NDArray[np.uint8]) -> Frame:
+        """Return the frame of a camera image, uint8 (H, W, 3) or (H, W), taken at `stamp` [s].
+
+        Its depth image is the nearest by stamp, if it is of the same size and at most `SLOP` off.
         """
         fitting = [(abs(at - stamp), depth) for at, depth in self._depths if depth.shape == image.shape[:2]]
         gap, depth = min(fitting, key=lambda pair: pair[0], default=(math.inf, None))
         focal_px = LIMO.focal_px(image.shape[1]) if self.focal_px is None else self.focal_px
-        return Sensors(focal_px, depth if gap <= SLOP else None, self.scan, self.odometry)
+        return Frame(stamp, image, focal_px, depth if gap <= SLOP else None)
 
 
 def picture_of(message: Any) -> NDArray[np.uint8]:

@@ -13,7 +13,7 @@ from limo_hog.cli.support.progress import progress
 
 if TYPE_CHECKING:
     from limo_sim.run.export import Thing
-    from limo_sim.sensing.camera import Frame
+    from limo_sim.sensing.camera import TrueFrame
 
 # Less visible things are marked `iscrowd`: evaluators neither want them found nor count them as false. The share is
 # that of the "reasonable" set in Dollár et al., "Pedestrian Detection: An Evaluation of the State of the Art", 2012.
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write_pictures(folder: Path, number: int, frame: Frame, *, depth: bool) -> dict[str, Any]:
+def _write_pictures(folder: Path, number: int, frame: TrueFrame, *, depth: bool) -> dict[str, Any]:
     """Write a frame, and return its entry in COCO's `images`."""
     import numpy as np
 

@@ -14,7 +14,7 @@ from limo_sim.cli.options import add_json, add_scenario
 from limo_sim.cli.watching import add_watching, watching
 
 if TYPE_CHECKING:
-    from limo_sim.run.episode import Moment
+    from limo_sim.run.log import Step
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -38,23 +38,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Run one episode and show its score card."""
     from limo_sim.run.catalogue import load
-    from limo_sim.run.episode import run_episode
-    from limo_sim.run.score import Scorer
+    from limo_sim.run.episode import run_episode, score
     from limo_sim.view.tuning import Tunable
     from limo_sim.world.variants import of_run
 
     scenario = of_run(load(args.scenario), args.seed)
-    scorer = Scorer(scenario)
     controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
     with watching(args, scenario, controller) as audience:
         with progress("s") as bar:
             task = bar.add_task("search", total=args.seconds)
 
-            def watch(moment: Moment) -> None:
-                bar.update(task, completed=round(moment.step.time, 1), description=moment.step.decision.mode.value)
-                scorer.add(moment.step)
-                audience.watch(moment)
+            def watch(step: Step) -> None:
+                bar.update(task, completed=round(step.log.time, 1), description=step.log.decision.mode.value)
+                audience.watch(step)
 
             episode = run_episode(
                 scenario,
@@ -64,10 +61,8 @@ def run(args: argparse.Namespace) -> int:
                 args.seed,
                 names=(args.controller, args.detector),
                 watch=watch,
-                # (The figure shows all of them.)
-                keep=args.plot is not None,
             )
-        card = scorer.card(episode)
+        card = score(episode)
         audience.end(episode, card)
     if args.json:
         write_json(args.json, card.to_json())

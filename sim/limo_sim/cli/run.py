@@ -16,7 +16,7 @@ from limo_sim.cli.options import add_json, add_scenario
 from limo_sim.cli.watching import add_watching, watching
 
 if TYPE_CHECKING:
-    from limo_sim.run.episode import Moment
+    from limo_sim.run.log import Step
 
 
 class ScriptError(LimoHogError):
@@ -55,14 +55,12 @@ def run(args: argparse.Namespace) -> int:
     if args.words and not args.node.name.endswith(".launch.py"):
         raise UsageError(f"{args.words[0]}: only a launch file has arguments; a node's come after --ros-args")
     from limo_sim.run.catalogue import load
-    from limo_sim.run.score import Scorer
     from limo_sim.world.variants import of_run
 
     with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
         from limo_sim.ros.apart import run_apart
         from limo_sim.ros.script import score_of
     scenario = of_run(load(args.scenario), args.seed)
-    scorer = Scorer(scenario)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
             # What the node prints must not mix with the JSON.
@@ -71,10 +69,9 @@ def run(args: argparse.Namespace) -> int:
         bar = stack.enter_context(progress("s"))
         task = bar.add_task("runs", total=args.seconds)
 
-        def watch(moment: Moment) -> None:
-            bar.update(task, completed=round(moment.step.time, 1))
-            scorer.add(moment.step)
-            audience.watch(moment)
+        def watch(step: Step) -> None:
+            bar.update(task, completed=round(step.log.time, 1))
+            audience.watch(step)
 
         def log(time: float, level: str, name: str, message: str) -> None:
             line = f"[{level}] [{time:.9f}] [{name}]: {message}"
@@ -89,10 +86,8 @@ def run(args: argparse.Namespace) -> int:
             log=log,
             watch=watch,
             pictures=bool(audience),
-            # (The figure shows all of them.)
-            keep=args.plot is not None,
         )
-        card = score_of(ended, scorer)
+        card = score_of(ended)
         bar.stop()
         audience.end(ended.episode, card)
     if args.json:

@@ -1,10 +1,10 @@
-"""The options of `follow`, `run` and `arena` that show or record a run: --view, --video, --record, --plot, --rerun."""
+"""The options of `follow`, `run` and `arena` that show or record a run: --view, --video, --record, --plot."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +14,8 @@ from limo_hog.cli.support.arguments import file_ending
 from limo_hog.cli.support.signals import held
 
 if TYPE_CHECKING:
-    from limo_sim.run.episode import Episode, Moment
+    from limo_sim.run.episode import Episode
+    from limo_sim.run.log import Step, Watch
     from limo_sim.run.score import ScoreCard
     from limo_sim.view.server import View
     from limo_sim.view.tuning import Tunable
@@ -49,7 +50,6 @@ def add_watching(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.png",
         help="draw path, pixel error, distance and speed in one figure (not with arena)",
     )
-    group.add_argument("--rerun", type=file_ending(".rrd"), metavar="FILE.rrd", help="log the run for the Rerun viewer")
 
 
 def _address(text: str) -> tuple[str, int]:
@@ -73,28 +73,32 @@ class Watching:
         The live page.
     """
 
-    keepers: list[Callable[[Moment], None]] = field(default_factory=list)
+    keepers: list[Watch] = field(default_factory=list)
     plot: Path | None = None
     view: View | None = None
+    _steps: list[Step] = field(default_factory=list)
 
     def __bool__(self) -> bool:
         """Whether a run needs to be shown to it."""
         return bool(self.keepers) or self.view is not None
 
-    def watch(self, moment: Moment) -> None:
-        """Keep and show a moment; returns when the run may go on."""
-        with held():
-            for keep in self.keepers:
-                keep(moment)
+    def watch(self, step: Step) -> None:
+        """Keep and show a step; returns when the run may go on."""
+        if self.plot is not None:
+            self._steps.append(step.bare())
+        if self.keepers:
+            with held():
+                for keep in self.keepers:
+                    keep(step)
         if self.view is not None:
-            self.view.watch(moment)
+            self.view.watch(step)
 
     def end(self, episode: Episode, card: ScoreCard) -> None:
         """Draw the figure, and show the score card on the live page."""
         if self.plot is not None:
             from limo_sim.view.plot import plot
 
-            plot(episode, self.plot)
+            plot(episode, self._steps, self.plot)
         if self.view is not None:
             self.view.end(card.to_json())
 
@@ -123,10 +127,6 @@ def watching(
             from limo_sim.view.record import recorded
 
             all_.keepers.append(stack.enter_context(recorded(args.record, scenario.camera)))
-        if args.rerun is not None:
-            from limo_sim.view.rerun_log import logged
-
-            all_.keepers.append(stack.enter_context(logged(args.rerun, scenario.room.half)))
         if args.view is not None:
             from limo_sim.view.server import View
 

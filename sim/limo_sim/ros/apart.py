@@ -15,7 +15,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -29,8 +29,10 @@ from limo_sim.ros.lockstep.patience import DiedError, HungError
 from limo_sim.ros.lockstep.records import Log, Past, StubError
 from limo_sim.ros.lockstep.world import World
 from limo_sim.ros.script import Ended, finished, run_script
-from limo_sim.run.episode import Moment
+from limo_sim.run.log import Step, Watch
+from limo_sim.run.score import Scorer
 from limo_sim.world.scenario import Scenario
+from limo_sim.world.variants import of_run
 
 #: A node that hangs is interrupted in its own process; where it takes no interrupt, the process is stopped so much
 #: later [s]. Chosen: a busy computer may be late by a second or two.
@@ -73,10 +75,9 @@ def run_apart(
     *,
     arguments: Sequence[str] = (),
     log: Log = lambda *_: None,
-    watch: Callable[[Moment], None] | None = None,
+    watch: Watch = lambda _: None,
     pictures: bool = True,
     patience: float = 20.0,
-    keep: bool = True,
 ) -> Ended:
     """Run a script as `run_script` does, in a process of its own; its arguments mean the same.
 
@@ -85,7 +86,7 @@ def run_apart(
     Parameters
     ----------
     pictures
-        Whether `watch` is given the frames, scans and windows; without, moments hold the step alone.
+        Whether `watch` is given the frames, scans and windows; without, it is given bare steps.
 
     Raises
     ------
@@ -99,13 +100,13 @@ def run_apart(
     ours, theirs = spawning.Pipe()
     # (A process that dies has told its time.)
     clock = spawning.Value("d", 0.0, lock=False)
-    job = _Job(script, scenario, seconds, seed, list(arguments), patience, pictures and watch is not None, clock)
+    job = _Job(script, scenario, seconds, seed, list(arguments), patience, pictures, clock)
     child = spawning.Process(target=_run, args=(theirs, job), name=script.name, daemon=True)
-    past = Past()
+    past = Past(Scorer(of_run(scenario, seed)))
     child.start()
     theirs.close()
     try:
-        ended = _listen(ours, child, past, job, log, watch, keep)
+        ended = _listen(ours, child, past, job, log, watch)
     finally:
         ours.close()
         child.join(_END_S)
@@ -114,10 +115,8 @@ def run_apart(
             child.kill()
             child.join()
     if ended is not None:
-        return replace(ended, episode=replace(ended.episode, steps=tuple(past.steps)))
-    world = World(
-        scenario, seed, seconds, script=script, log=log, watch=watch, patience=patience, began=began, keep=keep
-    )
+        return replace(ended, episode=replace(ended.episode, scorer=past.scorer))
+    world = World(scenario, seed, seconds, script=script, log=log, watch=watch, patience=patience, began=began)
     world.take_over(past, clock.value)
     world.fault = _why(child, silent, patience)
     return finished(world)
@@ -145,8 +144,7 @@ def _listen(
     past: Past,
     job: _Job,
     log: Log,
-    watch: Callable[[Moment], None] | None,
-    keep: bool,
+    watch: Watch,
 ) -> Ended | None:
     """Take what the process tells until the run is over; None where it dies or falls silent before."""
     limit = _START_S
@@ -163,12 +161,11 @@ def _listen(
             told, content = connection.recv()
         except (EOFError, OSError):
             return None
-        if told == "moment":
-            moment, asked, target = content
-            past.add(moment.step, keep)
+        if told == "step":
+            step, asked, target = content
+            past.add(step)
             past.asked, past.target_distance = asked, target
-            if watch is not None:
-                watch(moment)
+            watch(step)
             connection.send_bytes(b"go on")
         elif told == "commands":
             for command in content:
@@ -230,14 +227,13 @@ class _Link:
         """Pass on what the node logs."""
         self.tell("log", line)
 
-    def watch(self, moment: Moment) -> None:
+    def watch(self, step: Step) -> None:
         """Pass on a control period, and wait until it was watched."""
         world = self._world
         if world is None:
             return
-        if not self._pictures:
-            moment = Moment(moment.step, None, None, None)
-        self.tell("moment", (moment, list(world.asked), world.target_distance))
+        told = step if self._pictures else step.bare()
+        self.tell("step", (told, list(world.asked), world.target_distance))
         self._connection.recv_bytes()
 
 
@@ -282,8 +278,6 @@ def _run(connection: Connection, job: _Job) -> None:
             watch=link.watch,
             patience=job.patience,
             made=link.made,
-            # The steps are sent one by one.
-            keep=False,
         )
     except (KeyboardInterrupt, EOFError) as error:
         link.tell("error", KeyboardInterrupt(*error.args))

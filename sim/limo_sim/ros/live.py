@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from limo_hog.detections import Detections
 from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.pipeline import FrameLog
+from limo_hog.follow.sense.observation import Sensors
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
 from limo_sim.ros.lockstep.calls import PUBLISHED
 from limo_sim.run.arena import Arena
-from limo_sim.run.episode import FrameRecord, Moment, Step
+from limo_sim.run.log import Step, Watch
 from limo_sim.world.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def run_live(
     seed: int,
     seconds: float,
     bus: Bus | None,
-    watch: Callable[[Moment], None] | None = None,
+    watch: Watch | None = None,
 ) -> Arena:
     """Run the arena in real time, with its topics on the bus.
 
@@ -76,7 +76,7 @@ def run_live(
                 writer.publish(make())
         if watch is not None and arena.frame().stamp > shown:
             shown = arena.frame().stamp
-            watch(_moment(arena, twist))
+            watch(_step(arena, twist))
         arena.step()
         late = time.monotonic() - began - arena.time
         if late < 0:
@@ -87,9 +87,9 @@ def run_live(
     return arena
 
 
-def _moment(arena: Arena, twist: Twist) -> Moment:
+def _step(arena: Arena, twist: Twist) -> Step:
     frame = arena.frame()
     mode = Mode.STAND if twist == Twist() else Mode.DRIVE
     decision = Decision(twist, None, mode, "driven by /cmd_vel")
-    step = Step(arena.time, arena.truth(), decision, FrameRecord(frame.truth, Detections.none()))
-    return Moment(step, frame, arena.scan(), arena.odometry())
+    log = FrameLog(arena.time, decision, Sensors(arena.scan(), arena.odometry()), frame)
+    return Step(log, arena.truth(), frame.truth)

@@ -18,8 +18,9 @@ from limo_sim.ros.lockstep.turns import ExternalShutdownException, RunOver
 from limo_sim.ros.lockstep.windows import watched_cv2
 from limo_sim.ros.lockstep.world import World
 from limo_sim.ros.rclpy_stub.context import Context
-from limo_sim.run.episode import Episode, Moment
-from limo_sim.run.score import ScoreCard, Scorer
+from limo_sim.run.episode import Episode, score
+from limo_sim.run.log import Watch
+from limo_sim.run.score import ScoreCard
 from limo_sim.world.scenario import Scenario
 
 #: Simulated time after a script's failure, in which the watchdog stops the robot [s]: 0.5 s and 1 m/s over 1 m/s².
@@ -65,10 +66,9 @@ def run_script(
     *,
     arguments: Sequence[str] = (),
     log: Log = lambda *_: None,
-    watch: Callable[[Moment], None] | None = None,
+    watch: Watch = lambda _: None,
     patience: float = 20.0,
     made: Callable[[World], None] | None = None,
-    keep: bool = True,
 ) -> Outcome:
     """Run a script as `python SCRIPT ARGUMENTS` would, with the arena behind its topics.
 
@@ -88,9 +88,6 @@ def run_script(
         Wall time that the script may take without letting simulated time pass [s].
     made
         Called with the world before the script runs.
-    keep
-        Whether the log holds the steps, 4 kB each, and when each callback ran. Without them a run's memory does not
-        grow, and a `Scorer` that `watch` feeds measures it.
 
     Raises
     ------
@@ -101,7 +98,7 @@ def run_script(
     """
     if not script.is_file():
         raise StubError(f"{script}: no such file")
-    world = World(scenario, seed, seconds, script=script, log=log, watch=watch, patience=patience, keep=keep)
+    world = World(scenario, seed, seconds, script=script, log=log, watch=watch, patience=patience)
     if made is not None:
         made(world)
     argv, path = sys.argv, list(sys.path)
@@ -144,22 +141,17 @@ def finished(world: World) -> Outcome:
     return Outcome(world.episode(), failure, shown, bool(world.asked), world)
 
 
-def score_of(outcome: Ended, scorer: Scorer | None = None) -> ScoreCard:
+def score_of(outcome: Ended) -> ScoreCard:
     """Measure a run; where the script does not use cv2's HOG detector, figures of detections are None.
 
     Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
-    `scorer` is one that was given every step; without it, the steps are those that the run kept.
     """
-    if scorer is None:
-        scorer = Scorer(outcome.episode.scenario)
-        for step in outcome.episode.steps:
-            scorer.add(step)
-    card = scorer.card(outcome.episode)
+    card, driving = score(outcome.episode), outcome.episode.scorer.driving
     if outcome.asked:
         return card
     return replace(
         card,
-        modes={"drive": scorer.driving, "stand": 1.0 - scorer.driving},
+        modes={"drive": driving, "stand": 1.0 - driving},
         first_detection_s=None,
         detected=None,
         best_box_wrong=None,

@@ -18,7 +18,7 @@ from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.twist import Twist
 from limo_sim.sensing import imu, lidar
-from limo_sim.sensing.camera import CameraPose, Frame
+from limo_sim.sensing.camera import FOCAL_PX, CameraPose, TrueFrame
 from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Past, Renderer, Seen
 from limo_sim.world.crowd import STEP_S, Crowd
@@ -132,7 +132,7 @@ class Arena:
         )
         self._static_scanned = _scanned(scenario.furniture) + [wall.footprint for wall in scenario.walls]
         self._renderer: Renderer | None = None
-        self._frame: Frame | None = None
+        self._frame: TrueFrame | None = None
         self._scan: tuple[int, Scan] | None = None
 
     @property
@@ -191,7 +191,7 @@ class Arena:
         for channel in (self._camera, self._lidar, self._wheels):
             channel.advance(step, self._state)
 
-    def frame(self) -> Frame:
+    def frame(self) -> TrueFrame:
         """Return the newest camera frame that has arrived: the same one until another does."""
         exposure = self._camera.newest
         if self._frame is None or self._frame.stamp != exposure.state.time:
@@ -203,7 +203,8 @@ class Arena:
                 time=exposure.state.time,
                 past=Past(partial(self._earlier, exposure.state), exposure.state.turn_rate),
             )
-            self._frame = Frame(exposure.state.time, image, depth, self._truth_at(exposure.state, seen))
+            truth = self._truth_at(exposure.state, seen)
+            self._frame = TrueFrame(exposure.state.time, image, FOCAL_PX, depth, truth)
         return self._frame
 
     def scan(self) -> Scan:
@@ -244,7 +245,7 @@ class Arena:
         )
 
     def truth(self) -> Truth:
-        """Return the truth now (`Frame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
+        """Return the truth now (`TrueFrame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
         seen = self._render().look(_camera_at(self._state), self._state.people, self._movers.at(self.time))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from statistics import NormalDist
@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
-from limo_hog.follow.sense.detectors import Detector
+from limo_hog.follow.sense.detectors import Detector, detect_in, is_halved
 from limo_hog.follow.sense.region import Region
 from limo_sim.run.matching import NO_PERSON, person_of
 from limo_sim.sensing.camera import HEIGHT, WIDTH
-from limo_sim.world.scenario import DetectorFaults
+from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.truth import Truth
 from limo_sim.world.variants import FALSE_STREAM, MISS_STREAM
 
@@ -175,63 +175,46 @@ def misses_of(faults: DetectorFaults, rate_hz: float, people: int, seed: int) ->
     return [FittedMisses(fit_of(faults.model), rate_hz, random) for random in randoms]
 
 
-class FaultyDetector:
-    """A detector in an arena, with the faults of a scenario; boxes on people of whom nothing is known pass.
+class FaultySearch:
+    """Searches an arena's frames with the faults of its scenario; boxes on people of whom nothing is known pass.
 
-    What it does depends on the seed and the number of the frame alone, so that another detector or controller meets the
-    same misses and the same false boxes.
+    It stands in for `detect_in`. What it does depends on the seed and the number of the frame alone, so that another
+    detector or controller meets the same misses and the same false boxes.
 
     Parameters
     ----------
-    detector
-        Finds people in uint8 (H, W, 3) BGR images.
-    faults
-        What to add to its own.
-    rate_hz
-        Of the camera [Hz].
-    people
-        How many the scenario has.
-    seed
-        Of the run.
+    scenario, seed
+        Those of the run.
+    truth
+        Returns what the newest frame shows.
     """
 
-    def __init__(self, detector: Detector, faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> None:
-        self._detector, self._rate, self._seed = detector, rate_hz, seed
-        self._misses = misses_of(faults, rate_hz, people, seed)
+    def __init__(self, scenario: Scenario, seed: int, truth: Callable[[], Truth]) -> None:
+        faults = scenario.detector
+        self._seed, self._truth, self._rate = seed, truth, scenario.camera.rate_hz
+        self._misses = misses_of(faults, self._rate, len(scenario.people), seed)
         self._false_rate = faults.false_rate if faults.model == "none" else fit_of(faults.model).false_rate
-        self._truth: Truth | None = None
-        self._region: Region | None = None
 
-    def face(self, truth: Truth, region: Region | None) -> None:
-        """Say what the next image shows, and which part of the camera's image it is (None: all)."""
-        self._truth, self._region = truth, region
-
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        """Find people in the image announced by `face`, or in that at a fraction of its size; best first."""
-        if self._truth is None:
-            raise RuntimeError("FaultyDetector.detect: no image announced, want a call of face() before")
-        found = self._detector.detect(image)
-        period = round(self._truth.stamp * self._rate)
-        left, top, width, height = 0, 0, WIDTH, HEIGHT
-        if self._region is not None:
-            left, top, width, height = (
-                self._region.x,
-                self._region.y,
-                self._region.width,
-                self._region.height,
-            )
-        corner = np.array([left, top, 0, 0])
-        # The follower searches near people at half size.
-        shrink = round(height / image.shape[0])
-        kept = self._kept(found.boxes * shrink + corner, self._truth, period)
+    def __call__(self, detector: Detector, image: NDArray[np.uint8], region: Region | None) -> Detections:
+        """Find people in a region of the newest frame, or in all of it; best first."""
+        found = detect_in(detector, image, region)
+        truth = self._truth()
+        period = round(truth.stamp * self._rate)
+        kept = self._kept(found.boxes, truth, period)
         boxes, scores = self._false(period)
-        inside = (boxes[:, 0] >= left) & (boxes[:, 1] >= top)
-        inside &= (boxes[:, 0] + boxes[:, 2] <= left + width) & (boxes[:, 1] + boxes[:, 3] <= top + height)
-        boxes = (boxes[inside] - corner) // shrink
+        if region is not None:
+            ends = boxes[:, :2] + boxes[:, 2:]
+            inside = (boxes[:, 0] >= region.x) & (boxes[:, 1] >= region.y)
+            inside &= (ends[:, 0] <= region.x + region.width) & (ends[:, 1] <= region.y + region.height)
+            boxes, scores = boxes[inside], scores[inside]
+            if is_halved(region):
+                # Boxes of a half-size search have even sizes, and are an even number of pixels from its corner.
+                corner = np.array([region.x, region.y, 0, 0])
+                boxes = (boxes - corner) // 2 * 2 + corner
         all_boxes = np.concatenate([found.boxes[kept], boxes.astype(np.int32)])
-        all_scores = np.concatenate([found.scores[kept], scores[inside]])
+        all_scores = np.concatenate([found.scores[kept], scores])
         order = np.argsort(-all_scores, kind="stable")
-        return Detections(all_boxes[order], all_scores[order], found.person_box, found.calibration)
+        return replace(found, boxes=all_boxes[order], scores=all_scores[order])
 
     def _kept(self, boxes: NDArray[np.int32], truth: Truth, period: int) -> list[int]:
         """Return the boxes (N, 4) [px of the camera's image] that are on nobody, or on people who are not missed."""

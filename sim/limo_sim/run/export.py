@@ -14,7 +14,7 @@ from limo_hog.follow.pipeline import CONTROL_PERIOD
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
-from limo_sim.sensing.camera import Frame
+from limo_sim.sensing.camera import TrueFrame
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.variants import WANDERING_STREAM
 
@@ -77,7 +77,7 @@ WANDERING = Wandering()
 
 def labelled_frames(
     scenario: Scenario, seed: int, count: int, every_s: float
-) -> Iterator[tuple[Frame, tuple[Thing, ...]]]:
+) -> Iterator[tuple[TrueFrame, tuple[Thing, ...]]]:
     """Take `count` pictures, one every `every_s` seconds of the arena, while the robot wanders.
 
     Yields

@@ -13,8 +13,8 @@ import limo_hog
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.baselines import controller_of
 from limo_sim.run.catalogue import load
-from limo_sim.run.episode import run_episode
-from limo_sim.run.score import ScoreCard, score
+from limo_sim.run.episode import run_episode, score
+from limo_sim.run.score import ScoreCard
 
 #: Figures of a score card that are summed up, in the order they are shown.
 MEASURES = (

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO
+from limo_hog.follow.sense.observation import Frame
 from limo_sim.world.truth import Truth
 
 WIDTH, HEIGHT = 640, 480
@@ -55,24 +56,9 @@ class CameraPose:
         return offset
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """One exposure of the colour and the depth camera.
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueFrame(Frame):
+    """One exposure of the colour and the depth camera, 640 x 480, and the arena at that instant."""
 
-    Attributes
-    ----------
-    stamp
-        When it was taken [s].
-    image
-        uint8 (480, 640, 3), BGR.
-    depth
-        float32 (480, 640), distance along the optical axis [m]; inf too far, -inf too near, NaN unknown
-        (REP 118).
-    truth
-        The arena at that instant.
-    """
-
-    stamp: float
-    image: NDArray[np.uint8]
     depth: NDArray[np.float32]
     truth: Truth

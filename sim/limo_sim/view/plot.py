@@ -11,8 +11,9 @@ import numpy as np
 from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
 from limo_hog.follow.zones import ZONE_ENDS, Zone
-from limo_sim.run.episode import Episode, Step
-from limo_sim.view.reading import reading
+from limo_sim.run.episode import Episode
+from limo_sim.run.log import Step
+from limo_sim.view.reading import figures
 from limo_sim.world.furniture import Disc
 from limo_sim.world.scenario import Scenario
 
@@ -33,8 +34,8 @@ _ZONES = {
 }
 
 
-def plot(episode: Episode, path: Path) -> None:
-    """Draw an episode into a picture of the kind the path's suffix says."""
+def plot(episode: Episode, steps: Sequence[Step], path: Path) -> None:
+    """Draw an episode by its steps into a picture of the kind the path's suffix says."""
     figure = Figure(figsize=(11, 6.4), layout="constrained", dpi=150)
     figure.suptitle(
         f"{episode.scenario.name} · {episode.controller} · {episode.detector} · seed {episode.seed}",
@@ -42,16 +43,16 @@ def plot(episode: Episode, path: Path) -> None:
         fontweight="bold",
     )
     grid = figure.add_gridspec(3, 2, width_ratios=[1, 1.1], height_ratios=[1, 1.2, 1])
-    _path(figure.add_subplot(grid[:, 0]), episode.scenario, episode.steps)
+    _path(figure.add_subplot(grid[:, 0]), episode.scenario, steps)
     error, distance, speed = (figure.add_subplot(grid[row, 1]) for row in range(3))
-    readings = [reading(step) for step in episode.steps]
-    time = [r.time for r in readings]
-    _line(error, time, [r.error_px for r in readings], "#1f6feb")
+    rows = [figures(step) for step in steps]
+    time = [step.log.time for step in steps]
+    _line(error, time, [row["error_px"] for row in rows], "#1f6feb")
     error.set_title("off centre [px], left positive", **_TITLE)
     error.axhline(0, color=_FAINT, linewidth=0.8)
-    _distance(distance, time, [r.distance_m for r in readings])
-    _line(speed, time, [r.linear_m_s for r in readings], "#b35900", "forward [m/s]")
-    _line(speed, time, [r.angular_rad_s for r in readings], "#7a4fd0", "turn [rad/s]")
+    _distance(distance, time, [row["distance_m"] for row in rows])
+    _line(speed, time, [row["linear_m_s"] for row in rows], "#b35900", "forward [m/s]")
+    _line(speed, time, [row["angular_rad_s"] for row in rows], "#7a4fd0", "turn [rad/s]")
     speed.set_title("command", **_TITLE)
     speed.legend(loc="lower right", bbox_to_anchor=(1, 0.97), frameon=False, fontsize=8, ncols=2)
     speed.set_xlabel("time [s]")

@@ -3,64 +3,53 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.follow.sense.ranging import box_centre, person_depth
 from limo_hog.follow.zones import zone_of
 from limo_hog.imaging.drawing import annotate
-from limo_sim.run.episode import Step
-from limo_sim.sensing.camera import WIDTH, Frame
+from limo_sim.run.log import Step
+from limo_sim.sensing.camera import WIDTH
 from limo_sim.sensing.lidar import MOUNT_AHEAD
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """One control period in a few numbers.
+def figures(step: Step) -> dict[str, float | None]:
+    """Return a control period in a few numbers, for the page and the plot.
 
-    Attributes
-    ----------
-    time
-        Of the arena [s].
-    error_px
-        How far left of the image's middle the followed box is [px]; None without one.
-    distance_m
-        From the robot's centre to the nearest person, as the arena knows it [m]; None without people.
-    linear_m_s, angular_rad_s
-        The command.
+    `time` of the arena [s]; `error_px`, how far left of the image's middle the followed box is, None without one;
+    `distance_m` from the robot's centre to the nearest person, by the truth, None without people; the command's
+    `linear_m_s` and `angular_rad_s`.
     """
-
-    time: float
-    error_px: float | None
-    distance_m: float | None
-    linear_m_s: float
-    angular_rad_s: float
-
-
-def reading(step: Step) -> Reading:
-    """Read a control period."""
-    error, twist = None, step.decision.twist
-    if step.decision.target is not None:
-        error = WIDTH / 2 - box_centre(step.detections.boxes[step.decision.target])[0]
+    log, error = step.log, None
+    if log.decision.target is not None:
+        error = WIDTH / 2 - box_centre(log.detections.boxes[log.decision.target])[0]
     distances = [person.distance for person in step.truth.people if person is not None]
-    return Reading(step.time, error, min(distances, default=None), float(twist.linear), float(twist.angular))
+    return {
+        "time": log.time,
+        "error_px": error,
+        "distance_m": min(distances, default=None),
+        "linear_m_s": float(log.decision.twist.linear),
+        "angular_rad_s": float(log.decision.twist.angular),
+    }
 
 
-def measured_m(frame: Frame | None, step: Step) -> float | None:
+def measured_m(log: FrameLog) -> float | None:
     """Return how far the followed person is as the follower measures it: from the camera to their front [m]."""
-    if frame is None or step.decision.target is None:
+    if log.frame is None or log.frame.depth is None or log.decision.target is None:
         return None
-    return person_depth(frame.depth, step.detections.boxes[step.decision.target])
+    return person_depth(log.frame.depth, log.detections.boxes[log.decision.target])
 
 
 def followed_person(step: Step) -> int | None:
     """Return the index of the person that the followed box covers most of; None without a box or a person in it."""
-    if step.decision.target is None or step.seen is None:
+    log = step.log
+    if log.decision.target is None or step.seen is None:
         return None
-    x, y, w, h = step.detections.boxes[step.decision.target].tolist()
+    x, y, w, h = log.detections.boxes[log.decision.target].tolist()
     shared = {}
     for index, person in enumerate(step.seen.people):
         if person is not None and person.box is not None:
@@ -72,16 +61,20 @@ def followed_person(step: Step) -> int | None:
     return max(shared, key=shared.__getitem__, default=None)
 
 
-def annotated(frame: Frame, step: Step, caption: bool = True) -> NDArray[np.uint8]:
-    """Draw what the follower saw: all boxes and which is followed; in the caption its distance and what it does."""
-    words = [f"{step.time:.1f} s", step.decision.mode.value]
-    distance = measured_m(frame, step)
+def annotated(log: FrameLog, caption: bool = True) -> NDArray[np.uint8]:
+    """Draw what the follower saw, uint8 (H, W, 3) BGR: all boxes and which is followed; of a log with a frame.
+
+    The caption tells the followed person's distance and what the follower does.
+    """
+    if log.frame is None:
+        raise ValueError("annotated: the log has no frame")
+    words = [f"{log.time:.1f} s", log.decision.mode.value]
+    distance = measured_m(log)
     if distance is not None:
         words += [f"depth {distance:.2f} m", zone_of(distance).value]
-    labels = [f"{score:.1f}" for score in step.detections.scores]
-    return annotate(
-        frame.image, step.detections.boxes, labels, step.decision.target, "  ".join(words) if caption else ""
-    )
+    labels = [f"{score:.1f}" for score in log.detections.scores]
+    text = "  ".join(words) if caption else ""
+    return annotate(log.frame.image, log.detections.boxes, labels, log.decision.target, text)
 
 
 def depth_picture(depth: NDArray[np.float32], far: float) -> NDArray[np.uint8]:
@@ -136,5 +129,5 @@ def believed(step: Step) -> list[list[float | None]]:
             round(one.probability, 2),
             None if one.same is None else round(one.same, 2),
         ]
-        for one in step.decision.belief.people
+        for one in step.log.decision.belief.people
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -10,16 +10,15 @@ from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import bag_writer
 from limo_hog.ros2.findings import detections_message
 from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
-from limo_sim.run.episode import Moment
-from limo_sim.sensing.camera import FOCAL_PX
+from limo_sim.run.log import Step, Watch
 from limo_sim.world.scenario import Camera
 
 DETECTIONS = "/limo_camera/detections"
 
 
 @contextmanager
-def recorded(path: Path, camera: Camera) -> Iterator[Callable[[Moment], None]]:
-    """Give a function that records a moment: what was sensed, what was found in it, and then the command.
+def recorded(path: Path, camera: Camera) -> Iterator[Watch]:
+    """Give a function that records a step: what was sensed, what was found in it, and then the command.
 
     `camera` says how the lens bends.
     """
@@ -31,22 +30,24 @@ def recorded(path: Path, camera: Camera) -> Iterator[Callable[[Moment], None]]:
             stamps[topic] = stamp
             return fresh
 
-        def watch(moment: Moment) -> None:
-            step, frame = moment.step, moment.frame
-            now = step.time
-            if moment.scan is not None and once(SCAN, moment.scan.stamp):
-                write(SCAN, now, messages.laser_scan(moment.scan))
-            if moment.odometry is not None and once(ODOMETRY, moment.odometry.stamp):
-                write(ODOMETRY, now, messages.odometry(moment.odometry))
-            if frame is not None:
+        def watch(step: Step) -> None:
+            log, frame = step.log, step.log.frame
+            now, scan, odometry = log.time, log.sensors.scan, log.sensors.odometry
+            if scan is not None and once(SCAN, scan.stamp):
+                write(SCAN, now, messages.laser_scan(scan))
+            if odometry is not None and once(ODOMETRY, odometry.stamp):
+                write(ODOMETRY, now, messages.odometry(odometry))
+            if frame is not None and frame.depth is not None:
                 height, width = frame.image.shape[:2]
                 write(
-                    CAMERA_INFO, now, messages.camera_info(frame.stamp, width, height, FOCAL_PX, (camera.k1, camera.k2))
+                    CAMERA_INFO,
+                    now,
+                    messages.camera_info(frame.stamp, width, height, frame.focal_px, (camera.k1, camera.k2)),
                 )
                 write(DEPTH, now, messages.image(frame.stamp, frame.depth))
                 write(IMAGE, now, messages.image(frame.stamp, frame.image))
-                found = detections_message(frame.stamp, step.detections, messages.CAMERA_FRAME)
+                found = detections_message(frame.stamp, log.detections, messages.CAMERA_FRAME)
                 write(DETECTIONS, now, found)
-            write(COMMAND, now, messages.twist(step.decision.twist))
+            write(COMMAND, now, messages.twist(log.decision.twist))
 
         yield watch

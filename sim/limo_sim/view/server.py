@@ -26,7 +26,7 @@ from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.zones import ZONE_ENDS
 from limo_hog.imaging.writing import jpeg
-from limo_sim.run.episode import Moment
+from limo_sim.run.log import Step
 from limo_sim.sensing.camera import FIELD
 from limo_sim.view.access import HEADERS, Access, QuietLogger
 from limo_sim.view.controls import MAX_BYTES, apply
@@ -36,10 +36,10 @@ from limo_sim.view.reading import (
     believed,
     depth_colours,
     depth_picture,
+    figures,
     followed_person,
     hits,
     measured_m,
-    reading,
 )
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.furniture import Disc
@@ -133,9 +133,9 @@ class View:
         self._scenario, self._controller = scenario, controller
         self._host, self._port = host, port
         self.pace = pace or Pace()
-        self._newest: Moment | None = None
-        # The newest moment with a frame, with its number.
-        self._pictured: tuple[int, Moment] | None = None
+        self._newest: Step | None = None
+        # The newest step with a frame, with its number.
+        self._pictured: tuple[int, Step] | None = None
         self._rows: deque[list[float | None]] = deque(maxlen=_REMEMBERED)
         self._written = 0
         # Index of the person followed last; None before, and during a search.
@@ -160,22 +160,21 @@ class View:
         host = f"[{self._host}]" if ":" in self._host else self._host
         return f"http://{host}:{self._port}/"
 
-    def watch(self, moment: Moment) -> None:
-        """Show a moment, and return when the run may go on."""
-        if moment.frame is not None:
-            self._pictured = self._written, moment
-        now, robot = reading(moment.step), moment.step.truth.robot
-        people = [(None, None) if p is None else (p.x, p.y) for p in moment.step.truth.people]
-        measured = measured_m(moment.frame, moment.step)
-        self._rows.append([*asdict(now).values(), measured, *robot, *itertools.chain(*people)])
-        if moment.step.decision.mode is Mode.SEARCH:
+    def watch(self, step: Step) -> None:
+        """Show a step, and return when the run may go on."""
+        log, robot = step.log, step.truth.robot
+        if log.frame is not None:
+            self._pictured = self._written, step
+        people = [(None, None) if p is None else (p.x, p.y) for p in step.truth.people]
+        self._rows.append([*figures(step).values(), measured_m(log), *robot, *itertools.chain(*people)])
+        if log.decision.mode is Mode.SEARCH:
             self._followed = None
-        elif (followed := followed_person(moment.step)) is not None:
+        elif (followed := followed_person(step)) is not None:
             self._followed = followed
-        self._poses.append((moment.step.time, *moment.step.truth.robot))
+        self._poses.append((log.time, *robot))
         self._written += 1
-        self._newest = moment
-        self.pace.wait(moment.step.time)
+        self._newest = step
+        self.pace.wait(log.time)
 
     def end(self, card: Mapping[str, Any]) -> None:
         """Tell all pages that the run is over, with its score card."""
@@ -326,40 +325,39 @@ class View:
     def _newest_pictures(self) -> tuple[int, asyncio.Future[list[bytes]]] | None:
         """Encode the newest pictures, once for all pages and beside the server's loop; None without any."""
         if self._pictured is not None and (self._encoded is None or self._encoded[0] != self._pictured[0]):
-            number, moment = self._pictured
-            self._encoded = number, self._loop.run_in_executor(None, self._pictures, moment)
+            number, step = self._pictured
+            self._encoded = number, self._loop.run_in_executor(None, self._pictures, step)
         return self._encoded
 
-    def _state(self, moment: Moment) -> dict[str, Any]:
-        step = moment.step
+    def _state(self, step: Step) -> dict[str, Any]:
+        log = step.log
         return {
-            **asdict(reading(step)),
-            "mode": step.decision.mode.value,
-            "reason": step.decision.reason,
+            **figures(step),
+            "mode": log.decision.mode.value,
+            "reason": log.decision.reason,
             "robot": step.truth.robot,
             "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
             "followed": self._followed,
             "believed": believed(step),
-            "measured_m": measured_m(moment.frame, step),
-            "scan": hits(moment.scan, list(self._poses)),
-            "detect_ms": step.frame.detect_ms or None if step.frame else None,
-            "boxes": len(step.detections),
+            "measured_m": measured_m(log),
+            "scan": hits(log.sensors.scan, list(self._poses)),
+            "detect_ms": log.detect_ms or None,
+            "boxes": len(log.detections),
             "contacts": asdict(step.truth.contacts),
             "paused": self.pace.paused,
             "speed": self.pace.speed,
         }
 
-    def _pictures(self, moment: Moment) -> list[bytes]:
-        """Encode the pictures of a moment: the camera's, the depth's and a node's windows; a letter tells which."""
-        if moment.frame is None:
+    def _pictures(self, step: Step) -> list[bytes]:
+        """Encode the pictures of a step: the camera's, the depth's and a node's windows; a letter tells which."""
+        frame = step.log.frame
+        if frame is None or frame.depth is None:
             return []
-        depth = depth_picture(moment.frame.depth[::2, ::2], self._scenario.depth.far_m)
-        pictures = {b"c": annotated(moment.frame, moment.step, caption=False), b"d": depth}
+        depth = depth_picture(frame.depth[::2, ::2], self._scenario.depth.far_m)
+        pictures = {b"c": annotated(step.log, caption=False), b"d": depth}
         encoded = [letter + jpeg(p) for letter, p in pictures.items()]
         # A window's name stands between its letter and its picture, ended by a line feed.
-        return encoded + [
-            b"w" + " ".join(name.split()).encode() + b"\n" + jpeg(p) for name, p in moment.windows.items()
-        ]
+        return encoded + [b"w" + " ".join(name.split()).encode() + b"\n" + jpeg(p) for name, p in step.windows.items()]
 
 
 async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:

@@ -305,10 +305,10 @@ def returns(takes: Sequence[Take]) -> Finding:
 
 def blocked(take: Take) -> str:
     """Return which callback took longer than the watchdog's time, "" if none did."""
-    for call in take.outcome.world.callbacks if take.outcome else ():
-        if call.slept > SILENCE - 1e-6:
-            return f"the callback at {call.time:.1f} s slept for {call.slept:.1f} s"
-    return ""
+    call = take.outcome.world.longest if take.outcome else None
+    if call is None or call.slept <= SILENCE - 1e-6:
+        return ""
+    return f"the callback at {call.time:.1f} s slept for {call.slept:.1f} s"
 
 
 def keeps(takes: Sequence[Take]) -> Finding:

@@ -13,7 +13,7 @@ from limo_sim.ros.lockstep.calls import Calls
 from limo_sim.ros.lockstep.records import Command, Found, Shown
 from limo_sim.ros.lockstep.world import LOGGER, World
 from limo_sim.ros.script import Outcome, run_script
-from limo_sim.run.episode import Moment
+from limo_sim.run.log import Step
 from limo_sim.world.scenario import Person, Scenario
 from limo_sim.world.truth import Truth
 
@@ -88,10 +88,21 @@ class Look:
 
 @dataclass
 class Take:
-    """A node in one scene."""
+    """A node in one scene.
+
+    Attributes
+    ----------
+    looks
+        What it made of each camera frame.
+    path
+        The robot's x, y, yaw in each control period [m, m, rad].
+    outcome
+        How the run ended; None before.
+    """
 
     scene: Scene
     looks: list[Look] = field(default_factory=list)
+    path: list[tuple[float, float, float]] = field(default_factory=list)
     outcome: Outcome | None = None
 
     @property
@@ -107,24 +118,25 @@ def play(script: Path, scene: Scene) -> Take:
     said: list[str] = []
     commanded = 0
 
-    def watch(moment: Moment) -> None:
+    def watch(step: Step) -> None:
         nonlocal commanded
-        world = worlds[0]
+        take.path.append(step.truth.robot)
+        world, log = worlds[0], step.log
         commands = tuple(world.commands[commanded:])
-        if moment.frame is None:
+        if log.frame is None or step.seen is None:
             return
         commanded = len(world.commands)
         raw = world.found[-1] if world.found else None
         take.looks.append(
             Look(
-                moment.step.time,
-                moment.frame.image,
-                moment.step.detections,
+                log.time,
+                log.frame.image,
+                log.detections,
                 raw,
                 commands,
                 dict(world.shown),
                 tuple(said),
-                moment.frame.truth,
+                step.seen,
             )
         )
         said.clear()

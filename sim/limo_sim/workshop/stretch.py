@@ -314,12 +314,12 @@ def stops(takes: Sequence[Take]) -> Finding:
     if world is None or not any(speed > 0 for speed in speeds(takes, "far")):
         return Finding(None, "not tried: the robot does not drive to a person in a free room")
     episode = world.episode()
-    way = max(step.truth.robot[0] for step in episode.steps)
+    way = max(x for x, _, _ in take.path)
     if way < 0.1:
         return Finding(None, "not tried: the robot does not drive towards the chair")
     if episode.contacts.wall:
         return Finding(False, f"the robot drives {way:.2f} m and into the chair")
-    room = min(_room(step.truth.robot) for step in episode.steps)
+    room = min(_room(pose) for pose in take.path)
     said = f"the robot drives {way:.2f} m and stops {room:.2f} m before the chair"
     if room < LEAST_CLEARANCE:
         return Finding(False, f"{said}; wanted are at least {LEAST_CLEARANCE} m")

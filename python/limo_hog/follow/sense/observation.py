@@ -51,6 +51,37 @@ class Odometry:
     angular: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One image of the robot's camera.
+
+    Attributes
+    ----------
+    stamp
+        When it was taken [s].
+    image
+        uint8 (H, W, 3) BGR or (H, W).
+    focal_px
+        Focal length of the camera [px].
+    depth
+        float32 (H, W), distance along the optical axis [m] of the same view; inf too far, -inf too near, NaN unknown
+        (REP 118). None without a depth camera.
+    """
+
+    stamp: float
+    image: NDArray[np.uint8]
+    focal_px: float
+    depth: NDArray[np.float32] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """The newest readings beside the camera's: None without a lidar, without wheel encoders."""
+
+    scan: Scan | None = None
+    odometry: Odometry | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class Observation:
     """One camera frame's detections with the other sensors' newest readings.
@@ -108,20 +139,27 @@ class Observation:
 
 
 def observed(
-    stamp: float,
-    image: NDArray[np.uint8],
-    focal_px: float,
+    frame: Frame,
+    sensors: Sensors,
     detections: Detections,
-    region: Region | None,
-    depth: NDArray[np.float32] | None,
-    scan: Scan | None,
-    odometry: Odometry | None,
+    region: Region | None = None,
     fault: str = "",
     between: tuple[tuple[Scan, Odometry], ...] = (),
 ) -> Observation:
-    """Return the observation of one camera image, uint8 (H, W, 3) BGR or (H, W): its size and clothes are filled in."""
-    height, width = image.shape[:2]
-    clothes = clothes_in(image, detections.boxes)
+    """Return the observation of a frame and what was found in it: its size and people's clothes are filled in."""
+    height, width = frame.image.shape[:2]
+    clothes = clothes_in(frame.image, detections.boxes)
     return Observation(
-        stamp, width, height, focal_px, detections, region, depth, scan, odometry, fault, clothes, between
+        frame.stamp,
+        width,
+        height,
+        frame.focal_px,
+        detections,
+        region,
+        frame.depth,
+        sensors.scan,
+        sensors.odometry,
+        fault,
+        clothes,
+        between,
     )

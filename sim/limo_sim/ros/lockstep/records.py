@@ -1,8 +1,7 @@
-"""What is noted of a run in lock step: commands, pictures, boxes and callbacks, each with its time."""
+"""What is noted of a run in lock step: commands, pictures and boxes, each with its time."""
 
 from __future__ import annotations
 
-import math
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,9 +12,11 @@ from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.pipeline import Periods
 from limo_hog.follow.twist import Twist
 from limo_sim.ros.interfaces import Message
-from limo_sim.run.episode import Step
+from limo_sim.run.log import Step
+from limo_sim.run.score import Scorer
 
 #: Takes what a script logs: time [s], level, logger, message.
 Log = Callable[[float, str, str, str], None]
@@ -76,31 +77,27 @@ class Past:
 
     Attributes
     ----------
+    scorer
+        Has measured every control period.
     commands
         Time [s], linear [m/s] and angular speed [rad/s] of every command, one after another.
-    steps
-        Every control period, where they are kept.
-    logged, logged_frame
-        Time of the last control period, and stamp of the last frame in one [s].
+    periods
+        When the last control period began.
     found
         Whether a control period had a target.
     asked, target_distance
         As `World` has them.
     """
 
+    scorer: Scorer
     commands: array[float] = field(default_factory=lambda: array("d"))
-    steps: list[Step] = field(default_factory=list)
-    logged: float = -math.inf
-    logged_frame: float = -math.inf
+    periods: Periods = field(default_factory=Periods)
     found: bool = False
     asked: list[str] = field(default_factory=list)
     target_distance: float | None = None
 
-    def add(self, step: Step, keep: bool) -> None:
-        """Take the next control period, and keep it if asked to."""
-        self.logged = step.time
-        if step.frame is not None:
-            self.logged_frame = step.frame.truth.stamp
-        self.found |= step.decision.target is not None
-        if keep:
-            self.steps.append(step)
+    def add(self, step: Step) -> None:
+        """Take the next control period."""
+        self.scorer.add(step)
+        self.periods.begins(step.log.time, None)
+        self.found |= step.log.decision.target is not None

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Decision, Mode
-from limo_hog.follow.pipeline import CONTROL_PERIOD
+from limo_hog.follow.pipeline import FrameLog, Periods
+from limo_hog.follow.sense.observation import Sensors
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
 from limo_hog.ros2.messages import to_twist
@@ -31,8 +32,10 @@ from limo_sim.ros.lockstep.records import Callback, Command, Found, Log, Past, R
 from limo_sim.ros.lockstep.turns import RunOver, ThreadEnded, Turns
 from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
-from limo_sim.run.episode import Episode, FrameRecord, Moment, Step
-from limo_sim.sensing.camera import Frame
+from limo_sim.run.episode import Episode
+from limo_sim.run.log import Step, Watch
+from limo_sim.run.score import Scorer
+from limo_sim.sensing.camera import TrueFrame
 from limo_sim.world.scenario import Scenario
 
 #: A subscription is warned of when nobody publishes its topic for this time [s]. Chosen: publishers start within it.
@@ -52,8 +55,8 @@ class World:
         What the script's detector found since the last camera frame.
     asked
         Types and shapes of the images given to the detector, as "uint8 (480, 640, 3)", each once.
-    callbacks
-        How long each callback slept.
+    longest
+        The callback that slept longest; None while none has slept.
     parameters
         The newest values of the nodes' parameters, by name.
     fault
@@ -84,10 +87,9 @@ class World:
         *,
         script: Path,
         log: Log,
-        watch: Callable[[Moment], None] | None = None,
+        watch: Watch = lambda _: None,
         patience: float = 20.0,
         began: float | None = None,
-        keep: bool = True,
     ) -> None:
         scenario.check_detector_is_plain("a node brings its own detector")
         self.arena = Arena(scenario, seed)
@@ -109,16 +111,15 @@ class World:
         self._unheard: dict[str, float] = {}
         self._unanswered: dict[str, float] = {}
         self.fault: BaseException | None = None
-        self.callbacks: list[Callback] = []
+        self.longest: Callback | None = None
         self.asked: list[str] = []
         self.parameters: dict[str, Any] = {}
         self._outlet = Outlet(self.arena)
-        self._steps: list[Step] = []
-        self._frame: Frame | None = None
+        self.scorer = Scorer(self.arena.scenario)
+        self._frame: TrueFrame | None = None
         self._render_ms = 0.0
-        self._logged = self._logged_frame = -math.inf
+        self._periods = Periods()
         self._seen_before = False
-        self._keep = keep
         self._began = time.perf_counter() if began is None else began
         self._collected = False
         self.advances = 0
@@ -183,8 +184,9 @@ class World:
             self.fault = self.fault or error
             raise
         finally:
-            if self._keep:
-                self.callbacks.append(Callback(since, self.time - since))
+            slept = self.time - since
+            if slept > (0.0 if self.longest is None else self.longest.slept):
+                self.longest = Callback(since, slept)
 
     def show(self, window: str, picture: NDArray[np.uint8]) -> None:
         """Keep the newest picture of a window."""
@@ -253,9 +255,9 @@ class World:
             self.commands = [Command(at, Twist(linear, angular))]
         while arena.time < until - 1e-9:
             arena.step()
-        self._steps = list(past.steps)
+        self.scorer, self._periods = past.scorer, past.periods
         self.asked, self.parameters = list(past.asked), {"target_distance": past.target_distance}
-        self._logged, self._logged_frame, self._seen_before = past.logged, past.logged_frame, past.found
+        self._seen_before = past.found
 
     def episode(self) -> Episode:
         """Return the log."""
@@ -265,7 +267,7 @@ class World:
             detector="hog" if self.asked else "the node's own",
             seed=self.arena.seed,
             seconds=self.time,
-            steps=tuple(self._steps),
+            scorer=self.scorer,
             contacts=self.arena.contacts,
             wall_seconds=time.perf_counter() - self._began,
             target_distance=self.target_distance,
@@ -310,17 +312,11 @@ class World:
     def _log(self) -> None:
         """Log the control period that ends now."""
         frame = self._frame
-        fresh = frame is not None and frame.stamp > self._logged_frame
-        if not fresh and self.time - self._logged < CONTROL_PERIOD - 0.01:
+        begins, new = self._periods.begins(self.time, frame)
+        if frame is None or not begins:
             return
-        self._logged = self.time
-        record, target = None, None
-        if frame is not None and fresh:
-            self._logged_frame = frame.stamp
-            found = self._in_frame_pixels(frame)
-            target = int(np.argmax(found.scores)) if len(found) else None
-            detect_ms = sum(found.ms for found in self.found)
-            record = FrameRecord(frame.truth, found, detect_ms=detect_ms, render_ms=self._render_ms)
+        found = self._in_frame_pixels(frame) if new else Detections.none()
+        target = int(np.argmax(found.scores)) if len(found) else None
         twist = self.commands[-1].twist if self.commands else Twist()
         if self.asked:
             mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
@@ -328,23 +324,20 @@ class World:
             # Whether a node with a detector of its own searches or follows is not known.
             mode = Mode.STAND if twist == Twist() else Mode.DRIVE
         self._seen_before |= target is not None
-        decision = Decision(twist, None, mode, f"as {self.script.name} says", target)
-        step = Step(self.time, self.arena.truth(), decision, record)
-        if self._keep:
-            self._steps.append(step)
-        if self.watch is not None:
-            with self.patience.suspended():
-                self.watch(
-                    Moment(
-                        step,
-                        frame if fresh else None,
-                        self.arena.scan(),
-                        self.arena.odometry(),
-                        windows=self.windows,
-                    )
-                )
+        log = FrameLog(
+            self.time,
+            Decision(twist, None, mode, f"as {self.script.name} says", target),
+            Sensors(self.arena.scan(), self.arena.odometry()),
+            frame if new else None,
+            found,
+            detect_ms=sum(found.ms for found in self.found) if new else 0.0,
+        )
+        step = Step(log, self.arena.truth(), frame.truth if new else None, self._render_ms, self.windows)
+        self.scorer.add(step)
+        with self.patience.suspended():
+            self.watch(step)
 
-    def _in_frame_pixels(self, frame: Frame) -> Detections:
+    def _in_frame_pixels(self, frame: TrueFrame) -> Detections:
         """Return the boxes found last since the frame came, in its pixels: a smaller copy is scaled back."""
         height, width = frame.image.shape[:2]
         for found in reversed(self.found):

@@ -1,8 +1,8 @@
-"""How well a robot followed: the card of a run, measured of its log or as it goes."""
+"""How well a robot followed: the card of a run, measured as it goes."""
 
 from __future__ import annotations
 
 from limo_sim.run.score.card import ScoreCard
-from limo_sim.run.score.scorer import Scorer, score
+from limo_sim.run.score.scorer import Scorer
 
-__all__ = ["ScoreCard", "Scorer", "score"]
+__all__ = ["ScoreCard", "Scorer"]

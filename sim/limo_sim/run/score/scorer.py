@@ -17,22 +17,14 @@ import numpy as np
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.zones import Zone, zone_of
-from limo_sim.run.episode import Episode, Step
+from limo_sim.run.log import Step
 from limo_sim.run.matching import CRITERIA, NO_PERSON, Criteria, person_of
 from limo_sim.run.provenance import code_version, scenario_hash
 from limo_sim.run.score.card import ScoreCard
 from limo_sim.run.score.subject import Mean, Subject
 from limo_sim.world.robot import max_turn_rate
 from limo_sim.world.scenario import Scenario
-from limo_sim.world.truth import Truth
-
-
-def score(episode: Episode, criteria: Criteria = CRITERIA) -> ScoreCard:
-    """Measure an episode by the steps in its log."""
-    scorer = Scorer(episode.scenario, criteria)
-    for step in episode.steps:
-        scorer.add(step)
-    return scorer.card(episode)
+from limo_sim.world.truth import Contacts, Truth
 
 
 class Scorer:
@@ -47,7 +39,7 @@ class Scorer:
     """
 
     def __init__(self, scenario: Scenario, criteria: Criteria = CRITERIA) -> None:
-        self._criteria = criteria
+        self._scenario, self._criteria = scenario, criteria
         self._radii = [person.radius for person in scenario.people]
         self._motion = _Motion(max_turn_rate(scenario.robot.wheel_speed))
         # Everybody, until one of them is the target: then that one.
@@ -68,23 +60,23 @@ class Scorer:
         hits = (
             []
             if step.seen is None
-            else [person_of(box, step.seen.people, self._criteria) for box in step.detections.boxes]
+            else [person_of(box, step.seen.people, self._criteria) for box in step.log.detections.boxes]
         )
-        target = None if step.decision.target is None else hits[step.decision.target]
+        target = None if step.log.decision.target is None else hits[step.log.decision.target]
         for subject in self._subjects:
             subject.add(step, hits, target)
-        if step.frame is not None:
+        if step.seen is not None:
             self._frames += 1
-            self._detect_ms.append(step.frame.detect_ms)
-            self._render_ms.append(step.frame.render_ms)
+            self._detect_ms.append(step.log.detect_ms)
+            self._render_ms.append(step.render_ms)
             self._add_target(target)
         if hits:
             self._boxed += 1
             self._wrong += hits[0] == NO_PERSON
         self._steps += 1
-        self._driven += bool(step.decision.twist.linear or step.decision.twist.angular)
-        self._modes[step.decision.mode.value] += 1
-        self._reasons[step.decision.reason] += 1
+        self._driven += bool(step.log.decision.twist.linear or step.log.decision.twist.angular)
+        self._modes[step.log.decision.mode.value] += 1
+        self._reasons[step.log.decision.reason] += 1
         self._motion.add(step, target)
         self._clearance = min(self._clearance, _clearance(step.truth, self._radii))
         distances = [person.distance for person in people if person]
@@ -106,23 +98,33 @@ class Scorer:
         """Share of the steps whose command moves the robot."""
         return self._driven / max(self._steps, 1)
 
-    def card(self, episode: Episode) -> ScoreCard:
-        """Return the card of the run whose steps were added; those that the episode holds are not looked at."""
-        subject, target, motion = self._subjects[0], episode.target_distance, self._motion
+    def card(
+        self,
+        *,
+        controller: str,
+        detector: str,
+        seed: int,
+        seconds: float,
+        contacts: Contacts,
+        wall_seconds: float,
+        target_distance: float | None = None,
+    ) -> ScoreCard:
+        """Return the card of the run whose steps were added; the parameters are the attributes of `Episode`."""
+        subject, target, motion = self._subjects[0], target_distance, self._motion
         errors, gaps = np.array(subject.pixel_errors, float), subject.gaps
         detect_ms, render_ms = np.array(self._detect_ms, float), np.array(self._render_ms, float)
         least = subject.distances.least
         return ScoreCard(
-            scenario=episode.scenario.name,
-            controller=episode.controller,
-            detector=episode.detector,
-            seed=episode.seed,
-            seconds=round(episode.seconds, 6),
-            scenario_hash=scenario_hash(episode.scenario),
+            scenario=self._scenario.name,
+            controller=controller,
+            detector=detector,
+            seed=seed,
+            seconds=round(seconds, 6),
+            scenario_hash=scenario_hash(self._scenario),
             code_version=code_version(),
             target_m=target,
             kept_m=None if target is None else subject.kept(target),
-            success=self._success(episode, subject),
+            success=self._success(contacts, subject),
             frames=self._frames,
             first_detection_s=subject.first_detection,
             in_view=_share(subject.in_view, subject.frames),
@@ -142,8 +144,8 @@ class Scorer:
             intrusion_intimate=self._intrusion(Zone.INTIMATE),
             intrusion_personal=self._intrusion(Zone.PERSONAL),
             intrusion_social=self._intrusion(Zone.SOCIAL),
-            contacts_person=episode.contacts.person,
-            contacts_wall=episode.contacts.wall,
+            contacts_person=contacts.person,
+            contacts_wall=contacts.wall,
             lost=len(gaps),
             found_again=_share(sum(gap <= self._criteria.found_within_s for gap in gaps), len(gaps)),
             time_to_find_again_s=_share(sum(gaps), len(gaps)),
@@ -159,13 +161,13 @@ class Scorer:
             detect_ms_p95=_percentile(detect_ms, 95),
             detect_ms_mean=_share(float(detect_ms.sum()), len(detect_ms)),
             render_ms_p50=_percentile(render_ms, 50),
-            real_time_factor=episode.seconds / episode.wall_seconds if episode.wall_seconds > 0 else 0.0,
+            real_time_factor=seconds / wall_seconds if wall_seconds > 0 else 0.0,
         )
 
-    def _success(self, episode: Episode, subject: Subject) -> bool | None:
+    def _success(self, contacts: Contacts, subject: Subject) -> bool | None:
         if not self._anybody:
             return None
-        if not subject.last_in_view or episode.contacts.person > 0:
+        if not subject.last_in_view or contacts.person > 0:
             return False
         return subject.longest_unseen <= self._criteria.unseen_s
 
@@ -204,12 +206,12 @@ class _Motion:
             self.path_wrong += way if self._after_nobody else 0.0
         if target is not None:
             self._after_nobody = target == NO_PERSON
-        asked = float(step.decision.twist.angular)
+        asked = float(step.log.decision.twist.angular)
         rate = min(max(asked, -self._limit), self._limit) if math.isfinite(asked) else 0.0
         if self._rate is not None:
             self.turn_changes.add(abs(rate - self._rate))
         self._rate = rate
-        self._last.append((step.time, *pose))
+        self._last.append((step.log.time, *pose))
         if len(self._last) == 4:
             self.jerks.add(abs(_jerk(self._last)))
 

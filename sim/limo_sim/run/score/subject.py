@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from limo_hog.follow.zones import Zone, zone_of
-from limo_sim.run.episode import Step
+from limo_sim.run.log import Step
 from limo_sim.run.matching import Criteria
 from limo_sim.sensing.camera import WIDTH
 from limo_sim.world.truth import PersonTruth, Truth
@@ -67,7 +67,7 @@ class Subject:
             return
         self.distances.add(person.distance)
         self.zones[zone_of(person.distance)] += 1
-        self._keeps = step.decision.belief.keeps or self._keeps
+        self._keeps = step.log.decision.belief.keeps or self._keeps
         if self._keeps is None:
             self._unsaid.add(person.surface_distance)
         else:
@@ -93,10 +93,10 @@ class Subject:
             self.detected += found
             self.pixel_errors.append(abs(box[0] + box[2] / 2 - WIDTH / 2))
             if self._seen_at is not None:
-                self.longest_unseen = max(self.longest_unseen, step.time - self._seen_at)
-            self._seen_at = step.time
+                self.longest_unseen = max(self.longest_unseen, step.log.time - self._seen_at)
+            self._seen_at = step.log.time
         hidden = person is not None and person.box is not None and not visible
-        self._search(step.time, targeted, hidden)
+        self._search(step.log.time, targeted, hidden)
 
     def _search(self, time: float, targeted: bool, hidden: bool) -> None:
         if self._last is not None:

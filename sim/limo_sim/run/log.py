@@ -1,0 +1,46 @@
+"""The log of a run: what the follower or a node did in each control period, and the truth beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.pipeline import FrameLog
+from limo_hog.follow.sense.observation import Sensors
+from limo_sim.world.truth import Truth
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One control period in the arena.
+
+    Attributes
+    ----------
+    log
+        What was sensed, found and commanded.
+    truth
+        The arena at `log.time`.
+    seen
+        The arena when the frame was taken; None in a period without a new frame.
+    render_ms
+        Wall time of drawing the frame [ms].
+    windows
+        The pictures that a node shows with `cv2.imshow`, by name: uint8 (H, W, 3) BGR or (H, W).
+    """
+
+    log: FrameLog
+    truth: Truth
+    seen: Truth | None = None
+    render_ms: float = 0.0
+    windows: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+
+    def bare(self) -> Step:
+        """Return the step without images and scans: 4 kB instead of 3 MB."""
+        return replace(self, log=replace(self.log, frame=None, sensors=Sensors()), windows={})
+
+
+#: Is given every control period of a run.
+Watch = Callable[[Step], None]

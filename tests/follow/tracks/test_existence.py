@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.tracks.test_people import NOISE, POSE, a_person, box
+from tests.follow.tracks.people import NOISE, POSE, a_person, box
 from tests.follow.views import FOCAL, HEIGHT, before_wall, flat
 
 from limo_hog.follow.sense.ranging import stands_out, top_row

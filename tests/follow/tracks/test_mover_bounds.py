@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.follow.estimates import upper
-from tests.follow.tracks.test_scan_movers import FREE, GRID, HALF_VIEW, MOVERS, NOISE, person, walker
+from tests.follow.tracks.walkers import FREE, GRID, HALF_VIEW, MOVERS, NOISE, person, walker
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import Measurement

@@ -6,28 +6,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from tests.follow.estimates import upper
+from tests.follow.tracks.walkers import FREE, GRID, HALF_VIEW, MOVERS, NOISE, SCAN_S, legs, person, walker
 from tests.follow.views import look
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.space.grid import Grid
-from limo_hog.follow.tracks.kalman import Noise, Track
 from limo_hog.follow.tracks.legs import Returns
-from limo_hog.follow.tracks.movers import Mover, Movers
-from limo_hog.follow.tracks.person import Person
+from limo_hog.follow.tracks.movers import Mover
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
-
-MOVERS, NOISE, HALF_VIEW, SCAN_S, GRID = Movers(), Noise(), 2.0, 0.125, Grid()
-#: Ground that is free from now on, wherever nothing is.
-FREE = replace(GRID.start(Odometry()), freed=np.full((GRID.cells, GRID.cells), np.inf, np.float32))
-
-
-def legs(x: float, y: float, phase: float) -> list[tuple[float, float]]:
-    """Three returns of each of two shins, of which one stands while the other swings."""
-    swing = 0.15 * math.sin(phase)
-    return [(x + side * swing, y + side * 0.06 + d) for side in (-1, 1) for d in (-0.02, 0.0, 0.02)]
 
 
 def walk(start: tuple[float, float], velocity: tuple[float, float], scans: int) -> tuple[Mover, ...]:
@@ -115,12 +102,6 @@ def test_what_the_camera_has_shown_for_long_is_counted() -> None:
     assert movers[0].shown == movers[0].scans - 1
 
 
-def person(number: int, x: float, y: float, stamp: float) -> Person:
-    """Someone found by the camera at a stamp."""
-    track = Track(stamp, (x, y, 0.0, 0.0), upper(np.diag([0.04, 0.04, 0.5, 0.5])))
-    return Person(number, track, stamp, 5.0, 400.0, 0.0, confirmed=True)
-
-
 def test_the_legs_of_a_person_continue_the_track_that_the_camera_does_not_show() -> None:
     known = person(7, 1.55, 0.05, 0.875)
     movers = MOVERS.assign(walk((1.5, -0.4), (0.0, 0.5), 8), [known], 0.875)
@@ -179,12 +160,6 @@ def test_legs_that_begin_to_walk_where_a_lost_person_can_be_are_theirs_unless_an
         tracks = Tracks(people, scans=(scan,), stamp=1.0, movers=walk((1.5, -0.4), (0.0, 0.5), 8), moved_at=0.875)
         after = Tracker().follow_movers(tracks, HALF_VIEW, 0.5, GRID, FREE)
         assert (after.people[0].felt == 1.0) == found
-
-
-def walker(number: int | None, x: float, y: float) -> Mover:
-    """Legs that walk, of the person of a number."""
-    track = Track(1.0, (x, y, 0.0, 0.0), upper(np.diag([0.01, 0.01, 0.1, 0.1])))
-    return Mover(track, (x - 1.0, y), 0.0, 1.0, left=True, scans=9, number=number, named=0.0)
 
 
 def test_a_person_keeps_their_own_legs_where_one_box_lies_between_two_who_pass_each_other() -> None:

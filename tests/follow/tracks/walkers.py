@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from tests.follow.estimates import upper
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks.kalman import Noise, Track
@@ -44,3 +45,17 @@ def update(
     """What moves after a scan of a robot that stands and sees ±115°."""
     returns = Returns(stamp, np.array(points).reshape(-1, 2), Odometry())
     return MOVERS.update(movers, returns, HALF_VIEW, NOISE, GRID, ground)
+
+
+def walk(start: tuple[float, float], velocity: tuple[float, float], scans: int) -> tuple[Mover, ...]:
+    """What moves after so many scans of a robot that stands, with a wall 3 m to its left; it sees ±115°."""
+    movers: tuple[Mover, ...] = ()
+    wall = [(0.05 * step - 3.0, 3.0) for step in range(120)]
+    for index in range(scans):
+        time = index * SCAN_S
+        x, y = start[0] + velocity[0] * time, start[1] + velocity[1] * time
+        shown = abs(math.atan2(y, x - LIMO.lidar_x)) < HALF_VIEW
+        # In the order of the beams.
+        points = sorted(legs(x, y, 9.0 * time) * shown + wall, key=lambda one: math.atan2(one[1], one[0]))
+        movers = update(movers, time, *points)
+    return movers

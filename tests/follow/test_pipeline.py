@@ -2,70 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from tests.follow.loop import REGION, Loop
+from tests.follow.views import flat, scan, scan_of
 
-import numpy as np
-from numpy.typing import NDArray
-from tests.follow.views import boxes, flat, scan, scan_of
-
-from limo_hog.detections import Detections
-from limo_hog.follow import Decision, Follower, Mode, Observation, Odometry, Region, Sensors, Twist
-
-IMAGE = np.full((480, 640, 3), 90, np.uint8)
-SENSORS = Sensors(448.6, None, scan())
-REGION = Region(96, 32, 208, 192, 150.0)
+from limo_hog.follow import Decision, Mode, Odometry, Sensors, Twist
 
 
-@dataclass
-class Detector:
-    """Finds one box, or raises what it is given; notes the size of what it is shown."""
-
-    fails: Exception | None = None
-    shown: list[tuple[int, ...]] = field(default_factory=list)
-
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        self.shown.append(image.shape)
-        if self.fails is not None:
-            raise self.fails
-        return boxes((10, 20, 64, 128))
-
-
-@dataclass
-class Driver:
-    """Drives on, asks for a region, and notes what it is told."""
-
-    told: list[Observation] = field(default_factory=list)
-
-    def start(self) -> int:
-        return 0
-
-    def step(self, observation: Observation, state: int) -> Decision[int]:
-        self.told.append(observation)
-        return Decision(Twist(0.5, 0.1), state + 1, Mode.FOLLOW, f"step {state}", 0, REGION)
-
-
-def test_the_region_a_decision_asks_for_is_searched_in_the_next_image_and_boxes_are_in_the_whole() -> None:
-    detector, driver = Detector(), Driver()
-    follower = Follower(driver, detector)
-    first, second = follower.see(0.0, IMAGE, SENSORS), follower.see(0.1, IMAGE, SENSORS)
-    assert detector.shown == [(480, 640, 3), (192, 208, 3)]
+def test_the_region_asked_for_is_searched_next_and_boxes_are_in_the_whole_image() -> None:
+    loop = Loop()
+    first, second = loop.frame(0.0), loop.frame(0.1)
+    assert loop.shown == [(480, 640, 3), (192, 208, 3)]
     assert (first.region, second.region) == (None, REGION)
     assert second.detections.boxes.tolist() == [[106, 52, 64, 128]]
-    assert driver.told[1].region == REGION
+    assert loop.told[1].region == REGION
+    assert first.detect_ms > 0
 
 
 def test_the_state_is_kept_from_image_to_image_and_is_not_handed_out() -> None:
-    follower = Follower(Driver(), Detector())
-    reasons = [follower.see(0.1 * k, IMAGE, SENSORS).decision.reason for k in range(3)]
-    assert reasons == ["step 0", "step 1", "step 2"]
-    assert follower.see(0.3, IMAGE, SENSORS).decision.state is None
+    loop = Loop()
+    decisions = [loop.frame(0.1 * k).decision for k in range(3)]
+    assert [one.reason for one in decisions] == ["step 0", "step 1", "step 2"]
+    assert decisions[-1].state is None
 
 
 def test_the_controller_is_told_what_the_sensors_say() -> None:
-    driver = Driver()
+    loop = Loop()
     depth, turn, odometry = flat(3.0), scan(stamp=4.9), Odometry(4.95, 1.0)
-    Follower(driver, Detector()).see(5.0, IMAGE, Sensors(400.0, depth, turn, odometry))
-    told = driver.told[0]
+    loop.frame(5.0, Sensors(400.0, depth, turn, odometry))
+    told = loop.told[0]
     assert (told.stamp, told.width, told.height, told.focal_px) == (5.0, 640, 480, 400.0)
     assert told.depth is depth
     assert told.scan is turn
@@ -75,56 +39,46 @@ def test_the_controller_is_told_what_the_sensors_say() -> None:
 
 
 def test_a_detector_that_raises_stops_the_robot_and_the_next_image_is_searched_whole() -> None:
-    detector, driver = Detector(), Driver()
-    follower = Follower(driver, detector)
-    follower.see(0.0, IMAGE, SENSORS)
-    detector.fails = RuntimeError("the GPU fell off the bus")
-    failed = follower.see(0.1, IMAGE, SENSORS)
+    loop = Loop()
+    loop.frame(0.0)
+    loop.fails = RuntimeError("the GPU fell off the bus")
+    failed = loop.frame(0.1)
     assert failed.decision == Decision(Twist(), None, Mode.BLOCKED, "the detector failed: the GPU fell off the bus")
     assert failed.failure == failed.decision.reason
     assert len(failed.detections) == 0
-    detector.fails = None
-    again = follower.see(0.2, IMAGE, SENSORS)
+    loop.fails = None
+    again = loop.frame(0.2)
     assert again.failure == ""
     assert again.decision.twist == Twist(0.5, 0.1)
-    assert detector.shown[-1] == (480, 640, 3)
-    assert len(driver.told) == 2
+    assert loop.shown[-1] == (480, 640, 3)
+    assert len(loop.told) == 2
 
 
 def test_every_command_passes_the_safety_layer() -> None:
-    blocked = Follower(Driver(), Detector()).see(0.0, IMAGE, Sensors(448.6, None, scan_of([(0.6, 0.0)])))
-    assert blocked.decision.twist == Twist(0.0, 0.1)
-    assert blocked.decision.mode is Mode.BLOCKED
+    blocked = Loop().frame(0.0, Sensors(448.6, None, scan_of([(0.6, 0.0)]))).decision
+    assert (blocked.twist, blocked.mode) == (Twist(0.0, 0.1), Mode.BLOCKED)
+    # Before the first image the robot stands.
+    early = Loop().between(0.0)
+    assert (early.twist, early.mode) == (Twist(), Mode.BLOCKED)
 
 
 def test_between_images_a_newer_scan_counts_and_the_region_stays() -> None:
-    detector = Detector()
-    follower = Follower(Driver(), detector)
-    follower.see(0.0, IMAGE, SENSORS)
-    assert follower.recheck(0.1, scan(stamp=0.1), None).twist == Twist(0.5, 0.1)
-    stopped = follower.recheck(0.2, scan_of([(0.6, 0.0)], 0.2), None)
+    loop = Loop()
+    loop.frame(0.0)
+    assert loop.between(0.1).twist == Twist(0.5, 0.1)
+    stopped = loop.between(0.2, scan_of([(0.6, 0.0)], 0.2))
     assert stopped.twist == Twist(0.0, 0.1)
     assert (stopped.target, stopped.region, stopped.state) == (None, None, None)
-    follower.see(0.3, IMAGE, SENSORS)
-    assert detector.shown[-1] == (192, 208, 3)
-
-
-def test_before_the_first_image_the_robot_stands() -> None:
-    decision = Follower(Driver(), Detector()).recheck(0.0, scan(), None)
-    assert (decision.twist, decision.mode) == (Twist(), Mode.BLOCKED)
-
-
-def test_the_time_of_detection_is_told() -> None:
-    assert Follower(Driver(), Detector()).see(0.0, IMAGE, SENSORS).detect_ms > 0
+    loop.frame(0.3)
+    assert loop.shown[-1] == (192, 208, 3)
 
 
 def test_the_scans_between_two_slow_images_come_with_the_second() -> None:
-    driver = Driver()
-    follower = Follower(driver, Detector())
-    follower.see(0.0, IMAGE, SENSORS)
+    loop = Loop()
+    loop.frame(0.0)
     for stamp in (0.1, 0.2):
-        follower.recheck(stamp, scan(stamp=stamp), Odometry(stamp, x=stamp))
-    follower.see(0.3, IMAGE, SENSORS)
-    follower.see(0.4, IMAGE, SENSORS)
-    between = [[(seen.stamp, pose.x) for seen, pose in one.between] for one in driver.told]
+        loop.between(stamp, odometry=Odometry(stamp, x=stamp))
+    loop.frame(0.3)
+    loop.frame(0.4)
+    between = [[(seen.stamp, pose.x) for seen, pose in one.between] for one in loop.told]
     assert between == [[], [(0.1, 0.1), (0.2, 0.2)], []]

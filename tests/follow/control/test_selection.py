@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.tracks.test_identity import IN_RED, WINDOW, at, person
+from tests.follow.tracks.people import IN_RED, WINDOW
+from tests.follow.tracks.wearers import at, person
 
 from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.tracks.identity import Likeness, Traits

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests.follow.estimates import upper
-from tests.follow.tracks.test_scan_movers import person, walker
+from tests.follow.tracks.walkers import person, walker
 from tests.follow.views import flat, look, scan_of
 
 from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingController, Twist

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.tracks.test_people import NOISE, POSE, a_person, box
+from tests.follow.tracks.people import NOISE, POSE, a_person, box
 from tests.follow.views import FOCAL, HEIGHT, before_wall, flat
 
 from limo_hog.follow.sense.ranging import stands_out, top_row
@@ -34,21 +34,6 @@ def after(recall: float, score: float, frames: int, seed: int) -> Person:
     return person
 
 
-def test_evidence_is_the_ratio_of_the_two_densities() -> None:
-    free = replace(EXISTENCE, weight=1.0, most=99.0, least=99.0)
-    for score in (0.2, 0.8, 1.7, 3.0):
-        person = score / 1.3**2 * math.exp(-score / 1.3)
-        clutter = math.exp(-score / 0.5) / 0.5
-        expected = math.log(0.7 * person / (0.2 * clutter))
-        assert free.of_box(replace(box(2.5), score=score), 0.7) == pytest.approx(expected)
-    assert free.of_miss(0.7) == pytest.approx(math.log(0.3 / 0.8))
-
-
-def test_a_miss_never_speaks_for_a_person() -> None:
-    assert EXISTENCE.of_miss(0.05) == 0.0
-    assert EXISTENCE.of_miss(0.98) == -EXISTENCE.least
-
-
 @pytest.mark.parametrize("recall", [0.3, 0.5, 1.0])
 def test_people_are_confirmed_within_four_seconds_however_often_they_are_missed(recall: float) -> None:
     confirmed = [after(recall, 2.5, 40, seed).confirmed for seed in range(100)]
@@ -67,17 +52,6 @@ def test_a_certain_person_survives_a_second_of_misses_and_not_two() -> None:
         if miss == 9:
             assert person.confirmed
     assert not person.confirmed
-
-
-def test_recall_is_learnt_by_size() -> None:
-    learnt = Recall()
-    for frame in range(1000):
-        learnt = EXISTENCE.learn(learnt, 300.0, found=frame % 2 == 0)
-    assert EXISTENCE.recall_of(learnt, 310.0) == pytest.approx(0.5, abs=0.02)
-    assert EXISTENCE.recall_of(learnt, 150.0) == EXISTENCE.recall
-    assert EXISTENCE.is_chance(9, 0.5)
-    assert not EXISTENCE.is_chance(10, 0.5)
-    assert not EXISTENCE.is_chance(5, 0.9)
 
 
 @pytest.mark.parametrize("turn", [-1.2, -0.7, 0.0, 0.7, 1.2])
@@ -114,28 +88,12 @@ def test_the_head_ends_the_outline() -> None:
     assert top_row(depth, BOX, 2.0) == 0
 
 
-@pytest.mark.parametrize("found", [1, 2, 3])
-def test_the_recall_that_is_learnt_is_the_share_of_frames_in_which_the_person_was_found(found: int) -> None:
-    learnt = Recall()
-    for frame in range(2000):
-        learnt = EXISTENCE.learn(learnt, 300.0, found=frame % 4 < found)
-    # A hundred frames are kept in mind, and ten of the recall that is assumed before anything is learnt.
-    expected = (100 * found / 4 + 10 * 0.4) / 110
-    assert EXISTENCE.recall_of(learnt, 300.0) == pytest.approx(expected, abs=0.01)
-
-
 def test_misses_are_counted_since_the_last_box() -> None:
     person, counted = a_person(1, 2.5), []
     for found in (True, False, False, True, False):
         person = EXISTENCE.update(person, 0.0, found=found)
         counted.append(person.misses)
     assert counted == [0, 1, 2, 0, 1]
-
-
-def test_log_odds_are_those_of_a_probability_and_nothing_known_is_one_half() -> None:
-    assert initiate(1, box(2.5), 0.0, POSE, NOISE, UnknownRange()).existence == 0.5
-    assert replace(new(), log_odds=math.log(4.0)).existence == pytest.approx(4 / 5)
-    assert replace(new(), log_odds=-math.log(4.0)).existence == pytest.approx(1 / 5)
 
 
 def frames_until(person: Person, *, found: bool, confirmed: bool) -> int:
@@ -154,36 +112,6 @@ def test_four_clear_frames_confirm_and_fifteen_misses_drop_who_was_certain() -> 
     assert frames_until(a_person(1, 2.5), found=False, confirmed=False) == 15
 
 
-def test_a_track_is_confirmed_from_95_percent_until_it_is_below_27() -> None:
-    for before, confirmed, after_ in (
-        (2.9, False, False),
-        (3.0, False, True),
-        (-1.0, True, True),
-        (-1.01, True, False),
-    ):
-        person = replace(a_person(1, 2.5), log_odds=before, confirmed=confirmed)
-        assert EXISTENCE.update(person, 0.0, found=True).confirmed == after_
-    assert replace(new(), log_odds=3.0).existence == pytest.approx(0.95, abs=0.005)
-    assert replace(new(), log_odds=-1.0).existence == pytest.approx(0.27, abs=0.005)
-
-
-@pytest.mark.parametrize("sign", [-1, 1])
-def test_what_is_certain_is_so_to_five_either_way(sign: int) -> None:
-    person = new()
-    for _ in range(100):
-        person = EXISTENCE.update(person, sign * 0.4, found=True)
-    assert person.log_odds == sign * 5.0
-
-
-def test_of_ten_boxes_that_begin_a_track_one_is_on_a_person() -> None:
-    assert new().existence == pytest.approx(0.1, abs=0.001)
-
-
-def test_a_box_is_flat_whose_surroundings_are_within_two_decimetres_before_or_behind() -> None:
-    for relief, solid in ((None, True), (0.19, False), (0.21, True), (-0.19, False), (-0.21, True), (0.0, False)):
-        assert EXISTENCE.is_solid(replace(box(2.5), stands_out=relief)) == solid
-
-
 @pytest.mark.parametrize(("window", "same"), [(169, 100), (171, 200), (239, 200), (241, 300), (329, 300), (331, 400)])
 def test_people_are_of_one_size_up_to_170_240_and_330_pixels(window: float, same: float) -> None:
     learnt = Recall()
@@ -193,6 +121,39 @@ def test_people_are_of_one_size_up_to_170_240_and_330_pixels(window: float, same
         assert (EXISTENCE.recall_of(learnt, other) > 0.8) == (other == same)
 
 
-def test_a_box_can_take_as_much_as_a_miss_and_no_more() -> None:
-    assert EXISTENCE.of_box(replace(box(2.5), score=0.0), 0.4) == -0.4
-    assert EXISTENCE.of_box(replace(box(2.5), score=9.0), 0.9) == 1.5
+def test_a_surer_box_says_more_and_no_box_or_miss_decides() -> None:
+    scores = (0.0, 0.2, 0.8, 1.7, 3.0, 9.0)
+    told = [EXISTENCE.of_box(replace(box(2.5), score=score), 0.7) for score in scores]
+    assert told == sorted(told)
+    assert told[1] < 0 < told[3]
+    assert (told[0], told[-1]) == (-EXISTENCE.least, EXISTENCE.most)
+    # A miss tells the more the better people are found, and never speaks for a person.
+    missed = [EXISTENCE.of_miss(recall) for recall in (0.05, 0.4, 0.6, 0.98)]
+    assert missed == sorted(missed, reverse=True)
+    assert (missed[0], missed[-1]) == (0.0, -EXISTENCE.least)
+
+
+@pytest.mark.parametrize("found", [1, 2, 3])
+def test_the_recall_is_learnt_of_people_of_a_size_as_the_share_of_frames(found: int) -> None:
+    learnt = Recall()
+    for frame in range(2000):
+        learnt = EXISTENCE.learn(learnt, 300.0, found=frame % 4 < found)
+    # What is assumed before anything is learnt still counts for a little.
+    assert EXISTENCE.recall_of(learnt, 310.0) == pytest.approx(found / 4, abs=0.04)
+    assert EXISTENCE.recall_of(learnt, 150.0) == EXISTENCE.recall
+    assert EXISTENCE.is_chance(9, 0.5)
+    assert not EXISTENCE.is_chance(10, 0.5)
+    assert not EXISTENCE.is_chance(5, 0.9)
+
+
+def test_a_track_is_confirmed_from_95_percent_until_it_is_below_27() -> None:
+    for existence, before, after_ in (
+        (0.94, False, False),
+        (0.96, False, True),
+        (0.28, True, True),
+        (0.26, True, False),
+    ):
+        person = replace(a_person(1, 2.5), log_odds=math.log(existence / (1 - existence)), confirmed=before)
+        assert person.existence == pytest.approx(existence)
+        assert EXISTENCE.update(person, 0.0, found=True).confirmed == after_
+    assert new().existence == pytest.approx(0.1, abs=0.001)

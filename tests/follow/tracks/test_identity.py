@@ -4,45 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
+from tests.follow.tracks.people import IN_GREEN, IN_RED, WINDOW
+from tests.follow.tracks.wearers import at, legs, person
 
 from limo_hog.follow.control.selection import Choice, Selection
-from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.identity import Identity, Likeness, Traits
-from limo_hog.follow.tracks.kalman import Noise
-from limo_hog.follow.tracks.movers import Mover
-from limo_hog.follow.tracks.person import Person
-from limo_hog.follow.tracks.tracker import Tracks
 
 IDENTITY, SELECTION = Identity(), Selection()
-IN_RED: NDArray[np.float64] = np.array([[10.0, 4.0, 10.0], [6.0, 6.0, 9.0]])
-IN_GREEN: NDArray[np.float64] = np.array([[5.0, 10.0, 10.0], [6.0, 6.0, 9.0]])
-WINDOW = 536.0
-
-
-def person(
-    number: int,
-    stamp: float,
-    y: float = 0.0,
-    clothes: NDArray[np.float64] | None = IN_RED,
-    *,
-    tall: float = WINDOW,
-    measured: float | None = None,
-    age: int = 50,
-) -> Person:
-    """Return a confirmed person 2 m ahead, found in the frame of `stamp` unless `measured` says when."""
-    track = kalman.initiate(stamp, 0.0, 2.0, Odometry(), Noise())
-    track = replace(track, mean=(2.0, y, 0.0, 0.0))
-    seen = stamp if measured is None else measured
-    return Person(number, track, seen, 5.0, tall, -120.0, True, age, clothes=clothes, worn=clothes, tall=tall)
-
-
-def at(stamp: float, *people: Person) -> Tracks:
-    """Return the tracks of a frame."""
-    return Tracks(people, stamp=stamp)
 
 
 def followed() -> Likeness:
@@ -67,11 +36,6 @@ def test_a_track_that_goes_over_to_another_shirt_is_not_the_person_any_more() ->
 def test_one_box_of_odd_colours_does_not_lose_the_person() -> None:
     known = IDENTITY.update(followed(), at(1.1, person(1, 1.1, clothes=IN_GREEN)))
     assert known.of(1) > 0.9
-
-
-def legs(one: Person, stamp: float, *, since: float = 0.0) -> Mover:
-    """Return what walks where a person is and has been shown to be their legs since then [s]."""
-    return Mover(one.track, (0.0, 0.0), 0.0, stamp, left=True, number=one.number, named=since)
 
 
 def test_a_person_whose_legs_have_been_the_same_stays_the_person() -> None:
@@ -102,7 +66,7 @@ def test_a_box_beside_another_person_tells_nothing_for_it_may_show_either() -> N
         assert low <= known.of(1) <= high
 
 
-def test_two_alike_side_by_side_hardly_change_places_and_not_at_all_while_each_has_legs_that_go_on() -> None:
+def test_two_alike_side_by_side_hardly_change_places_while_each_has_legs_that_go_on() -> None:
     for apart, low, high in ((0.45, 0.95, 1.0), (0.35, 0.6, 0.8)):
         known = followed()
         for frame in range(11, 111):
@@ -200,7 +164,7 @@ def test_before_one_is_followed_the_one_straight_ahead_and_near_is_meant() -> No
     assert SELECTION.choose(at(0.0, aside, behind, ahead), Choice()).number == 1
 
 
-def test_a_person_who_may_be_the_lost_person_is_looked_at_for_some_seconds_and_then_left() -> None:
+def test_a_person_who_may_be_the_lost_person_is_looked_at_for_some_seconds() -> None:
     def looked(stamp: float, unsure_at: float | None) -> Choice:
         likeness = replace(followed(), chances=((2, 0.3),), at=stamp)
         back = replace(person(2, stamp, clothes=None), tall=None)
@@ -227,3 +191,56 @@ def test_everyone_else_who_is_about_is_remembered_once() -> None:
         others = person(2, stamp, 1.5, IN_GREEN), person(3, stamp, -1.5, IN_GREEN)
         known = IDENTITY.update(known, at(stamp, person(1, stamp), *others))
     assert sorted(one.number for one in known.others) == [2, 3]
+
+
+def test_one_box_never_decides_and_a_track_that_ends_is_doubted_more_and_more() -> None:
+    # However alike or unlike it is, one box is worth a factor of some twelve.
+    unsure = replace(followed(), chances=((1, 0.5),))
+    for clothes, tall, low, high in ((IN_RED, WINDOW, 0.9, 0.93), (IN_RED + 9.0, 2 * WINDOW, 0.07, 0.1)):
+        known = IDENTITY.update(unsure, at(1.1, person(1, 1.1, clothes=clothes, tall=tall, age=1)))
+        assert low < known.of(1) < high
+    known, doubts = followed(), []
+    for frame in range(11, 41):
+        known = IDENTITY.update(known, at(0.1 * frame, person(1, 0.1 * frame, measured=1.0)))
+        doubts.append(1 - known.of(1))
+    assert doubts[0] < 0.01
+    assert doubts == sorted(doubts)
+    assert 0.5 < doubts[-1] < 0.9
+
+
+def test_a_person_who_is_likelier_known_as_another_is_compared_with_that_one() -> None:
+    # Both wear red: the shirt tells nothing.
+    unsure = replace(followed(), chances=((1, 0.5),))
+    known = replace(unsure, others=(Traits(7, IN_RED, WINDOW),))
+    assert IDENTITY.update(known, at(1.1, person(1, 1.1, age=1))).of(1) == pytest.approx(0.5, abs=0.01)
+    # A track that was another person before is compared with that one alone.
+    known = replace(unsure, others=(Traits(7, IN_RED, WINDOW), Traits(1, IN_RED + 9.0, 2 * WINDOW)))
+    assert IDENTITY.update(known, at(1.1, person(1, 1.1, age=1))).of(1) > 0.8
+
+
+def test_of_many_who_were_about_a_track_that_begins_is_the_person_less_likely() -> None:
+    chances = []
+    for others in (0, 1, 6):
+        known = replace(followed(), others=tuple(Traits(100 + index, None, WINDOW) for index in range(others)))
+        begun = replace(person(2, 5.0, clothes=None), tall=None)
+        chances.append(IDENTITY.update(known, at(5.0, begun)).of(2))
+    assert chances == pytest.approx([1 / 2, 1 / 3, 1 / 8], abs=1e-3)
+
+
+def test_where_the_person_is_and_what_they_wear_is_learnt_where_it_is_sure() -> None:
+    dusk = IN_RED - 0.5
+    for chance, learnt in ((0.5, False), (0.999, True)):
+        known = replace(followed(), chances=((1, chance),))
+        after = IDENTITY.update(known, at(1.1, replace(person(1, 1.1, 0.7, dusk), tall=None)))
+        assert (after.at == 1.1) == (after.place == (2.0, 0.7)) == learnt
+        assert after.traits.clothes is not None
+        assert (after.traits.clothes < IN_RED).all() == learnt
+
+
+def test_the_eight_others_seen_last_are_remembered() -> None:
+    crowd = [person(number, 1.1, 2.0 * number) for number in range(2, 13)]
+    known = IDENTITY.update(followed(), at(1.1, person(1, 1.1), *crowd))
+    assert [one.number for one in known.others] == list(range(5, 13))
+    # What is no person yet is nobody else.
+    unknown = replace(crowd[0], confirmed=False)
+    assert IDENTITY.update(followed(), at(1.1, person(1, 1.1), unknown)).others == ()

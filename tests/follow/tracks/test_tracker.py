@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests.follow.estimates import upper
-from tests.follow.tracks.test_people import IN_GREEN, IN_RED, NOISE, POSE, WINDOW, a_person, box
-from tests.follow.tracks.test_scan_movers import FREE, GRID, person, walker
+from tests.follow.tracks.people import IN_GREEN, IN_RED, NOISE, POSE, WINDOW, a_person, box
+from tests.follow.tracks.walkers import FREE, GRID, person, walker
 from tests.follow.views import boxes, flat, look, scan_of
 
 from limo_hog.follow.sense.observation import Observation, Odometry

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.sim.run.steps import commands, figures, keeps_no_steps, watching
 
 from limo_hog.detections import Detections
 from limo_hog.detector import PeopleDetector
@@ -28,8 +29,6 @@ from limo_sim.run.episode import Episode, run_episode
 from limo_sim.run.score import Scorer, score
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
-
-WALL_CLOCK = {"detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor"}
 
 
 class Failing:
@@ -53,25 +52,16 @@ def run(scenario: str, seconds: float, controller: Any = None, detector: Any = N
 
 
 def test_the_same_seed_gives_the_same_score_but_for_the_wall_clock() -> None:
-    one, two = (score(run("followable", 3.0)).to_json() for _ in range(2))
-    for name in WALL_CLOCK:
-        assert one.pop(name) is not None
-        two.pop(name)
+    one, two = (figures(score(run("followable", 3.0))) for _ in range(2))
     assert one == two
-
-
-def test_a_run_that_keeps_no_steps_is_scored_as_it_goes() -> None:
+    # A run that keeps no steps is scored as it goes.
     scenario = Scenario.load("followable")
     scorer = Scorer(scenario)
     short = run_episode(
-        scenario, TrackingController(), detector_named("hog"), 3.0, 0, watch=lambda m: scorer.add(m.step), keep=False
+        scenario, TrackingController(), detector_named("hog"), 3.0, 0, watch=watching(scorer), keep=False
     )
-    assert short.steps == ()
-    one, two = scorer.card(short).to_json(), score(run("followable", 3.0)).to_json()
-    for name in WALL_CLOCK:
-        assert one.pop(name) is not None
-        two.pop(name)
-    assert one == two
+    assert keeps_no_steps(short)
+    assert figures(scorer.card(short)) == one
 
 
 def test_the_clock_figures_are_those_of_the_wall() -> None:
@@ -186,11 +176,11 @@ def test_nobody_is_approached_nearer_than_the_safety_layer_allows() -> None:
 
 def test_a_detector_that_raises_stops_the_robot_until_it_works_again() -> None:
     episode = run("standing", 6.0, detector=Failing())
-    failed = [step for step in episode.steps if "GPU fell off" in step.decision.reason]
+    decisions = [decision for _, _, decision in commands(episode)]
+    failed = [one for one in decisions if "GPU fell off" in one.reason]
     assert len(failed) == 10
-    assert all(step.decision.mode is Mode.BLOCKED and step.decision.twist == Twist() for step in failed)
-    after = [step for step in episode.steps if step.time > failed[-1].time]
-    assert after[-1].decision.mode in (Mode.FOLLOW, Mode.HOLD)
+    assert all(one.mode is Mode.BLOCKED and one.twist == Twist() for one in failed)
+    assert decisions[-1].mode in (Mode.FOLLOW, Mode.HOLD)
 
 
 def test_nobody_is_found_where_nobody_is() -> None:
@@ -200,15 +190,13 @@ def test_nobody_is_found_where_nobody_is() -> None:
     assert result.modes["search"] == 1.0
 
 
-def test_between_two_frames_of_a_slow_camera_a_command_goes_out_every_period_until_the_frame_is_too_old() -> None:
+def test_between_slow_frames_a_command_goes_out_every_period_until_one_is_too_old() -> None:
     standing = Scenario.load("standing")
     slow = dataclasses.replace(standing, camera=dataclasses.replace(standing.camera, rate_hz=1.0))
     episode = run_episode(slow, controller_named("approach"), detector_named("hog"), 3.0, 0)
     ages: dict[float, Any] = {}
-    last = 0.0
-    for step in episode.steps:
-        last = step.frame.truth.stamp if step.frame else last
-        ages.setdefault(round(step.time - last, 1), []).append(step.decision)
+    for _, old, decision in commands(episode):
+        ages.setdefault(round(old, 1), []).append(decision)
     assert sorted(ages) == pytest.approx([0.1 * k for k in range(10)])
     assert all(decision.mode is Mode.FOLLOW for age in (0.0, 0.1, 0.4) for decision in ages[age])
     for age in (0.6, 0.7, 0.8, 0.9):

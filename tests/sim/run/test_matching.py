@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.sim.run.test_score import OFF, ON, card, person, step
+from tests.sim.run.steps import OFF, ON, person
 
-from limo_sim.run.matching import on_person
+from limo_sim.run.matching import on_person, person_of
 from limo_sim.world.truth import PersonTruth
 
 
@@ -46,15 +46,12 @@ def test_the_middle_of_a_box_and_its_height_decide_whom_it_is_on(column: int, ro
 
 def test_a_box_on_two_people_is_on_the_one_in_view_then_on_the_nearer_one() -> None:
     left, right = person(box=(300, 100, 60, 120)), person(box=(320, 100, 60, 120))
-    box = [[285 + 15, 90, 80, 160]]  # its middle, 340, is 10 px from the left one's and 10 from the right one's
 
-    def subject(one: PersonTruth, other: PersonTruth, shift: int) -> float | None:
-        moved = [[box[0][0] + shift, *box[0][1:]]]
-        return card(
-            step(0, replace(one, distance=1.0), replace(other, distance=2.0), boxes=moved, target=0)
-        ).distance_mean_m
+    def on(one: PersonTruth, other: PersonTruth, middle: int) -> int | None:
+        return person_of(np.array([middle - 40, 90, 80, 160], np.int32), (one, other))
 
-    assert subject(left, right, -4) == 1.0
-    assert subject(left, right, 4) == 2.0
-    assert subject(replace(left, visible=0.3), right, -4) == 2.0
-    assert subject(left, replace(right, visible=0.3), 4) == 1.0
+    # Their middles are at 330 and 350.
+    assert (on(left, right, 336), on(left, right, 344)) == (0, 1)
+    for visible, number in ((0.499, 1), (0.5, 0)):
+        assert on(replace(left, visible=visible), replace(right, visible=0.5), 336) == number
+    assert on(left, replace(right, visible=0.3), 344) == 0

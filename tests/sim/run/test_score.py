@@ -9,58 +9,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.sim.run.steps import CAMERA, OFF, ON, TRUNK, add, card, followed, other_person, person, step
 
-from limo_hog.detections import Detections
-from limo_hog.follow.decision import Belief, Decision, Mode
-from limo_hog.follow.twist import Twist
-from limo_sim.run.episode import Episode, FrameRecord, Step
 from limo_sim.run.matching import Criteria
-from limo_sim.run.score import ScoreCard, Scorer, score
+from limo_sim.run.score import Scorer
 from limo_sim.world.scenario import Scenario
-from limo_sim.world.truth import Contacts, PersonTruth, Truth
-
-BOX = (300, 100, 60, 120)
-ON, OFF = [285, 90, 80, 160], [20, 90, 80, 160]
-#: From the robot's centre to the camera, and from a person's surface to the axis [m].
-CAMERA, TRUNK = 0.084, 0.08
-TOUCHED = Contacts(person=1, wall=2)
-
-
-def person(distance: float = 2.0, visible: float = 1.0, box: tuple[int, int, int, int] | None = BOX) -> PersonTruth:
-    return PersonTruth(distance, 0.0, math.pi, distance, 0.0, distance - CAMERA - TRUNK, visible, box)
-
-
-def other_person(box: tuple[int, int, int, int] = (20, 100, 60, 120)) -> PersonTruth:
-    return replace(person(), box=box)
-
-
-def step(
-    number: int,
-    *people: PersonTruth | None,
-    boxes: list[list[int]] | None = None,
-    target: int | None = None,
-    at: float = 0.0,
-    robot: tuple[float, float, float] | None = None,
-    turn: float | None = None,
-    detect_ms: float = 2.0,
-    render_ms: float = 1.0,
-) -> Step:
-    truth = Truth(0.1 * number, robot or (at, 0.0, 0.0), people, Contacts(0, 0))
-    found = Detections.none() if not boxes else Detections(np.array(boxes, np.int32), np.arange(len(boxes), 0.0, -1.0))
-    twist = Twist(0.0, 0.1 * number if turn is None else turn)
-    decision = Decision(twist, None, Mode.FOLLOW, "because", target)
-    return Step(0.1 * number, truth, decision, FrameRecord(truth, found, None, detect_ms, render_ms))
-
-
-def card(*steps: Step, target: float | None = 1.5, contacts: Contacts = TOUCHED) -> ScoreCard:
-    scenario = Scenario.load("two_people")
-    episode = Episode(scenario, "c", "d", 0, 0.1 * len(steps), steps, contacts, 0.5, target)
-    return score(episode)
+from limo_sim.world.truth import Contacts
 
 
 def test_fractions_begin_when_the_person_is_first_in_view() -> None:
     unseen = [step(k, person(visible=0.0, box=None)) for k in range(5)]
-    seen = [step(k, person(), boxes=[ON], target=0) for k in range(5, 8)]
+    seen = [followed(k) for k in range(5, 8)]
     gone = [step(8, person(visible=0.1))]
     result = card(*unseen, *seen, *gone)
     assert result.in_view == 0.75
@@ -71,15 +30,14 @@ def test_fractions_begin_when_the_person_is_first_in_view() -> None:
 def test_a_score_as_the_run_goes_needs_12_bytes_a_frame() -> None:
     scorer = Scorer(Scenario.load("two_people"))
 
-    def add(first: int, last: int) -> int:
-        for k in range(first, last):
-            scorer.add(step(k, person(), boxes=[ON], target=0))
+    def memory_after(first: int, last: int) -> int:
+        add(scorer, (followed(k) for k in range(first, last)))
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
     try:
-        before = add(0, 1000)
-        grown = add(1000, 5000) - before
+        before = memory_after(0, 1000)
+        grown = memory_after(1000, 5000) - before
     finally:
         tracemalloc.stop()
     # an array is made larger by up to a sixteenth more than it needs
@@ -127,8 +85,8 @@ def test_the_distance_error_is_to_what_the_controller_keeps_at_the_time() -> Non
     kept = (None, None, 2.0, None, 3.0)
     surfaces = (1.0, 1.2, 1.9, 2.3, 2.5)
     steps = [
-        replace(one, decision=replace(one.decision, belief=Belief(keeps)))
-        for one, keeps in zip((step(k, person(d + CAMERA + TRUNK)) for k, d in enumerate(surfaces)), kept, strict=True)
+        step(k, person(surface + CAMERA + TRUNK), keeps=keeps)
+        for k, (surface, keeps) in enumerate(zip(surfaces, kept, strict=True))
     ]
     result = card(*steps, target=1.5)
     held = (1.5, 1.5, 2.0, 2.0, 3.0)
@@ -250,8 +208,7 @@ def test_a_turn_rate_that_is_no_number_counts_as_none() -> None:
 def test_driving_is_the_share_of_the_steps_whose_command_moves_the_robot() -> None:
     scorer = Scorer(Scenario.load("two_people"))
     assert scorer.driving == 0.0
-    for k, turn in enumerate((0.0, 0.5, 0.2, 0.0)):
-        scorer.add(step(k, turn=turn))
+    add(scorer, (step(k, turn=turn) for k, turn in enumerate((0.0, 0.5, 0.2, 0.0))))
     assert scorer.driving == 2 / 4
 
 
@@ -272,16 +229,17 @@ def test_the_shortest_logs_have_finite_figures(count: int) -> None:
 
 @pytest.mark.parametrize("yaw", [0.0, 0.8, math.pi, -2.0])
 def test_jerk_is_the_third_derivative_of_the_distance_driven(yaw: float) -> None:
-    def placed(k: int, distance: float) -> Step:
-        return step(k, robot=(distance * math.cos(yaw), distance * math.sin(yaw), yaw))
+    def jerk(*distances: float) -> float | None:
+        way = [(driven * math.cos(yaw), driven * math.sin(yaw), yaw) for driven in distances]
+        return card(*(step(k, robot=place) for k, place in enumerate(way))).jerk_mean
 
-    steady = [placed(k, 0.3 * 0.1 * k) for k in range(20)]
-    speeding = [placed(k, 0.5 * 0.4 * (0.1 * k) ** 2) for k in range(20)]
-    jerked = [placed(k, 6.0 * (0.1 * k) ** 3 / 6) for k in range(20)]
-    assert card(*steady).jerk_mean == pytest.approx(0.0, abs=1e-9)
-    assert card(*speeding).jerk_mean == pytest.approx(0.0, abs=1e-9)
-    assert card(*jerked).jerk_mean == pytest.approx(6.0)
-    assert card(*(placed(k, -6.0 * (0.1 * k) ** 3 / 6) for k in range(20))).jerk_mean == pytest.approx(6.0)
+    times = [0.1 * k for k in range(20)]
+    assert jerk(*(0.3 * t for t in times)) == pytest.approx(0.0, abs=1e-9)
+    assert jerk(*(0.2 * t**2 for t in times)) == pytest.approx(0.0, abs=1e-9)
+    assert jerk(*(t**3 for t in times)) == jerk(*(-(t**3) for t in times)) == pytest.approx(6.0)
+    # Pushes that come late in the run count as those that come early.
+    pushes = np.cumsum([0.1] * 8 + [0.1, 0.15, 0.3, 0.3, 0.1, 0.4])
+    assert jerk(*pushes) == pytest.approx(np.abs(np.diff(pushes, 3)).mean() / 0.1**3)
 
 
 def test_percentiles_and_means_of_the_wall_clock() -> None:
@@ -343,10 +301,17 @@ def test_driving_counts_as_wrong_from_a_target_that_is_no_person_to_one_that_is(
 
 def test_a_run_fails_only_beyond_the_time_unseen_that_the_criteria_allow() -> None:
     steps = [step(k, person(visible=float(k not in (2, 3)))) for k in range(6)]
-    episode = Episode(Scenario.load("two_people"), "c", "d", 0, 0.6, tuple(steps), Contacts(0, 0), 0.5)
-    assert score(episode, Criteria(unseen_s=0.31)).success is True
-    assert score(episode, Criteria(unseen_s=0.29)).success is False
+    for unseen_s, success in ((0.31, True), (0.29, False)):
+        assert card(*steps, contacts=Contacts(), criteria=Criteria(unseen_s=unseen_s)).success is success
     # From .5 s to 1 s, and no longer than allowed.
     steps = [step(k, person(visible=float(not 5 < k < 10))) for k in range(11)]
-    episode = replace(episode, seconds=1.1, steps=tuple(steps))
-    assert score(episode, Criteria(unseen_s=0.5)).success is True
+    assert card(*steps, contacts=Contacts(), criteria=Criteria(unseen_s=0.5)).success is True
+
+
+def test_frames_are_counted_and_periods_without_one_are_not() -> None:
+    assert card(*(step(k, person(), frame=k != 2) for k in range(5))).frames == 4
+
+
+@pytest.mark.parametrize(("visible", "share"), [(0.5, 1.0), (0.499, 0.5)])
+def test_a_person_is_in_view_of_whom_half_is_visible(visible: float, share: float) -> None:
+    assert card(step(0, person()), step(1, person(visible=visible))).in_view == share

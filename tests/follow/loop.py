@@ -1,0 +1,55 @@
+"""The follower's loop with a detector and a driver that are made up. Tests call `Follower` here alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from tests.follow.views import boxes, scan
+
+from limo_hog.detections import Detections
+from limo_hog.follow import Decision, Follower, Mode, Observation, Odometry, Region, Sensors, Twist
+from limo_hog.follow.pipeline import Sighting
+from limo_hog.follow.sense.observation import Scan
+
+IMAGE = np.full((480, 640, 3), 90, np.uint8)
+SENSORS = Sensors(448.6, None, scan())
+REGION = Region(96, 32, 208, 192, 150.0)
+
+
+@dataclass
+class Loop:
+    """A follower whose detector finds one box and whose driver drives on and asks for a region.
+
+    `shown` are the sizes of the images that were searched, `told` what the driver was told; where `fails` is set the
+    detector raises it.
+    """
+
+    fails: Exception | None = None
+    shown: list[tuple[int, ...]] = field(default_factory=list)
+    told: list[Observation] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._follower = Follower(self, self)
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        self.shown.append(image.shape)
+        if self.fails is not None:
+            raise self.fails
+        return boxes((10, 20, 64, 128))
+
+    def start(self) -> int:
+        return 0
+
+    def step(self, observation: Observation, state: int) -> Decision[int]:
+        self.told.append(observation)
+        return Decision(Twist(0.5, 0.1), state + 1, Mode.FOLLOW, f"step {state}", 0, REGION)
+
+    def frame(self, now: float, sensors: Sensors = SENSORS) -> Sighting:
+        """What comes of an image."""
+        return self._follower.see(now, IMAGE, sensors)
+
+    def between(self, now: float, turn: Scan | None = None, odometry: Odometry | None = None) -> Decision[None]:
+        """The command of a control period without an image; the lidar hits nothing unless `turn` says otherwise."""
+        return self._follower.recheck(now, scan(stamp=now) if turn is None else turn, odometry)

@@ -1,0 +1,103 @@
+"""Logs of runs, made up: the scorer's input. Tests build and read the log's records here alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from limo_hog.detections import Detections
+from limo_hog.follow.decision import Belief, Decision, Mode
+from limo_hog.follow.twist import Twist
+from limo_sim.run.episode import Episode, FrameRecord, Moment, Step
+from limo_sim.run.matching import Criteria
+from limo_sim.run.score import ScoreCard, Scorer, score
+from limo_sim.world.scenario import Scenario
+from limo_sim.world.truth import Contacts, PersonTruth, Truth
+
+#: A person's silhouette in the image, a box on it and one that is on nobody [px].
+BOX = (300, 100, 60, 120)
+ON, OFF = [285, 90, 80, 160], [20, 90, 80, 160]
+#: From the robot's centre to the camera, and from a person's surface to the axis [m].
+CAMERA, TRUNK = 0.084, 0.08
+TOUCHED = Contacts(person=1, wall=2)
+#: Figures of a card that differ from run to run.
+WALL_CLOCK = {"detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor"}
+
+
+def person(distance: float = 2.0, visible: float = 1.0, box: tuple[int, int, int, int] | None = BOX) -> PersonTruth:
+    return PersonTruth(distance, 0.0, math.pi, distance, 0.0, distance - CAMERA - TRUNK, visible, box)
+
+
+def other_person(box: tuple[int, int, int, int] = (20, 100, 60, 120)) -> PersonTruth:
+    return replace(person(), box=box)
+
+
+def step(
+    number: int,
+    *people: PersonTruth | None,
+    boxes: list[list[int]] | None = None,
+    target: int | None = None,
+    time: float | None = None,
+    at: float = 0.0,
+    robot: tuple[float, float, float] | None = None,
+    turn: float | None = None,
+    keeps: float | None = None,
+    detect_ms: float = 2.0,
+    render_ms: float = 1.0,
+    frame: bool = True,
+) -> Step:
+    """A control period, at a tenth of a second times its number unless `time` says when [s]."""
+    truth = Truth(0.1 * number, robot or (at, 0.0, 0.0), people, Contacts(0, 0))
+    found = Detections.none() if not boxes else Detections(np.array(boxes, np.int32), np.arange(len(boxes), 0.0, -1.0))
+    twist = Twist(0.0, 0.1 * number if turn is None else turn)
+    decision = Decision(twist, None, Mode.FOLLOW, "because", target, belief=Belief(keeps))
+    record = FrameRecord(truth, found, None, detect_ms, render_ms) if frame else None
+    return Step(0.1 * number if time is None else time, truth, decision, record)
+
+
+def followed(number: int, time: float | None = None) -> Step:
+    """A step in which the person is found and followed."""
+    return step(number, person(), boxes=[ON], target=0, time=time)
+
+
+def card(
+    *steps: Step, target: float | None = 1.5, contacts: Contacts = TOUCHED, criteria: Criteria | None = None
+) -> ScoreCard:
+    """The score card of these steps."""
+    scenario = Scenario.load("two_people")
+    episode = Episode(scenario, "c", "d", 0, 0.1 * len(steps), steps, contacts, 0.5, target)
+    return score(episode) if criteria is None else score(episode, criteria)
+
+
+def add(scorer: Scorer, steps: Iterable[Step]) -> None:
+    for one in steps:
+        scorer.add(one)
+
+
+def watching(scorer: Scorer) -> Callable[[Moment], None]:
+    """What a run is to be watched by, so that the scorer measures it as it goes."""
+    return lambda moment: scorer.add(moment.step)
+
+
+def keeps_no_steps(episode: Episode) -> bool:
+    return episode.steps == ()
+
+
+def commands(episode: Episode) -> Iterator[tuple[float, float, Decision[Any]]]:
+    """Every command of a run: when it was sent, the age of the frame that it is of [s], and what it says."""
+    taken = 0.0
+    for one in episode.steps:
+        taken = one.frame.truth.stamp if one.frame else taken
+        yield one.time, one.time - taken, one.decision
+
+
+def figures(card: ScoreCard) -> dict[str, Any]:
+    """What a card says but for the wall clock's figures, which are there."""
+    told = card.to_json()
+    for name in WALL_CLOCK:
+        assert told.pop(name) is not None
+    return told

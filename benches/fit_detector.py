@@ -294,7 +294,7 @@ def plain(frames: Sequence[tuple[Truth, Detections]]) -> Iterator[Sighting]:
 def with_model(frames: Sequence[tuple[Truth, Detections]], model: str, seed: int) -> Iterator[Sighting]:
     """Yield the same with a scenario's `[detector] model` on."""
     detector, newest = Again(), frames[0][0]
-    scenario = Scenario(name=model, people=(Person(),), detector=DetectorFaults(model=model))
+    scenario = Scenario(name=model, people=(Person(route=((2.0, 0.0, 3600.0),)),), detector=DetectorFaults(model=model))
     search = FaultySearch(scenario, seed, lambda: newest)
     changed = []
     for truth, found in frames:

@@ -11,8 +11,7 @@ from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.arena import Arena
 from limo_sim.run.baselines import controller_of
 from limo_sim.run.catalogue import load
-from limo_sim.run.episode import run_episode
-from limo_sim.run.score import score
+from limo_sim.run.episode import run_episode, score
 from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 
 SCENARIOS = sorted((Path(__file__).parents[2] / "examples" / "arena").glob("*.toml"))

@@ -9,12 +9,23 @@ from numpy.typing import NDArray
 from tests.follow.views import boxes, scan
 
 from limo_hog.detections import Detections
-from limo_hog.follow import Decision, Follower, Mode, Observation, Odometry, Region, Sensors, Twist
-from limo_hog.follow.pipeline import Sighting
-from limo_hog.follow.sense.observation import Scan
+from limo_hog.follow import (
+    Decision,
+    Follower,
+    Frame,
+    FrameLog,
+    Mode,
+    Observation,
+    Odometry,
+    Region,
+    Scan,
+    Sensors,
+    Twist,
+)
 
 IMAGE = np.full((480, 640, 3), 90, np.uint8)
-SENSORS = Sensors(448.6, None, scan())
+SENSORS = Sensors(scan())
+FOCAL_PX = 448.6
 REGION = Region(96, 32, 208, 192, 150.0)
 
 
@@ -46,10 +57,17 @@ class Loop:
         self.told.append(observation)
         return Decision(Twist(0.5, 0.1), state + 1, Mode.FOLLOW, f"step {state}", 0, REGION)
 
-    def frame(self, now: float, sensors: Sensors = SENSORS) -> Sighting:
+    def tick(self, now: float, frame: Frame | None, sensors: Sensors = SENSORS) -> FrameLog | None:
+        return self._follower.tick(now, frame, sensors)
+
+    def frame(self, now: float, sensors: Sensors = SENSORS, depth: NDArray[np.float32] | None = None) -> FrameLog:
         """What comes of an image."""
-        return self._follower.see(now, IMAGE, sensors)
+        log = self.tick(now, Frame(now, IMAGE, FOCAL_PX, depth), sensors)
+        assert log is not None
+        return log
 
     def between(self, now: float, turn: Scan | None = None, odometry: Odometry | None = None) -> Decision[None]:
         """The command of a control period without an image; the lidar hits nothing unless `turn` says otherwise."""
-        return self._follower.recheck(now, scan(stamp=now) if turn is None else turn, odometry)
+        log = self.tick(now, None, Sensors(scan(stamp=now) if turn is None else turn, odometry))
+        assert log is not None
+        return log.decision

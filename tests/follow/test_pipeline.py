@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tests.follow.loop import REGION, Loop
+from tests.follow.loop import FOCAL_PX, IMAGE, REGION, Loop
 from tests.follow.views import flat, scan, scan_of
 
-from limo_hog.follow import Decision, Mode, Odometry, Sensors, Twist
+from limo_hog.follow import Decision, Frame, Mode, Odometry, Sensors, Twist
 
 
 def test_the_region_asked_for_is_searched_next_and_boxes_are_in_the_whole_image() -> None:
@@ -28,9 +28,9 @@ def test_the_state_is_kept_from_image_to_image_and_is_not_handed_out() -> None:
 def test_the_controller_is_told_what_the_sensors_say() -> None:
     loop = Loop()
     depth, turn, odometry = flat(3.0), scan(stamp=4.9), Odometry(4.95, 1.0)
-    loop.frame(5.0, Sensors(400.0, depth, turn, odometry))
+    loop.frame(5.0, Sensors(turn, odometry), depth)
     told = loop.told[0]
-    assert (told.stamp, told.width, told.height, told.focal_px) == (5.0, 640, 480, 400.0)
+    assert (told.stamp, told.width, told.height, told.focal_px) == (5.0, 640, 480, FOCAL_PX)
     assert told.depth is depth
     assert told.scan is turn
     assert told.odometry is odometry
@@ -55,7 +55,7 @@ def test_a_detector_that_raises_stops_the_robot_and_the_next_image_is_searched_w
 
 
 def test_every_command_passes_the_safety_layer() -> None:
-    blocked = Loop().frame(0.0, Sensors(448.6, None, scan_of([(0.6, 0.0)]))).decision
+    blocked = Loop().frame(0.0, Sensors(scan_of([(0.6, 0.0)]))).decision
     assert (blocked.twist, blocked.mode) == (Twist(0.0, 0.1), Mode.BLOCKED)
     # Before the first image the robot stands.
     early = Loop().between(0.0)
@@ -82,3 +82,18 @@ def test_the_scans_between_two_slow_images_come_with_the_second() -> None:
     loop.frame(0.4)
     between = [[(seen.stamp, pose.x) for seen, pose in one.between] for one in loop.told]
     assert between == [[], [(0.1, 0.1), (0.2, 0.2)], []]
+
+
+def test_a_period_begins_with_a_new_image_and_a_tenth_of_a_second_after_the_last() -> None:
+    loop, first, second = Loop(), Frame(0.0, IMAGE, FOCAL_PX, None), Frame(0.04, IMAGE, FOCAL_PX, None)
+    ticks = [(0.0, first), (0.02, first), (0.06, second), (0.14, second), (0.16, second), (0.2, None), (0.26, None)]
+    logs = [loop.tick(now, frame) for now, frame in ticks]
+    assert [log and (log.time, log.frame) for log in logs] == [
+        *((0.0, first), None, (0.06, second), None, (0.16, None), None, (0.26, None)),
+    ]
+
+
+def test_a_clock_that_was_set_back_begins_a_period() -> None:
+    loop = Loop()
+    loop.frame(100.0)
+    assert loop.tick(3.0, None) is not None

@@ -33,8 +33,8 @@ from limo_hog.follow.control.naming import controller_named
 from limo_sim.ros.apart import run_apart
 from limo_sim.ros.script import score_of
 from limo_sim.run.catalogue import load
-from limo_sim.run.episode import Moment, run_episode
-from limo_sim.run.score import Scorer
+from limo_sim.run.episode import run_episode, score
+from limo_sim.run.log import Step
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
 
@@ -106,22 +106,20 @@ def watch_a_page(seconds: float, seed: int) -> None:
     times, took = array("d", bytes(8 * STEPS)), array("d", bytes(8 * STEPS))
     made, last = 0, [time.thread_time(), 0.0]
     scenario = load("workshop")
-    scorer = Scorer(scenario)
 
     with View(scenario, pace=Pace(0)) as view:
         command = [sys.executable, "-m", "tests.hardening.soak", "clients", "--url", view.url]
         clients = subprocess.Popen(command)
 
-        def watch(moment: Moment) -> None:
+        def watch(step: Step) -> None:
             nonlocal made
-            scorer.add(moment.step)
-            view.watch(moment)
+            view.watch(step)
             now = time.thread_time()
-            times[made], took[made] = moment.step.time, 1e3 * (now - last[0])
+            times[made], took[made] = step.log.time, 1e3 * (now - last[0])
             made, last[0] = made + 1, now
-            if moment.step.time - last[1] >= 10.0:
-                last[1] = moment.step.time
-                rows.append((moment.step.time, *held_mb(), descriptors()))
+            if step.log.time - last[1] >= 10.0:
+                last[1] = step.log.time
+                rows.append((step.log.time, *held_mb(), descriptors()))
                 if len(rows) % 6 == 0:
                     p95 = np.percentile(took[max(0, made - 600) : made], 95)
                     at, mb, files, free, open_ = rows[-1]
@@ -129,8 +127,8 @@ def watch_a_page(seconds: float, seed: int) -> None:
                     print(f"{at:.0f} s: {told}", flush=True)
 
         controller = controller_named("tracking", None)
-        episode = run_episode(scenario, controller, PeopleDetector(), seconds, seed, watch=watch, keep=False)
-        view.end(scorer.card(episode).to_json())
+        episode = run_episode(scenario, controller, PeopleDetector(), seconds, seed, watch=watch)
+        view.end(score(episode).to_json())
         clients.terminate()
         clients.wait()
     warm = [row for row in rows if row[0] > min(WARM_S, seconds / 4)]
@@ -170,22 +168,20 @@ async def read_pages(url: str) -> None:
 def run_a_node(seconds: float, seed: int) -> None:
     """Run a node in a process of its own, and score it as it goes."""
     scenario = load("followable")
-    scorer = Scorer(scenario)
     rows: list[tuple[float, float, float]] = []
 
-    def watch(moment: Moment) -> None:
-        scorer.add(moment.step)
-        if not rows or moment.step.time - rows[-1][0] >= 10.0:
+    def watch(step: Step) -> None:
+        if not rows or step.log.time - rows[-1][0] >= 10.0:
             (node,) = multiprocessing.active_children()
-            rows.append((moment.step.time, held_mb()[0], memory_mb(node.pid or 0)[0]))
+            rows.append((step.log.time, held_mb()[0], memory_mb(node.pid or 0)[0]))
             if len(rows) % 30 == 0:
                 print("{:.0f} s: {:.1f} MB, the node's process {:.1f} MB".format(*rows[-1]), flush=True)
 
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "node.py"
         script.write_text(NODE, encoding="utf-8")
-        ended = run_apart(script, scenario, seconds, seed, watch=watch, pictures=False, keep=False)
-    print(f"{score_of(ended, scorer).frames} frames {ended.failure}")
+        ended = run_apart(script, scenario, seconds, seed, watch=watch, pictures=False)
+    print(f"{score_of(ended).frames} frames {ended.failure}")
     warm = [row for row in rows if row[0] > min(WARM_S, seconds / 4)]
     hours = [row[0] / 3600 for row in warm]
     for name, values in (("here", [row[1] for row in warm]), ("the node's process", [row[2] for row in warm])):

@@ -102,12 +102,12 @@ def test_a_depth_image_in_millimetres_is_read_and_one_of_another_size_is_not_the
 
 def test_until_the_calibration_comes_the_limos_own_focal_length_is_taken() -> None:
     senses = Senses()
-    assert senses.at(0.0, np.zeros((480, 640, 3), np.uint8)).focal_px == pytest.approx(448.6, abs=0.05)
-    assert senses.at(0.0, np.zeros((240, 320, 3), np.uint8)).focal_px == pytest.approx(224.3, abs=0.05)
+    assert senses.frame(0.0, np.zeros((480, 640, 3), np.uint8)).focal_px == pytest.approx(448.6, abs=0.05)
+    assert senses.frame(0.0, np.zeros((240, 320, 3), np.uint8)).focal_px == pytest.approx(224.3, abs=0.05)
     senses.take(messages.camera_info(0.0, 640, 480, 0.0))
     assert senses.focal_px is None
     senses.take(messages.camera_info(0.0, 640, 480, 500.0))
-    assert senses.at(0.0, PICTURE).focal_px == 500.0
+    assert senses.frame(0.0, PICTURE).focal_px == 500.0
 
 
 def test_what_is_no_depth_image_and_no_picture_is_named() -> None:
@@ -139,9 +139,9 @@ def test_the_recorded_command_is_what_drove_the_robot_of_either_type_and_no_othe
 
 def test_a_detector_that_raises_is_a_fault_of_that_frame_and_the_replay_goes_on() -> None:
     done = list(replay(frames(3), Driver(), Failing()))
-    assert [frame.sighting.failure for frame in done] == ["", "the detector failed: out of memory", ""]
-    assert [frame.sighting.decision.twist.linear for frame in done] == [0.2, 0.0, 0.2]
-    assert done[1].sighting.decision.mode is Mode.BLOCKED
+    assert [frame.log.failure for frame in done] == ["", "the detector failed: out of memory", ""]
+    assert [frame.log.decision.twist.linear for frame in done] == [0.2, 0.0, 0.2]
+    assert done[1].log.decision.mode is Mode.BLOCKED
 
 
 def test_the_command_line_counts_the_failures_and_says_the_first(

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tests.sim.logs import kept_in
 from tests.sim.ros.conftest import HEAD, STANDING, node
 from tests.sim.ros.test_run import DRIVE, FOLLOW
 
@@ -21,8 +22,7 @@ from limo_sim.ros import apart
 from limo_sim.ros.apart import run_apart
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.script import Ended, run_script, score_of
-from limo_sim.run.episode import Moment
-from limo_sim.run.score import Scorer
+from limo_sim.run.log import Step
 from limo_sim.world.scenario import Scenario
 
 #: Drives for ten images, then does something else.
@@ -39,18 +39,27 @@ def script(tmp_path: Path) -> Callable[[str], Path]:
     return write
 
 
-def log(ended: Ended) -> list[tuple[object, ...]]:
+def log(steps: list[Step]) -> list[tuple[object, ...]]:
     return [
-        (step.time, step.truth, step.decision, step.seen, step.detections.boxes.tolist())
-        for step in ended.episode.steps
+        (step.log.time, step.truth, step.log.decision, step.seen, step.log.detections.boxes.tolist()) for step in steps
     ]
+
+
+def figures(ended: Ended) -> dict[str, object]:
+    """The card of a run, but for the wall clock's figures."""
+    clock = ("detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor")
+    return {name: value for name, value in score_of(ended).to_json().items() if name not in clock}
 
 
 def test_a_run_apart_is_the_run_in_this_process(script: Callable[[str], Path]) -> None:
     path = script(node(FOLLOW, "self.declare_parameter('target_distance', 1.8)"))
-    here, there = run_script(path, STANDING, 1.5, 3), run_apart(path, STANDING, 1.5, 3)
-    assert log(here) == log(there)
-    assert len(log(there)) > 10
+    here_steps: list[Step] = []
+    there_steps: list[Step] = []
+    here = run_script(path, STANDING, 1.5, 3, watch=kept_in(here_steps))
+    there = run_apart(path, STANDING, 1.5, 3, watch=kept_in(there_steps))
+    assert log(here_steps) == log(there_steps)
+    assert len(there_steps) > 10
+    assert figures(here) == figures(there)
     assert (here.failure, here.asked) == (there.failure, there.asked) == ("", True)
     for name in ("scenario", "controller", "detector", "seed", "seconds", "contacts", "target_distance"):
         assert getattr(here.episode, name) == getattr(there.episode, name), name
@@ -58,17 +67,17 @@ def test_a_run_apart_is_the_run_in_this_process(script: Callable[[str], Path]) -
 
 def test_a_person_who_watches_is_given_the_same_pictures(script: Callable[[str], Path]) -> None:
     path = script(node(FOLLOW))
-    here: list[Moment] = []
-    there: list[Moment] = []
+    here: list[Step] = []
+    there: list[Step] = []
     run_script(path, STANDING, 0.3, watch=here.append)
     run_apart(path, STANDING, 0.3, watch=there.append)
     assert len(here) == len(there)
     for ours, theirs in zip(here, there, strict=True):
-        assert (ours.frame is None) == (theirs.frame is None)
-        assert ours.odometry == theirs.odometry
+        assert (ours.log.frame is None) == (theirs.log.frame is None)
+        assert ours.log.sensors.odometry == theirs.log.sensors.odometry
         assert ours.windows.keys() == theirs.windows.keys()
-        if ours.frame is not None and theirs.frame is not None:
-            assert (ours.frame.image == theirs.frame.image).all()
+        if ours.log.frame is not None and theirs.log.frame is not None:
+            assert (ours.log.frame.image == theirs.log.frame.image).all()
 
 
 @pytest.mark.parametrize(
@@ -89,39 +98,23 @@ def test_a_person_who_watches_is_given_the_same_pictures(script: Callable[[str],
 def test_a_node_that_dies_leaves_its_log_and_a_robot_that_stands(
     script: Callable[[str], Path], body: str, said: str
 ) -> None:
-    ended = run_apart(script(node(THEN + body)), STANDING, 20.0)
+    steps: list[Step] = []
+    after_raising: list[Step] = []
+    ended = run_apart(script(node(THEN + body)), STANDING, 20.0, watch=kept_in(steps))
     assert ended.failure.startswith("node.py ")
     assert said in ended.failure
     assert ended.failure.endswith("; the watchdog stopped the robot")
     assert "\n" not in ended.failure
     # What followed is what follows where a node raises at the same time: the arena is the same one.
-    raised = run_script(script(node(THEN + "raise RuntimeError")), STANDING, 20.0)
-    assert [(step.time, step.truth) for step in ended.episode.steps] == [
-        (step.time, step.truth) for step in raised.episode.steps
-    ]
+    text = THEN + "raise RuntimeError"
+    raised = run_script(script(node(text)), STANDING, 20.0, watch=kept_in(after_raising))
+    assert [(step.log.time, step.truth) for step in steps] == [(step.log.time, step.truth) for step in after_raising]
     assert ended.episode.contacts == raised.episode.contacts
-    assert ended.episode.steps[-1].time == pytest.approx(2.9, abs=0.11)
+    assert steps[-1].log.time == pytest.approx(2.9, abs=0.11)
+    assert figures(ended) == figures(raised)
 
 
-@pytest.mark.parametrize("body", [FOLLOW, DRIVE, THEN + "import os; os._exit(3)"], ids=["finds", "drives", "dies"])
-def test_a_run_that_keeps_no_steps_is_scored_as_it_goes(script: Callable[[str], Path], body: str) -> None:
-    path = script(node(body))
-    scorer = Scorer(STANDING)
-    as_it_goes = run_apart(path, STANDING, 1.5, 3, watch=lambda moment: scorer.add(moment.step), keep=False)
-    assert as_it_goes.episode.steps == ()
-    kept = run_apart(path, STANDING, 1.5, 3)
-    assert len(kept.episode.steps) > 10
-    assert as_it_goes.failure == kept.failure
-    cards = [score_of(as_it_goes, scorer).to_json(), score_of(kept).to_json()]
-    for card in cards:
-        for name in ("detect_ms_p50", "detect_ms_p95", "detect_ms_mean", "render_ms_p50", "real_time_factor"):
-            del card[name]
-    assert cards[0] == cards[1]
-
-
-def test_a_run_that_keeps_no_steps_needs_no_memory_for_them(
-    script: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_memory_of_a_run_does_not_grow(script: Callable[[str], Path], capsys: pytest.CaptureFixture[str]) -> None:
     said = f"""
 import gc, tracemalloc
 self.n = getattr(self, 'n', 0) + 1
@@ -132,17 +125,15 @@ if self.n in (50, 150):
     gc.collect()
     print(tracemalloc.get_traced_memory()[0])
 """
-    scorer = Scorer(STANDING)
     here: list[int] = []
 
-    def watch(moment: Moment) -> None:
-        scorer.add(moment.step)
+    def watch(_: Step) -> None:
         gc.collect()
         here.append(tracemalloc.get_traced_memory()[0])
 
     tracemalloc.start()
     try:
-        run_apart(script(node(said)), STANDING, 15.5, watch=watch, pictures=False, keep=False)
+        run_apart(script(node(said)), STANDING, 15.5, watch=watch, pictures=False)
     finally:
         tracemalloc.stop()
     there = [int(line) for line in capsys.readouterr().out.split()]
@@ -187,7 +178,7 @@ def test_what_a_node_prints_comes_out_here_even_right_before_its_death(
 
 
 def test_a_watcher_that_fails_ends_the_node(script: Callable[[str], Path]) -> None:
-    def full(_: Moment) -> None:
+    def full(_: Step) -> None:
         raise OSError("no space left on device")
 
     with pytest.raises(OSError, match="no space left"):

@@ -11,13 +11,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.sim.logs import kept_in
 from tests.sim.ros.conftest import NOBODY, STANDING, Run, node
 
 from limo_hog.cli.main import main
 from limo_hog.ros2 import names
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.script import run_script, score_of
-from limo_sim.run.episode import Moment
+from limo_sim.run.log import Step
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Person
 
@@ -50,28 +51,27 @@ def test_a_node_that_drives_moves_the_robot(run: Run) -> None:
 
 
 def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
-    moments: list[Moment] = []
-    outcome = run(node(FOLLOW), STANDING, 3.0, watch=moments.append)
+    steps: list[Step] = []
+    outcome = run(node(FOLLOW), STANDING, 3.0, watch=steps.append)
     card = score_of(outcome)
     assert outcome.failure == ""
     assert card.first_detection_s == 0.0
     assert card.detected == 1.0
     assert card.frames == 30
-    person = outcome.episode.steps[-1].truth.people[0]
+    person = steps[-1].truth.people[0]
     assert person is not None
     assert abs(person.bearing) < 0.05
-    shown = [moment for moment in moments if moment.frame is not None]
+    shown = [(step.windows["camera"], step.log.frame.image) for step in steps if step.log.frame is not None]
     assert len(shown) == 30
-    for moment in shown:
-        assert moment.frame is not None
-        np.testing.assert_array_equal(moment.windows["camera"], moment.frame.image)
+    for window, image in shown:
+        np.testing.assert_array_equal(window, image)
 
 
 def test_a_nodes_windows_are_on_the_live_page_under_their_names(run: Run) -> None:
-    moments: list[Moment] = []
-    run(node(FOLLOW), STANDING, 0.2, watch=moments.append)
+    steps: list[Step] = []
+    run(node(FOLLOW), STANDING, 0.2, watch=steps.append)
     with View(STANDING) as view:
-        window = view._pictures(moments[-1])[-1]
+        window = view._pictures(steps[-1])[-1]
     name, _, jpeg = window[1:].partition(b"\n")
     assert (window[:1], name) == (b"w", b"camera")
     picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
@@ -81,8 +81,9 @@ def test_a_nodes_windows_are_on_the_live_page_under_their_names(run: Run) -> Non
 
 def test_the_same_node_gives_the_same_run(run: Run) -> None:
     def log() -> list[tuple[object, ...]]:
-        steps = run(node(FOLLOW), STANDING, 1.0).episode.steps
-        return [(step.time, step.truth.robot, step.decision.twist, step.detections.boxes.tolist()) for step in steps]
+        steps: list[Step] = []
+        run(node(FOLLOW), STANDING, 1.0, watch=kept_in(steps))
+        return [(s.log.time, s.truth.robot, s.log.decision.twist, s.log.detections.boxes.tolist()) for s in steps]
 
     assert log() == log()
 
@@ -176,8 +177,9 @@ def test_a_script_that_waits_without_spinning_is_stopped(run: Run) -> None:
 
 def test_the_watchdog_stops_a_robot_whose_node_falls_silent(run: Run) -> None:
     body = f"self.n = getattr(self, 'n', 0) + 1\nif self.n <= 5:\n    {DRIVE}"
-    outcome = run(node(body))
-    speeds = {step.time: step.truth.robot[0] for step in outcome.episode.steps}
+    steps: list[Step] = []
+    outcome = run(node(body), watch=kept_in(steps))
+    speeds = {step.log.time: step.truth.robot[0] for step in steps}
     assert outcome.world.arena.watchdog_stops == 1
     assert speeds[1.9] - speeds[1.5] == pytest.approx(0.0, abs=1e-6)
 
@@ -373,12 +375,14 @@ def test_images_go_through_cv_bridge_and_back(run: Run) -> None:
 
 
 def test_numpy_seed_and_detections_of_a_frame_belong_together(run: Run) -> None:
-    steps = [step for step in run(node(FOLLOW), STANDING, 0.5).episode.steps if len(step.detections)]
-    assert steps
-    for step in steps:
+    steps: list[Step] = []
+    run(node(FOLLOW), STANDING, 0.5, watch=kept_in(steps))
+    with_boxes = [step for step in steps if len(step.log.detections)]
+    assert with_boxes
+    for step in with_boxes:
         person = step.seen.people[0] if step.seen else None
         assert person is not None
         assert person.box is not None
-        box = step.detections.boxes[0]
+        box = step.log.detections.boxes[0]
         assert abs((box[0] + box[2] / 2) - (person.box[0] + person.box[2] / 2)) < 25
-        assert np.isfinite(step.detections.scores).all()
+        assert np.isfinite(step.log.detections.scores).all()

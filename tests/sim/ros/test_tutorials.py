@@ -119,7 +119,6 @@ def test_the_depth_cameras_info_is_that_of_the_camera(run: Run) -> None:
 def test_a_node_with_its_own_detector_is_shown_by_what_it_does_not_by_a_search(run: Run) -> None:
     drive = "twist = Twist(); twist.linear.x = 0.2 if self.get_clock().now().nanoseconds < 1e9 else 0.0\n"
     outcome = run(node(drive + "self.pub.publish(twist)"), STANDING)
-    assert {step.decision.mode.value for step in outcome.episode.steps} == {"drive", "stand"}
     card = score_of(outcome)
     assert set(card.modes) == {"drive", "stand"}
     assert card.modes["drive"] == pytest.approx(0.5, abs=0.1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -11,10 +11,13 @@ import numpy as np
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Belief, Decision, Mode
+from limo_hog.follow.pipeline import FrameLog
+from limo_hog.follow.sense.observation import Sensors
 from limo_hog.follow.twist import Twist
-from limo_sim.run.episode import Episode, FrameRecord, Moment, Step
-from limo_sim.run.matching import Criteria
-from limo_sim.run.score import ScoreCard, Scorer, score
+from limo_sim.run.episode import Episode, score
+from limo_sim.run.log import Step
+from limo_sim.run.matching import CRITERIA, Criteria
+from limo_sim.run.score import ScoreCard, Scorer
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
@@ -55,8 +58,8 @@ def step(
     found = Detections.none() if not boxes else Detections(np.array(boxes, np.int32), np.arange(len(boxes), 0.0, -1.0))
     twist = Twist(0.0, 0.1 * number if turn is None else turn)
     decision = Decision(twist, None, Mode.FOLLOW, "because", target, belief=Belief(keeps))
-    record = FrameRecord(truth, found, None, detect_ms, render_ms) if frame else None
-    return Step(0.1 * number if time is None else time, truth, decision, record)
+    log = FrameLog(0.1 * number if time is None else time, decision, Sensors(), None, found, detect_ms=detect_ms)
+    return Step(log, truth, truth if frame else None, render_ms)
 
 
 def followed(number: int, time: float | None = None) -> Step:
@@ -69,8 +72,9 @@ def card(
 ) -> ScoreCard:
     """The score card of these steps."""
     scenario = Scenario.load("two_people")
-    episode = Episode(scenario, "c", "d", 0, 0.1 * len(steps), steps, contacts, 0.5, target)
-    return score(episode) if criteria is None else score(episode, criteria)
+    scorer = Scorer(scenario, criteria or CRITERIA)
+    add(scorer, steps)
+    return score(Episode(scenario, "c", "d", 0, 0.1 * len(steps), scorer, contacts, 0.5, target))
 
 
 def add(scorer: Scorer, steps: Iterable[Step]) -> None:
@@ -78,21 +82,12 @@ def add(scorer: Scorer, steps: Iterable[Step]) -> None:
         scorer.add(one)
 
 
-def watching(scorer: Scorer) -> Callable[[Moment], None]:
-    """What a run is to be watched by, so that the scorer measures it as it goes."""
-    return lambda moment: scorer.add(moment.step)
-
-
-def keeps_no_steps(episode: Episode) -> bool:
-    return episode.steps == ()
-
-
-def commands(episode: Episode) -> Iterator[tuple[float, float, Decision[Any]]]:
+def commands(steps: Iterable[Step]) -> Iterator[tuple[float, float, Decision[Any]]]:
     """Every command of a run: when it was sent, the age of the frame that it is of [s], and what it says."""
     taken = 0.0
-    for one in episode.steps:
-        taken = one.frame.truth.stamp if one.frame else taken
-        yield one.time, one.time - taken, one.decision
+    for one in steps:
+        taken = one.seen.stamp if one.seen else taken
+        yield one.log.time, one.log.time - taken, one.log.decision
 
 
 def figures(card: ScoreCard) -> dict[str, Any]:

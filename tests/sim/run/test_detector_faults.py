@@ -14,14 +14,13 @@ from tests.sim.run.steps import figures
 
 from limo_hog.detections import Detections
 from limo_hog.follow import TrackingController
-from limo_hog.follow.sense.detectors import HalfSize, detect_in, detector_named
+from limo_hog.follow.sense.detectors import Detector, HalfSize, detector_named
 from limo_hog.follow.sense.region import Region
 from limo_sim.run.catalogue import load
-from limo_sim.run.detector_faults import FaultyDetector, fit_of
-from limo_sim.run.episode import run_episode
-from limo_sim.run.score import score
+from limo_sim.run.detector_faults import FaultySearch, fit_of
+from limo_sim.run.episode import run_episode, score
 from limo_sim.run.sweep import Run, play_all
-from limo_sim.world.scenario import DetectorFaults
+from limo_sim.world.scenario import Camera, DetectorFaults, Person, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
@@ -42,13 +41,25 @@ def truth(frame: int, rate: float = 10.0) -> Truth:
     return Truth(frame / rate, (0.0, 0.0, 0.0), people, Contacts())
 
 
+PERSON = Person(route=((2.0, 0.0, 3600.0),))
+
+
+class Faulty:
+    """A detector with the faults of a scenario with two people."""
+
+    def __init__(self, detector: Detector, faults: DetectorFaults, seed: int = 0, rate: float = 10.0) -> None:
+        scenario = Scenario(people=(PERSON, PERSON), detector=faults, camera=Camera(rate_hz=rate))
+        self._detector, self._truth = detector, truth(0)
+        self._search = FaultySearch(scenario, seed, lambda: self._truth)
+
+    def at(self, now: Truth, region: Region | None = None) -> Detections:
+        self._truth = now
+        return self._search(self._detector, IMAGE, region)
+
+
 def seen(faults: DetectorFaults, frames: int, seed: int = 0, rate: float = 10.0) -> list[Detections]:
-    detector = FaultyDetector(SeesBoth(), faults, rate, 2, seed)
-    found = []
-    for frame in range(frames):
-        detector.face(truth(frame, rate), None)
-        found.append(detector.detect(IMAGE))
-    return found
+    faulty = Faulty(SeesBoth(), faults, seed, rate)
+    return [faulty.at(truth(frame, rate)) for frame in range(frames)]
 
 
 def found_of(frames: list[Detections], person: int) -> NDArray[np.bool_]:
@@ -95,10 +106,9 @@ def test_false_boxes_come_at_their_rate_within_the_image_and_best_first() -> Non
 def test_a_seed_fixes_every_miss_and_false_box_whichever_frames_are_read() -> None:
     faults = DetectorFaults(recall=0.5, false_rate=0.5)
     every = seen(faults, 300, seed=4)
-    sparse = FaultyDetector(SeesBoth(), faults, 10.0, 2, 4)
+    sparse = Faulty(SeesBoth(), faults, 4)
     for frame in range(0, 300, 7):
-        sparse.face(truth(frame), None)
-        found = sparse.detect(IMAGE)
+        found = sparse.at(truth(frame))
         np.testing.assert_array_equal(found.boxes, every[frame].boxes)
         np.testing.assert_array_equal(found.scores, every[frame].scores)
     assert (found_of(every, 0) != found_of(seen(faults, 300, seed=5), 0)).any()
@@ -115,11 +125,10 @@ def test_a_search_in_part_of_the_image_or_at_half_size_loses_the_same_people(win
     region = Region(48, 96, 192, 288, window_height)
     faults = DetectorFaults(recall=0.5, false_rate=2.0)
     whole = seen(faults, 200)
-    detector = FaultyDetector(SeesOne(), faults, 10.0, 2, 0)
+    faulty = Faulty(SeesOne(), faults)
     extra = 0
     for frame in range(200):
-        detector.face(truth(frame), region)
-        found = detect_in(detector, IMAGE, region)
+        found = faulty.at(truth(frame), region)
         near = np.abs(found.boxes - WINDOWS[0]).max(axis=1, initial=0) <= 1
         assert near.any() == found_of(whole[frame : frame + 1], 0)[0]
         assert (found.boxes[:, :2] >= (48, 96)).all()
@@ -135,19 +144,18 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
             del image
             return Detections.none()
 
-    detector = FaultyDetector(SeesNobody(), DetectorFaults(false_rate=2.0), 10.0, 2, 0)
-    region, part = Region(32, 64, 512, 384, 200.0), IMAGE[64:448:half, 32:544:half]
+    faulty = Faulty(SeesNobody(), DetectorFaults(false_rate=2.0))
+    region = Region(32, 64, 512, 384, 200.0 * half)
     count = from_the_top = 0
     for frame in range(100):
-        detector.face(truth(frame), None)
-        x, y, w, h = detector.detect(IMAGE).boxes.T
+        x, y, w, h = faulty.at(truth(frame)).boxes.T
         from_the_top += np.count_nonzero((y == 0) & (h == 480))
         # Windows of HOG are twice as high as wide.
         np.testing.assert_array_equal(w, h // 2)
         within = (x >= 32) & (y >= 64) & (x + w <= 544) & (y + h <= 448)
-        expected = np.stack([x - 32, y - 64, w, h], axis=1)[within] // half
-        detector.face(truth(frame), region)
-        np.testing.assert_array_equal(detector.detect(part).boxes, expected)
+        # A search at half size gives even pixels from the region's corner.
+        expected = np.stack([x - 32, y - 64, w, h], axis=1)[within] // half * half + (32, 64, 0, 0)
+        np.testing.assert_array_equal(faulty.at(truth(frame), region).boxes, expected)
         count += len(expected)
     assert count > 20
     # One window in eighty is drawn as high as the image or higher.
@@ -155,9 +163,8 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
 
 
 def test_the_half_size_detector_keeps_its_own_boxes() -> None:
-    detector = FaultyDetector(HalfSize(SeesBoth()), DetectorFaults(false_rate=0.001), 10.0, 2, 0)
-    detector.face(truth(0), None)
-    np.testing.assert_array_equal(detector.detect(IMAGE).boxes[:2], WINDOWS * 2)
+    faulty = Faulty(HalfSize(SeesBoth()), DetectorFaults(false_rate=0.001))
+    np.testing.assert_array_equal(faulty.at(truth(0)).boxes[:2], WINDOWS * 2)
 
 
 def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np.bool_]:
@@ -170,12 +177,9 @@ def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np
         def detect(self, _image: NDArray[np.uint8]) -> Detections:
             return Detections(window, np.array([1.0]))
 
-    detector = FaultyDetector(SeesOne(), DetectorFaults(model=model), 10.0, 1, seed)
-    found = []
-    for frame in range(frames):
-        detector.face(Truth(frame / 10, (0.0, 0.0, 0.0), (person,), Contacts()), None)
-        found.append((detector.detect(IMAGE).boxes == window).all(axis=1).any())
-    return np.array(found)
+    faulty = Faulty(SeesOne(), DetectorFaults(model=model), seed)
+    truths = [Truth(frame / 10, (0.0, 0.0, 0.0), (person, None), Contacts()) for frame in range(frames)]
+    return np.array([(faulty.at(now).boxes == window).all(axis=1).any() for now in truths])
 
 
 @pytest.mark.parametrize("model", ["opencv", "limo"])

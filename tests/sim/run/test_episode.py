@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.sim.run.steps import commands, figures, keeps_no_steps, watching
+from tests.sim.logs import steps_of
+from tests.sim.run.steps import commands, figures
 
 from limo_hog.detections import Detections
 from limo_hog.detector import PeopleDetector
@@ -25,8 +26,7 @@ from limo_hog.follow import (
 )
 from limo_hog.follow.control.memory import TrackingState
 from limo_hog.follow.sense.detectors import detector_named
-from limo_sim.run.episode import Episode, run_episode
-from limo_sim.run.score import Scorer, score
+from limo_sim.run.episode import Episode, run_episode, score
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
 
@@ -54,14 +54,6 @@ def run(scenario: str, seconds: float, controller: Any = None, detector: Any = N
 def test_the_same_seed_gives_the_same_score_but_for_the_wall_clock() -> None:
     one, two = (figures(score(run("followable", 3.0))) for _ in range(2))
     assert one == two
-    # A run that keeps no steps is scored as it goes.
-    scenario = Scenario.load("followable")
-    scorer = Scorer(scenario)
-    short = run_episode(
-        scenario, TrackingController(), detector_named("hog"), 3.0, 0, watch=watching(scorer), keep=False
-    )
-    assert keeps_no_steps(short)
-    assert figures(scorer.card(short)) == one
 
 
 def test_the_clock_figures_are_those_of_the_wall() -> None:
@@ -175,8 +167,8 @@ def test_nobody_is_approached_nearer_than_the_safety_layer_allows() -> None:
 
 
 def test_a_detector_that_raises_stops_the_robot_until_it_works_again() -> None:
-    episode = run("standing", 6.0, detector=Failing())
-    decisions = [decision for _, _, decision in commands(episode)]
+    steps = steps_of(Scenario.load("standing"), TrackingController(), Failing(), 6.0, 0)
+    decisions = [decision for _, _, decision in commands(steps)]
     failed = [one for one in decisions if "GPU fell off" in one.reason]
     assert len(failed) == 10
     assert all(one.mode is Mode.BLOCKED and one.twist == Twist() for one in failed)
@@ -193,9 +185,9 @@ def test_nobody_is_found_where_nobody_is() -> None:
 def test_between_slow_frames_a_command_goes_out_every_period_until_one_is_too_old() -> None:
     standing = Scenario.load("standing")
     slow = dataclasses.replace(standing, camera=dataclasses.replace(standing.camera, rate_hz=1.0))
-    episode = run_episode(slow, controller_named("approach"), detector_named("hog"), 3.0, 0)
+    steps = steps_of(slow, controller_named("approach"), detector_named("hog"), 3.0, 0)
     ages: dict[float, Any] = {}
-    for _, old, decision in commands(episode):
+    for _, old, decision in commands(steps):
         ages.setdefault(round(old, 1), []).append(decision)
     assert sorted(ages) == pytest.approx([0.1 * k for k in range(10)])
     assert all(decision.mode is Mode.FOLLOW for age in (0.0, 0.1, 0.4) for decision in ages[age])

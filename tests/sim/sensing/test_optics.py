@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
-from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, WIDTH, Frame
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, WIDTH, TrueFrame
 from limo_sim.sensing.optics import Lens, Shutter
 from limo_sim.world.scenario import Camera, Depth, Furniture, Light, Person, Scenario
 
@@ -77,7 +77,7 @@ def test_what_the_lens_moves_out_of_the_image_is_not_visible(x: float, y: float)
             assert (box is not None) is within
 
 
-def turned(camera: Camera, rate: float) -> Frame:
+def turned(camera: Camera, rate: float) -> TrueFrame:
     """Return a frame taken while the robot turns, by which time it looks straight ahead again."""
     scenario = dataclasses.replace(POST, camera=dataclasses.replace(camera, noise=0.0, rate_hz=50.0))
     arena = Arena(dataclasses.replace(scenario, robot=dataclasses.replace(scenario.robot, wheel_acceleration=10.0)), 0)
@@ -87,7 +87,7 @@ def turned(camera: Camera, rate: float) -> Frame:
     return arena.frame()
 
 
-def darkness(frame: Frame, row: int) -> NDArray[np.float64]:
+def darkness(frame: TrueFrame, row: int) -> NDArray[np.float64]:
     line = frame.image[row - 3 : row + 4].astype(float).mean(axis=(0, 2))
     return np.asarray(np.maximum(np.median(line) - line, 0.0))
 

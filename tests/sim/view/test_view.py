@@ -12,13 +12,15 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from tests.sim.logs import steps_of
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
-from limo_sim.run.episode import Moment, run_episode
+from limo_sim.run.episode import run_episode
+from limo_sim.run.log import Step
 from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 from limo_sim.view.pace import Pace
-from limo_sim.view.reading import depth_colours, depth_picture, followed_person, measured_m, reading
+from limo_sim.view.reading import depth_colours, depth_picture, figures, followed_person, measured_m
 from limo_sim.view.server import ServeError, View
 from limo_sim.view.tuning import Parameter, ParameterError, Tunable
 from limo_sim.world.scenario import Scenario
@@ -99,17 +101,17 @@ def test_the_page_is_served_on_loopback_alone() -> None:
 def test_the_map_follows_the_person_that_the_followed_box_is_on() -> None:
     told = []
 
-    def watch(moment: Moment) -> None:
-        followed = followed_person(moment.step)
-        if followed is not None and moment.step.seen is not None:
+    def watch(step: Step) -> None:
+        followed = followed_person(step)
+        if followed is not None and step.seen is not None:
             told.append(followed)
-            now, person = reading(moment.step), moment.step.seen.people[followed]
-            assert now.error_px is not None
+            error_px, person = figures(step)["error_px"], step.seen.people[followed]
+            assert error_px is not None
             assert person is not None
             # A pinhole camera 8.4 cm ahead of the robot's centre sees them there, give or take an arm.
             ahead = person.distance * math.cos(person.bearing) - MOUNT_AHEAD
             left = FOCAL_PX * person.distance * math.sin(person.bearing) / ahead
-            assert left == pytest.approx(now.error_px, abs=FOCAL_PX * 0.3 / ahead)
+            assert left == pytest.approx(error_px, abs=FOCAL_PX * 0.3 / ahead)
 
     scenario = Scenario.load("two_people")
     run_episode(scenario, controller_named("tracking", None), PeopleDetector(scale=1.2), 20, 0, watch=watch)
@@ -120,10 +122,10 @@ def test_the_map_follows_the_person_that_the_followed_box_is_on() -> None:
 def test_the_distance_seen_is_from_the_camera_to_the_persons_front() -> None:
     seen = []
 
-    def watch(moment: Moment) -> None:
-        measured, now = measured_m(moment.frame, moment.step), reading(moment.step)
-        if measured is not None and now.distance_m is not None:
-            seen.append(now.distance_m - measured)
+    def watch(step: Step) -> None:
+        measured, distance_m = measured_m(step.log), figures(step)["distance_m"]
+        if measured is not None and distance_m is not None:
+            seen.append(distance_m - measured)
 
     run_episode(WORKSHOP, controller_named("tracking", None), PeopleDetector(scale=1.2), 15, 0, watch=watch)
     # The camera is 8.4 cm ahead of the centre, a person's front 5 to 25 cm before their axis.
@@ -200,7 +202,6 @@ def test_a_run_goes_on_with_every_parameter_at_its_bound(name: str, bound: str) 
     controller: Tunable[Any] = Tunable(controller_named(name, None))
     for one in controller.parameters.values():
         controller.set(one.name, getattr(one, bound))
-    reasons = [
-        step.decision.reason for step in run_episode(WORKSHOP, controller, PeopleDetector(scale=1.2), 6, 0).steps
-    ]
+    steps = steps_of(WORKSHOP, controller, PeopleDetector(scale=1.2), 6, 0)
+    reasons = [step.log.decision.reason for step in steps]
     assert not any("failed" in reason or "finite" in reason for reason in reasons), set(reasons)

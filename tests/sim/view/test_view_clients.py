@@ -15,11 +15,13 @@ from typing import Any
 import aiohttp
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from tests.sim.view.stalled import HANDSHAKE, stalled
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
-from limo_sim.run.episode import Moment, run_episode
+from limo_sim.run.episode import run_episode
+from limo_sim.run.log import Step
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Scenario
@@ -28,30 +30,34 @@ WORKSHOP = Scenario.load("workshop")
 
 
 @pytest.fixture(scope="module")
-def moments() -> list[Moment]:
-    """Moments whose pictures are noise: 300 kB each, so that a stalled client's buffers are full at once."""
-    seen: list[Moment] = []
+def steps() -> list[Step]:
+    """Steps whose pictures are noise: 300 kB each, so that a stalled client's buffers are full at once."""
+    seen: list[Step] = []
     run_episode(WORKSHOP, controller_named("tracking", None), PeopleDetector(scale=1.2), 0.5, 0, watch=seen.append)
     rng = np.random.default_rng(0)
     return [
-        dataclasses.replace(
-            moment,
-            frame=dataclasses.replace(moment.frame, image=rng.integers(0, 256, (480, 640, 3), dtype=np.uint8)),
-        )
-        for moment in seen
-        if moment.frame is not None
+        pictured(step, rng.integers(0, 256, (480, 640, 3), dtype=np.uint8))
+        for step in seen
+        if step.log.frame is not None
     ]
 
 
+def pictured(step: Step, image: NDArray[np.uint8]) -> Step:
+    """Return a step whose frame shows another image."""
+    assert step.log.frame is not None
+    frame = dataclasses.replace(step.log.frame, image=image)
+    return dataclasses.replace(step, log=dataclasses.replace(step.log, frame=frame))
+
+
 @contextmanager
-def showing(view: View, moments: list[Moment]) -> Iterator[None]:
-    """Show the moments over and over, 50 a second, in a thread of their own."""
+def showing(view: View, steps: list[Step]) -> Iterator[None]:
+    """Show the steps over and over, 50 a second, in a thread of their own."""
     over = threading.Event()
 
     def show() -> None:
         while not over.is_set():
-            for moment in moments:
-                view.watch(moment)
+            for step in steps:
+                view.watch(step)
                 time.sleep(0.02)
 
     thread = threading.Thread(target=show)
@@ -68,11 +74,11 @@ def showing(view: View, moments: list[Moment]) -> Iterator[None]:
     [HANDSHAKE, "", "GET /live HTTP/1.1\r\nHost: ", "GET / HTTP/1.1\r\nHost: {host}\r\nContent-Length: 9\r\n\r\n"],
     ids=["never reads", "never asks", "asks half", "never sends its body"],
 )
-def test_a_run_ends_within_2_s_with_50_stalled_clients(request_: str, moments: list[Moment]) -> None:
+def test_a_run_ends_within_2_s_with_50_stalled_clients(request_: str, steps: list[Step]) -> None:
     with ExitStack() as served:
         view = served.enter_context(View(WORKSHOP, pace=Pace(0)))
         with stalled(view.url, 50, request_):
-            with showing(view, moments):
+            with showing(view, steps):
                 time.sleep(3)
             began = time.monotonic()
             view.end({"in_view": 1.0})
@@ -81,7 +87,7 @@ def test_a_run_ends_within_2_s_with_50_stalled_clients(request_: str, moments: l
 
 
 def test_a_client_that_does_not_read_is_dropped_and_one_that_does_is_served(
-    moments: list[Moment], monkeypatch: pytest.MonkeyPatch
+    steps: list[Step], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("limo_sim.view.server.STALL_S", 1.0)
 
@@ -92,7 +98,7 @@ def test_a_client_that_does_not_read_is_dropped_and_one_that_does_is_served(
                 count += (await page.receive(timeout=5)).type is aiohttp.WSMsgType.BINARY
             return count
 
-    with View(WORKSHOP, pace=Pace(0)) as view, stalled(view.url, 5) as clients, showing(view, moments):
+    with View(WORKSHOP, pace=Pace(0)) as view, stalled(view.url, 5) as clients, showing(view, steps):
         # Ten a second on an idle machine; on busy cores fewer, but not none.
         assert asyncio.run(pictures(view, 4)) > 3
         for client in clients:
@@ -102,19 +108,20 @@ def test_a_client_that_does_not_read_is_dropped_and_one_that_does_is_served(
                     pass
 
 
-def test_clients_that_do_not_read_keep_no_frames_of_the_run(moments: list[Moment]) -> None:
+def test_clients_that_do_not_read_keep_no_frames_of_the_run(steps: list[Step]) -> None:
     images: list[weakref.ref[Any]] = []
 
     def show(view: View) -> None:
-        for moment in moments:
-            assert moment.frame
-            frame = dataclasses.replace(moment.frame, image=moment.frame.image.copy())
-            images.append(weakref.ref(frame.image))
-            view.watch(dataclasses.replace(moment, frame=frame))
+        for step in steps:
+            assert step.log.frame
+            image = step.log.frame.image.copy()
+            images.append(weakref.ref(image))
+            view.watch(pictured(step, image))
+            del image
             time.sleep(0.05)
 
     with View(WORKSHOP, pace=Pace(0)) as view, ExitStack() as clients:
-        # One after another, so that each stalls at a moment of its own.
+        # One after another, so that each stalls at a step of its own.
         for _ in range(12):
             clients.enter_context(stalled(view.url, 1))
             show(view)
@@ -123,11 +130,11 @@ def test_clients_that_do_not_read_keep_no_frames_of_the_run(moments: list[Moment
         assert sum(image() is not None for image in images) <= 3
 
 
-def test_ten_pages_share_their_pictures(moments: list[Moment], monkeypatch: pytest.MonkeyPatch) -> None:
-    encoded: list[Moment] = []
+def test_ten_pages_share_their_pictures(steps: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
+    encoded: list[Step] = []
 
-    def count(_: View, moment: Moment) -> list[bytes]:
-        encoded.append(moment)
+    def count(_: View, step: Step) -> list[bytes]:
+        encoded.append(step)
         return [b"c"]
 
     monkeypatch.setattr(View, "_pictures", count)
@@ -141,6 +148,6 @@ def test_ten_pages_share_their_pictures(moments: list[Moment], monkeypatch: pyte
         await asyncio.gather(*(look(view) for _ in range(10)))
 
     with View(WORKSHOP, pace=Pace(0)) as view:
-        view.watch(moments[0])
+        view.watch(steps[0])
         asyncio.run(all_look(view))
-    assert encoded == [moments[0]]
+    assert encoded == [steps[0]]

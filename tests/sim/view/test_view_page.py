@@ -14,8 +14,7 @@ from tests.sim.view.chromium import CHROMIUM, Tab, chromium, open_tab
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
-from limo_sim.run.episode import run_episode
-from limo_sim.run.score import score
+from limo_sim.run.episode import run_episode, score
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable

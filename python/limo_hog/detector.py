@@ -33,8 +33,8 @@ _LARGE_WINDOW_FROM_PX = 64.0
 #: Hits that OpenCV's sample asks a group to have more than.
 _GROUP_THRESHOLD = 2
 #: How often the levels between two that are searched whole are halved, by how much the threshold is lowered for a
-#: neighbouring level [SVM margin], and how far around a place windows are searched [strides]. `benches/guided.py`
-#: measures others, docs/simd.md shows them.
+#: neighbouring level [SVM margin], and how far around a place windows are searched [strides]. docs/simd.md shows
+#: others.
 _GUIDES: dict[str, tuple[int, float, tuple[float, float]] | None] = {"exact": None, "guided": (3, 0.75, (0.75, 1.25))}
 #: More levels than a pyramid of the finest `scale` and the largest image can have.
 _LEVELS = 2048

@@ -27,7 +27,7 @@ from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import MAX_RECORD, BagError, bag_writer, read_bag
 from limo_hog.ros2.findings import detections_message
-from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
+from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, DETECTIONS, IMAGE, ODOMETRY, SCAN
 from limo_hog.ros2.replay import replay
 
 HEIGHT, WIDTH = 144, 96
@@ -46,7 +46,7 @@ def _told() -> Iterator[tuple[str, float, Any]]:
         yield DEPTH, now, messages.image(now, np.full((HEIGHT, WIDTH), 2.0, np.float32))
         yield IMAGE, now, messages.image(now, rng.integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8))
         found = Detections(np.array([[10, 8, 64, 128]], np.int32), np.array([0.7]))
-        yield "/limo_camera/detections", now, detections_message(now, found, "depth_link")
+        yield DETECTIONS, now, detections_message(now, found, "depth_link")
         yield COMMAND, now, messages.twist(Twist(0.1, 0.0))
 
 

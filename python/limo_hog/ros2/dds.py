@@ -50,7 +50,7 @@ _PREFIX = "rt"
 
 
 class BusError(LimoHogError):
-    """DDS cannot be used as asked."""
+    """The ROS 2 network cannot be used as asked, or no camera image comes over it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,21 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
-from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, Sighting
 from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
-from limo_hog.ros2.bag import Record, to_detections
+from limo_hog.ros2.bag import BagError, Record, to_detections
 from limo_hog.ros2.names import COMMAND, DETECTIONS_TYPE, IMAGE, STAMPED_COMMAND_TYPE, TYPES
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
 
 S = TypeVar("S")
-
-
-class ReplayError(LimoHogError):
-    """A recording lacks what a follower needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +55,7 @@ def replay(
 
     Raises
     ------
-    ReplayError
+    BagError
         If there are no images on the topic, or no camera info before the first.
     MessageError
         If an image or a depth image contradicts itself.
@@ -74,7 +69,7 @@ def replay(
 
     def work(twist: Twist | None) -> Replayed:
         if senses.focal_px is None:
-            raise ReplayError("no camera info before the first image: its focal length is needed")
+            raise BagError("no camera info before the first image: its focal length is needed")
         stamp, image = messages.to_seconds(waiting.header.stamp), picture_of(waiting)
         return Replayed(stamp, image, follower.see(stamp, image, senses.at(stamp, image)), recorded, twist)
 
@@ -98,7 +93,7 @@ def replay(
         frames += 1
     if not frames:
         there = ", ".join(sorted(topics)) or "nothing"
-        raise ReplayError(f"no images on {image_topic}; the recording holds {there}")
+        raise BagError(f"no images on {image_topic}; the recording holds {there}")
 
 
 def _command(topic: str, message: Any) -> Twist | None:

@@ -9,12 +9,10 @@ from pathlib import Path
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import bag_writer
 from limo_hog.ros2.findings import detections_message
-from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
+from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, DETECTIONS, IMAGE, ODOMETRY, SCAN
 from limo_sim.run.episode import Moment
 from limo_sim.sensing.camera import FOCAL_PX
 from limo_sim.world.scenario import Camera
-
-DETECTIONS = "/limo_camera/detections"
 
 
 @contextmanager

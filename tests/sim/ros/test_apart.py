@@ -13,8 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.sim.ros.conftest import HEAD, STANDING, node
-from tests.sim.ros.test_run import DRIVE, FOLLOW
+from tests.sim.ros.scripts import DRIVE, FOLLOW, HEAD, STANDING, node
 
 from limo_hog.cli.main import main
 from limo_sim.ros import apart

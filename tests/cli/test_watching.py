@@ -68,14 +68,14 @@ def test_the_recording_is_read_by_another_library_than_wrote_it(kept: Path) -> N
             counts[connection.topic, connection.msgtype] += 1
             if connection.topic == "/limo_camera/image":
                 assert (message.width, message.height, message.encoding) == (640, 480, "bgr8")
-            elif connection.topic == "/limo_camera/detections":
+            elif connection.topic == "/detections":
                 boxes += len(message.detections)
     frames = 10 * SECONDS
     assert counts == {
         ("/limo_camera/image", "sensor_msgs/msg/Image"): frames,
         ("/limo_camera/depth/image_raw", "sensor_msgs/msg/Image"): frames,
         ("/limo_camera/camera_info", "sensor_msgs/msg/CameraInfo"): frames,
-        ("/limo_camera/detections", "vision_msgs/msg/Detection2DArray"): frames,
+        ("/detections", "vision_msgs/msg/Detection2DArray"): frames,
         ("/cmd_vel", "geometry_msgs/msg/Twist"): frames,
         ("/odom", "nav_msgs/msg/Odometry"): frames,
         ("/scan", "sensor_msgs/msg/LaserScan"): 8 * SECONDS,

@@ -95,7 +95,7 @@ def test_of_several_depth_images_the_nearest_in_time_counts_not_the_newest() -> 
     assert told_depth((0.9, depth(1.0)), (0.98, depth(2.0)), (1.04, depth(3.0))) == 2.0
 
 
-def test_a_depth_image_in_millimetres_is_read_and_one_of_another_size_is_not_the_pictures() -> None:
+def test_depth_in_millimetres_is_read_and_depth_of_another_size_is_left_alone() -> None:
     assert told_depth((1.0, np.full((48, 64), 2500, np.uint16))) == 2.5
     assert told_depth((1.0, np.ones((24, 32), np.float32))) is None
 
@@ -128,7 +128,7 @@ def stamped(stamp: float, command: Twist) -> Record:
 
 
 @pytest.mark.parametrize("kind", ["Twist", "TwistStamped"])
-def test_the_recorded_command_is_what_drove_the_robot_of_either_type_and_no_other_twist(kind: str) -> None:
+def test_the_recorded_command_is_what_drove_the_robot_of_either_type(kind: str) -> None:
     drove = Twist(0.3, -0.2)
     planned = Record("/cmd_vel_nav", 1.01, messages.twist(Twist(9.0, 9.0)))
     sent = Record(names.COMMAND, 1.02, messages.twist(drove)) if kind == "Twist" else stamped(1.02, drove)

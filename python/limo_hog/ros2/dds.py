@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from rosbags.interfaces import Nodetype
-
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
-from limo_hog.ros2.messages import MessageError, deserialize, serialize, typestore
+from limo_hog.ros2.messages import Field, MessageError, deserialize, fields_of, serialize, typestore
 
 with needed(by="ROS 2 over the network", what="Cyclone DDS", install="'limo-hog[ros2]'"):
     from cyclonedds import builtin
@@ -52,7 +50,7 @@ _PREFIX = "rt"
 
 
 class BusError(LimoHogError):
-    """DDS cannot be used as asked."""
+    """The ROS 2 network cannot be used as asked, or no camera image comes over it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,7 @@ def dds_type(type_name: str) -> Any:
     Its samples hold a ROS message in `message`; None in place of one that could not be read.
     """
     package, _, name = type_name.split("/")
-    fields = {field: _dds_field(desc) for field, desc in typestore().fielddefs[type_name][1]}
+    fields = {field.name: _dds_field(field) for field in fields_of(type_name)}
     made: Any = make_idl_struct(f"{name}_", f"{package}.msg.dds_.{name}_", fields)
 
     def hold(self: Any, message: Any) -> None:
@@ -95,19 +93,18 @@ def dds_type(type_name: str) -> Any:
     return made
 
 
-def _dds_field(desc: Any) -> Any:
-    kind, of = desc
-    if kind == Nodetype.NAME:
-        return dds_type(of)
-    if kind == Nodetype.BASE:
-        base = of[0]
-        if base in ("uint8", "char", "byte", "octet"):
-            # As idlc does it: with uint8 the type information crashes readers of Cyclone DDS 0.10.
-            return types.byte
-        return {"bool": bool, "string": str}.get(base) or getattr(types, base)
-    item, length = of
+def _dds_field(field: Field) -> Any:
+    if field.is_message:
+        item = dds_type(field.item)
+    elif field.item in ("uint8", "char", "byte", "octet"):
+        # As idlc does it: with uint8 the type information crashes readers of Cyclone DDS 0.10.
+        item = types.byte
+    else:
+        item = {"bool": bool, "string": str}.get(field.item) or getattr(types, field.item)
     generic: Any = types
-    return generic.array[_dds_field(item), length] if kind == Nodetype.ARRAY else generic.sequence[_dds_field(item)]
+    if field.length is None:
+        return item
+    return generic.array[item, field.length] if field.length else generic.sequence[item]
 
 
 def _qos(type_name: str, depth: int, *, reliable: bool = True, kept: bool = False) -> Qos:

@@ -7,14 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, FrameLog
 from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages, names
-from limo_hog.ros2.dds import Bus, Endpoints
+from limo_hog.ros2.dds import Bus, BusError, Endpoints
 from limo_hog.ros2.messages import MessageError
 from limo_hog.ros2.outputs import Commands, Findings
 from limo_hog.ros2.senses import Senses, picture_of
@@ -23,10 +22,6 @@ S = TypeVar("S")
 
 #: The drive ends after so long without a camera image [s]: discovery takes up to 3 s, a driver as long to start.
 SILENT_AFTER = 10.0
-
-
-class SilentRobotError(LimoHogError):
-    """No camera image arrives."""
 
 
 @dataclass
@@ -66,7 +61,7 @@ def camera_topic(bus: Bus) -> str:
 
     Raises
     ------
-    SilentRobotError
+    BusError
         If no camera is found within 10 s.
     """
 
@@ -77,7 +72,7 @@ def camera_topic(bus: Bus) -> str:
         return offered(names.IMAGE, found) or offered(names.IMAGE_COMPRESSED, found)
 
     if not either(bus.topics(SILENT_AFTER, enough=either)):
-        raise SilentRobotError(
+        raise BusError(
             f"no publisher of {names.IMAGE} or {names.IMAGE_COMPRESSED} in ROS domain {bus.domain} "
             f"within {SILENT_AFTER:g} s"
         )
@@ -145,7 +140,7 @@ def drive(
 
     Raises
     ------
-    SilentRobotError
+    BusError
         If there is no camera, or no image comes for 10 s.
     """
     camera = camera_topic(bus)
@@ -163,7 +158,7 @@ def drive(
             if frame is not None:
                 heard, stamp = came, frame.stamp
             elif came - heard > SILENT_AFTER:
-                raise SilentRobotError(f"no image on {camera} in ROS domain {bus.domain} for {SILENT_AFTER:g} s")
+                raise BusError(f"no image on {camera} in ROS domain {bus.domain} for {SILENT_AFTER:g} s")
             elif not report.frames:
                 continue
             # The robot's clock, by the last image's stamp and the time since on this machine's clock.

@@ -8,6 +8,7 @@ or since 1970, as the clock that took them; frames are the Limo's: x forward, y 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, cast
 
@@ -93,25 +94,65 @@ def deserialize(data: bytes, type_name: str) -> Any:
         raise MessageError(f"{len(data)} bytes are no {type_name}: {error}") from error
 
 
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A field of a message, as its definition says.
+
+    Attributes
+    ----------
+    name
+        The field's.
+    item
+        What it holds, alone or several times: "float64", "string", or a message as "geometry_msgs/msg/Point".
+    is_message
+        Whether `item` is a message.
+    length
+        Of an array of fixed length; 0 for a sequence, None for a single item.
+    zero
+        What a single item is by default; None for a message.
+    """
+
+    name: str
+    item: str
+    is_message: bool
+    length: int | None
+    zero: Any
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether the items are numbers, which lie in one numpy array."""
+        return not self.is_message and self.item not in ("string", "wstring", "bool")
+
+
+@cache
+def fields_of(type_name: str) -> tuple[Field, ...]:
+    """Return the fields of a message type."""
+    fields = []
+    definition: Any = typestore().fielddefs[type_name][1]
+    for name, (kind, of) in definition:
+        length = {Nodetype.ARRAY: of[1], Nodetype.SEQUENCE: 0}.get(kind)
+        item_kind, item = (kind, of) if length is None else of[0]
+        if item_kind == Nodetype.NAME:
+            fields.append(Field(name, item, True, length, None))
+            continue
+        zero = {"string": "", "wstring": "", "bool": False}.get(item[0], 0.0 if item[0].startswith("float") else 0)
+        if (type_name, name) == ("geometry_msgs/msg/Quaternion", "w"):
+            zero = 1.0
+        fields.append(Field(name, item[0], False, length, zero))
+    return tuple(fields)
+
+
 def default_message(type_name: str) -> Any:
     """Return a message with ROS's defaults: zeros, empty strings and sequences, and a quaternion's w of 1."""
-    values = {name: _default(desc) for name, desc in typestore().fielddefs[type_name][1]}
-    if type_name == "geometry_msgs/msg/Quaternion":
-        values["w"] = 1.0
-    return typestore().types[type_name](**values)
+    return typestore().types[type_name](**{field.name: _default(field) for field in fields_of(type_name)})
 
 
-def _default(desc: Any) -> Any:
-    kind, of = desc
-    if kind == Nodetype.NAME:
-        return default_message(of)
-    if kind == Nodetype.BASE:
-        return {"string": "", "wstring": "", "bool": False}.get(of[0], 0.0 if of[0].startswith("float") else 0)
-    (item_kind, item), length = of
-    length = length if kind == Nodetype.ARRAY else 0
-    if item_kind == Nodetype.BASE and not item[0].endswith("string"):
-        return np.zeros(length, element_type(item[0]))
-    return [_default((item_kind, item)) for _ in range(length)]
+def _default(field: Field) -> Any:
+    if field.length is None:
+        return default_message(field.item) if field.is_message else field.zero
+    if field.is_message:
+        return [default_message(field.item) for _ in range(field.length)]
+    return [""] * field.length if field.zero == "" else np.zeros(field.length, element_type(field.item))
 
 
 def element_type(base: str) -> np.dtype[Any]:

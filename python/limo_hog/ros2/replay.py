@@ -7,22 +7,17 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from limo_hog.detections import Detections
-from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, FrameLog
 from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
-from limo_hog.ros2.bag import Record, to_detections
+from limo_hog.ros2.bag import BagError, Record, to_detections
 from limo_hog.ros2.names import COMMAND, DETECTIONS_TYPE, IMAGE, STAMPED_COMMAND_TYPE, TYPES
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
 
 S = TypeVar("S")
-
-
-class ReplayError(LimoHogError):
-    """A recording lacks what a follower needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +50,7 @@ def replay(
 
     Raises
     ------
-    ReplayError
+    BagError
         If there are no images on the topic, or no camera info before the first.
     MessageError
         If an image or a depth image contradicts itself.
@@ -69,7 +64,7 @@ def replay(
 
     def work(now: float, twist: Twist | None) -> Replayed:
         if senses.focal_px is None:
-            raise ReplayError("no camera info before the first image: its focal length is needed")
+            raise BagError("no camera info before the first image: its focal length is needed")
         frame = senses.frame(messages.to_seconds(waiting.header.stamp), picture_of(waiting))
         log = follower.tick(now, frame, senses.sensors)
         if log is None:
@@ -96,7 +91,7 @@ def replay(
         frames += 1
     if not frames:
         there = ", ".join(sorted(topics)) or "nothing"
-        raise ReplayError(f"no images on {image_topic}; the recording holds {there}")
+        raise BagError(f"no images on {image_topic}; the recording holds {there}")
 
 
 def _command(topic: str, message: Any) -> Twist | None:

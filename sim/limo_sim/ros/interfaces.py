@@ -13,10 +13,9 @@ from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
-from rosbags.interfaces import Nodetype
 from rosbags.typesys import get_types_from_msg
 
-from limo_hog.ros2.messages import element_type, typestore
+from limo_hog.ros2.messages import Field, element_type, fields_of, typestore
 
 #: What `import` finds.
 PACKAGES = (
@@ -35,116 +34,85 @@ SERVICES = {
     ("example_interfaces", "Trigger"): ("", "bool success\nstring message"),
 }
 
-_TEXT = ("string", "wstring")
+
+def default(field: Field) -> Any:
+    """Return a fresh default of a field."""
+    if field.length is None:
+        return message_class(field.item)() if field.is_message else field.zero
+    if not field.is_numeric:
+        return [message_class(field.item)() if field.is_message else field.zero for _ in range(field.length)]
+    return np.zeros(field.length, element_type(field.item)) if field.length else array.array(_code(field))
 
 
-class Field:
-    """One field of a message: its default, and what may be assigned."""
+def checked(field: Field, value: Any) -> Any:
+    """Return a value as a field stores it.
 
-    def __init__(self, name: str, desc: Any) -> None:
-        self.name = name
-        self.kind, of = desc
-        if self.kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-            (self.item_kind, item), self.length = of
-        else:
-            self.item_kind, item = desc
-        self.base = "" if self.item_kind == Nodetype.NAME else item[0]
-        self.nested = item if self.item_kind == Nodetype.NAME else ""
-        self.is_numeric = bool(self.base) and self.base not in (*_TEXT, "bool")
-
-    def default(self) -> Any:
-        """Return a fresh default."""
-        if self.kind == Nodetype.ARRAY:
-            if self.is_numeric:
-                return np.zeros(self.length, element_type(self.base))
-            return [self._item_default() for _ in range(self.length)]
-        if self.kind == Nodetype.SEQUENCE:
-            return array.array(self._code) if self.is_numeric else []
-        return self._item_default()
-
-    def checked(self, value: Any) -> Any:
-        """Return a value as it is stored.
-
-        Raises
-        ------
-        AssertionError
-            As rclpy does, if the value is of another type or out of range.
-        """
-        if self.kind not in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-            self._check_item(value)
-            return value
-        if isinstance(value, array.array) and self.is_numeric and value.typecode == self._code:
-            return self._sized(value)
-        if isinstance(value, np.ndarray):
-            fits = self.is_numeric and value.dtype == element_type(self.base)
-            if not fits or self.kind != Nodetype.ARRAY:
-                self._refuse(value, "use .tolist(), or array.array with .tobytes()" if self.is_numeric else "")
-            return self._sized(value)
-        if isinstance(value, str) or not isinstance(value, Sequence):
-            self._refuse(value)
-        if self.base == "uint8" and isinstance(value, bytes | bytearray):
-            return self._sized(array.array("B", value))
-        for item in value:
-            self._check_item(item)
-        return self._sized(array.array(self._code, value) if self.is_numeric else value)
-
-    def from_wire(self, value: Any) -> Any:
-        """Return a rosbags field's value as it is stored here, a copy."""
-        if self.kind == Nodetype.NAME:
-            return from_wire(value)
-        if self.nested:
-            return [from_wire(item) for item in value]
-        if self.kind == Nodetype.SEQUENCE and self.is_numeric:
-            return array.array(self._code, np.ascontiguousarray(value).tobytes())
-        return copy.copy(value)
-
-    @property
-    def _code(self) -> str:
-        kind = element_type(self.base)
-        return {"i8": "q", "u8": "Q"}.get(f"{kind.kind}{kind.itemsize}", kind.char)
-
-    def _item_default(self) -> Any:
-        if self.nested:
-            return message_class(self.nested)()
-        if self.base in _TEXT:
-            return ""
-        if self.base == "bool":
-            return False
-        return 0.0 if self.base.startswith("float") else 0
-
-    def _check_item(self, value: Any) -> None:
-        if self.nested:
-            good = isinstance(value, message_class(self.nested))
-        elif self.base in _TEXT:
-            good = isinstance(value, str)
-        elif self.base == "bool":
-            good = isinstance(value, bool)
-        elif self.base.startswith("float"):
-            good = isinstance(value, float)
-        else:
-            good = isinstance(value, int)
-            limits = np.iinfo(element_type(self.base))
-            if good and not limits.min <= value <= limits.max:
-                self._refuse(value, f"want {limits.min} … {limits.max}")
-        if not good:
-            self._refuse(value)
-
-    def _sized(self, value: Any) -> Any:
-        if self.kind == Nodetype.ARRAY:
-            if len(value) != self.length:
-                self._refuse(value, f"want {self.length} elements, came {len(value)}")
-            if self.is_numeric:
-                return np.array(value, element_type(self.base))
+    Raises
+    ------
+    AssertionError
+        As rclpy does, if the value is of another type or out of range.
+    """
+    if field.length is None:
+        _check_item(field, value)
         return value
+    if isinstance(value, array.array) and field.is_numeric and value.typecode == _code(field):
+        return _sized(field, value)
+    if isinstance(value, np.ndarray):
+        fits = field.is_numeric and value.dtype == element_type(field.item)
+        if not fits or not field.length:
+            _refuse(field, value, "use .tolist(), or array.array with .tobytes()" if field.is_numeric else "")
+        return _sized(field, value)
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        _refuse(field, value)
+    if field.item == "uint8" and isinstance(value, bytes | bytearray):
+        return _sized(field, array.array("B", value))
+    for item in value:
+        _check_item(field, item)
+    return _sized(field, array.array(_code(field), value) if field.is_numeric else value)
 
-    def _refuse(self, value: Any, advice: str = "") -> None:
-        wanted = self.nested.replace("/msg/", ".msg.") or {"string": "str"}.get(self.base, self.base)
-        wanted = "float" if wanted.startswith("float") else "int" if "int" in wanted else wanted
-        several = {Nodetype.ARRAY: "a sequence of ", Nodetype.SEQUENCE: "a sequence of "}.get(self.kind, "")
-        came = f"{type(value).__name__} {value!r}"[:80]
-        raise AssertionError(
-            f"the field {self.name!r} must be {several}{wanted!r}, came {came}" + (f": {advice}" if advice else "")
-        )
+
+def _from_wire(field: Field, value: Any) -> Any:
+    if field.is_message:
+        return from_wire(value) if field.length is None else [from_wire(item) for item in value]
+    if field.length == 0 and field.is_numeric:
+        return array.array(_code(field), np.ascontiguousarray(value).tobytes())
+    return copy.copy(value)
+
+
+def _code(field: Field) -> str:
+    kind = element_type(field.item)
+    return {"i8": "q", "u8": "Q"}.get(f"{kind.kind}{kind.itemsize}", kind.char)
+
+
+def _check_item(field: Field, value: Any) -> None:
+    if field.is_message:
+        good = isinstance(value, message_class(field.item))
+    else:
+        good = isinstance(value, type(field.zero))
+        if good and field.is_numeric and isinstance(value, int):
+            limits = np.iinfo(element_type(field.item))
+            if not limits.min <= value <= limits.max:
+                _refuse(field, value, f"want {limits.min} … {limits.max}")
+    if not good:
+        _refuse(field, value)
+
+
+def _sized(field: Field, value: Any) -> Any:
+    if field.length:
+        if len(value) != field.length:
+            _refuse(field, value, f"want {field.length} elements, came {len(value)}")
+        if field.is_numeric:
+            return np.array(value, element_type(field.item))
+    return value
+
+
+def _refuse(field: Field, value: Any, advice: str = "") -> None:
+    wanted = field.item.replace("/msg/", ".msg.") if field.is_message else type(field.zero).__name__
+    several = "" if field.length is None else "a sequence of "
+    came = f"{type(value).__name__} {value!r}"[:80]
+    raise AssertionError(
+        f"the field {field.name!r} must be {several}{wanted!r}, came {came}" + (f": {advice}" if advice else "")
+    )
 
 
 class Message:
@@ -164,9 +132,7 @@ class Message:
             if name in values:
                 setattr(self, name, values[name])
             else:
-                object.__setattr__(self, name, field.default())
-        if self._type_name == "geometry_msgs/msg/Quaternion" and "w" not in values:
-            object.__setattr__(self, "w", 1.0)
+                object.__setattr__(self, name, default(field))
 
     def __setattr__(self, name: str, value: Any) -> None:
         field = self._fields.get(name)
@@ -174,7 +140,7 @@ class Message:
             raise AttributeError(
                 f"{type(self).__name__!r} object has no attribute {name!r}; its fields are {', '.join(self._fields)}"
             )
-        object.__setattr__(self, name, field.checked(value))
+        object.__setattr__(self, name, checked(field, value))
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -192,13 +158,9 @@ class Message:
         """Return each field's name and type."""
         types = {}
         for name, field in cls._fields.items():
-            item = field.nested.replace("/msg/", "/") or {"float64": "double", "float32": "float"}.get(
-                field.base, field.base
-            )
-            if field.kind == Nodetype.SEQUENCE:
-                item = f"sequence<{item}>"
-            elif field.kind == Nodetype.ARRAY:
-                item = f"{item}[{field.length}]"
+            item = {"float64": "double", "float32": "float"}.get(field.item, field.item.replace("/msg/", "/"))
+            if field.length is not None:
+                item = f"{item}[{field.length}]" if field.length else f"sequence<{item}>"
             types[name] = item
         return types
 
@@ -206,14 +168,14 @@ class Message:
 @cache
 def message_class(type_name: str) -> type[Message]:
     """Return the class of a type such as "geometry_msgs/msg/Twist"."""
-    constants, fields = typestore().fielddefs[type_name]
+    fields = [field for field in fields_of(type_name) if field.name != _EMPTY]
     package, _, name = type_name.split("/")
-    body: dict[str, Any] = {constant: value for constant, _, value in constants}
+    body: dict[str, Any] = {constant: value for constant, _, value in typestore().fielddefs[type_name][0]}
     body |= {
-        "__slots__": tuple(field for field, _ in fields),
+        "__slots__": tuple(field.name for field in fields),
         "__doc__": f"{type_name}.",
         "__module__": f"{package}.msg",
-        "_fields": {field: Field(field, desc) for field, desc in fields if field != _EMPTY},
+        "_fields": {field.name: field for field in fields},
         "_type_name": type_name,
     }
     return type(name, (Message,), body)
@@ -228,7 +190,7 @@ def from_wire(message: Any) -> Message:
     made = message_class(message.__msgtype__)
     new = made.__new__(made)
     for name, field in made._fields.items():
-        object.__setattr__(new, name, field.from_wire(getattr(message, name)))
+        object.__setattr__(new, name, _from_wire(field, getattr(message, name)))
     return new
 
 

@@ -9,11 +9,9 @@ from pathlib import Path
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import bag_writer
 from limo_hog.ros2.findings import detections_message
-from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, IMAGE, ODOMETRY, SCAN
+from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, DETECTIONS, IMAGE, ODOMETRY, SCAN
 from limo_sim.run.log import Step, Watch
 from limo_sim.world.scenario import Camera
-
-DETECTIONS = "/limo_camera/detections"
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import threading
@@ -32,14 +31,6 @@ from limo_sim.run.arena import Arena
 from limo_sim.world.scenario import Scenario
 
 TWIST = "geometry_msgs/msg/Twist"
-
-
-@pytest.fixture(autouse=True)
-def own_domain(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tests that run at once must not hear each other."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(100 + worker))
-    monkeypatch.delenv("CYCLONEDDS_URI", raising=False)
 
 
 @contextmanager

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
 import threading
 import time
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,6 @@ import pytest
 pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
 
 from cyclonedds.idl import make_idl_struct, types
-from rosbags.interfaces import Nodetype
 
 from limo_hog.detections import Detections
 from limo_hog.follow.control.naming import controller_named
@@ -42,29 +41,34 @@ MESSAGES = {
 }
 
 
-def cyclone(kind: Any, value: Any) -> tuple[Any, Any]:
-    """Return Cyclone's own type of a field, and the value as it takes it."""
-    node, of = kind
-    if node == Nodetype.NAME:
-        fields = {name: cyclone(field, getattr(value, name)) for name, field in messages.typestore().fielddefs[of][1]}
-        struct: Any = make_idl_struct(of.replace("/", "_"), of, {name: made[0] for name, made in fields.items()})
-        return struct, struct(**{name: made[1] for name, made in fields.items()})
-    if node == Nodetype.BASE:
-        return {"string": str, "bool": bool}.get(of[0]) or getattr(types, of[0]), value
-    item, length = of
+def cyclone(message: Any) -> Any:
+    """Return a message as Cyclone's own struct."""
+    return cyclone_type(message.__msgtype__)(
+        **{field.name: as_taken(getattr(message, field.name)) for field in messages.fields_of(message.__msgtype__)}
+    )
+
+
+@cache
+def cyclone_type(name: str) -> Any:
     generic: Any = types
-    blank = "" if item[0] == Nodetype.BASE and item[1][0] == "string" else None
-    empty = messages.default_message(item[1]) if item[0] == Nodetype.NAME else 0.0 if blank is None else blank
-    of_items = cyclone(item, empty)[0]
-    values = [cyclone(item, one)[1] for one in value]
-    return (generic.array[of_items, length] if node == Nodetype.ARRAY else generic.sequence[of_items]), values
+    fields = {}
+    for field in messages.fields_of(name):
+        plain = {"string": str, "bool": bool}.get(field.item) or getattr(types, field.item, None)
+        one = cyclone_type(field.item) if field.is_message else plain
+        several = generic.array[one, field.length] if field.length else generic.sequence[one]
+        fields[field.name] = one if field.length is None else several
+    return make_idl_struct(name.replace("/", "_"), name, fields)
+
+
+def as_taken(value: Any) -> Any:
+    if isinstance(value, list | np.ndarray):
+        return [as_taken(one) for one in value]
+    return cyclone(value) if hasattr(value, "__msgtype__") else value
 
 
 @pytest.mark.parametrize("name", MESSAGES)
 def test_the_bytes_are_those_of_cyclone_dds_own_encoder(name: str) -> None:
-    message = MESSAGES[name]
-    _, theirs = cyclone((Nodetype.NAME, message.__msgtype__), message)
-    assert messages.serialize(message) == theirs.serialize(use_version_2=False)
+    assert messages.serialize(MESSAGES[name]) == cyclone(MESSAGES[name]).serialize(use_version_2=False)
 
 
 def test_boxes_carry_the_number_of_their_person_best_first() -> None:
@@ -88,15 +92,8 @@ def test_people_are_listed_the_likeliest_first_with_their_velocities() -> None:
     assert [one.child_frame_id for one in MESSAGES["frames"].transforms] == ["person_7", "followed_person", "person_12"]
 
 
-@pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> None:
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(140 + worker))
-    monkeypatch.delenv("CYCLONEDDS_URI", raising=False)
-
-
 @pytest.mark.parametrize("kind", [names.TYPES[names.COMMAND], names.STAMPED_COMMAND_TYPE])
-def test_commands_have_the_type_that_the_robot_takes(kind: str, domain: None) -> None:
+def test_commands_have_the_type_that_the_robot_takes(kind: str) -> None:
     robot, ours = dds.Bus(), dds.Bus()
     heard = robot.subscription(names.COMMAND, kind)
     commands = Commands(ours)
@@ -109,7 +106,7 @@ def test_commands_have_the_type_that_the_robot_takes(kind: str, domain: None) ->
     assert {message.__msgtype__ for message in came} == {kind}
 
 
-def test_a_drive_publishes_where_the_person_is(domain: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drive_publishes_where_the_person_is(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(follower, "SILENT_AFTER", 20.0)
     scenario = Scenario(name="standing", people=(Person(route=((3.0, 0.5, 3600.0),)),))
     arena = threading.Thread(target=run_live, args=(scenario, 0, 12.0, dds.Bus()))

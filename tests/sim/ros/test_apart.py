@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pytest
 from tests.sim.logs import kept_in
-from tests.sim.ros.conftest import HEAD, STANDING, node
-from tests.sim.ros.test_run import DRIVE, FOLLOW
+from tests.sim.ros.scripts import DRIVE, FOLLOW, HEAD, STANDING, node
 
 from limo_hog.cli.main import main
 from limo_sim.ros import apart

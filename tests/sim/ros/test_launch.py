@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.sim.ros.conftest import NOBODY
+from tests.sim.ros.scripts import NOBODY
 
 from limo_hog.cli.main import main
 from limo_sim.ros.script import Outcome, run_script

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from tests.sim.ros.conftest import NOBODY, STANDING
+from tests.sim.ros.scripts import NOBODY, STANDING
 
 from limo_sim.ros.script import Outcome, run_script
 from limo_sim.world.scenario import Scenario

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.sim.ros.conftest import Run
+from tests.sim.ros.scripts import Run
 
 RECORDS = Path(__file__).parent / "rclpy_api"
 

@@ -6,13 +6,14 @@ import dataclasses
 import importlib.util
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from tests.sim.logs import kept_in
-from tests.sim.ros.conftest import NOBODY, STANDING, Run, node
+from tests.sim.ros.scripts import DRIVE, FOLLOW, NOBODY, STANDING, Run, node, said
 
 from limo_hog.cli.main import main
 from limo_hog.ros2 import names
@@ -21,26 +22,6 @@ from limo_sim.ros.script import run_script, score_of
 from limo_sim.run.log import Step
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Person
-
-DRIVE = "twist = Twist(); twist.linear.x = 0.2; self.pub.publish(twist)"
-
-FOLLOW = """
-import cv2
-import numpy as np
-from cv_bridge import CvBridge
-image = CvBridge().imgmsg_to_cv2(msg, 'bgr8')
-if not hasattr(self, 'hog'):
-    self.hog = cv2.HOGDescriptor()
-    self.hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
-rects, weights = self.hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)
-twist = Twist()
-if len(rects):
-    x, y, w, h = rects[int(np.argmax(weights))]
-    twist.angular.z = 0.005 * (320 - (x + w // 2))
-self.pub.publish(twist)
-cv2.imshow('camera', image)
-cv2.waitKey(1)
-"""
 
 
 def test_a_node_that_drives_moves_the_robot(run: Run) -> None:
@@ -249,7 +230,6 @@ def test_timers_keep_their_period_in_the_arenas_time(run: Run) -> None:
 
 
 def test_colour_and_depth_are_paired_by_their_stamps(run: Run) -> None:
-    lines: list[str] = []
     make = """
     import message_filters
     self.subs = [message_filters.Subscriber(self, Image, t) for t in
@@ -258,30 +238,11 @@ def test_colour_and_depth_are_paired_by_their_stamps(run: Run) -> None:
     self.sync.registerCallback(lambda a, b: self.get_logger().info(
         f'{a.encoding} {b.encoding} {a.header.stamp == b.header.stamp}'))
     """
-    run(node("pass", make), seconds=1.0, log=lambda _t, _l, _n, m: lines.append(m))
-    assert lines == ["bgr8 32FC1 True"] * 10
+    assert said(run, node(DRIVE, make), seconds=1.0) == ["bgr8 32FC1 True"] * 10
 
 
 def test_every_topic_of_the_workshop_arrives_at_its_rate(run: Run) -> None:
-    counts: dict[str, int] = {}
-    text = "import importlib\nrclpy.init()\nn = Node('n')\n"
-    for topic, kind in names.TYPES.items():
-        if topic not in (names.COMMAND, names.ANNOTATED):
-            package, _, name = kind.split("/")
-            text += f"T = getattr(importlib.import_module('{package}.msg'), '{name}')\n"
-            text += f"n.create_subscription(T, '{topic}', lambda m: n.get_logger().info('{topic}'), 100)\n"
-
-    def log(_t: float, _l: str, _n: str, message: str) -> None:
-        counts[message] = counts.get(message, 0) + 1
-
-    run(text + "rclpy.spin(n)", seconds=2.0, log=log)
-    assert {topic: round(n / 2) for topic, n in counts.items()} == {
-        names.IMAGE: 10,
-        names.IMAGE_COMPRESSED: 10,
-        names.DEPTH: 10,
-        names.DEPTH_LCAS: 10,
-        names.CAMERA_INFO: 10,
-        names.DEPTH_INFO: 10,
+    rates = dict.fromkeys(names.TYPES, 10) | {
         names.SCAN: 8,
         names.ODOMETRY: 50,
         names.IMU: 100,
@@ -289,6 +250,15 @@ def test_every_topic_of_the_workshop_arrives_at_its_rate(run: Run) -> None:
         names.TF: 50,
         names.TF_STATIC: 0,
     }
+    del rates[names.COMMAND], rates[names.ANNOTATED]
+    text = "import importlib\nrclpy.init()\nn = Node('n')\n"
+    for topic in rates:
+        package, _, name = names.TYPES[topic].split("/")
+        text += f"T = getattr(importlib.import_module('{package}.msg'), '{name}')\n"
+        text += f"n.create_subscription(T, '{topic}', lambda m: n.get_logger().info('{topic}'), 100)\n"
+    counts: Counter[str] = Counter()
+    run(text + "rclpy.spin(n)", seconds=2.0, log=lambda _t, _l, _n, topic: counts.update([topic]))
+    assert {topic: round(n / 2) for topic, n in counts.items()} == rates
 
 
 def test_polling_and_spinning_with_a_timeout_let_time_pass(run: Run) -> None:
@@ -304,10 +274,12 @@ def test_polling_and_spinning_with_a_timeout_let_time_pass(run: Run) -> None:
 
 
 def test_a_run_leaves_python_as_it_was(run: Run) -> None:
-    before = (time.sleep, cv2.imshow, getattr(cv2, "HOGDescriptor", None), list(sys.path), list(sys.argv))
+    def python() -> tuple[object, ...]:
+        return time.sleep, cv2.imshow, getattr(cv2, "HOGDescriptor", None), list(sys.path), list(sys.argv)
+
+    before = python()
     run(node(FOLLOW), seconds=0.2)
-    after = (time.sleep, cv2.imshow, getattr(cv2, "HOGDescriptor", None), list(sys.path), list(sys.argv))
-    assert before == after
+    assert python() == before
     assert importlib.util.find_spec("message_filters") is None
 
 

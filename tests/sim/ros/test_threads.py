@@ -9,17 +9,10 @@ import sys
 import time
 
 import pytest
-from tests.sim.ros.conftest import Run
+from tests.sim.ros.scripts import Run, said
 
 NODE = "import threading, time\nrclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\n"
 SERVICE = "from std_srvs.srv import Trigger\n"
-
-
-def said(run: Run, text: str, seconds: float = 3.0) -> list[str]:
-    lines: list[str] = []
-    outcome = run(NODE + text, seconds=seconds, log=lambda _t, _l, _n, message: lines.append(message))
-    assert outcome.failure == "", outcome.traceback
-    return lines
 
 
 def test_main_sleeps_while_a_thread_spins(run: Run) -> None:
@@ -33,7 +26,7 @@ while rclpy.ok():
         break
     time.sleep(0.1)
 """
-    assert said(run, text) == ["0.5", "1.0", "1.5"]
+    assert said(run, NODE + text) == ["0.5", "1.0", "1.5"]
 
 
 def test_the_scripts_end_waits_for_its_threads_but_not_for_daemons(run: Run) -> None:
@@ -46,7 +39,7 @@ threading.Thread(target=count, args=('waited for', 2, 0.5)).start()
 threading.Thread(target=count, args=('daemon', 99, 0.6), daemon=True).start()
 pub.publish(Twist())
 """
-    assert said(run, text) == ["waited for 0", "daemon 0", "waited for 1"]
+    assert said(run, NODE + text) == ["waited for 0", "daemon 0", "waited for 1"]
 
 
 def test_events_and_queues_wait_in_the_arenas_time(run: Run) -> None:
@@ -69,7 +62,7 @@ n.get_logger().info(box.get())
 worker.join()
 pub.publish(Twist())
 """
-    assert said(run, text) == ["False", "empty at 0.9", "done"]
+    assert said(run, NODE + text) == ["False", "empty at 0.9", "done"]
 
 
 def test_a_pool_computes_without_simulated_time(run: Run) -> None:
@@ -80,7 +73,7 @@ with ThreadPoolExecutor(2) as pool:
 n.get_logger().info(str(n.get_clock().now().nanoseconds))
 pub.publish(Twist())
 """
-    assert said(run, text) == ["30", "0"]
+    assert said(run, NODE + text) == ["30", "0"]
 
 
 def test_what_a_thread_raises_ends_the_run(run: Run) -> None:
@@ -169,14 +162,14 @@ n.create_timer(1.0, ask)
 rclpy.spin(n)
 """
     )
-    assert said(run, text, seconds=2.5) == ["answered", "answered"]
+    assert said(run, NODE + text, seconds=2.5) == ["answered", "answered"]
 
 
 def test_a_service_that_no_node_offers_is_warned_of(run: Run) -> None:
     text = SERVICE + "pub.publish(Twist())\nn.create_client(Trigger, 'goo').wait_for_service()"
-    lines: list[str] = []
-    run(NODE + text, seconds=3.0, log=lambda _t, _l, _n, message: lines.append(message))
-    assert lines == ["no node offers the service '/goo', asked for at line 13; offered: none"]
+    assert said(run, NODE + text, seconds=3.0) == [
+        "no node offers the service '/goo', asked for at line 13; offered: none"
+    ]
 
 
 def test_late_subscriptions_get_what_was_published_to_be_kept(run: Run) -> None:
@@ -192,4 +185,4 @@ n.create_subscription(String, 'map', lambda m: n.get_logger().info('volatile ' +
 pub.publish(Twist())
 rclpy.spin(n)
 """
-    assert said(run, text) == ["new"]
+    assert said(run, NODE + text) == ["new"]

@@ -3,28 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from tests.sim.ros.conftest import STANDING, Run, node
+from tests.sim.ros.scripts import STANDING, Run, node, said
 
-from limo_hog.ros2 import names
 from limo_sim.cli.card import picture
 from limo_sim.ros.script import score_of
 
 SAY = "self.get_logger().info(str(%s))"
 ZERO = "self.pub.publish(Twist())"
-
-
-def said(run: Run, make: str, *arguments: str, seconds: float = 0.2, **options: object) -> list[str]:
-    """Run a node with `make` in its constructor and return its log."""
-    lines: list[str] = []
-    outcome = run(
-        node(ZERO, make),
-        seconds=seconds,
-        arguments=["--ros-args", *arguments],
-        log=lambda _t, _l, _n, message: lines.append(message),
-        **options,
-    )
-    assert outcome.failure == ""
-    return lines
 
 
 @pytest.mark.parametrize(
@@ -41,7 +26,7 @@ def said(run: Run, make: str, *arguments: str, seconds: float = 0.2, **options: 
 )
 def test_a_parameters_value_is_read_as_the_tutorials_do(run: Run, default: str, field: str, shown: str) -> None:
     make = f"self.declare_parameter('x', {default})\n" + SAY % f"self.get_parameter('x').get_parameter_value().{field}"
-    assert said(run, make) == [shown]
+    assert said(run, node(ZERO, make), seconds=0.2) == [shown]
 
 
 def test_init_is_a_context_that_shuts_down(run: Run) -> None:
@@ -56,21 +41,18 @@ def test_init_is_a_context_that_shuts_down(run: Run) -> None:
     assert run(text, seconds=0.5).failure == ""
 
 
-def test_overrides_are_declared_where_a_node_asks_for_it(run: Run) -> None:
-    options = "super().__init__('follower', automatically_declare_parameters_from_overrides=True)"
-    text = node(ZERO, SAY % "self.get_parameter('gain').value").replace("super().__init__('follower')", options)
-    lines: list[str] = []
-    arguments = ["--ros-args", "-p", "gain:=2.5"]
-    assert run(text, arguments=arguments, log=lambda _t, _l, _n, m: lines.append(m), seconds=0.2).failure == ""
-    assert lines == ["2.5"]
-
-
-def test_undeclared_parameters_are_allowed_where_a_node_asks_for_it(run: Run) -> None:
-    options = "super().__init__('follower', allow_undeclared_parameters=True)"
-    text = node(ZERO, SAY % "self.get_parameter('gain').value").replace("super().__init__('follower')", options)
-    lines: list[str] = []
-    assert run(text, log=lambda _t, _l, _n, m: lines.append(m), seconds=0.2).failure == ""
-    assert lines == ["None"]
+@pytest.mark.parametrize(
+    ("option", "arguments", "gain"),
+    [
+        ("automatically_declare_parameters_from_overrides", ["--ros-args", "-p", "gain:=2.5"], "2.5"),
+        ("allow_undeclared_parameters", [], "None"),
+    ],
+)
+def test_a_node_may_ask_for_parameters_it_has_not_declared(
+    run: Run, option: str, arguments: list[str], gain: str
+) -> None:
+    text = node(ZERO, SAY % "self.get_parameter('gain').value").replace("('follower')", f"('follower', {option}=True)")
+    assert said(run, text, arguments=arguments, seconds=0.2) == [gain]
 
 
 def test_a_subscription_that_hears_nothing_warns_after_two_seconds(run: Run) -> None:
@@ -112,8 +94,7 @@ def test_the_depth_cameras_info_is_that_of_the_camera(run: Run) -> None:
         "self.create_subscription(CameraInfo, '/limo_camera/depth/camera_info',"
         " lambda m: self.get_logger().info(f'{m.width} {m.k[0] > 100}'), 10)"
     )
-    assert said(run, make) == ["640 True", "640 True"]
-    assert names.DEPTH_INFO == "/limo_camera/depth/camera_info"
+    assert said(run, node(ZERO, make), seconds=0.2) == ["640 True", "640 True"]
 
 
 def test_a_node_with_its_own_detector_is_shown_by_what_it_does_not_by_a_search(run: Run) -> None:

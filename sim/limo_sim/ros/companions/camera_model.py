@@ -8,10 +8,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
+
+#: Names of ROS 2's `PinholeCameraModel` that are not offered.
+_MISSING = (
+    "rectifyImage",
+    "rectifyPoint",
+    "unrectifyPoint",
+    "rectify_image",
+    "rectify_point",
+    "unrectify_point",
+    "getDeltaU",
+    "getDeltaV",
+    "getDeltaX",
+    "getDeltaY",
+    "fullResolution",
+    "fullIntrinsicMatrix",
+    "fullProjectionMatrix",
+    "tfFrame_",
+    "stamp_",
+)
 
 
-class PinholeCameraModel(Offered):
+class PinholeCameraModel(PartialApi, missing=_MISSING):
     """A rectified pinhole camera, read from a CameraInfo; rays are optical: X right, Y down, Z forward.
 
     Attributes
@@ -21,12 +40,6 @@ class PinholeCameraModel(Offered):
     K, P
         Intrinsic (3, 3) and projection (3, 4) matrices [px].
     """
-
-    _not_offered = (
-        *("rectifyImage", "rectifyPoint", "unrectifyPoint", "rectify_image", "rectify_point", "unrectify_point"),
-        *("getDeltaU", "getDeltaV", "getDeltaX", "getDeltaY", "fullResolution", "fullIntrinsicMatrix"),
-        *("fullProjectionMatrix", "tfFrame_", "stamp_"),
-    )
 
     def __init__(self) -> None:
         self.K: Any = None

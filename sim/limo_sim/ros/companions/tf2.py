@@ -16,7 +16,7 @@ from limo_sim.ros.rclpy_stub.clock import Duration, Time
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import ReentrantCallbackGroup
 from limo_sim.ros.rclpy_stub.node import Node
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, QoSProfile
 
 
@@ -48,14 +48,23 @@ class TimeoutException(TransformException):
 _Track = list[tuple[int, Rigid]]
 
 
-class Buffer(Offered):
-    """Keeps the transforms of the last seconds and combines them."""
+#: Names of ROS 2's `Buffer` that are not offered.
+_MISSING = (
+    "lookup_transform_full",
+    "lookup_transform_full_async",
+    "lookup_transform_async",
+    "transform_full",
+    "can_transform_full",
+    "wait_for_transform_async",
+    "wait_for_transform_full_async",
+    "all_frames_as_yaml",
+    "set_transform_callback",
+    "get_latest_common_time",
+)
 
-    _not_offered = (
-        *("lookup_transform_full", "lookup_transform_full_async", "lookup_transform_async", "transform_full"),
-        *("can_transform_full", "wait_for_transform_async", "wait_for_transform_full_async"),
-        *("all_frames_as_yaml", "set_transform_callback", "get_latest_common_time"),
-    )
+
+class Buffer(PartialApi, missing=_MISSING):
+    """Keeps the transforms of the last seconds and combines them."""
 
     def __init__(self, cache_time: Duration | None = None, node: Node | None = None) -> None:  # noqa: ARG002
         self._kept_ns = 10 * 10**9 if cache_time is None else cache_time.nanoseconds

@@ -11,7 +11,7 @@ from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.lockstep.world import UNHEARD_AFTER
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 
 
 class ClockType(IntEnum):
@@ -22,10 +22,8 @@ class ClockType(IntEnum):
     STEADY_TIME = 3
 
 
-class Duration(Offered):
+class Duration(PartialApi, missing=("get_c_duration",)):
     """A difference of times; `nanoseconds` holds it exactly."""
-
-    _not_offered = ("get_c_duration",)
 
     def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None:
         self.nanoseconds = int(seconds * 1e9) + int(nanoseconds)
@@ -125,10 +123,8 @@ class Time:
         return f"Time(nanoseconds={self.nanoseconds}, clock_type={self.clock_type.name})"
 
 
-class Clock(Offered):
+class Clock(PartialApi, missing=("create_jump_callback", "ros_time_is_active", "set_ros_time_override", "handle")):
     """Tells the arena's time."""
-
-    _not_offered = ("create_jump_callback", "ros_time_is_active", "set_ros_time_override", "handle")
 
     def __init__(self, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> None:
         self.clock_type = clock_type
@@ -149,10 +145,8 @@ class Clock(Offered):
         return True
 
 
-class Timer(Offered):
+class Timer(PartialApi, missing=("handle",)):
     """Calls back again and again; after a blocked while, the calls that were missed are left out, as in ROS."""
-
-    _not_offered = ("handle",)
 
     def __init__(
         self,

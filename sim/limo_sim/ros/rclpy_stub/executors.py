@@ -12,20 +12,26 @@ from limo_sim.ros.rclpy_stub.context import Context, current
 from limo_sim.ros.rclpy_stub.future import Future, Task
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.node import Node
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 
 #: Threads of a MultiThreadedExecutor without a number. In ROS as many as the computer has processors; here always the
 #: same, since a run must not depend on the computer. Chosen: a workshop's laptop has four.
 _THREADS = 4
 
 
-class Executor(Offered):
-    """Runs the callbacks of its nodes, one at a time."""
+#: Names of rclpy's `Executor` that are not offered.
+_MISSING = (
+    "wait_for_ready_callbacks",
+    "spin_once_until_future_complete",
+    "can_execute",
+    "create_timer",
+    "add_to_context",
+    "guard_condition",
+)
 
-    _not_offered = (
-        *("wait_for_ready_callbacks", "spin_once_until_future_complete", "can_execute"),
-        *("create_timer", "add_to_context", "guard_condition"),
-    )
+
+class Executor(PartialApi, missing=_MISSING):
+    """Runs the callbacks of its nodes, one at a time."""
 
     def __init__(self, *, context: Any = None) -> None:
         self.context = context or current()

@@ -11,8 +11,7 @@ from limo_sim.ros.lockstep.records import StubError
 class Future:
     """An answer that may not be there yet."""
 
-    def __init__(self, *, executor: Any = None) -> None:
-        self._executor = executor
+    def __init__(self, *, executor: Any = None) -> None:  # noqa: ARG002 — rclpy's signature
         self._done = self._cancelled = False
         self._result: Any = None
         self._exception: BaseException | None = None

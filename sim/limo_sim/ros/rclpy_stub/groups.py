@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 
 
-class CallbackGroup(Offered):
+class CallbackGroup(PartialApi, missing=("beginning_execution", "ending_execution")):
     """Callbacks that are scheduled by the same rule."""
-
-    _not_offered = ("beginning_execution", "ending_execution")
 
     def __init__(self) -> None:
         self._entities: list[Any] = []

@@ -7,7 +7,7 @@ from enum import IntEnum
 from typing import Any
 
 from limo_sim.ros.rclpy_stub.context import current
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 
 
 class LoggingSeverity(IntEnum):
@@ -24,10 +24,8 @@ class LoggingSeverity(IntEnum):
 _levels: dict[str, LoggingSeverity] = {}
 
 
-class Logger(Offered):
+class Logger(PartialApi, missing=("log", "is_enabled_for", "get_logger_name")):
     """Speaks under a name."""
-
-    _not_offered = ("log", "is_enabled_for", "get_logger_name")
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -12,8 +12,8 @@ from limo_sim.ros.rclpy_stub.clock import Clock, ClockType, Rate, Timer
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from limo_sim.ros.rclpy_stub.logger import Logger
-from limo_sim.ros.rclpy_stub.offered import Offered
 from limo_sim.ros.rclpy_stub.parameters import Parameter, Parameters, SetParametersResult
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import QoSProfile, qos_profile_services_default, to_profile
 from limo_sim.ros.rclpy_stub.services import Client, Service
 from limo_sim.ros.rclpy_stub.topics import Publisher, Subscription, check_topic, check_type, publishers_of
@@ -29,22 +29,47 @@ _WITHOUT_EFFECT = (
 )
 
 
-class Node(Offered):
-    """What a script derives its node from."""
+#: Names of rclpy's `Node` that are not offered.
+_MISSING = (
+    "create_guard_condition",
+    "destroy_guard_condition",
+    "guards",
+    "handle",
+    "context",
+    "wait_for_node",
+    "waitables",
+    "add_waitable",
+    "remove_waitable",
+    "set_descriptor",
+    "describe_parameter",
+    "describe_parameters",
+    "list_parameters",
+    "get_parameter_types",
+    "get_parameter_type",
+    "set_parameters_atomically",
+    "PARAM_REL_TOL",
+    "get_service_names_and_types",
+    "get_node_names",
+    "count_clients",
+    "count_services",
+    "get_publishers_info_by_topic",
+    "get_subscriptions_info_by_topic",
+    "get_fully_qualified_node_names",
+    "get_publisher_names_and_types_by_node",
+    "get_subscriber_names_and_types_by_node",
+    "get_service_names_and_types_by_node",
+    "get_client_names_and_types_by_node",
+    "get_node_names_and_namespaces",
+    "get_node_names_and_namespaces_with_enclaves",
+    "add_pre_set_parameters_callback",
+    "remove_pre_set_parameters_callback",
+    "add_post_set_parameters_callback",
+    "remove_post_set_parameters_callback",
+)
 
-    _not_offered = (
-        *("create_guard_condition", "destroy_guard_condition", "guards", "handle", "context", "wait_for_node"),
-        *("waitables", "add_waitable", "remove_waitable", "set_descriptor", "describe_parameter"),
-        *("describe_parameters", "list_parameters", "get_parameter_types", "get_parameter_type"),
-        *("set_parameters_atomically", "PARAM_REL_TOL", "get_service_names_and_types", "get_node_names"),
-        *("count_clients", "count_services"),
-        *("get_publishers_info_by_topic", "get_subscriptions_info_by_topic", "get_fully_qualified_node_names"),
-        *("get_publisher_names_and_types_by_node", "get_subscriber_names_and_types_by_node"),
-        *("get_service_names_and_types_by_node", "get_client_names_and_types_by_node"),
-        *("get_node_names_and_namespaces", "get_node_names_and_namespaces_with_enclaves"),
-        *("add_pre_set_parameters_callback", "remove_pre_set_parameters_callback"),
-        *("add_post_set_parameters_callback", "remove_post_set_parameters_callback"),
-    )
+
+class Node(PartialApi, missing=_MISSING):
+    """What a script derives its node from."""
 
     def __init__(
         self,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 
 
 class ParameterException(Exception):  # noqa: N818 — rclpy's names
@@ -80,10 +80,8 @@ class ParameterValue:
     string_array_value: list[str] = field(default_factory=list)
 
 
-class Parameter(Offered):
+class Parameter(PartialApi, missing=("to_parameter_msg", "from_parameter_msg")):
     """A name with a value."""
-
-    _not_offered = ("to_parameter_msg", "from_parameter_msg")
 
     Type = ParameterType
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Any
 
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 
 
 class ReliabilityPolicy(IntEnum):
@@ -49,10 +49,8 @@ class LivelinessPolicy(IntEnum):
 
 
 @dataclass
-class QoSProfile(Offered):
+class QoSProfile(PartialApi, missing=("get_c_qos_profile",)):
     """What a writer offers and a reader asks for; lifespan, deadline and lease are taken and change nothing here."""
-
-    _not_offered = ("get_c_qos_profile",)
 
     depth: int = 10
     history: HistoryPolicy = HistoryPolicy.KEEP_LAST

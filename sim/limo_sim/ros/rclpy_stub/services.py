@@ -12,7 +12,7 @@ from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.future import Future
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import QoSProfile
 
 #: A call without a time limit that has waited so long can never be answered [s]: an answer takes no simulated time
@@ -20,10 +20,8 @@ from limo_sim.ros.rclpy_stub.qos import QoSProfile
 NEVER_AFTER = 30.0
 
 
-class Service(Offered):
+class Service(PartialApi, missing=("send_response", "configure_introspection", "handle", "logger_name")):
     """Answers requests by a callback of the script."""
-
-    _not_offered = ("send_response", "configure_introspection", "handle", "logger_name")
 
     def __init__(
         self,
@@ -74,10 +72,8 @@ class Service(Offered):
         current().world.services.pop(self.srv_name, None)
 
 
-class Client(Offered):
+class Client(PartialApi, missing=("configure_introspection", "handle", "logger_name", "get_pending_request")):
     """Sends requests."""
-
-    _not_offered = ("configure_introspection", "handle", "logger_name", "get_pending_request")
 
     def __init__(self, srv_type: Any, srv_name: str, qos_profile: QoSProfile, callback_group: CallbackGroup) -> None:
         self.srv_type, self.srv_name, self.service_name = srv_type, srv_name, srv_name

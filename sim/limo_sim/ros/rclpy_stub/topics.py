@@ -13,14 +13,14 @@ from limo_sim.ros.lockstep.calls import PUBLISHED
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
-from limo_sim.ros.rclpy_stub.offered import Offered
+from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 
 
-class Publisher(Offered):
+class Publisher(
+    PartialApi, missing=("assert_liveliness", "wait_for_all_acked", "handle", "event_handlers", "logger_name")
+):
     """Sends messages of one type to one topic."""
-
-    _not_offered = ("assert_liveliness", "wait_for_all_acked", "handle", "event_handlers", "logger_name")
 
     def __init__(self, msg_type: type[Message], topic: str, qos: QoSProfile) -> None:
         self.msg_type = msg_type
@@ -65,10 +65,8 @@ class Publisher(Offered):
             writers.remove(self.topic)
 
 
-class Subscription(Offered):
+class Subscription(PartialApi, missing=("handle", "event_handlers", "raw", "logger_name")):
     """Calls back with each message of a topic; the newest `depth` wait for a slow callback."""
-
-    _not_offered = ("handle", "event_handlers", "raw", "logger_name")
 
     def __init__(
         self,

@@ -35,7 +35,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("words", metavar="NAME:=VALUE", nargs="*", help="arguments of a launch file")
     add_scenario(parser, 60.0, "simulated time (60)")
     add_json(parser)
-    parser.add_argument("--real", action="store_true", help="with this computer's own rclpy: in real time, no score")
     add_watching(parser)
     parser.add_argument(
         "--ros-args",
@@ -48,10 +47,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Run the node and show its score card."""
-    if args.real:
-        from limo_sim.cli.real import run_real
-
-        return run_real(args)
     if args.words and not args.node.name.endswith(".launch.py"):
         raise UsageError(f"{args.words[0]}: only a launch file has arguments; a node's come after --ros-args")
     from limo_sim.run.catalogue import load

@@ -19,7 +19,6 @@ _LIBRARIES = {
     "cyclonedds": ("Cyclone DDS", "ros2"),
     "matplotlib": ("matplotlib", "plot"),
     "mcap": ("mcap", "record"),
-    "rerun": ("Rerun", "viz"),
     "rosbags": ("rosbags", "record"),
     "scipy": ("SciPy", "train"),
     "shtab": ("shtab", "completion"),

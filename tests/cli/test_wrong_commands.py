@@ -66,7 +66,7 @@ WRONG_ARGUMENTS = [
     ("score --scenario here/same.toml there/same.toml", "there/same.toml: is called 'same', as here/same.toml is"),
     ("score --scenario named.toml empty", "empty: is called 'empty', as named.toml is; give it another name"),
     ("score --scenario empty empty", "empty: is called 'empty', as empty is"),
-    ("arena", "give --ros2, --view, --video, --record or --rerun"),
+    ("arena", "give --ros2, --view, --video or --record"),
     (
         "arena --video a.mp4 --plot a.png --seconds 0.2",
         "--plot a.png: an arena has no run to draw; use it with follow or run",
@@ -159,8 +159,6 @@ MISSING = [
     ("cv2", "replay a.mcap --detector cv2", "needs OpenCV: pip install 'limo-hog[cv]'"),
     ("av", "follow --video a.mp4", "writing H.264 video needs PyAV: pip install 'limo-hog[video]'"),
     ("matplotlib", "follow --plot a.png", "--plot needs matplotlib: pip install 'limo-hog[plot]'"),
-    ("rerun", "arena --rerun a.rrd", "--rerun needs the Rerun SDK: pip install 'limo-hog[viz]'"),
-    ("rerun", "follow --rerun a.rrd", "--rerun needs the Rerun SDK: pip install 'limo-hog[viz]'"),
     ("rosbags", "follow --record a.mcap", "pip install 'limo-hog[record]'"),
     ("rosbags", "run node.py", "limo-hog run needs rosbags: pip install 'limo-hog[record]'"),
     ("rosbags", "workshop check node.py", "limo-hog workshop needs rosbags: pip install 'limo-hog[record]'"),

@@ -1,4 +1,4 @@
-"""The options of `follow`, `run` and `arena` that show or record a run: --view, --video, --record, --plot, --rerun."""
+"""The options of `follow`, `run` and `arena` that show or record a run: --view, --video, --record, --plot."""
 
 from __future__ import annotations
 
@@ -49,7 +49,6 @@ def add_watching(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.png",
         help="draw path, pixel error, distance and speed in one figure (not with arena)",
     )
-    group.add_argument("--rerun", type=file_ending(".rrd"), metavar="FILE.rrd", help="log the run for the Rerun viewer")
 
 
 def _address(text: str) -> tuple[str, int]:
@@ -123,10 +122,6 @@ def watching(
             from limo_sim.view.record import recorded
 
             all_.keepers.append(stack.enter_context(recorded(args.record, scenario.camera)))
-        if args.rerun is not None:
-            from limo_sim.view.rerun_log import logged
-
-            all_.keepers.append(stack.enter_context(logged(args.rerun, scenario.room.half)))
         if args.view is not None:
             from limo_sim.view.server import View
 

@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 
 import limo_hog
-from limo_sim.env.second import KINDS
+from limo_sim.env import KINDS
 
 ACTIONS, TRIES = 200, 5
 
@@ -22,8 +22,7 @@ def main() -> None:
     limo_hog.set_num_threads(1)
     cv2.setNumThreads(1)
     actions = np.random.default_rng(0).uniform(-0.3, 0.3, (ACTIONS, 2)).astype(np.float32)
-    envs = {f"v1 {kind}": gymnasium.make("limo_sim.env:LimoFollow-v1", observe=kind) for kind in KINDS}
-    envs["v0"] = gymnasium.make("limo_sim.env:LimoFollow-v0", scenario="followable")
+    envs = {kind: gymnasium.make("limo_sim.env:LimoFollow-v1", observe=kind) for kind in KINDS}
     best = dict.fromkeys(envs, 0.0)
     for seed in range(TRIES):
         for name, env in envs.items():

@@ -10,7 +10,7 @@ import pytest
 
 from limo_hog.follow import ApproachController
 from limo_hog.follow.sense.detectors import detector_named
-from limo_sim.env import LimoFollow
+from limo_sim.env import LimoFollowV1
 from limo_sim.ros.live import run_live
 from limo_sim.ros.script import run_script
 from limo_sim.run.arena import Arena
@@ -58,7 +58,7 @@ def test_an_arena_on_the_network_has_the_people_of_the_seed() -> None:
 
 
 def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
-    env = LimoFollow(DRAWN)
+    env = LimoFollowV1(DRAWN)
     places = []
     for seed in (0, 1, 0):
         env.reset(seed=seed)
@@ -71,9 +71,9 @@ def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
     [
         lambda node: run_script(node, UNKIND, 0.5),
         lambda _: run_live(UNKIND, 0, 0.04, None),
-        lambda _: LimoFollow(UNKIND),
+        lambda _: LimoFollowV1(UNKIND, "camera"),
     ],
-    ids=["run", "arena", "LimoFollow-v0"],
+    ids=["run", "arena", "images of LimoFollow-v1"],
 )
 def test_faults_of_a_detector_are_refused_where_the_detector_is_another_s(
     start: Callable[[Path], object], node: Path

@@ -70,8 +70,6 @@ class World:
         Topics whose messages later subscriptions get, and these messages.
     turns
         The script's threads.
-    scripts
-        Files whose lines are named: the script, and the nodes of a launch file.
     advances
         How often the arena advanced.
     """
@@ -94,7 +92,6 @@ class World:
         self.seconds = seconds
         self.log = log
         self.script = script
-        self.scripts = {str(script)}
         self.watch = watch
         self.patience = Patience(patience)
         self.readers: list[Reader] = []
@@ -135,7 +132,7 @@ class World:
     def line(self) -> int | None:
         """Return the line of the script that runs now; None where the script is not in the call."""
         frame: FrameType | None = sys._getframe(1)
-        while frame is not None and frame.f_code.co_filename not in self.scripts:
+        while frame is not None and frame.f_code.co_filename != str(self.script):
             frame = frame.f_back
         return None if frame is None else frame.f_lineno
 

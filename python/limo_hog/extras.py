@@ -17,6 +17,7 @@ _LIBRARIES = {
     "av": ("PyAV", "video"),
     "cv2": ("OpenCV", "cv"),
     "cyclonedds": ("Cyclone DDS", "ros2"),
+    "limo_sim": ("the arena", "sim"),
     "matplotlib": ("matplotlib", "plot"),
     "mcap": ("mcap", "record"),
     "rosbags": ("rosbags", "record"),

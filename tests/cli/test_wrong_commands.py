@@ -159,6 +159,7 @@ MISSING = [
     ("cv2", "replay a.mcap --detector cv2", "needs OpenCV: pip install 'limo-hog[cv]'"),
     ("av", "follow --video a.mp4", "writing H.264 video needs PyAV: pip install 'limo-hog[video]'"),
     ("matplotlib", "follow --plot a.png", "--plot needs matplotlib: pip install 'limo-hog[plot]'"),
+    ("limo_sim", "follow", "limo-hog follow needs the arena: pip install 'limo-hog[sim]'"),
     ("rosbags", "follow --record a.mcap", "pip install 'limo-hog[record]'"),
     ("rosbags", "run node.py", "limo-hog run needs rosbags: pip install 'limo-hog[record]'"),
     ("rosbags", "workshop check node.py", "limo-hog workshop needs rosbags: pip install 'limo-hog[record]'"),

@@ -305,18 +305,9 @@ def test_ctrl_c_ends_a_run_that_is_paused_on_its_page() -> None:
     assert process.returncode == 130
 
 
-def test_a_log_for_the_rerun_viewer_is_one(tmp_path: Path) -> None:
-    pytest.importorskip("rerun", reason="needs the extra viz: pip install 'limo-hog[viz]'")
-    assert main(["follow", "--seconds", "2", "--rerun", str(tmp_path / "run.rrd")]) == 0
-    log = tmp_path / "run.rrd"
-    assert log.read_bytes()[:3] == b"RRF"
-    assert log.stat().st_size > 100_000
-    assert list(tmp_path.iterdir()) == [log]
-
-
 def test_a_missing_library_is_named_with_what_brings_it() -> None:
     with (
-        pytest.raises(MissingExtraError, match=r"^--rerun needs the Rerun SDK: pip install 'limo-hog\[viz\]'$"),
-        needed(by="--rerun", what="the Rerun SDK", install="'limo-hog[viz]'"),
+        pytest.raises(MissingExtraError, match=r"^--video needs PyAV: pip install 'limo-hog\[video\]'$"),
+        needed(by="--video", what="PyAV", install="'limo-hog[video]'"),
     ):
         import no_such_library  # type: ignore[import-not-found]  # noqa: F401

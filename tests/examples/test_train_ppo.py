@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from limo_sim.run.baselines import Policy
-from limo_sim.run.sighting import SIZE
+from limo_sim.run.last_seen import SIZE
 
 pytest.importorskip(
     "stable_baselines3", reason="stable-baselines3 is not installed: it brings torch, several gigabytes"

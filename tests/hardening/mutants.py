@@ -88,7 +88,7 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
             for name in ("summary", "detector_faults", "episode", "score_sweep", "everywhere")
         ],
     ),
-    "env": ([f"{SIM}/env/*.py"], ["tests/sim/env/test_env_v0.py", "tests/sim/env/test_env.py"]),
+    "env": ([f"{SIM}/env.py"], ["tests/sim/test_env.py"]),
     "messages": ([f"{ROS2}/messages.py"], ["tests/ros2/test_messages.py"]),
 }
 #: Libraries that are imported before the forks; ours are imported in each.

@@ -1,8 +1,8 @@
 """Routes `limo-hog COMMAND` to the command's module, and turns named errors into one line.
 
-A command is a module with `add_parser(subparsers) -> None` and `run(args) -> int`. The detector's and the robot's
-commands are modules beside this one, named as the command; other distributions offer theirs as entry points of the
-group `limo_hog.commands`. Only the module of the command that was asked for is imported.
+A command is a module with `add_parser(subparsers) -> None` and `run(args) -> int`, named as the command: the detector's
+and the robot's are beside this one, the arena's in `limo_sim.cli`. Only the module of the command that was asked for is
+imported; where the arena is not installed, the error names the line that installs it.
 """
 
 from __future__ import annotations
@@ -20,10 +20,8 @@ from types import ModuleType, SimpleNamespace
 from limo_hog.cli.support.output import UsageError, one_line
 from limo_hog.cli.support.signals import stopping
 from limo_hog.exceptions import LimoHogError
-from limo_hog.extras import MissingExtraError, missing_extra
+from limo_hog.extras import missing_extra
 
-#: Entry points of this group are commands: the name is the command's, the value its module.
-ENTRY_POINTS = "limo_hog.commands"
 #: Commands of this package and their line in `limo-hog --help`.
 BUILT_IN = {
     "detect": "find people in photographs, folders and videos",
@@ -120,7 +118,7 @@ def whole_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="limo-hog")
     commands = parser.add_subparsers(metavar="COMMAND")
     for name, line in (ARENA | BUILT_IN).items():
-        with suppress(MissingExtraError):
+        with suppress(ModuleNotFoundError):
             module = _module_of(name, [])
             if module is not None:
                 # A command has no line of its own in the help; completion leaves out those without.
@@ -138,26 +136,14 @@ def _likely(word: str, known: Iterable[str]) -> str:
 
 
 def _module_of(command: str, arguments: list[str]) -> ModuleType | None:
-    """Import a command's module; None where no distribution has such a command.
-
-    Raises
-    ------
-    MissingExtraError
-        A command of the arena, which is not installed.
-    """
+    """Import a command's module; None where there is no such command."""
     if command == "follow" and "--ros2" in arguments:
         # The robot has no simulator.
         return importlib.import_module("limo_hog.cli.follow_robot")
     if command in BUILT_IN:
         return importlib.import_module(f"limo_hog.cli.{command}")
-    from importlib.metadata import entry_points
-
-    offered = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
-    if command in offered:
-        module: ModuleType = offered[command].load()
-        return module
     if command in ARENA:
-        raise MissingExtraError(f"limo-hog {command} needs the arena: pip install 'limo-hog[sim]'")
+        return importlib.import_module(f"limo_sim.cli.{command}")
     return None
 
 

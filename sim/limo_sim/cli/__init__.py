@@ -1,1 +1,1 @@
-"""The arena's commands of `limo-hog`, found through the entry-point group `limo_hog.commands`."""
+"""The arena's commands of `limo-hog`, which `limo_hog.cli.main` lists."""

@@ -31,8 +31,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Run the arena."""
-    if not args.ros2 and not any((args.view, args.video, args.record, args.rerun)):
-        raise UsageError("an arena without any output: give --ros2, --view, --video, --record or --rerun")
+    if not args.ros2 and not any((args.view, args.video, args.record)):
+        raise UsageError("an arena without any output: give --ros2, --view, --video or --record")
     if args.plot:
         raise UsageError(f"--plot {args.plot}: an arena has no run to draw; use it with follow or run")
     from limo_sim.ros.live import run_live

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.output import STDOUT, UsageError, write_json
+from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
@@ -31,11 +31,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "waits, so the same file, scenario and seed give the same run. Ends with the score card of `follow`.",
         epilog="What of ROS 2's Python API is offered: https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
     )
-    parser.add_argument("node", metavar="NODE.py", type=Path, help="the script, or a launch file FILE.launch.py")
-    parser.add_argument("words", metavar="NAME:=VALUE", nargs="*", help="arguments of a launch file")
+    parser.add_argument("node", metavar="NODE.py", type=Path, help="the script")
     add_scenario(parser, 60.0, "simulated time (60)")
     add_json(parser)
-    parser.add_argument("--real", action="store_true", help="with this computer's own rclpy: in real time, no score")
     add_watching(parser)
     parser.add_argument(
         "--ros-args",
@@ -48,12 +46,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Run the node and show its score card."""
-    if args.real:
-        from limo_sim.cli.real import run_real
-
-        return run_real(args)
-    if args.words and not args.node.name.endswith(".launch.py"):
-        raise UsageError(f"{args.words[0]}: only a launch file has arguments; a node's come after --ros-args")
     from limo_sim.run.catalogue import load
     from limo_sim.world.variants import of_run
 
@@ -82,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
             scenario,
             args.seconds,
             args.seed,
-            arguments=[*args.words, "--ros-args", *args.ros_args],
+            arguments=["--ros-args", *args.ros_args],
             log=log,
             watch=watch,
             pictures=bool(audience),

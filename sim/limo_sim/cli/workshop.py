@@ -65,10 +65,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             one.add_argument(
                 "--gradescope", type=output_file, metavar="FILE", help="write results.json for a Gradescope autograder"
             )
-        if action == "new":
-            one.add_argument(
-                "--notebook", action="store_true", help="a Jupyter notebook, FILE.ipynb, instead of FILE.py"
-            )
         one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
     words = "check every node in a folder, each in a process of its own, and write a table of points"
     one = actions.add_parser("grade", help=words, description=words.capitalize() + ".")
@@ -112,23 +108,15 @@ def run(args: argparse.Namespace) -> int:
         if missed:
             raise CheckpointError(f"{args.file}: {len(missed)} of {len(verdicts)} checkpoints do not hold")
         return 0
-    as_notebook = args.action == "new" and args.notebook
-    if as_notebook:
-        with needed(by="limo-hog workshop", what="rosbags", install="'limo-hog[record]'"):
-            from limo_sim.workshop.notebook import notebook
-        text = notebook(node)
-    else:
-        text = template(node) if args.action == "new" else solution(node)
-    suffix = "" if args.action == "new" else "_solution"
-    path = args.file or Path(f"{node}{suffix}.{'ipynb' if as_notebook else 'py'}")
+    text = template(node) if args.action == "new" else solution(node)
+    path = args.file or Path(f"{node}.py" if args.action == "new" else f"{node}_solution.py")
     if str(path) == STDOUT:
         sys.stdout.write(text)
         return 0
     if path.exists():
         raise UsageError(f"{path} is there already; give another name")
     write_text(path, text)
-    how = "open it in Jupyter" if as_notebook else f"try it: limo-hog run {path}"
-    print(f"{path} is written; {how}", file=sys.stderr)
+    print(f"{path} is written; try it: limo-hog run {path}", file=sys.stderr)
     return 0
 
 

@@ -6,8 +6,7 @@ import contextlib
 from typing import Any
 
 from limo_sim.ros import interfaces
-from limo_sim.ros.companions import bridge, camera_model, filters, quaternions, tf2, tf2_geometry
-from limo_sim.ros.launching import description
+from limo_sim.ros.companions import bridge, camera_model, filters, packages, quaternions, tf2, tf2_geometry
 from limo_sim.ros.lockstep import turns
 from limo_sim.ros.rclpy_stub import (
     clock,
@@ -26,7 +25,7 @@ from limo_sim.ros.rclpy_stub import (
 
 def offered() -> dict[str, dict[str, Any]]:
     """Return the content of every module."""
-    found = _rclpy() | _companions() | description.OFFERED
+    found = _rclpy() | _companions()
     for package in interfaces.PACKAGES:
         found[package] = {}
         found[f"{package}.msg"] = {
@@ -122,6 +121,8 @@ def _companions() -> dict[str, dict[str, Any]]:
             "TimeSynchronizer": filters.TimeSynchronizer,
             "ApproximateTimeSynchronizer": filters.ApproximateTimeSynchronizer,
         },
+        "ament_index_python": {"get_package_share_directory": packages.share_directory},
+        "ament_index_python.packages": {"get_package_share_directory": packages.share_directory},
         "cv_bridge": {"CvBridge": bridge.CvBridge, "CvBridgeError": bridge.CvBridgeError},
         "image_geometry": {"PinholeCameraModel": camera_model.PinholeCameraModel},
         "tf2_ros": {**listener, **broadcasters, **exceptions},

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from limo_hog.ros2 import names
 from limo_sim.ros.front import in_front
-from limo_sim.ros.launching.programs import SUFFIX, launch
 from limo_sim.ros.lockstep.patience import DiedError, HungError
 from limo_sim.ros.lockstep.records import Log, StubError
 from limo_sim.ros.lockstep.turns import ExternalShutdownException, RunOver
@@ -75,11 +74,11 @@ def run_script(
     Parameters
     ----------
     script
-        An ordinary rclpy script, or a launch file whose nodes are such scripts.
+        An ordinary rclpy script.
     scenario, seconds, seed
         The arena, and how much of its time the script gets [s].
     arguments
-        Command line of the script; what follows --ros-args is ROS's. Of a launch file: name:=value.
+        Command line of the script; what follows --ros-args is ROS's.
     log
         Called with every line that the script logs.
     watch
@@ -107,10 +106,7 @@ def run_script(
     with in_front(world), watched_cv2(world):
         try:
             with world.patience.watching(), world.turns.main(Context(world)):
-                if script.name.endswith(SUFFIX):
-                    launch(script, world, arguments)
-                else:
-                    runpy.run_path(str(script), run_name="__main__")
+                runpy.run_path(str(script), run_name="__main__")
         except (RunOver, ExternalShutdownException):
             pass
         except SystemExit as exit_:

@@ -19,7 +19,7 @@ from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import measure
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_hog.follow.twist import Twist
-from limo_sim.run.sighting import SCALE, SIZE, Sighting, sighted, state_of
+from limo_sim.run.last_seen import SCALE, SIZE, LastSeen, sighted, state_of
 
 #: Names that `controller_of` knows beside those of `limo_hog.follow` and "policy:FILE.npz".
 BASELINES = ("pursuit", "ppo")
@@ -78,11 +78,11 @@ class PurePursuit:
     max_linear: float = bounded(0.7, 0, 1)
     max_angular: float = bounded(1.5, 0, 3)
 
-    def start(self) -> Sighting | None:
+    def start(self) -> LastSeen | None:
         """Return the state before the first observation."""
         return None
 
-    def step(self, observation: Observation, state: Sighting | None) -> Decision[Sighting | None]:
+    def step(self, observation: Observation, state: LastSeen | None) -> Decision[LastSeen | None]:
         """Drive towards the last sighting; stand where there was none."""
         odometry = observation.odometry or Odometry()
         target, state = _look(observation, odometry, state)
@@ -125,11 +125,11 @@ class Policy:
         # A wrong file is an error before the robot starts.
         _ = self._layers
 
-    def start(self) -> Sighting | None:
+    def start(self) -> LastSeen | None:
         """Return the state before the first observation."""
         return None
 
-    def step(self, observation: Observation, state: Sighting | None) -> Decision[Sighting | None]:
+    def step(self, observation: Observation, state: LastSeen | None) -> Decision[LastSeen | None]:
         """Do what the network says."""
         odometry = observation.odometry or Odometry()
         target, state = _look(observation, odometry, state)
@@ -161,7 +161,7 @@ class Policy:
         return layers
 
 
-def _look(observation: Observation, odometry: Odometry, before: Sighting | None) -> tuple[int | None, Sighting | None]:
+def _look(observation: Observation, odometry: Odometry, before: LastSeen | None) -> tuple[int | None, LastSeen | None]:
     """Return the box that is the person's, and the newest sighting.
 
     The first person is the one with the highest score; then the box nearest to where that person would be now.

@@ -17,7 +17,7 @@ MISS_STREAM, FALSE_STREAM = 6, 7  # of the detector's faults, `run.detector_faul
 PEOPLE_STREAM = 8  # of the people's clothes, statures, speeds and starts, below
 CROWD_STREAM = 9  # of the people who give way, each with its own number behind
 # Two that were given the crowd's number, and keep it for the figures: the robot's way in `run.export`, and the errors
-# of the sightings in `env.second`. The first person who gives way draws the same numbers there.
+# of the sightings in `env`. The first person who gives way draws the same numbers there.
 WANDERING_STREAM = SIGHTING_STREAM = CROWD_STREAM
 
 _SKIN = ((236, 196, 168), (198, 154, 124), (150, 104, 76), (96, 66, 50))

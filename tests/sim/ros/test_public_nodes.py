@@ -84,3 +84,17 @@ def test_threads_take_turns_so_that_two_runs_are_the_same(name: str) -> None:
     first, second = (ran(name, STANDING, 3.0) for _ in range(2))
     assert first.commands == second.commands
     assert first.said == second.said
+
+
+def test_a_node_finds_its_packages_files_as_ros2_pkg_create_lays_them_out(tmp_path: Path) -> None:
+    node = tmp_path / "src" / "talk" / "talk" / "talker.py"
+    node.parent.mkdir(parents=True)
+    (node.parent / "__init__.py").touch()
+    node.write_text(
+        "import rclpy\nfrom ament_index_python.packages import get_package_share_directory as share\n"
+        "rclpy.init()\nlogger = rclpy.create_node('talker').get_logger()\n"
+        "logger.info(share('talk'))\nlogger.info(share('unknown'))\n"
+    )
+    said: list[str] = []
+    run_script(node, NOBODY, 0.1, log=lambda _t, _l, _n, text: said.append(text))
+    assert said[:2] == [str(node.parents[1]), str(node.parent)]

@@ -18,7 +18,7 @@ from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_sim.cli import score
 from limo_sim.env import LimoFollowV1
 from limo_sim.run.baselines import BASELINES, PPO_FILE, Policy, PurePursuit, controller_of
-from limo_sim.run.sighting import SIZE, Sighting
+from limo_sim.run.last_seen import SIZE, LastSeen
 from limo_sim.sensing.camera import FOCAL_PX
 
 
@@ -94,7 +94,7 @@ def test_a_policys_action_is_in_units_of_the_environments(tmp_path: Path) -> Non
     policy = Policy(network(tmp_path / "a.npz", constant))
     decision = policy.step(seeing((2.5, 0.8)), policy.start())
     assert (decision.twist.linear, decision.twist.angular) == pytest.approx((0.35, -1.5))
-    assert isinstance(decision.state, Sighting)
+    assert isinstance(decision.state, LastSeen)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +10,7 @@ import pytest
 
 from limo_hog.follow import ApproachController
 from limo_hog.follow.sense.detectors import detector_named
-from limo_sim.cli.real import run_real
-from limo_sim.cli.run import add_parser
-from limo_sim.env import LimoFollow
+from limo_sim.env import LimoFollowV1
 from limo_sim.ros.live import run_live
 from limo_sim.ros.script import run_script
 from limo_sim.run.arena import Arena
@@ -27,7 +24,6 @@ DRAWN = Scenario(
     name="drawn", people=(Person(route=((2.5, 0.0, 0.0), (3.0, 1.5, 0.0))),), vary=Vary(clothes=True, place=0.4)
 )
 UNKIND = Scenario(name="unkind", detector=DetectorFaults(recall=0.5))
-UNKIND_TOML = "[detector]\nrecall = 0.5\n"
 NODE = "import rclpy\nrclpy.init()\nnode = rclpy.create_node('idle')\nrclpy.spin(node)\n"
 
 
@@ -62,7 +58,7 @@ def test_an_arena_on_the_network_has_the_people_of_the_seed() -> None:
 
 
 def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
-    env = LimoFollow(DRAWN)
+    env = LimoFollowV1(DRAWN)
     places = []
     for seed in (0, 1, 0):
         env.reset(seed=seed)
@@ -75,9 +71,9 @@ def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
     [
         lambda node: run_script(node, UNKIND, 0.5),
         lambda _: run_live(UNKIND, 0, 0.04, None),
-        lambda _: LimoFollow(UNKIND),
+        lambda _: LimoFollowV1(UNKIND, "camera"),
     ],
-    ids=["run", "arena", "LimoFollow-v0"],
+    ids=["run", "arena", "images of LimoFollow-v1"],
 )
 def test_faults_of_a_detector_are_refused_where_the_detector_is_another_s(
     start: Callable[[Path], object], node: Path
@@ -86,16 +82,3 @@ def test_faults_of_a_detector_are_refused_where_the_detector_is_another_s(
         start(node)
     start_plain = replace(UNKIND, detector=DetectorFaults())
     assert Arena(start_plain).scenario == start_plain
-
-
-def test_a_node_on_the_network_is_refused_before_it_starts(
-    tmp_path: Path, node: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = tmp_path / "unkind.toml"
-    file.write_text(UNKIND_TOML, encoding="utf-8")
-    monkeypatch.setattr("importlib.util.find_spec", lambda _: object())
-    parser = argparse.ArgumentParser()
-    add_parser(parser.add_subparsers())
-    args = parser.parse_args(["run", str(node), "--real", "--scenario", str(file), "--seconds", "1"])
-    with pytest.raises(ScenarioError, match="detector: a node brings its own"):
-        run_real(args)

@@ -8,7 +8,6 @@ the arena advances by one step.
 from __future__ import annotations
 
 import math
-import sys
 import threading
 from _thread import allocate_lock
 from collections.abc import Callable, Iterator
@@ -33,15 +32,14 @@ class Seat:
 
     Attributes
     ----------
-    owner, argv
-        The rclpy context and the command line that the thread's program has; a new thread inherits them.
+    owner
+        The rclpy context; a new thread inherits it.
     daemon
         Whether the script's end waits for the thread.
     """
 
-    def __init__(self, owner: Any, argv: list[str], *, daemon: bool) -> None:
+    def __init__(self, owner: Any, *, daemon: bool) -> None:
         self.owner = owner
-        self.argv = argv
         self.daemon = daemon
         self.ready: Callable[[], bool] = lambda: True
         self.until = math.inf
@@ -98,7 +96,7 @@ class Turns:
     @contextmanager
     def main(self, owner: Any) -> Iterator[None]:
         """Make the calling thread the script's first; at the end the others are waited for, daemons are ended."""
-        seat = Seat(owner, sys.argv, daemon=False)
+        seat = Seat(owner, daemon=False)
         self._order.append(seat)
         self._current = seat
         self._seats[threading.get_ident()] = seat
@@ -126,7 +124,6 @@ class Turns:
         if chosen is not me:
             self._hand_to(chosen)
             me.turn.acquire()
-            sys.argv = me.argv
         if me.ended:
             raise ThreadEnded
         if ready():
@@ -137,16 +134,12 @@ class Turns:
 
     def start(self, thread: threading.Thread, start: Callable[[threading.Thread], None]) -> None:
         """Start a thread of the script; it runs when its turn comes."""
-        mine = self._seats[threading.get_ident()]
-        # A node of a launch file has a context and a command line of its own.
-        owner, argv = getattr(thread, "limo_program", (mine.owner, mine.argv))
-        seat = Seat(owner, argv, daemon=thread.daemon)
+        seat = Seat(self._seats[threading.get_ident()].owner, daemon=thread.daemon)
         run = thread.run
 
         def run_in_turn() -> None:
             self._seats[threading.get_ident()] = seat
             seat.turn.acquire()
-            sys.argv = seat.argv
             try:
                 if not seat.ended:
                     run()

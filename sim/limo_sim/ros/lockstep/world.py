@@ -73,8 +73,6 @@ class World:
         Topics whose messages later subscriptions get, and these messages.
     turns
         The script's threads.
-    scripts
-        Files whose lines are named: the script, and the nodes of a launch file.
     advances
         How often the arena advanced.
     """
@@ -96,7 +94,6 @@ class World:
         self.seconds = seconds
         self.log = log
         self.script = script
-        self.scripts = {str(script)}
         self.watch = watch
         self.patience = Patience(patience)
         self.readers: list[Reader] = []
@@ -136,7 +133,7 @@ class World:
     def line(self) -> int | None:
         """Return the line of the script that runs now; None where the script is not in the call."""
         frame: FrameType | None = sys._getframe(1)
-        while frame is not None and frame.f_code.co_filename not in self.scripts:
+        while frame is not None and frame.f_code.co_filename != str(self.script):
             frame = frame.f_back
         return None if frame is None else frame.f_lineno
 

@@ -105,11 +105,10 @@ def yaml_value(text: str, where: str) -> Any:
 
 
 class Context:
-    """The state that `rclpy.init` makes and `rclpy.shutdown` ends; `preset` is what a launch file gives the node."""
+    """The state that `rclpy.init` makes and `rclpy.shutdown` ends."""
 
-    def __init__(self, world: World, preset: RosArguments | None = None) -> None:
+    def __init__(self, world: World) -> None:
         self.world = world
-        self._preset = preset or RosArguments()
         self.is_initialized = False
         self.arguments = RosArguments()
         #: The executor of `rclpy.spin` without one.
@@ -119,11 +118,7 @@ class Context:
         """Begin, with the command line's arguments unless others are given."""
         if self.is_initialized:
             raise RuntimeError("rclpy.init() has been called before, without rclpy.shutdown()")
-        given = parse_ros_arguments(sys.argv if args is None else list(args))
-        parameters = {name: dict(values) for name, values in self._preset.parameters.items()}
-        for name, values in given.parameters.items():
-            parameters.setdefault(name, {}).update(values)
-        self.arguments = RosArguments(parameters, self._preset.remaps | given.remaps)
+        self.arguments = parse_ros_arguments(sys.argv if args is None else list(args))
         self.is_initialized = True
 
     def shutdown(self) -> None:

@@ -1,4 +1,4 @@
-"""`LimoFollow-v1`: observations to choose, normalised actions, and a reward that has a slope everywhere."""
+"""The arena for Gymnasium: `gymnasium.make("limo_sim.env:LimoFollow-v1")` imports this module, which registers it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from limo_hog.extras import needed
 from limo_hog.follow.twist import Twist
-from limo_sim.env.first import ACTIONS_PER_SECOND
-from limo_sim.env.glimpse import Glimpse, glimpse, hiding
-from limo_sim.run.arena import STEPS_PER_SECOND, Arena
+from limo_sim.run.arena import STEPS_PER_SECOND, Arena, Plan
 from limo_sim.run.catalogue import RANDOM, load
 from limo_sim.run.detector_faults import Missing, misses_of
-from limo_sim.run.sighting import SCALE, SIZE, Sighting, sighted, state_of
+from limo_sim.run.last_seen import SCALE, SIZE, LastSeen, sighted, state_of
+from limo_sim.run.matching import CRITERIA
 from limo_sim.sensing import lidar
-from limo_sim.sensing.camera import HEIGHT, WIDTH
+from limo_sim.sensing.camera import FOCAL_PX, HEIGHT, MOUNT_AHEAD, MOUNT_HEIGHT, WIDTH
+from limo_sim.world.furniture import Disc, Rectangle
+from limo_sim.world.person import trunk_radius
 from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.schema import ScenarioError
 from limo_sim.world.variants import SIGHTING_STREAM, made_up
@@ -29,6 +30,7 @@ from limo_sim.world.variants import SIGHTING_STREAM, made_up
 with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
     import cv2
 
+ACTIONS_PER_SECOND = 10
 #: What an observation may be.
 KINDS = ("camera", "gray", "state")
 #: Size of the small gray image [px]: an eighth of the camera's.
@@ -38,6 +40,15 @@ _DEPTH_REACH = 20.0
 # Standard deviations of a sighting [rad, m]. Measured in the arena: the middle of HOG's box strays by 2.7 … 6.4 px of a
 # focal length of 449 px, and its depth by about 5 cm.
 _BEARING_NOISE, _RANGE_NOISE = 0.011, 0.05
+# Half the breadth of a silhouette in statures. Measured: arms swing to .13 on either side.
+_HALF_BREADTH = 0.13
+# HOG finds hardly anybody smaller, nor nearer to a side of the image [px]; above the head it wants room, so that people
+# whose head touches the image's edge are missed. Measured in the arena, 48 views a cell.
+_LEAST_PX, _SIDE_PX = 96.0, 60.0
+# Nearer than this nothing is in front of the camera [m].
+_NEAR = 0.05
+# Furniture that is as high as a person.
+_HIDING = ("pillar",)
 
 Observation = Any  # a float32 array for "state", else a dict of arrays
 
@@ -73,6 +84,32 @@ class Shaping:
 SHAPING = Shaping()
 
 
+@dataclass(frozen=True, slots=True)
+class Glimpse:
+    """One person, seen from the robot.
+
+    Attributes
+    ----------
+    bearing, distance
+        From the robot's centre to the person's axis [rad, m].
+    surface
+        From the camera to the front of the person's trunk [m].
+    visible
+        Share of the silhouette that is in the image and not behind a wall or a pillar, about.
+    height_px
+        Of the whole silhouette [px].
+    found
+        Whether HOG would find the person.
+    """
+
+    bearing: float
+    distance: float
+    surface: float
+    visible: float
+    height_px: float
+    found: bool
+
+
 class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
     """Follow the scenario's first person; ten actions a second.
 
@@ -80,7 +117,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     Observations, as `observe` says:
 
-    - "state": float32 (9,), see `limo_sim.run.sighting.state_of`: where the person was last seen, and the motions.
+    - "state": float32 (9,), see `limo_sim.run.last_seen.state_of`: where the person was last seen, and the motions.
       HOG's limits, the noise of its boxes and the scenario's `[detector]` (its false boxes left out) are those of the
       arena; no image is drawn, so that it is quick.
     - "gray": a dict of `gray`, uint8 (60, 80, 1), and `motion`, float32 (2,): speed and turn rate in units of actions.
@@ -146,7 +183,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._misses: list[Missing] = []
         if scenario.detector != DetectorFaults():
             self._misses = misses_of(scenario.detector, scenario.camera.rate_hz, 1, arena.seed)
-        self._last: Sighting | None = None
+        self._last: LastSeen | None = None
         self._looked, self._seen = -1.0, False
         self._action = (0.0, 0.0)
         return self._observe(), {"time": 0.0}
@@ -262,3 +299,64 @@ def _reward(seen: Glimpse | None, touched_person: int, touched_wall: int) -> dic
 def _rgb(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     rgb: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
     return rgb
+
+
+def hiding(scenario: Scenario) -> list[Disc | Rectangle]:
+    """Return what a person may stand behind, unseen."""
+    pieces = [piece.footprint for piece in scenario.furniture if piece.kind in _HIDING]
+    return [*pieces, *(wall.footprint for wall in scenario.walls)]
+
+
+def glimpse(plan: Plan, scenario: Scenario, index: int, walls: Sequence[Disc | Rectangle]) -> Glimpse | None:
+    """Return what is seen of a person; None where the person is not in the arena. `walls` is what hides people."""
+    pose = plan.people[index] if index < len(plan.people) else None
+    if pose is None:
+        return None
+    person = scenario.people[index]
+    x, y, yaw = plan.robot
+    dx, dy = pose.x - x, pose.y - y
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    left, ahead = cos * dy - sin * dx, cos * dx + sin * dy
+    bearing, distance = math.atan2(left, ahead), math.hypot(dx, dy)
+    depth = ahead - MOUNT_AHEAD
+    towards = yaw + math.atan2(left, depth)
+    surface = math.hypot(depth, left) - trunk_radius(person, pose, towards)
+    if depth < _NEAR:
+        return Glimpse(bearing, distance, surface, 0.0, 0.0, False)
+    scale = FOCAL_PX / depth
+    column, half = -left * scale, _HALF_BREADTH * person.height * scale
+    height, head = person.height * scale, (person.height - MOUNT_HEIGHT) * scale
+    across = min(column + half, WIDTH / 2) - max(column - half, -WIDTH / 2)
+    upright = min(head, HEIGHT / 2) + min(MOUNT_HEIGHT * scale, HEIGHT / 2)
+    visible = max(across, 0.0) / (2 * half) * upright / height
+    camera = x + MOUNT_AHEAD * cos, y + MOUNT_AHEAD * sin
+    if visible > 0.0 and any(_between(camera, (pose.x, pose.y), wall) for wall in walls):
+        visible = 0.0
+    found = visible >= CRITERIA.in_view and height >= _LEAST_PX and head <= HEIGHT / 2
+    found = found and abs(column) <= WIDTH / 2 - _SIDE_PX
+    return Glimpse(bearing, distance, surface, visible, height, found)
+
+
+def _between(start: tuple[float, float], end: tuple[float, float], shape: Disc | Rectangle) -> bool:
+    """Whether a shape cuts the straight line from one place to another."""
+    x0, y0 = start[0] - shape.x, start[1] - shape.y
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    if isinstance(shape, Disc):
+        share = min(max(-(x0 * dx + y0 * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
+        return math.hypot(x0 + share * dx, y0 + share * dy) < shape.radius
+    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
+    first, last = 0.0, 1.0
+    for place, way, half in (
+        (cos * x0 + sin * y0, cos * dx + sin * dy, shape.half_x),
+        (cos * y0 - sin * x0, cos * dy - sin * dx, shape.half_y),
+    ):
+        if abs(way) < 1e-12:
+            if abs(place) > half:
+                return False
+            continue
+        near, far = sorted(((-half - place) / way, (half - place) / way))
+        first, last = max(first, near), min(last, far)
+    return first < last
+
+
+gymnasium.register("LimoFollow-v1", entry_point="limo_sim.env:LimoFollowV1", max_episode_steps=600)

@@ -48,7 +48,7 @@ SCALE = Scale()
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
+class LastSeen:
     """Where a person was last seen, and how the person moved then, in the odometry's frame [s, m, m, m/s, m/s]."""
 
     stamp: float
@@ -58,18 +58,18 @@ class Sighting:
     vy: float = 0.0
 
 
-def sighted(bearing: float, distance: float, stamp: float, odometry: Odometry, before: Sighting | None) -> Sighting:
+def sighted(bearing: float, distance: float, stamp: float, odometry: Odometry, before: LastSeen | None) -> LastSeen:
     """Return a sighting from bearing and distance, seen from the robot's centre [rad, m], and the one before it."""
     direction = odometry.yaw + bearing
     x, y = odometry.x + distance * math.cos(direction), odometry.y + distance * math.sin(direction)
     if before is None or not 0.0 < stamp - before.stamp <= SCALE.gap_s:
-        return Sighting(stamp, x, y)
+        return LastSeen(stamp, x, y)
     dt, share = stamp - before.stamp, SCALE.smoothing
     vx, vy = (x - before.x) / dt, (y - before.y) / dt
-    return Sighting(stamp, x, y, before.vx + share * (vx - before.vx), before.vy + share * (vy - before.vy))
+    return LastSeen(stamp, x, y, before.vx + share * (vx - before.vx), before.vy + share * (vy - before.vy))
 
 
-def state_of(last: Sighting | None, seen: bool, now: float, odometry: Odometry) -> NDArray[np.float32]:
+def state_of(last: LastSeen | None, seen: bool, now: float, odometry: Odometry) -> NDArray[np.float32]:
     """Return a state, float32 (9,), each number in -1 … 1.
 
     0: 1 where the person was seen in the newest frame (`seen`), else 0. 1, 2: cosine and sine of the bearing of the

@@ -14,11 +14,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from limo_hog.follow.sense.observation import Odometry
-from limo_sim.env import LimoFollowV1
-from limo_sim.env.glimpse import Glimpse, glimpse, hiding
-from limo_sim.env.second import SHAPING, _reward
+from limo_sim.env import SHAPING, Glimpse, LimoFollowV1, _reward, glimpse, hiding
 from limo_sim.run.arena import Arena, Plan
-from limo_sim.run.sighting import sighted, state_of
+from limo_sim.run.last_seen import sighted, state_of
 from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.world.person import Pose
@@ -114,6 +112,15 @@ def test_touching_the_person_ends_the_episode() -> None:
             break
     assert terminated
     assert reward < -SHAPING.person_contact + 1
+
+
+def test_a_contact_with_the_wall_costs_once_and_the_episode_goes_on() -> None:
+    env = LimoFollowV1(Scenario(robot=Robot(x=4.5)))
+    env.reset(seed=0)
+    steps = [env.step(AHEAD) for _ in range(20)]
+    costs = [info["reward"]["contact"] for *_, info in steps]
+    assert sum(costs) == min(costs) == -SHAPING.wall_contact
+    assert not any(terminated for _, _, terminated, _, _ in steps)
 
 
 def run(seed: int, observe: str = "state") -> list[Any]:
@@ -283,6 +290,16 @@ def test_the_scan_is_the_distance_to_what_it_hits_and_eight_where_it_hits_nothin
     assert scan[146] == pytest.approx(1.5 - lidar_x, abs=0.1)
     # Beside it the arena ends further off.
     assert 2.0 < scan[60:100].min() <= scan.max() <= 8.0
+
+
+def test_depth_that_is_unknown_or_out_of_range_is_0(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = LimoFollowV1(STANDING, "camera")
+    env.reset(seed=0)
+    frame = env._running().frame()
+    depth = frame.depth.copy()
+    depth[0, :3] = math.nan, math.inf, -math.inf
+    monkeypatch.setattr(Arena, "frame", lambda _: replace(frame, depth=depth))
+    assert env._observe()["depth"][0, :3].tolist() == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("others", [(), ((3.0, 0.5),), ((-2.0, 0.0), (3.0, 0.5))])

@@ -1,1 +1,0 @@
-"""Python launch files of the simple kind: nodes with parameters, remaps and launch arguments, in one run."""

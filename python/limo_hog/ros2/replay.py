@@ -9,11 +9,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detections import Detections
+from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, Sighting
-from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import Record, to_detections

@@ -98,13 +98,18 @@ def add_follower(parser: ArgumentParser) -> None:
 
 def add_target_and_detector(parser: ArgumentParser) -> None:
     """Add --target and --detector."""
+    parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
+    add_detector(parser)
+
+
+def add_detector(parser: ArgumentParser) -> None:
+    """Add --detector."""
     from limo_hog.follow.sense.detectors import NAMES
 
-    parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
     parser.add_argument(
         "--detector",
         default="hog",
-        metavar="|".join((*NAMES, "hog:MODEL", "onnx:FILE")),
-        help="the people detector: ours, ours on the half image, OpenCV's, one that `train` wrote, or a network "
+        metavar="|".join(NAMES),
+        help="the people detector: ours, ours on the half image, ours with another model, OpenCV's, or a network "
         "(%(default)s)",
     )

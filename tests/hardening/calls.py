@@ -240,12 +240,6 @@ def gradients(a: Arguments) -> None:
         assert shares.shape[2] == 2 and (shares >= 0).all() and (bins < hog.nbins).all()
 
 
-def regions(a: Arguments) -> None:
-    hog = a.draw.choice(DETECTORS)
-    options = a.options(winStride=a.stride, padding=a.padding, scale=a.scale)
-    boxes_and_weights(hog.detectROI(a.image(), a.rectangles(), a.number(), **options), 4)
-
-
 def grouping(a: Arguments) -> None:
     rects, threshold = a.rectangles(), a.some(0, 1, 2, 3, -1, 100)
     eps = a.options(eps=lambda: a.some(0.2, 0.0, -1.0, 5.0, 0.05))
@@ -268,12 +262,12 @@ def construction(a: Arguments) -> None:
         a.some(False, True),
     ]
     hog: Any = HOGDescriptor(*arguments, *more[: a.draw.randrange(8)])
-    repr(hog), hash(hog), hog.getWinSigma()
+    repr(hog), hog.getWinSigma()
     hog.setSVMDetector(a.svm(hog))
     assert hog.checkDetectorSize() is True
     again: Any = pickle.loads(pickle.dumps(copy.deepcopy(hog)))
-    # (What is no number equals nothing.)
-    assert again == hog or np.isnan(hog.svmDetector).any() or "nan" in repr(hog)
+    assert repr(again) == repr(hog)
+    np.testing.assert_array_equal(again.svmDetector, hog.svmDetector)
 
 
 def svms(a: Arguments) -> None:
@@ -339,7 +333,6 @@ WEIGHTS: dict[Callable[[Arguments], None], int] = {
     grouping: 24,
     construction: 6,
     svms: 6,
-    regions: 6,
     threads: 1,
     finding: 1,
     finders: 1,

@@ -14,7 +14,7 @@ import numpy as np
 import limo_hog
 from limo_hog import HOGDescriptor, PeopleDetector
 from limo_hog.detections import Detections
-from limo_hog.suppression import nms, soft_nms
+from limo_hog.suppression import nms
 
 #: What no argument of the API means; none of them runs code of its own.
 UGLY: list[Any] = [
@@ -71,8 +71,8 @@ DETECTORS = detectors()
 FINDERS = [
     PeopleDetector(**wanted)
     for wanted in (
-        *({}, {"min_height": None}, {"nms": "group"}, {"nms": "soft", "threshold": -1.0}, {"model": "daimler"}),
-        {"model": "limo", "min_height": 40, "nms": "iou", "padding": (0, 0)},
+        *({}, {"min_height": None}, {"nms": "group"}, {"threshold": -1.0}, {"model": "daimler"}),
+        {"model": "limo", "min_height": 40, "padding": (0, 0)},
     )
 ]
 
@@ -294,7 +294,7 @@ def finders(a: Arguments) -> None:
         min_height=lambda: a.some(64, 100.0, None, 8, 7),
         max_height=lambda: a.some(None, 500, 64, 1),
         threshold=a.number,
-        nms=lambda: a.some("overlap", "iou", "soft", "group"),
+        nms=lambda: a.some("overlap", "group"),
         overlap=lambda: a.some(None, 0.5, 0, 1, 7),
         group_threshold=lambda: a.some(None, 0, 2, -2),
         win_stride=a.stride,
@@ -311,8 +311,6 @@ def detections(a: Arguments) -> None:
     found = Detections(boxes, scores)
     kept = nms(boxes, scores, a.draw.random())
     assert len(kept) == len(set(kept.tolist())) <= count
-    soft, lowered = soft_nms(boxes, scores, a.draw.uniform(0.01, 1), a.draw.gauss(0, 1))
-    assert len(soft) == len(lowered) <= count
     drawn = found.draw(a.image())
     assert drawn.dtype == np.uint8 and drawn.ndim == 3
     assert len(pickle.loads(pickle.dumps(found[kept]))) == len(kept)

@@ -6,6 +6,8 @@ from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 from pathlib import Path
 
+from limo_hog.cv2_api.arguments import number as bounded
+
 #: What a picture of `--size` may have: 64 megapixels take 1 GB to draw, and no camera has more.
 _MOST_PIXELS = 64_000_000
 #: Digits of the largest whole number an option takes.
@@ -50,12 +52,10 @@ def _cut(text: str) -> str:
 def number(text: str, low: float, high: float, what: str) -> float:
     """Read a number within bounds."""
     try:
-        value = float(text)
+        return bounded(what, float(text), low, high)
     except ValueError:
-        value = float("nan")
-    if not low <= value <= high:
-        raise ArgumentTypeError(f"{_cut(text)} is no {what}; wanted is a number from {low:g} to {high:g}")
-    return value
+        wanted = f"wanted is a number from {low:g} to {high:g}"
+        raise ArgumentTypeError(f"{_cut(text)} is no {what}; {wanted}") from None
 
 
 def metres(text: str) -> float:

@@ -37,6 +37,12 @@ def intersection_over_smaller(some: Boxes, others: Boxes) -> NDArray[np.float64]
     return _ratio(np.minimum(shared, smaller), smaller)
 
 
+def share_inside(some: Boxes, others: Boxes) -> NDArray[np.float64]:
+    """Return the shared area over that of the first box: float64 (M, N) in 0..1; 0 for boxes without area."""
+    shared, areas, _ = _areas(some, others)
+    return _ratio(shared, np.broadcast_to(areas, shared.shape))
+
+
 def nms(boxes: Boxes, scores: Scores, threshold: float, overlap: Overlap = intersection_over_union) -> NDArray[np.intp]:
     """Return the indices of the boxes to keep, best first (greedy NMS; of equal scores the first box wins).
 

@@ -314,9 +314,10 @@ def test_a_log_for_the_rerun_viewer_is_one(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [log]
 
 
-def test_a_missing_library_is_named_with_what_brings_it() -> None:
+def test_a_missing_library_is_named_with_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
     with (
-        pytest.raises(MissingExtraError, match=r"^--rerun needs the Rerun SDK: pip install 'limo-hog\[viz\]'$"),
-        needed(by="--rerun", what="the Rerun SDK", install="'limo-hog[viz]'"),
+        pytest.raises(MissingExtraError, match=r"^a film needs PyAV: pip install 'limo-hog\[video\]'$"),
+        needed(by="a film"),
     ):
-        import no_such_library  # type: ignore[import-not-found]  # noqa: F401
+        import av  # noqa: F401

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from limo_hog import _core
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.exceptions import ImageError
-from limo_hog.imaging.reading import ReadError
 from limo_hog.learn.labels import LabelWarning
 from limo_hog.learn.windows import (
     Jitter,
@@ -109,7 +108,7 @@ def readable(path: Path) -> NDArray[np.uint8] | None:
     """
     try:
         return read_gray(path)
-    except (ReadError, ImageError, OSError) as error:
+    except (ImageError, OSError) as error:
         warnings.warn(f"left out: {error}", LabelWarning, stacklevel=2)
         return None
 

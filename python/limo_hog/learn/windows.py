@@ -13,7 +13,7 @@ from limo_hog.extras import needed
 from limo_hog.learn.labels import Picture
 from limo_hog.models import PERSON_BOX, PersonBox
 
-with needed(by="training", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="training"):
     import cv2
 
 #: Cells are 8 × 8 px, blocks 2 × 2 cells: windows are whole cells, at least one block.

@@ -17,7 +17,7 @@ from limo_hog.ros2.mcap_reading import check_type, mcap_messages
 from limo_hog.ros2.messages import serialize, typestore
 from limo_hog.ros2.names import DETECTIONS_TYPE
 
-with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
+with needed(by="a recording"):
     from mcap.writer import CompressionType, Writer
     from rosbags.highlevel import AnyReader
 

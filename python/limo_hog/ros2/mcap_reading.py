@@ -19,7 +19,7 @@ from limo_hog.extras import needed
 from limo_hog.ros2.messages import typestore
 from limo_hog.ros2.names import DETECTIONS_TYPE, TYPES
 
-with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
+with needed(by="a recording"):
     import lz4.frame
     import zstandard
     from mcap.data_stream import ReadDataStream

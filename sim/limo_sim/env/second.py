@@ -26,7 +26,7 @@ from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.schema import ScenarioError
 from limo_sim.world.variants import SIGHTING_STREAM, made_up
 
-with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="the arena's camera"):
     import cv2
 
 #: What an observation may be.

@@ -14,7 +14,7 @@ from limo_hog.extras import needed
 from limo_sim.run.episode import Moment
 from limo_sim.view.reading import reading
 
-with needed(by="--rerun", what="the Rerun SDK", install="'limo-hog[viz]'"):
+with needed(by="--rerun"):
     import rerun as rr
 
 _ROBOT, _PERSON, _WALL = (31, 111, 235), (209, 36, 47), (138, 148, 158)

@@ -118,7 +118,7 @@ class Cv2Detector:
 
     @cached_property
     def _hog(self) -> cv2.HOGDescriptor:
-        with needed(by="the detector cv2", what="OpenCV", install="'limo-hog[cv]'"):
+        with needed(by="the detector cv2"):
             import cv2
         if not hasattr(cv2, "HOGDescriptor"):
             raise DetectorError(f"OpenCV {cv2.__version__} has no HOGDescriptor: use the detector hog, or OpenCV 4")
@@ -183,7 +183,7 @@ class OnnxDetector:
 
     @cached_property
     def _network(self) -> cv2.dnn.Net:
-        with needed(by="an ONNX detector", what="OpenCV", install="'limo-hog[cv]'"):
+        with needed(by="an ONNX detector"):
             import cv2
 
         if not self.path.is_file():

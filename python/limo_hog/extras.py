@@ -20,7 +20,7 @@ _LIBRARIES = {
     "lz4": ("LZ4", "record"),
     "matplotlib": ("matplotlib", "plot"),
     "mcap": ("mcap", "record"),
-    "rerun": ("Rerun", "viz"),
+    "rerun": ("the Rerun SDK", "viz"),
     "rosbags": ("rosbags", "record"),
     "scipy": ("SciPy", "train"),
     "shtab": ("shtab", "completion"),

@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from limo_hog.atomic import is_stream
-from limo_hog.cli.support.arguments import count, number, output_file, threads
+from limo_hog.cli.support.arguments import MODEL, count, number, output_file, threads
 from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.cli.support.results import json_lines, refuse_to_overwrite, write_coco, write_csv
 from limo_hog.detector import PeopleDetector
@@ -41,7 +41,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--model",
         default="opencv",
         metavar="NAME|FILE",
-        help="opencv, daimler, limo, or a trained model's file (%(default)s)",
+        help=f"{MODEL} (%(default)s)",
     )
     parser.add_argument(
         "--search",

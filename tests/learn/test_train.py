@@ -158,7 +158,7 @@ def test_ten_crops_and_a_damaged_negative_make_a_detector_with_warnings(
 
 
 @pytest.mark.slow
-def test_the_arenas_bollards_are_learnt_to_an_average_precision_of_95_on_unseen_seeds(
+def test_the_arenas_bollards_are_learnt_and_found_in_pictures_of_unseen_seeds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The commands of docs/training.md."""

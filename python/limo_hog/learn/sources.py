@@ -14,7 +14,7 @@ from limo_hog.imaging.reading import Kind, ReadError, find_sources
 from limo_hog.learn.formats import holds_labels, read_labels
 from limo_hog.learn.labels import LabelError, LabelWarning, Picture, choose, inside, sizes_of
 from limo_hog.learn.mining import Negatives, readable
-from limo_hog.learn.windows import PEOPLE, Region, WindowShape, positive_regions, shape_for
+from limo_hog.learn.windows import Region, WindowShape, positive_regions, shape_for
 
 #: Fewer objects than this are warned of: a window has thousands of numbers, and so few examples are learnt by heart.
 _FEW = 100
@@ -176,7 +176,7 @@ def _held_out(pictures: list[Picture], share: float, seed: int) -> tuple[list[Pi
 def _shape(training: list[Picture], wanted: Wanted) -> WindowShape:
     if training:
         return shape_for(sizes_of(training), wanted.window)
-    return WindowShape(wanted.window or PEOPLE.size, PEOPLE.object_box)
+    return WindowShape(wanted.window) if wanted.window else WindowShape()
 
 
 def _min_height(training: list[Picture], shape: WindowShape) -> float:

@@ -26,14 +26,13 @@ _OBJECT_AREA_PX2 = 4000.0
 
 @dataclass(frozen=True, slots=True)
 class WindowShape:
-    """A detection window: its width and height [px], and where the object stands in it, as shares of both."""
+    """A detection window: its width and height [px], and where the object stands in it, as shares of both.
 
-    size: tuple[int, int]
+    The defaults are those of crops of people.
+    """
+
+    size: tuple[int, int] = (64, 128)
     object_box: PersonBox = PERSON_BOX
-
-
-#: Of crops of people, unless told otherwise.
-PEOPLE = WindowShape((64, 128))
 
 
 @dataclass(frozen=True, slots=True)

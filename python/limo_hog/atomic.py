@@ -41,7 +41,7 @@ def part_of(path: Path) -> Path:
 
 @contextmanager
 def about(path: Path) -> Iterator[None]:
-    """Let an error that names the unfinished file, or none, name the file the user knows."""
+    """Errors inside name `path`, not its temporary file."""
     try:
         yield
     except OSError as error:

@@ -7,7 +7,7 @@ import os
 import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, overload
+from typing import Any, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,6 +138,14 @@ class Detections:
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         # A copy in another process does not know the image.
         return Detections, (self.boxes, self.scores, self.person_box, self.calibration)
+
+
+class Detector(Protocol):
+    """Finds people in images: `PeopleDetector`, those of `limo_hog.follow`, or yours."""
+
+    def detect(self, image: NDArray[np.uint8]) -> Detections:
+        """Return the people in a uint8 (H, W, 3) BGR image, best first."""
+        ...
 
 
 def remembered(image: Any) -> Any:

@@ -5,37 +5,56 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog import _core
-from limo_hog.cv2_api.arguments import integer, pair, pixels, real, shown
+from limo_hog.cv2_api.arguments import integer, number, pair, pixels, shown
 from limo_hog.detections import Detections, remembered
 from limo_hog.exceptions import ImageError, ParameterError, ParameterTypeError
 from limo_hog.models import Model, load_model
 from limo_hog.parallel import in_order
-from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
+from limo_hog.suppression import intersection_over_smaller, nms
 
 if TYPE_CHECKING:
     from PIL.Image import Image as PilImage
 
-#: Ways to make one box of a person's many hits, and the default `overlap` of each.
-#: 0.65 and 0.3: chosen on street photographs, where 0.5 to 0.75 and 0.2 to 0.4 hardly differ.
-_NMS = {"overlap": 0.65, "iou": 0.3, "soft": 0.3, "group": None}
+#: Ways to make one box of a person's many hits.
+_NMS = ("overlap", "group")
+#: Default of `overlap`: chosen on street photographs, where 0.5 to 0.75 hardly differ.
+_OVERLAP = 0.65
 #: Where a model has two windows: from this height of the smallest person [px] on the large window alone is used, the
 #: image being enlarged for it. On USC-C, LAMR .27 against .32 with both at 64 px; at 48 px both are better, .29 to .31.
 _LARGE_WINDOW_FROM_PX = 64.0
 #: Hits that OpenCV's sample asks a group to have more than.
 _GROUP_THRESHOLD = 2
-#: How often the levels between two that are searched whole are halved, by how much the threshold is lowered for a
-#: neighbouring level [SVM margin], and how far around a place windows are searched [strides]. docs/simd.md shows
-#: others.
-_GUIDES: dict[str, tuple[int, float, tuple[float, float]] | None] = {"exact": None, "guided": (3, 0.75, (0.75, 1.25))}
+
+
+class Guide(NamedTuple):
+    """What of the levels between two that are searched whole is searched.
+
+    Attributes
+    ----------
+    halvings
+        How often these levels are halved.
+    margin
+        How much the threshold is lowered for a neighbouring level [SVM margin].
+    reach
+        How far around a place windows are searched, across and down [strides].
+    """
+
+    halvings: int
+    margin: float
+    reach: tuple[float, float]
+
+
+#: The guide of each search. docs/simd.md shows others.
+_GUIDES = {"exact": None, "guided": Guide(halvings=3, margin=0.75, reach=(0.75, 1.25))}
 #: More levels than a pyramid of the finest `scale` and the largest image can have.
 _LEVELS = 2048
 #: Bounds of arguments, so that no image grows, and no pyramid is cut, beyond what memory and `_LEVELS` hold.
@@ -54,7 +73,7 @@ class PeopleDetector:
     model
         "opencv" (INRIA people, window 64 × 128; also "default"), "daimler" (window 48 × 96), "limo" (our weights,
         window 64 × 128; people below 64 px are sought with a second one of 48 × 96), or the path of a file that OpenCV
-        or limo-hog wrote; see `limo_hog.models.load_model`.
+        or limo-hog wrote; or a `Model`; see `limo_hog.models.load_model`.
     min_height
         Height of the smallest person to find [px], head to foot: the image is enlarged (or reduced) until they fill
         the model's window. Half the height takes four times the time. None searches the image as it is: people from
@@ -67,10 +86,9 @@ class PeopleDetector:
     nms
         How one box is made of a person's many hits, which are compared by the person boxes inside of the windows.
         "overlap": the best hit stays and removes those that share more than `overlap` of the smaller box's area;
-        "iou": as that, by intersection over union; "soft": as "iou", but others' scores are lowered instead, so that
-        people half hidden by others may stay; "group": OpenCV's grouping of the windows.
+        "group": OpenCV's grouping of the windows.
     overlap
-        0..1; for "soft", the overlap that lowers a score to 37 %. None: 0.65 for "overlap", 0.3 for "iou" and "soft".
+        0..1; None: 0.65.
     group_threshold
         For "group": similar hits must be more than this to make a detection (None: 2); 0 returns every hit.
     win_stride
@@ -92,11 +110,11 @@ class PeopleDetector:
         The model's file is damaged or cannot be read.
     """
 
-    model: str | os.PathLike[str] = "opencv"
+    model: str | os.PathLike[str] | Model = "opencv"
     min_height: float | None = 64.0
     max_height: float | None = None
     threshold: float | None = None
-    nms: Literal["overlap", "iou", "soft", "group"] = "overlap"
+    nms: Literal["overlap", "group"] = "overlap"
     overlap: float | None = None
     group_threshold: int | None = None
     win_stride: tuple[int, int] = (8, 8)
@@ -105,52 +123,43 @@ class PeopleDetector:
     search: Literal["exact", "guided"] = "exact"
     _model: Model = field(init=False, repr=False, compare=False)
     _hogs: tuple[_core.Hog, ...] = field(init=False, repr=False, compare=False)
+    #: How much images are enlarged.
+    _zoom: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         model = load_model(self.model)
-        self._set(_model=model)
         self._check_nms()
-        self._check_sizes()
+        _word("search", self.search, _GUIDES)
         self._set(
-            threshold=None if self.threshold is None else _number("threshold", self.threshold, -math.inf, math.inf),
-            scale=_number("scale", self.scale, _FINEST_SCALE, math.inf),
+            _model=model,
+            threshold=None if self.threshold is None else number("threshold", self.threshold),
+            scale=number("scale", self.scale, _FINEST_SCALE),
             win_stride=_pair("win_stride", self.win_stride, 1, None),
-            padding=_pair("padding", self.padding, 0, self._model.geometry.winSize),
+            padding=_pair("padding", self.padding, 0, model.geometry.winSize),
         )
-        if not isinstance(self.search, str) or self.search not in _GUIDES:
-            kind = ParameterError if isinstance(self.search, str) else ParameterTypeError
-            raise kind(f"search is {shown(self.search)}; one of {', '.join(_GUIDES)} is wanted")
-        self._set(_hogs=tuple(self._compiled()))
+        if self.min_height is not None:
+            self._set(min_height=number("min_height", self.min_height, _LEAST_HEIGHT_PX))
+        enlarged_enough = self.min_height is not None and self.min_height >= _LARGE_WINDOW_FROM_PX
+        # OpenCV's grouping knows one window only.
+        smaller = None if enlarged_enough or self.nms == "group" else model.smaller
+        least = (smaller or model).person_height
+        zoom = 1.0 if self.min_height is None else least / self.min_height
+        if self.min_height is not None and smaller is not None:
+            zoom = max(zoom, model.person_height / _LARGE_WINDOW_FROM_PX)
+        self._check_max_height(least if self.min_height is None else self.min_height)
+        self._set(_zoom=zoom, _hogs=tuple(self._compiled(smaller)))
 
-    def _compiled(self) -> Iterator[_core.Hog]:
+    def _compiled(self, smaller: Model | None) -> Iterator[_core.Hog]:
         """Yield the model's detector and, where it serves, the one for smaller people, up to the size of the former."""
-        model, smaller = self._model, self._smaller
+        model = self._model
         yield model.geometry._replace(nlevels=_LEVELS).compiled(model.coefficients)
         if smaller is not None:
             levels = math.ceil(math.log(model.person_height / smaller.person_height) / math.log(self.scale))
             yield smaller.geometry._replace(nlevels=levels).compiled(smaller.coefficients)
 
-    @property
-    def _smaller(self) -> Model | None:
-        """The model for smaller people, where it is used: OpenCV's grouping knows one window only."""
-        enlarged_enough = self.min_height is not None and self.min_height >= _LARGE_WINDOW_FROM_PX
-        return None if enlarged_enough or self.nms == "group" else self._model.smaller
-
-    @property
-    def _zoom(self) -> float:
-        """How much images are enlarged."""
-        if self.min_height is None:
-            return 1.0
-        if self._smaller is None:
-            return self._model.person_height / self.min_height
-        return max(self._smaller.person_height / self.min_height, self._model.person_height / _LARGE_WINDOW_FROM_PX)
-
-    def _check_sizes(self) -> None:
-        if self.min_height is not None:
-            self._set(min_height=_number("min_height", self.min_height, _LEAST_HEIGHT_PX, math.inf))
+    def _check_max_height(self, least: float) -> None:
         if self.max_height is not None:
-            least = (self._smaller or self._model).person_height if self.min_height is None else self.min_height
-            self._set(max_height=_number("max_height", self.max_height, 0, math.inf))
+            self._set(max_height=number("max_height", self.max_height, 0))
             if self.max_height < least:
                 raise ParameterError(
                     f"max_height is {self.max_height:g}; at least {least:g} is wanted, the height of the smallest "
@@ -158,15 +167,11 @@ class PeopleDetector:
                 )
 
     def _check_nms(self) -> None:
-        if not isinstance(self.nms, str) or self.nms not in _NMS:
-            kind = ParameterError if isinstance(self.nms, str) else ParameterTypeError
-            raise kind(f"nms is {shown(self.nms)}; one of {', '.join(_NMS)} is wanted")
+        _word("nms", self.nms, _NMS)
         if self.overlap is not None:
             if self.nms == "group":
                 raise ParameterError('overlap has no meaning for nms="group"; leave it out, or choose another nms')
-            self._set(overlap=_number("overlap", self.overlap, 0, 1))
-            if self.nms == "soft" and self.overlap == 0:
-                raise ParameterError('overlap is 0; above 0 is wanted for nms="soft"')
+            self._set(overlap=number("overlap", self.overlap, 0, 1))
         if self.group_threshold is not None:
             if self.nms != "group":
                 raise ParameterError(f'group_threshold has no meaning for nms="{self.nms}"; it needs nms="group"')
@@ -220,10 +225,9 @@ class PeopleDetector:
 
             image = as_array(image)
         image = pixels(image)
-        first_level = self._first_level(image)
+        size = self._searched_size(image)
         threshold = self._model.threshold if self.threshold is None else self.threshold
-        group_threshold = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
-        grouping = group_threshold if self.nms == "group" else 0
+        members = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
         hits = [
             hog.detect_multi_scale(
                 image,
@@ -231,18 +235,23 @@ class PeopleDetector:
                 self.win_stride,
                 self.padding,
                 self.scale,
-                grouping,
+                members if self.nms == "group" else 0,
                 False,
-                first_level,
+                size,
                 _GUIDES[self.search],
                 threads,
             )
             for hog in self._hogs
         ]
         boxes, scores = (np.concatenate(parts) for parts in zip(*hits, strict=True))
-        kept, scores = self._one_of_many(boxes, scores, threshold)
-        zoom = np.array(first_level) / image.shape[1::-1]
-        found = boxes[kept] / np.tile(zoom, 2)
+        if self.nms == "group":
+            kept = np.argsort(-scores, kind="stable")
+        else:
+            # People are compared, not windows: those of two people side by side share most of their margins.
+            people = self._model.person_box.inside(boxes)
+            kept = nms(people, scores, _OVERLAP if self.overlap is None else self.overlap, intersection_over_smaller)
+        zoom = np.array(size) / image.shape[1::-1]
+        found, scores = boxes[kept] / np.tile(zoom, 2), scores[kept]
         if self.max_height is not None:
             # A level's window is rounded to whole pixels.
             low = self._model.person_box.height * found[:, 3] <= self.max_height + 0.5
@@ -250,10 +259,9 @@ class PeopleDetector:
         boxes = np.rint(found).astype(np.int32)
         return Detections(boxes, scores, self._model.person_box, self._model.calibration, searched)
 
-    def _first_level(self, image: NDArray[np.uint8]) -> tuple[int, int]:
+    def _searched_size(self, image: NDArray[np.uint8]) -> tuple[int, int]:
         """Return the size (x, y) [px] at which the smallest person in the image fills the model's window."""
-        zoom = self._zoom
-        width, height = (max(1, round(side * zoom)) for side in image.shape[1::-1])
+        width, height = (max(1, round(side * self._zoom)) for side in image.shape[1::-1])
         if width * height > _MOST_PIXELS:
             came, limit = f"{image.shape[1]} x {image.shape[0]} px", f"at most {_MOST_PIXELS} pixels are allowed"
             if self.min_height is None:
@@ -264,43 +272,16 @@ class PeopleDetector:
             )
         return width, height
 
-    def _one_of_many(
-        self, windows: NDArray[np.int32], scores: NDArray[np.float64], threshold: float
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Return the indices of the hits that stay, best first, and their scores."""
-        overlap = _NMS[self.nms] if self.overlap is None else self.overlap
-        # People are compared, not windows: those of two people side by side share most of their margins.
-        boxes = self._model.person_box.inside(windows)
-        if overlap is None:
-            kept = np.argsort(-scores, kind="stable")
-        elif self.nms == "soft":
-            return soft_nms(boxes, scores, overlap**2, threshold)
-        elif self.nms == "overlap":
-            kept = nms(boxes, scores, overlap, intersection_over_smaller)
-        else:
-            kept = nms(boxes, scores, overlap)
-        return kept, scores[kept]
-
     def __reduce__(self) -> tuple[Any, tuple[()]]:
         # Copies and pickles are made anew of the arguments: the compiled detector cannot be pickled.
         arguments = {name.name: getattr(self, name.name) for name in dataclasses.fields(self) if name.init}
         return partial(type(self), **arguments), ()
 
 
-def _number(name: str, value: Any, low: float, high: float) -> float:
-    number = real(name, value, math.nan)
-    if value is None or isinstance(value, bool):
-        raise ParameterTypeError(f"{name} is {value}; a number is wanted")
-    if not (math.isfinite(number) and low <= number <= high):
-        bounds = (
-            "a finite number"
-            if low == -math.inf
-            else f"{low:g} or more"
-            if high == math.inf
-            else f"{low:g} to {high:g}"
-        )
-        raise ParameterError(f"{name} is {shown(value)}; {bounds} is wanted")
-    return number
+def _word(name: str, value: Any, words: Collection[str]) -> None:
+    if not isinstance(value, str) or value not in words:
+        kind = ParameterError if isinstance(value, str) else ParameterTypeError
+        raise kind(f"{name} is {shown(value)}; one of {', '.join(words)} is wanted")
 
 
 def _pair(name: str, value: Any, least: int, most: tuple[int, int] | None) -> tuple[int, int]:

@@ -18,6 +18,7 @@ _LIBRARIES = {
     "cv2": ("OpenCV", "cv"),
     "cyclonedds": ("Cyclone DDS", "ros2"),
     "limo_sim": ("the arena", "sim"),
+    "lz4": ("LZ4", "record"),
     "matplotlib": ("matplotlib", "plot"),
     "mcap": ("mcap", "record"),
     "rosbags": ("rosbags", "record"),
@@ -25,6 +26,7 @@ _LIBRARIES = {
     "shtab": ("shtab", "completion"),
     "sklearn": ("scikit-learn", "train"),
     "threadpoolctl": ("threadpoolctl", "train"),
+    "zstandard": ("Zstandard", "record"),
 }
 
 
@@ -33,22 +35,18 @@ def missing_extra(by: str, error: ImportError) -> MissingExtraError:
     name = (error.name or "").partition(".")[0]
     library, extra = _LIBRARIES.get(name, (name or "a library", None))
     if not isinstance(error, ModuleNotFoundError):
-        return _broken(by, library, error)
+        # Such as OpenCV with windows, where the system has no libGL.
+        return MissingExtraError(f"{by} needs {library}, which is installed but does not load: {error}")
     if extra is None:
         return MissingExtraError(f"{by} needs the module {name}, which is not installed: install limo-hog anew")
     return MissingExtraError(f"{by} needs {library}: pip install 'limo-hog[{extra}]'")
 
 
-def _broken(by: str, library: str, error: ImportError) -> MissingExtraError:
-    # Such as OpenCV with windows, where the system has no libGL.
-    return MissingExtraError(f"{by} needs {library}, which is installed but does not load: {error}")
-
-
 @contextmanager
-def needed(by: str, what: str, install: str) -> Iterator[None]:
+def needed(by: str) -> Iterator[None]:
     """Raise an error that names what to install when an import inside fails.
 
-    >>> with needed(by="writing H.264 video", what="PyAV", install="'limo-hog[video]'"):
+    >>> with needed(by="writing H.264 video"):
     ...     import av
 
     Raises
@@ -58,7 +56,5 @@ def needed(by: str, what: str, install: str) -> Iterator[None]:
     """
     try:
         yield
-    except ModuleNotFoundError as error:
-        raise MissingExtraError(f"{by} needs {what}: pip install {install}") from error
     except ImportError as error:
-        raise _broken(by, what, error) from error
+        raise missing_extra(by, error) from error

@@ -46,9 +46,9 @@ class Calibration(NamedTuple):
 PERSON_BOX = PersonBox()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """A linear SVM over HOG descriptors, and how its windows and margins are to be read.
+    """A linear SVM over HOG descriptors, and how its windows and margins are to be read; equal to itself alone.
 
     Attributes
     ----------
@@ -115,8 +115,8 @@ _NAMED: dict[str, Callable[[], Model]] = {
 }
 
 
-def load_model(name: str | os.PathLike[str]) -> Model:
-    """Return a model by its name, or from a file that OpenCV or limo-hog wrote.
+def load_model(name: str | os.PathLike[str] | Model) -> Model:
+    """Return a model by its name, or from a file that OpenCV or limo-hog wrote; a `Model` as it is.
 
     Parameters
     ----------
@@ -135,6 +135,8 @@ def load_model(name: str | os.PathLike[str]) -> Model:
     OSError
         The file is there and cannot be read.
     """
+    if isinstance(name, Model):
+        return name
     if not isinstance(name, (str, os.PathLike)):
         raise ParameterTypeError(
             f"model is {shown(name)}; a name ({', '.join(_NAMED)}) or the path of a file is wanted"

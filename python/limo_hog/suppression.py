@@ -18,8 +18,6 @@ Overlap = Callable[[Boxes, Boxes], NDArray[np.float64]]
 
 #: Boxes that `nms` decides on together; of 64 to 1024 the fastest for 100 to 10,000 boxes.
 _CHUNK = 256
-#: `soft_nms` drops boxes whose height above the threshold falls to this share of the best box's.
-_LEAST_SHARE = 0.05
 
 
 def intersection_over_union(some: Boxes, others: Boxes) -> NDArray[np.float64]:
@@ -34,7 +32,15 @@ def intersection_over_smaller(some: Boxes, others: Boxes) -> NDArray[np.float64]
     A box that lies inside another has 1, however small it is: a part of a person is no second person.
     """
     shared, areas, other_areas = _areas(some, others)
-    return _ratio(shared, np.minimum(areas, other_areas))
+    smaller = np.minimum(areas, other_areas)
+    # Rounding may leave a box that lies inside another a little more than its own area.
+    return _ratio(np.minimum(shared, smaller), smaller)
+
+
+def share_inside(some: Boxes, others: Boxes) -> NDArray[np.float64]:
+    """Return the shared area over that of the first box: float64 (M, N) in 0..1; 0 for boxes without area."""
+    shared, areas, _ = _areas(some, others)
+    return _ratio(shared, np.broadcast_to(areas, shared.shape))
 
 
 def nms(boxes: Boxes, scores: Scores, threshold: float, overlap: Overlap = intersection_over_union) -> NDArray[np.intp]:
@@ -56,31 +62,6 @@ def nms(boxes: Boxes, scores: Scores, threshold: float, overlap: Overlap = inter
                 stays[i + 1 :] &= ~removes[i, i + 1 :]
         kept = np.concatenate([kept, best[stays]])
     return kept
-
-
-def soft_nms(
-    boxes: Boxes, scores: Scores, sigma: float, threshold: float
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return the indices of the boxes to keep, best first, and their lowered scores.
-
-    Each box that is kept lowers the others' scores by exp(-iou² / sigma), so that a person half hidden behind
-    another stays; boxes that fall below `threshold` are dropped, and so are those below 5 % of the best. (Bodla et
-    al., Soft-NMS, ICCV 2017.) A margin may be negative: what is lowered is its height above `threshold`.
-    """
-    above = scores.astype(np.float64) - threshold
-    waiting = np.flatnonzero(above >= 0)
-    kept: list[int] = []
-    left: list[float] = []
-    least = _LEAST_SHARE * float(above.max(initial=0.0))
-    while waiting.size:
-        best = int(waiting[np.argmax(above[waiting])])
-        kept.append(best)
-        left.append(float(above[best]) + threshold)
-        waiting = waiting[waiting != best]
-        iou = intersection_over_union(boxes[best : best + 1], boxes[waiting])[0]
-        above[waiting] *= np.exp(-(iou**2) / sigma)
-        waiting = waiting[above[waiting] > least]
-    return np.array(kept, np.intp), np.array(left)
 
 
 def _areas(some: Boxes, others: Boxes) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

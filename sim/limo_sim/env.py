@@ -27,7 +27,7 @@ from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.schema import ScenarioError
 from limo_sim.world.variants import SIGHTING_STREAM, made_up
 
-with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="the arena's camera"):
     import cv2
 
 ACTIONS_PER_SECOND = 10

@@ -16,7 +16,7 @@ from limo_hog.cli.main import ARENA, BUILT_IN, main
         ("limo-hog ''", {*ARENA, *BUILT_IN}),
         ("limo-hog det", {"detect"}),
         ("limo-hog detect --min", {"--min-height"}),
-        ("limo-hog detect --nms ''", {"overlap", "iou", "soft", "group"}),
+        ("limo-hog detect --nms ''", {"overlap", "group"}),
         ("limo-hog follow --controller tr", {"tracking"}),
         ("limo-hog workshop ''", {"new", "check", "grade", "solution"}),
     ],

@@ -139,7 +139,7 @@ def test_person_boxes_lie_within_the_windows(pictures: Path, capsys: pytest.Capt
 def test_overlapping_hits_leave_only_the_best(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(pictures / "a.png")
     for overlap in ("0", "1"):
-        assert main(["detect", path, "--json", "-", "--nms", "iou", "--overlap", overlap]) == 0
+        assert main(["detect", path, "--json", "-", "--overlap", overlap]) == 0
     few, all_ = lines_of(capsys.readouterr().out)
     raw = PeopleDetector(nms="group", group_threshold=0).detect(PICTURE)
     assert len(all_["boxes"]) == len(raw)

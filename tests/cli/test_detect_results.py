@@ -149,11 +149,6 @@ def test_resuming_with_other_parameters_is_refused(
     assert file.read_bytes() == before
 
 
-def test_resuming_what_was_not_kept_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["detect", "a.png", "--resume"]) == 2
-    assert "--json FILE or --out DIR" in capsys.readouterr().err
-
-
 def test_resuming_from_another_file_leaves_it_alone(
     pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -66,7 +66,7 @@ def test_without_json_a_person_reads_the_card(capsys: pytest.CaptureFixture[str]
     ("arguments", "message"),
     [
         (["--scenario", "moon"], "unknown scenario moon"),
-        (["--detector", "yolo"], "want one of hog, hog-half, hog-iou, hog-soft, cv2, hog:MODEL, onnx:FILE"),
+        (["--detector", "yolo"], "want one of hog, hog-half, hog:MODEL, cv2, onnx:FILE"),
         (["--detector", "onnx:absent.onnx"], "absent.onnx: no such file"),
         (["--controller", "approach", "--target", "1"], "holds no distance"),
     ],

@@ -305,9 +305,10 @@ def test_ctrl_c_ends_a_run_that_is_paused_on_its_page() -> None:
     assert process.returncode == 130
 
 
-def test_a_missing_library_is_named_with_what_brings_it() -> None:
+def test_a_missing_library_is_named_with_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
     with (
-        pytest.raises(MissingExtraError, match=r"^--video needs PyAV: pip install 'limo-hog\[video\]'$"),
-        needed(by="--video", what="PyAV", install="'limo-hog[video]'"),
+        pytest.raises(MissingExtraError, match=r"^a film needs PyAV: pip install 'limo-hog\[video\]'$"),
+        needed(by="a film"),
     ):
-        import no_such_library  # type: ignore[import-not-found]  # noqa: F401
+        import av  # noqa: F401

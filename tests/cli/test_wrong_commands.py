@@ -45,7 +45,6 @@ WRONG_ARGUMENTS = [
     ("bench --image tiny.png", "a picture of 200x60 is smaller than the detector's window"),
     ("bench --channels rgb", "invalid choice: 'rgb' (choose from"),
     ("bench --threads many", "'many' is no number of threads"),
-    ("train crops --out m.yml --object-box 0 0 1 1.1", "'1.1' is no share; wanted is a number from 0 to 1"),
     ("train crops --out m.yml --held-out 1", "'1' is no share; wanted is a number from 0 to 0.99"),
     ("evaluate opencv there.txt --json folder", "'folder' is a folder"),
     ("follow --controller fast", "invalid choice: 'fast' (choose from"),

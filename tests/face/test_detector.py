@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 import limo_hog
 from limo_hog import HOGDescriptor, PeopleDetector
 from limo_hog.cli.support.scene import street
-from limo_hog.suppression import intersection_over_smaller, nms, soft_nms
+from limo_hog.models import load_model
+from limo_hog.suppression import intersection_over_smaller, nms
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
 Image = NDArray[np.uint8]
@@ -110,7 +111,7 @@ def test_people_taller_than_asked_for_are_left_out() -> None:
 
 
 def test_people_of_exactly_the_greatest_height_are_reported() -> None:
-    every_window = PeopleDetector(threshold=-9.0, nms="iou", overlap=1)
+    every_window = PeopleDetector(threshold=-9.0, overlap=1)
     for max_height, window_height in ((64, 82), (65, 82), (67, 86)):  # 64 / 0.78, and 1.05 times that
         found = replace(every_window, max_height=max_height).detect(picture()[200:360, 300:400])
         assert found.boxes[:, 3].max() == window_height
@@ -140,32 +141,22 @@ def test_an_image_that_would_be_enlarged_beyond_memory_is_refused() -> None:
 # One box a person.
 
 
-def test_every_way_to_suppress_is_applied_to_all_hits_with_its_own_limit() -> None:
+def test_of_hits_on_one_person_the_best_stays_by_the_person_boxes_overlap() -> None:
     detector = PeopleDetector(min_height=None, threshold=-0.7, nms="group", group_threshold=0)
     hits = detector.detect(picture())
     x, y, w, h = hits.boxes.T
     # People are compared, not windows: those of two people side by side share their margins.
     people = np.stack([x + 0.2 * w, y + 0.1 * h, 0.6 * w, 0.78 * h], axis=1)
-    by_overlap = nms(people, hits.scores, 0.65, intersection_over_smaller)
-    by_iou = nms(people, hits.scores, 0.3)
-    softly, lowered = soft_nms(people, hits.scores, 0.3**2, -0.7)
-    assert len(by_overlap) > len(nms(hits.boxes, hits.scores, 0.65, intersection_over_smaller))
-    ways: list[tuple[Any, Any, Any]] = [
-        ("overlap", by_overlap, hits.scores[by_overlap]),
-        ("iou", by_iou, hits.scores[by_iou]),
-        ("soft", softly, lowered),
-    ]
-    assert len({len(kept) for _, kept, _ in ways}) == 3, "the picture does not tell the ways apart"
-    for way, kept, scores in ways:
-        found = replace(detector, nms=way, group_threshold=None).detect(picture())
-        assert sorted(map(tuple, found.boxes.tolist())) == sorted(map(tuple, hits.boxes[kept].tolist()))
-        np.testing.assert_allclose(found.scores, scores)
-        assert (np.diff(found.scores) <= 0).all()
+    kept = nms(people, hits.scores, 0.65, intersection_over_smaller)
+    assert len(kept) > len(nms(hits.boxes, hits.scores, 0.65, intersection_over_smaller))
+    found = replace(detector, nms="overlap", group_threshold=None).detect(picture())
+    np.testing.assert_array_equal(found.boxes, hits.boxes[kept])
+    np.testing.assert_array_equal(found.scores, hits.scores[kept])
 
 
 def test_the_limit_of_overlap_can_be_chosen() -> None:
     hits = PeopleDetector(nms="group", group_threshold=0).detect(picture())
-    assert len(PeopleDetector(nms="iou", overlap=1).detect(picture())) == len(hits)
+    assert len(PeopleDetector(overlap=1).detect(picture())) == len(hits)
     counts = [len(PeopleDetector(threshold=-0.7, overlap=limit).detect(picture())) for limit in (0.1, 0.65, 0.95)]
     assert 0 < counts[0] < counts[1] < counts[2]
 
@@ -190,7 +181,7 @@ def test_a_detector_cannot_be_changed() -> None:
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda d: pickle.loads(pickle.dumps(d)), replace])
 def test_a_copy_is_equal_and_finds_the_same(again: Any) -> None:
-    detector = PeopleDetector(model="daimler", threshold=0.5, win_stride=(8, 16), nms="iou", overlap=0.4)
+    detector = PeopleDetector(model="daimler", threshold=0.5, win_stride=(8, 16), overlap=0.4)
     detector.detect(picture())
     twin = again(detector)
     assert twin == detector and hash(twin) == hash(detector) and repr(twin) == repr(detector)
@@ -261,39 +252,29 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"model": 7}, TypeError, "model is 7"),
     ({"model": None}, TypeError, "model is None"),
     ({"min_height": 0}, ValueError, "min_height is 0; 8 or more is wanted"),
-    ({"min_height": -64}, ValueError, "min_height is -64"),
     ({"min_height": float("nan")}, ValueError, "min_height is nan"),
     ({"min_height": "64"}, TypeError, "min_height is '64'; a number is wanted"),
     ({"min_height": 300, "max_height": 100}, ValueError, "max_height is 100; at least 300"),
     ({"min_height": None, "max_height": 90}, ValueError, "max_height is 90; at least 99.84"),
     ({"max_height": float("inf")}, ValueError, "max_height is inf"),
     ({"threshold": float("nan")}, ValueError, "threshold is nan; a finite number is wanted"),
-    ({"threshold": float("inf")}, ValueError, "threshold is inf"),
     ({"threshold": 10**400}, ValueError, r"threshold is 1000.*… is wanted|threshold is 10000"),
-    ({"threshold": 10**5000}, ValueError, "threshold is int of thousands of digits"),
     ({"threshold": True}, TypeError, "threshold is True"),
     ({"threshold": np.zeros(3)}, TypeError, "threshold is array"),
-    ({"nms": "bogus"}, ValueError, "nms is 'bogus'; one of overlap, iou, soft, group is wanted"),
-    ({"nms": None}, TypeError, "nms is None"),
-    ({"nms": ["iou"]}, TypeError, r"nms is \['iou'\]"),
+    ({"nms": "bogus"}, ValueError, "nms is 'bogus'; one of overlap, group is wanted"),
+    ({"nms": ["group"]}, TypeError, r"nms is \['group'\]"),
     ({"overlap": 7}, ValueError, "overlap is 7; 0 to 1 is wanted"),
-    ({"overlap": -0.1}, ValueError, "overlap is -0.1"),
-    ({"overlap": 0, "nms": "soft"}, ValueError, "overlap is 0; above 0"),
     ({"overlap": 0.5, "nms": "group"}, ValueError, "overlap has no meaning"),
     ({"group_threshold": -2, "nms": "group"}, ValueError, "group_threshold is -2; 0 or more"),
     ({"group_threshold": 1.5, "nms": "group"}, TypeError, "group_threshold is 1.5"),
     ({"group_threshold": 0}, ValueError, 'group_threshold has no meaning for nms="overlap"'),
     ({"win_stride": (0, 8)}, ValueError, r"win_stride is \(0, 8\)"),
-    ({"win_stride": (-8, 8)}, ValueError, r"win_stride is \(-8, 8\)"),
     ({"win_stride": 8}, TypeError, r"win_stride is 8; two integers \(x, y\) are wanted"),
-    ({"win_stride": ()}, ValueError, r"win_stride is \(\)"),
     ({"win_stride": (8.0, 8)}, TypeError, "win_stride is"),
     ({"padding": -1}, TypeError, "padding is -1; two integers"),
     ({"padding": (-1, 0)}, ValueError, r"padding is \(-1, 0\)"),
     ({"padding": (65, 0)}, ValueError, r"padding is \(65, 0\).*\(64, 128\)"),
-    ({"padding": (10**400, 0)}, ValueError, "padding is"),
     ({"scale": 0.5}, ValueError, "scale is 0.5; 1.005 or more"),
-    ({"scale": 1}, ValueError, "scale is 1;"),
     ({"scale": float("nan")}, ValueError, "scale is nan"),
     ({"scale": None}, TypeError, "scale is None"),
     # (An array of records cannot be compared with a text.)
@@ -382,6 +363,15 @@ def test_a_card_that_is_no_json_is_named(tmp_path: Path) -> None:
         Path(f"{path}.json").write_text(text)
         with pytest.raises(limo_hog.ModelFormatError, match=r"m\.yml\.json is no model card"):
             PeopleDetector(model=path)
+
+
+def test_a_model_need_not_be_in_a_file() -> None:
+    detector = PeopleDetector(model=load_model("daimler"))
+    np.testing.assert_array_equal(
+        detector.detect(picture()).boxes, PeopleDetector(model="daimler").detect(picture()).boxes
+    )
+    assert replace(detector) == detector != PeopleDetector(model=load_model("daimler"))
+    assert len(pickle.loads(pickle.dumps(detector)).detect(picture())) > 0
 
 
 def test_a_file_without_an_svm_is_refused(tmp_path: Path) -> None:

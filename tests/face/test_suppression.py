@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_hog.suppression import intersection_over_smaller, intersection_over_union, nms, soft_nms
+from limo_hog.suppression import intersection_over_smaller, intersection_over_union, nms
 
 Boxes = NDArray[np.int_]
 
@@ -78,23 +78,3 @@ def test_thousands_of_hits_are_suppressed_at_once() -> None:
 def test_no_boxes_leave_no_boxes() -> None:
     empty = np.empty((0, 4), np.int32)
     assert nms(empty, np.empty(0), 0.5).size == 0
-    assert soft_nms(empty, np.empty(0), 0.5, 0.0)[0].size == 0
-
-
-def test_soft_nms_lowers_the_scores_of_neighbours_alone() -> None:
-    boxes = np.array([[0, 0, 10, 10], [5, 0, 10, 10], [100, 0, 10, 10]])
-    kept, scores = soft_nms(boxes, np.array([2.0, 1.5, 1.0]), 0.5, 0.0)
-    assert kept.tolist() == [0, 1, 2]
-    assert scores == pytest.approx([2.0, 1.5 * np.exp(-(1 / 9) / 0.5), 1.0])
-
-
-def test_soft_nms_drops_what_is_left_of_a_copy() -> None:
-    boxes = np.array([[0, 0, 10, 10], [0, 0, 10, 10]])
-    kept, _ = soft_nms(boxes, np.array([2.0, 0.1]), 0.1, 0.0)
-    assert kept.tolist() == [0]
-
-
-def test_soft_nms_never_raises_a_score_below_zero() -> None:
-    boxes = np.array([[0, 0, 10, 10], [3, 0, 10, 10]])
-    _, scores = soft_nms(boxes, np.array([1.0, -0.5]), 0.5, -1.0)
-    assert scores[1] < -0.5

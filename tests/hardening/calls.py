@@ -14,7 +14,7 @@ import numpy as np
 import limo_hog
 from limo_hog import HOGDescriptor, PeopleDetector
 from limo_hog.detections import Detections
-from limo_hog.suppression import nms, soft_nms
+from limo_hog.suppression import nms
 
 #: What no argument of the API means; none of them runs code of its own.
 UGLY: list[Any] = [
@@ -71,8 +71,8 @@ DETECTORS = detectors()
 FINDERS = [
     PeopleDetector(**wanted)
     for wanted in (
-        *({}, {"min_height": None}, {"nms": "group"}, {"nms": "soft", "threshold": -1.0}, {"model": "daimler"}),
-        {"model": "limo", "min_height": 40, "nms": "iou", "padding": (0, 0)},
+        *({}, {"min_height": None}, {"nms": "group"}, {"threshold": -1.0}, {"model": "daimler"}),
+        {"model": "limo", "min_height": 40, "padding": (0, 0)},
     )
 ]
 
@@ -240,12 +240,6 @@ def gradients(a: Arguments) -> None:
         assert shares.shape[2] == 2 and (shares >= 0).all() and (bins < hog.nbins).all()
 
 
-def regions(a: Arguments) -> None:
-    hog = a.draw.choice(DETECTORS)
-    options = a.options(winStride=a.stride, padding=a.padding, scale=a.scale)
-    boxes_and_weights(hog.detectROI(a.image(), a.rectangles(), a.number(), **options), 4)
-
-
 def grouping(a: Arguments) -> None:
     rects, threshold = a.rectangles(), a.some(0, 1, 2, 3, -1, 100)
     eps = a.options(eps=lambda: a.some(0.2, 0.0, -1.0, 5.0, 0.05))
@@ -268,12 +262,12 @@ def construction(a: Arguments) -> None:
         a.some(False, True),
     ]
     hog: Any = HOGDescriptor(*arguments, *more[: a.draw.randrange(8)])
-    repr(hog), hash(hog), hog.getWinSigma()
+    repr(hog), hog.getWinSigma()
     hog.setSVMDetector(a.svm(hog))
     assert hog.checkDetectorSize() is True
     again: Any = pickle.loads(pickle.dumps(copy.deepcopy(hog)))
-    # (What is no number equals nothing.)
-    assert again == hog or np.isnan(hog.svmDetector).any() or "nan" in repr(hog)
+    assert repr(again) == repr(hog)
+    np.testing.assert_array_equal(again.svmDetector, hog.svmDetector)
 
 
 def svms(a: Arguments) -> None:
@@ -300,7 +294,7 @@ def finders(a: Arguments) -> None:
         min_height=lambda: a.some(64, 100.0, None, 8, 7),
         max_height=lambda: a.some(None, 500, 64, 1),
         threshold=a.number,
-        nms=lambda: a.some("overlap", "iou", "soft", "group"),
+        nms=lambda: a.some("overlap", "group"),
         overlap=lambda: a.some(None, 0.5, 0, 1, 7),
         group_threshold=lambda: a.some(None, 0, 2, -2),
         win_stride=a.stride,
@@ -317,8 +311,6 @@ def detections(a: Arguments) -> None:
     found = Detections(boxes, scores)
     kept = nms(boxes, scores, a.draw.random())
     assert len(kept) == len(set(kept.tolist())) <= count
-    soft, lowered = soft_nms(boxes, scores, a.draw.uniform(0.01, 1), a.draw.gauss(0, 1))
-    assert len(soft) == len(lowered) <= count
     drawn = found.draw(a.image())
     assert drawn.dtype == np.uint8 and drawn.ndim == 3
     assert len(pickle.loads(pickle.dumps(found[kept]))) == len(kept)
@@ -339,7 +331,6 @@ WEIGHTS: dict[Callable[[Arguments], None], int] = {
     grouping: 24,
     construction: 6,
     svms: 6,
-    regions: 6,
     threads: 1,
     finding: 1,
     finders: 1,

@@ -141,7 +141,7 @@ def test_what_lies_in_an_ignored_box_is_neither_right_nor_wrong() -> None:
     assert outcomes.right.tolist() == [False]
 
 
-def test_a_detector_that_finds_everyone_has_no_miss_rate_and_one_that_finds_nobody_has_all() -> None:
+def test_whoever_finds_everyone_has_no_miss_rate_and_whoever_finds_nobody_has_all() -> None:
     boxes = np.array([[5, 5, 20, 40]], np.float64)
     nothing = (np.empty((0, 4)), np.empty(0))
     plain = [(boxes, np.zeros(1, np.bool_))] * 4

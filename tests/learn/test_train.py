@@ -96,10 +96,6 @@ def test_the_same_command_writes_the_same_bytes(trained: Path, bollards: Path, t
         (["{empty}", "--negatives", "{crops}"], 1, "no image or video in this folder"),
         (["{data}", "--label", "cow"], 1, "no box has the label 'cow'"),
         (["{data}", "--window", "60x60"], 2, "multiples of 8"),
-        (["{data}", "--object-box", ".5", ".1", ".6", ".5"], 2, "inside of the crop"),
-        # The whole crop may be the object.
-        (["{crops}", "--object-box", "0", "0", "1", "1"], 1, "there are crops only"),
-        (["{data}", "--resume"], 1, "no stopped run to resume"),
     ],
 )
 def test_bad_data_is_named_in_one_line_and_nothing_is_written(
@@ -121,7 +117,7 @@ def test_bad_data_is_named_in_one_line_and_nothing_is_written(
     assert not out.exists() and not out.with_name("model.yml.json").exists()
 
 
-def test_ctrl_c_keeps_the_last_round_and_the_run_goes_on(trained: Path, bollards: Path, tmp_path: Path) -> None:
+def test_ctrl_c_keeps_the_last_round(bollards: Path, tmp_path: Path) -> None:
     out = tmp_path / "bollard.yml"
     command = [str(LIMO_HOG), "train", str(bollards), "--out", str(out), "--rounds", "1"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
@@ -132,11 +128,8 @@ def test_ctrl_c_keeps_the_last_round_and_the_run_goes_on(trained: Path, bollards
                 break
         rest = process.stderr.read()
         assert process.wait(60) == 130
-    assert f"{out} is round 0; --resume goes on from it" in rest
+    assert f"{out} is round 0" in rest
     assert [row["round"] for row in json.loads(out.with_name("bollard.yml.json").read_text())["rounds"]] == [0]
-    assert main([*command[1:], "--resume"]) == 0
-    for name in ("bollard.yml", "bollard.yml.json"):
-        assert (tmp_path / name).read_bytes() == trained.with_name(name).read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bollard.yml", "bollard.yml.json"]
 
 
@@ -155,13 +148,17 @@ def test_ten_crops_and_a_damaged_negative_make_a_detector_with_warnings(
     out = tmp_path / "m.yml"
     assert main(["train", str(tmp_path / "crops"), "--negatives", str(tmp_path / "free"), "--out", str(out)]) == 0
     warned = [line for line in capsys.readouterr().err.splitlines() if "warning:" in line]
-    assert [line.split("warning: ")[1].partition(":")[0] for line in warned] == ["10 objects only", "left out"]
-    assert json.loads(out.with_name("m.yml.json").read_text())["figures"]["crops"] == 2
+    assert [line.split("warning: ")[1].partition(":")[0] for line in warned] == [
+        "10 objects only",
+        "no labelled picture is left to measure on",
+        "left out",
+    ]
+    assert "figures" not in json.loads(out.with_name("m.yml.json").read_text())
     assert load_model(out).person_box.height == 0.78
 
 
 @pytest.mark.slow
-def test_the_arenas_bollards_are_learnt_to_an_average_precision_of_95_on_unseen_seeds(
+def test_the_arenas_bollards_are_learnt_and_found_in_pictures_of_unseen_seeds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The commands of docs/training.md."""

@@ -36,10 +36,6 @@ Image = NDArray[np.uint8]
 Find = Callable[..., tuple[Any, Any]]
 
 
-class ParityError(LimoHogError):
-    """The two detectors do not agree."""
-
-
 @dataclass(frozen=True)
 class Row:
     """The result for one size, channel count and thread count; without an OpenCV that has HOG, its fields are None."""
@@ -104,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     wrong = [row for row in rows if row.rects_equal is False and row.search == "exact"]
     if wrong:
         where = ", ".join(f"{r.size[0]}x{r.size[1]}x{r.channels} on {r.threads} threads" for r in wrong)
-        raise ParityError(f"other rectangles than OpenCV {facts['opencv']}: {where}")
+        raise LimoHogError(f"other rectangles than OpenCV {facts['opencv']}: {where}")
     return 0
 
 

@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from limo_hog.atomic import is_stream
-from limo_hog.cli.support.arguments import count, number, output_file, threads
+from limo_hog.cli.support.arguments import MODEL, count, number, output_file, threads
 from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.cli.support.results import json_lines, refuse_to_overwrite, write_coco, write_csv
 from limo_hog.detector import PeopleDetector
@@ -41,7 +41,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--model",
         default="opencv",
         metavar="NAME|FILE",
-        help="opencv, daimler, limo, or a trained model's file (%(default)s)",
+        help=f"{MODEL} (%(default)s)",
     )
     parser.add_argument(
         "--search",
@@ -61,12 +61,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--max-height", type=_pixels, metavar="PX", help="leave out people taller than this")
     parser.add_argument(
         "--nms",
-        choices=["overlap", "iou", "soft", "group"],
+        choices=["overlap", "group"],
         default=PeopleDetector.nms,
         help="how one box is made of a person's many hits; group is OpenCV's way (%(default)s)",
     )
     parser.add_argument(
-        "--overlap", type=_overlap, metavar="X", help="how much two people's boxes may overlap, 0..1 (by --nms)"
+        "--overlap", type=_overlap, metavar="X", help="how much two people's boxes may overlap, 0..1 (0.65)"
     )
     parser.add_argument("--person-box", action="store_true", help="boxes tight around the person, without margin")
     parser.add_argument(

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import number, output_file
+from limo_hog.cli.support.arguments import MODEL, number, output_file
 from limo_hog.cli.support.output import STDOUT, write_json
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Measure a detector on labelled pictures: log-average miss rate, recall, average precision, time; "
         "with intervals, and against others on the same pictures.",
     )
-    parser.add_argument("model", metavar="MODEL", help="opencv, daimler, limo, or the file of a trained detector")
+    parser.add_argument("model", metavar="MODEL", help=MODEL)
     parser.add_argument(
         "data",
         type=Path,

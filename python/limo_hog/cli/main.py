@@ -25,7 +25,7 @@ from limo_hog.extras import missing_extra
 #: Commands of this package and their line in `limo-hog --help`.
 BUILT_IN = {
     "detect": "find people in photographs, folders and videos",
-    "train": "train a detector from labelled pictures or crops",
+    "train": "train a detector from labelled pictures",
     "evaluate": "measure detectors on labelled pictures",
     "bench": "time this detector against OpenCV's, with parity checked in the same run",
     "replay": "run the detector and the follower on a recording",

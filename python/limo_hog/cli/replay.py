@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from limo_hog.cli.support.arguments import file_ending, output_file
+from limo_hog.cli.support.arguments import add_detector, file_ending, output_file
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
-from limo_hog.follow.sense.detectors import NAMES, detector_named
+from limo_hog.follow.sense.detectors import detector_named
 
 if TYPE_CHECKING:
     from limo_hog.ros2.replay import Replayed
@@ -33,9 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="controller (%(default)s)")
-    parser.add_argument(
-        "--detector", default="hog", metavar="|".join((*NAMES, "hog:MODEL", "onnx:FILE")), help="detector (hog)"
-    )
+    add_detector(parser)
     parser.add_argument("--image", metavar="TOPIC", help="topic of the camera (/limo_camera/image)")
     parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="video of the detections (H.264)")
     parser.add_argument(

@@ -1,33 +1,33 @@
-"""`limo-hog train`: labelled boxes or crops in, a detector out."""
+"""`limo-hog train`: labelled boxes in, a detector out."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import count, file_ending, number, seed, size
 from limo_hog.cli.support.output import UsageError
 
 if TYPE_CHECKING:
     from limo_hog.learn.sources import TrainingData
-    from limo_hog.learn.training import Round, State, TrainingParameters
+    from limo_hog.learn.training import Round, TrainingParameters
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `train`."""
     parser = subparsers.add_parser(
         "train",
-        description="Train a detector of people or of anything else that looks alike from the same side: from labelled "
-        "pictures, or from crops and pictures that show no such object. Ctrl-C keeps the last round.",
+        description="Train a detector of people or of anything else that looks alike from the same side, from labelled "
+        "pictures. Ctrl-C keeps the last round.",
     )
     parser.add_argument(
         "data",
         nargs="+",
         type=Path,
         metavar="DATA",
-        help="labels (VOC, YOLO, COCO, CVAT, imglab, boxes.json), or folders of crops, each filling a window",
+        help="labels (VOC, YOLO, COCO, CVAT, imglab, boxes.json), or folders of crops of people as INRIA's",
     )
     parser.add_argument(
         "--out",
@@ -48,27 +48,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--window", type=size, metavar="WxH", help="window size [px], multiples of 8 (chosen from DATA)"
     )
-    parser.add_argument(
-        "--object-box",
-        type=_side,
-        nargs=4,
-        metavar=("X", "Y", "W", "H"),
-        help="where the object stands in a crop, as shares of it (0.2 0.1 0.6 0.78, a person)",
-    )
     parser.add_argument("--no-mirror", action="store_true", help="do not learn mirrored objects: left is not right")
     parser.add_argument(
         "--rounds", type=count, default=3, metavar="N", help="rounds of hard-negative mining (%(default)s)"
     )
     parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all that is drawn (%(default)s)")
-    parser.add_argument("--resume", action="store_true", help="go on where a run with the same arguments was stopped")
 
 
 def _share(text: str) -> float:
     return number(text, 0, 0.99, "share")
-
-
-def _side(text: str) -> float:
-    return number(text, 0, 1, "share")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -77,15 +65,11 @@ def run(args: argparse.Namespace) -> int:
     from limo_hog.cli.support.progress import progress
     from limo_hog.cli.support.warned import warnings_in_one_line
     from limo_hog.learn.sources import Wanted, gather
-    from limo_hog.learn.training import State, TrainingParameters, fingerprint, train
-    from limo_hog.models import PersonBox
+    from limo_hog.learn.training import TrainingParameters, train
 
     if args.window and (args.window[0] % 8 or args.window[1] % 8 or min(args.window) < 16):
         raise UsageError(f"--window {args.window[0]}x{args.window[1]}: multiples of 8 from 16 on are wanted")
-    box = None if args.object_box is None else PersonBox(*args.object_box)
-    if box and not (box.width > 0 < box.height and box.x + box.width <= 1 and box.y + box.height <= 1):
-        raise UsageError(f"--object-box {' '.join(f'{share:g}' for share in box)}: it must lie inside of the crop")
-    how = TrainingParameters(rounds=args.rounds, mirror=not args.no_mirror, held_out=args.held_out, seed=args.seed)
+    how = TrainingParameters(rounds=args.rounds, mirror=not args.no_mirror, seed=args.seed)
     wanted = Wanted(
         tuple(args.data),
         tuple(args.negatives),
@@ -93,18 +77,15 @@ def run(args: argparse.Namespace) -> int:
         args.label,
         args.pictures,
         args.window,
-        box,
         args.held_out,
         args.seed,
     )
-    state_path = args.out.with_name(f".{args.out.name}.state.npz")
+    rounds: list[dict[str, Any]] = []
     with warnings_in_one_line(), progress("pictures") as bar:
         bar.add_task("reading", total=None)
         data = gather(wanted)
         # A folder that cannot be made is told before the work, not after.
         args.out.parent.mkdir(parents=True, exist_ok=True)
-        mark = fingerprint(data, how)
-        state = State.load(state_path, mark) if args.resume else State(mark)
         tasks = {bar.task_ids[0]: "reading"}
 
         def step(stage: str, steps: int | None) -> None:
@@ -117,39 +98,26 @@ def run(args: argparse.Namespace) -> int:
             bar.advance(task)
 
         try:
-            for done in train(data, how, state, cores(), step):
-                line = _keep(done, args.out, state_path, state, data, how)
+            for done in train(data, how, cores(), step):
+                line = _keep(done, args.out, rounds, data, how)
                 bar.console.print(line, highlight=False, soft_wrap=True)
         except KeyboardInterrupt:
-            if state.records:
-                last = state.records[-1]["round"]
-                print(f"limo-hog: {args.out} is round {last}; --resume goes on from it", file=sys.stderr)
+            if rounds:
+                print(f"limo-hog: {args.out} is round {rounds[-1]['round']}", file=sys.stderr)
             raise
-    state_path.unlink(missing_ok=True)
     print(args.out)
     return 0
 
 
-def _keep(
-    done: Round,
-    out: Path,
-    state_path: Path,
-    state: State,
-    data: TrainingData,
-    how: TrainingParameters,
-) -> str:
-    """Measure and write a round's detector; return what is said of it."""
-    from limo_hog.cli.support.environment import cores
+def _keep(done: Round, out: Path, rounds: list[dict[str, Any]], data: TrainingData, how: TrainingParameters) -> str:
+    """Measure and write a round's detector, note it in `rounds`, and return what is said of it."""
     from limo_hog.learn.card import make_card, measure, write_model
     from limo_hog.learn.training import as_json
 
-    measured = measure(done, data, cores(), final=done.number == how.rounds)
-    figures = measured["figures"]
-    state.records.append(
-        as_json(done) | {name: figures[name] for name in ("lamr", "ap", "crops_found") if name in figures}
-    )
-    write_model(out, done.coefficients, data.shape, make_card(measured, state.records, data, how))
-    state.save(state_path)
+    measured = measure(done, data, final=done.number == how.rounds)
+    figures = measured.get("figures", {})
+    rounds.append(as_json(done) | {name: figures[name] for name in ("lamr", "ap") if name in figures})
+    write_model(out, done.coefficients, data.shape, make_card(measured, rounds, data, how))
     words = [
         f"round {done.number}: {done.objects} objects, {done.negatives} negatives",
         f"{done.descriptor_bytes / 2**20:.0f} MB of descriptors",
@@ -161,6 +129,4 @@ def _keep(
         words.insert(
             1, f"LAMR {figures['lamr']:.3f}, AP {figures['ap']:.3f} on {figures['pictures']} pictures held out"
         )
-    elif figures["crops_found"] is not None:
-        words.insert(1, f"{figures['crops_found']:.1%} of {figures['crops']} crops held out found at 0.1 FPPI")
     return "; ".join(words)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Sequence
 from typing import Any, SupportsFloat, SupportsIndex
@@ -133,6 +134,23 @@ def real(name: str, value: SupportsFloat | None, default: float) -> float:
         raise ParameterTypeError(f"{name} is {shown(value)}; one number is wanted") from None
     except OverflowError:
         raise ParameterError(f"{name} is {shown(value)}; it is larger than any float") from None
+
+
+def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
+    """Return a finite number within bounds, both included; a truth value is none.
+
+    Raises
+    ------
+    ParameterError, ParameterTypeError
+        It is out of its bounds, infinite or NaN, or no number.
+    """
+    if value is None or isinstance(value, bool):
+        raise ParameterTypeError(f"{name} is {value}; a number is wanted")
+    found = real(name, value, math.nan)
+    if not (math.isfinite(found) and low <= found <= high):
+        bounds = f"{low:g} to {high:g}" if high < math.inf else f"{low:g} or more"
+        raise ParameterError(f"{name} is {shown(value)}; {'a finite number' if low == -math.inf else bounds} is wanted")
+    return found
 
 
 def integer(name: str, value: SupportsIndex | None, default: int) -> int:

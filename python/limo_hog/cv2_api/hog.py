@@ -1,32 +1,15 @@
-"""`cv2.HOGDescriptor` as OpenCV 4.14 has it: a program moves by writing `limo_hog.` for `cv2.`.
-
-`docs/parity.md` lists where it differs on purpose.
-"""
+"""`cv2.HOGDescriptor` as OpenCV 4.14 has it; `docs/parity.md` lists where it differs on purpose."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
 from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limo_hog import _core
-from limo_hog.cv2_api.arguments import (
-    Nothing,
-    Pair,
-    Pairs,
-    coefficients,
-    flag,
-    integer,
-    pair,
-    pixels,
-    places,
-    real,
-    rectangles,
-)
-from limo_hog.cv2_api.features import Features
+from limo_hog.cv2_api import functions
+from limo_hog.cv2_api.arguments import Nothing, Pair, Pairs, coefficients, flag, integer, pair, pixels, places, real
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.cv2_api.state import State, replaced
 from limo_hog.exceptions import ParameterTypeError
@@ -35,18 +18,18 @@ from limo_hog.exceptions import ParameterTypeError
 Found = tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]
 
 
-class HOGDescriptor(Features):
+class HOGDescriptor:
     """Histograms of oriented gradients, and a linear SVM that finds people by them.
 
     `HOGDescriptor()` has the geometry of OpenCV's default people detector, gamma correction on. With arguments the
     first five are mandatory and gamma correction is off unless asked for, as in OpenCV 4.14; None stands for a
     default. `HOGDescriptor(filename)` loads a file. Sizes are (width, height) [px]. The geometry is checked at its
-    first use: what does not fit raises `GeometryError`.
+    first use: what does not fit raises `GeometryError`. Images are uint8 (H, W), (H, W, 1) or (H, W, 3).
 
     Threads may share one: a search is of the geometry and coefficients that were in force together when it began.
     """
 
-    __slots__ = ()
+    __slots__ = ("_state",)
 
     def __init__(
         self,
@@ -67,35 +50,156 @@ class HOGDescriptor(Features):
     ) -> None:
         if isinstance(_winSize, (str, os.PathLike)):
             filename, _winSize = _winSize, None
-        sizes = {
-            "_winSize": _winSize,
-            "_blockSize": _blockSize,
-            "_blockStride": _blockStride,
-            "_cellSize": _cellSize,
-            "_nbins": _nbins,
-        }
-        missing = [name for name, value in sizes.items() if value is None]
+        sizes = (_winSize, _blockSize, _blockStride, _cellSize, _nbins)
+        missing = [f"_{name}" for name, value in zip(Geometry._fields, sizes, strict=False) if value is None]
         if 0 < len(missing) < len(sizes):
-            raise ParameterTypeError(f"HOGDescriptor(...) needs {', '.join(sizes)}; missing: {', '.join(missing)}")
-        default = Geometry()
-        super().__init__(
-            Geometry(
-                pair("_winSize", _winSize, default.winSize),
-                pair("_blockSize", _blockSize, default.blockSize),
-                pair("_blockStride", _blockStride, default.blockStride),
-                pair("_cellSize", _cellSize, default.cellSize),
-                integer("_nbins", _nbins, default.nbins),
-                integer("_derivAperture", _derivAperture, default.derivAperture),
-                real("_winSigma", _winSigma, default.winSigma),
-                integer("_histogramNormType", _histogramNormType, default.histogramNormType),
-                real("_L2HysThreshold", _L2HysThreshold, default.L2HysThreshold),
-                flag("_gammaCorrection", _gammaCorrection, bool(missing)),
-                integer("_nlevels", _nlevels, default.nlevels),
-                flag("_signedGradient", _signedGradient, False),
+            raise ParameterTypeError(
+                f"HOGDescriptor(...) needs its first five arguments; missing: {', '.join(missing)}"
             )
+        default = Geometry()
+        geometry = Geometry(
+            pair("_winSize", _winSize, default.winSize),
+            pair("_blockSize", _blockSize, default.blockSize),
+            pair("_blockStride", _blockStride, default.blockStride),
+            pair("_cellSize", _cellSize, default.cellSize),
+            integer("_nbins", _nbins, default.nbins),
+            integer("_derivAperture", _derivAperture, default.derivAperture),
+            real("_winSigma", _winSigma, default.winSigma),
+            integer("_histogramNormType", _histogramNormType, default.histogramNormType),
+            real("_L2HysThreshold", _L2HysThreshold, default.L2HysThreshold),
+            flag("_gammaCorrection", _gammaCorrection, bool(missing)),
+            integer("_nlevels", _nlevels, default.nlevels),
+            flag("_signedGradient", _signedGradient, False),
         )
+        self._state = State(geometry)
         if filename is not None:
             self.load(filename)
+
+    @property
+    def winSize(self) -> tuple[int, int]:
+        """Detection window (width, height) [px]."""
+        return self._state.geometry.winSize
+
+    @property
+    def blockSize(self) -> tuple[int, int]:
+        """Block (width, height) [px]."""
+        return self._state.geometry.blockSize
+
+    @property
+    def blockStride(self) -> tuple[int, int]:
+        """Distance of neighbouring blocks (x, y) [px]."""
+        return self._state.geometry.blockStride
+
+    @property
+    def cellSize(self) -> tuple[int, int]:
+        """Cell (width, height) [px]."""
+        return self._state.geometry.cellSize
+
+    @property
+    def nbins(self) -> int:
+        """Orientation bins of a cell."""
+        return self._state.geometry.nbins
+
+    @property
+    def derivAperture(self) -> int:
+        """Kept and saved, never used, as in OpenCV."""
+        return self._state.geometry.derivAperture
+
+    @property
+    def winSigma(self) -> float:
+        """Gaussian window of a block [px]; -1 stands for the default, see `getWinSigma`."""
+        return self._state.geometry.winSigma
+
+    @property
+    def histogramNormType(self) -> int:
+        """Kept and saved, never used, as in OpenCV: L2-Hys is the only one."""
+        return self._state.geometry.histogramNormType
+
+    @property
+    def L2HysThreshold(self) -> float:
+        """Clipping value of the block normalisation."""
+        return self._state.geometry.L2HysThreshold
+
+    @property
+    def gammaCorrection(self) -> bool:
+        """Whether the gradient is taken of the square root of the pixels."""
+        return self._state.geometry.gammaCorrection
+
+    @property
+    def nlevels(self) -> int:
+        """Most levels of a pyramid."""
+        return self._state.geometry.nlevels
+
+    @property
+    def signedGradient(self) -> bool:
+        """Whether the bins cover 2π instead of π."""
+        return self._state.geometry.signedGradient
+
+    def getDescriptorSize(self) -> int:
+        """Elements of one window's descriptor: bins × cells of a block × blocks of a window."""
+        return self._state.describing.descriptor_len
+
+    def getWinSigma(self) -> float:
+        """Gaussian window in force [px]: `winSigma`, or (block width + block height) / 8 where that is not positive."""
+        return self._state.geometry.sigma
+
+    def computeGradient(
+        self,
+        img: NDArray[np.uint8],
+        grad: NDArray[np.float32] | None = None,
+        angleOfs: NDArray[np.uint8] | None = None,
+        paddingTL: Pair | None = None,
+        paddingBR: Pair | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]] | tuple[Nothing, Nothing]:
+        """Gradient magnitudes shared between the two nearest orientation bins.
+
+        Parameters
+        ----------
+        grad, angleOfs
+            Arrays to fill, of the results' shapes and types; others, and None, are left alone.
+        paddingTL, paddingBR
+            Columns and rows (x, y) to add (or, if negative, to drop) at the top left and the bottom right [px].
+
+        Returns
+        -------
+        grad, angleOfs
+            float32 (H', W', 2) magnitudes and uint8 (H', W', 2) bins; `((), ())` where no pixel is left.
+        """
+        image = pixels(img)
+        (left, top), (right, bottom) = pair("paddingTL", paddingTL), pair("paddingBR", paddingBR)
+        if 0 in (image.shape[0] + top + bottom, image.shape[1] + left + right):
+            return (), ()
+        shares, bins = self._state.describing.gradient(image, (left, top, right, bottom))
+        return _filled(grad, shares), _filled(angleOfs, bins)
+
+    def compute(
+        self,
+        img: NDArray[np.uint8],
+        winStride: Pair | None = None,
+        padding: Pair | None = None,
+        locations: Pairs | None = None,
+    ) -> NDArray[np.float32] | Nothing:
+        """Descriptors of the windows of an image.
+
+        Parameters
+        ----------
+        winStride
+            Distance of neighbouring windows (x, y) [px]; by default the cell size.
+        padding
+            Border around the image (x, y) [px], mirrored.
+        locations
+            Top left corners (x, y) of the windows [px]; by default the whole grid, row by row.
+
+        Returns
+        -------
+        descriptors
+            float32 (windows × descriptor size,), blocks column by column; zeros for a location outside. `()` when
+            no window fits.
+        """
+        descriptors = self._state.describing.compute(
+            pixels(img), pair("winStride", winStride), pair("padding", padding), places("locations", locations)
+        )
+        return descriptors if len(descriptors) else ()
 
     @property
     def svmDetector(self) -> NDArray[np.float32] | Nothing:
@@ -106,8 +210,7 @@ class HOGDescriptor(Features):
     def checkDetectorSize(self) -> bool:
         """Whether the detector, if any, fits the geometry; false only after `load` of a file without a detector."""
         state = self._state
-        size = state.bare.descriptor_len
-        return state.svm is None or len(state.svm) in (size, size + 1)
+        return state.svm is None or len(state.svm) - state.describing.descriptor_len in (0, 1)
 
     def setSVMDetector(self, svmdetector: ArrayLike | None) -> None:
         """Set the coefficients of the SVM: one per descriptor element, and perhaps the bias after them.
@@ -125,22 +228,15 @@ class HOGDescriptor(Features):
         svm = coefficients(svmdetector)
         while True:
             before = self._state
-            after = before.with_svm(svm)
+            after = State(before.geometry, svm)
             if svm is not None:
                 # Compiled first: what does not fit raises here, and changes nothing.
-                _ = after.armed
+                _ = after.detecting
             if replaced(self, before, after):
                 return
 
-    @staticmethod
-    def getDefaultPeopleDetector() -> NDArray[np.float32]:
-        """float32 (3781,): OpenCV's people detector for the default geometry, bias last."""
-        return _core.default_people_detector()
-
-    @staticmethod
-    def getDaimlerPeopleDetector() -> NDArray[np.float32]:
-        """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
-        return _core.daimler_people_detector()
+    getDefaultPeopleDetector = staticmethod(functions.HOGDescriptor_getDefaultPeopleDetector)
+    getDaimlerPeopleDetector = staticmethod(functions.HOGDescriptor_getDaimlerPeopleDetector)
 
     def detect(
         self,
@@ -154,8 +250,6 @@ class HOGDescriptor(Features):
 
         Parameters
         ----------
-        img
-            uint8 (H, W), (H, W, 1) or (H, W, 3).
         hitThreshold
             Least score of a hit.
         winStride
@@ -174,7 +268,7 @@ class HOGDescriptor(Features):
         state = self._state
         if state.svm is None:
             return (), ()
-        found, weights = state.armed.detect(
+        found, weights = state.detecting.detect(
             pixels(img),
             real("hitThreshold", hitThreshold, 0.0),
             pair("winStride", winStride),
@@ -199,8 +293,6 @@ class HOGDescriptor(Features):
 
         Parameters
         ----------
-        img
-            uint8 (H, W), (H, W, 1) or (H, W, 3).
         hitThreshold
             Least score of a hit.
         winStride
@@ -226,7 +318,7 @@ class HOGDescriptor(Features):
         state = self._state
         if state.svm is None:
             return (), ()
-        boxes, weights = state.armed.detect_multi_scale(
+        boxes, weights = state.detecting.detect_multi_scale(
             pixels(img),
             real("hitThreshold", hitThreshold, 0.0),
             pair("winStride", winStride),
@@ -236,46 +328,6 @@ class HOGDescriptor(Features):
             flag("useMeanshiftGrouping", useMeanshiftGrouping, False),
         )
         return (boxes, weights) if len(boxes) else ((), ())
-
-    def detectROI(
-        self,
-        img: NDArray[np.uint8],
-        regions: Sequence[Sequence[int]] | NDArray[np.integer[Any]],
-        hitThreshold: SupportsFloat | None = 0.0,
-        **options: Any,
-    ) -> Found:
-        """People of any size in regions of an image, each searched as if it were an image of its own.
-
-        (For single windows at given places, as OpenCV's C++ method of this name has it, use `detect` with
-        `searchLocations`.)
-
-        Parameters
-        ----------
-        img
-            uint8 (H, W), (H, W, 1) or (H, W, 3).
-        regions
-            (n, 4) integers: x, y, width, height [px]; what lies outside the image is passed over.
-        hitThreshold
-            Least score of a hit.
-        **options
-            The other arguments of `detectMultiScale`, by name.
-
-        Returns
-        -------
-        foundLocations, foundWeights
-            As of `detectMultiScale`, in pixels of the whole image, region by region.
-        """
-        image = pixels(img)
-        boxes, weights = [np.empty((0, 4), np.int32)], [np.empty(0)]
-        for x, y, width, height in rectangles("regions", regions):
-            left, top = max(x, 0), max(y, 0)
-            region = image[top : max(y + height, 0), left : max(x + width, 0)]
-            if region.size:
-                found, scores = self.detectMultiScale(region, hitThreshold, **options)
-                boxes.append(np.reshape(np.asarray(found, np.int32), (-1, 4)) + np.array([left, top, 0, 0], np.int32))
-                weights.append(np.asarray(scores, np.float64))
-        all_boxes = np.concatenate(boxes)
-        return (all_boxes, np.concatenate(weights)) if len(all_boxes) else ((), ())
 
     def save(self, filename: str | os.PathLike[str], objname: str = "") -> None:
         """Write geometry and detector to a file that OpenCV reads, too.
@@ -326,23 +378,11 @@ class HOGDescriptor(Features):
         geometry, numbers = model_files.load(filename, objname)
         loaded = State(geometry, coefficients(numbers))
         # Compiled first: what does not fit raises here, and changes nothing.
-        _ = loaded.bare if loaded.svm is None else loaded.armed
+        _ = loaded.detecting
         while True:
             before = self._state
-            if replaced(self, before, loaded if numbers else loaded.with_svm(before.svm)):
+            if replaced(self, before, loaded if numbers else State(geometry, before.svm)):
                 return True
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, HOGDescriptor):
-            return NotImplemented
-        mine, theirs = self._state, other._state
-        if mine.svm is None or theirs.svm is None:
-            return mine.geometry == theirs.geometry and mine.svm is theirs.svm
-        return mine.geometry == theirs.geometry and np.array_equal(mine.svm, theirs.svm)
-
-    def __hash__(self) -> int:
-        # It may change while it is a key, so nothing it holds may go in.
-        return hash(HOGDescriptor)
 
     def __repr__(self) -> str:
         state = self._state
@@ -350,12 +390,10 @@ class HOGDescriptor(Features):
         svm = "no detector" if state.svm is None else f"a detector of {len(state.svm)} coefficients"
         return f"<{type(self).__name__} {held}; {svm}>"
 
-    def __reduce__(self) -> tuple[Callable[..., HOGDescriptor], tuple[Any, ...]]:
-        state = self._state
-        return _restored, (type(self), tuple(state.geometry), state.svm)
 
-
-def _restored(kind: type[HOGDescriptor], geometry: tuple[Any, ...], svm: NDArray[np.float32] | None) -> HOGDescriptor:
-    hog = kind(*geometry)
-    hog._state = hog._state.with_svm(svm)
-    return hog
+def _filled(target: Any, result: Any) -> Any:
+    """Return `target` holding `result` where it can, else `result` itself."""
+    if isinstance(target, np.ndarray) and target.shape == result.shape and target.dtype == result.dtype:
+        target[...] = result
+        return target
+    return result

@@ -35,7 +35,7 @@ def install_into_cv2() -> list[str]:
     MissingExtraError
         OpenCV is not installed.
     """
-    with needed(by="limo_hog.install_into_cv2", what="OpenCV", install="'limo-hog[cv]'"):
+    with needed(by="limo_hog.install_into_cv2"):
         import cv2
     names = {"HOGDescriptor": HOGDescriptor} | {name: getattr(functions, name) for name in _FUNCTIONS}
     missing = [name for name in names if not hasattr(cv2, name)]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from limo_hog import _core
 from limo_hog.cv2_api.geometry import Geometry
+from limo_hog.exceptions import DetectorSizeError
 
 #: Held only while one state takes another's place. A child forked meanwhile by another thread would wait for it for
 #: ever, and so gets a new one.
@@ -35,36 +36,33 @@ class Holder(Protocol):
 class State:
     """A geometry and the coefficients of an SVM, neither of which changes.
 
-    What is compiled of them is made when first needed; two threads that need it at once make the same twice.
+    They are compiled when first needed; two threads that need that at once compile twice.
     """
 
-    __slots__ = ("_armed", "_bare", "geometry", "svm")
+    __slots__ = ("_compiled", "geometry", "svm")
 
     def __init__(self, geometry: Geometry, svm: NDArray[np.float32] | None = None) -> None:
         self.geometry = geometry
         self.svm = svm
-        self._bare: _core.Hog | None = None
-        self._armed: _core.Hog | None = None
+        self._compiled: _core.Hog | None = None
 
     @property
-    def bare(self) -> _core.Hog:
-        """The compiled geometry without the SVM."""
-        if self._bare is None:
-            self._bare = self.geometry.compiled(None)
-        return self._bare
+    def detecting(self) -> _core.Hog:
+        """Geometry and SVM, compiled; `DetectorSizeError` where the SVM does not fit."""
+        if self._compiled is None:
+            self._compiled = self.geometry.compiled(self.svm)
+        return self._compiled
 
     @property
-    def armed(self) -> _core.Hog:
-        """The compiled geometry with the SVM."""
-        if self._armed is None:
-            self._armed = self.geometry.compiled(self.svm)
-        return self._armed
+    def describing(self) -> _core.Hog:
+        """As `detecting`, or the geometry alone where the SVM does not fit."""
+        try:
+            return self.detecting
+        except DetectorSizeError:
+            return self.geometry.compiled(None)
 
-    def with_svm(self, svm: NDArray[np.float32] | None) -> State:
-        """Return this geometry with another SVM."""
-        state = State(self.geometry, svm)
-        state._bare = self._bare
-        return state
+    def __reduce__(self) -> tuple[type[State], tuple[Geometry, NDArray[np.float32] | None]]:
+        return State, (self.geometry, self.svm)  # what is compiled cannot be pickled
 
 
 def replaced(owner: Holder, before: State, after: State) -> bool:

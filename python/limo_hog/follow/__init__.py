@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from limo_hog.detections import Detector
 from limo_hog.follow.control.approach import ApproachController
 from limo_hog.follow.control.distance import ProxemicController
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
@@ -9,7 +10,7 @@ from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.pipeline import Follower, FrameLog
 from limo_hog.follow.safety.guard import Guard
-from limo_hog.follow.sense.detectors import Detector, detector_named
+from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.follow.sense.observation import Frame, Observation, Odometry, Scan, Sensors
 from limo_hog.follow.sense.ranging import person_depth
 from limo_hog.follow.sense.region import Region

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from limo_hog.extras import needed
 
-with needed(by="drawing on pictures", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="drawing on pictures"):
     import cv2
 
 #: Okabe and Ito's vermillion, bluish green and blue, which the colour-blind tell apart, as BGR.

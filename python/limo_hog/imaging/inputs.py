@@ -52,13 +52,10 @@ def as_array(image: Any) -> Any:
 
 def _read(path: Path) -> NDArray[np.uint8]:
     try:
-        from limo_hog.imaging.reading import Kind, ReadError, Source, read_image
+        from limo_hog.imaging.reading import Kind, Source, read_image
     except MissingExtraError:
         return _read_with_pillow(path)
-    try:
-        return read_image(Source(str(path), path, Kind.IMAGE))
-    except ReadError as error:
-        raise ImageError(str(error)) from error
+    return read_image(Source(str(path), path, Kind.IMAGE))
 
 
 def _read_with_pillow(path: Path) -> NDArray[np.uint8]:

@@ -16,10 +16,10 @@ from urllib.parse import urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.exceptions import LimoHogError
+from limo_hog.exceptions import ImageError
 from limo_hog.extras import needed
 
-with needed(by="reading pictures", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="reading pictures"):
     import cv2
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".jp2", ".pbm", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp")
@@ -31,7 +31,7 @@ STDIN = "-"
 STREAM_TIMEOUT_S = 10
 
 
-class ReadError(LimoHogError):
+class ReadError(ImageError):
     """An input is not a picture, a video or a camera that can be read."""
 
 

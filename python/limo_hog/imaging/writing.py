@@ -14,7 +14,7 @@ from limo_hog.atomic import about, whole_file
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 
-with needed(by="writing pictures", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="writing pictures"):
     import cv2
 
 
@@ -60,7 +60,7 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[[NDArray[np.uint8]
     WriteError
         If no frame came.
     """
-    with needed(by="writing H.264 video", what="PyAV", install="'limo-hog[video]'"):
+    with needed(by="writing H.264 video"):
         import av
     with whole_file(path) as part, ExitStack() as stack:
         with about(path):

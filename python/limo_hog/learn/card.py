@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -17,18 +16,14 @@ from limo_hog.atomic import write_text
 from limo_hog.cv2_api import model_files
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
-from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, Rival, evaluate
-from limo_hog.learn.mining import readable
+from limo_hog.learn.evaluation.run import EvaluationParameters, Rival, evaluate
 from limo_hog.learn.sources import TrainingData
 from limo_hog.learn.training import Round, TrainingParameters
 from limo_hog.learn.windows import WindowShape
-from limo_hog.models import Calibration
-from limo_hog.parallel import in_order
+from limo_hog.models import Calibration, Model
 
 #: Where the curve of a trained detector ends; its margins are a little smaller than those of OpenCV's.
 LEAST_SCORE = -1.2
-#: False positives per image at the threshold of the card.
-_FPPI = 0.1
 #: Newton's steps of the calibration, and the least change that is worth one more.
 _STEPS, _SETTLED = 50, 1e-10
 #: Bins of the calibration error.
@@ -52,26 +47,19 @@ def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShap
     write_text(card_path(path), json.dumps(card, indent=2) + "\n")
 
 
-def measure(done: Round, data: TrainingData, workers: int, final: bool) -> dict[str, Any]:
-    """Measure a round's detector on what was held out.
+def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
+    """Measure a round's detector on the labelled pictures held out.
 
     Returns
     -------
-    `threshold`, `calibration` and `figures` of a card. With labelled pictures: LAMR, recall, AP. With crops only: the
-    share of the crops held back that are found, false alarms being counted on pictures of the negatives.
+    `threshold`, `calibration` and `figures` (LAMR, recall, AP) of a card; nothing where no picture was held out.
     """
-    with TemporaryDirectory(prefix="limo-hog-") as folder:
-        path = Path(folder) / "model.yml"
-        write_model(path, done.coefficients, data.shape, {"person_box": list(data.shape.object_box)})
-        detector = PeopleDetector(model=path, min_height=data.min_height, threshold=LEAST_SCORE)
-    if data.validation:
-        how = EvaluationParameters(draws=1000 if final else 1)
-        _, (evaluation,) = evaluate([Rival("trained", detector)], data.validation, how)
-        return _measured(evaluation, data)
-    return _measured_on_crops(done, detector, data, workers)
-
-
-def _measured(evaluation: Evaluation, data: TrainingData) -> dict[str, Any]:
+    if not data.validation:
+        return {}
+    model = Model(Geometry(winSize=data.shape.size), done.coefficients.astype(np.float32), data.shape.object_box)
+    detector = PeopleDetector(model=model, min_height=data.min_height, threshold=LEAST_SCORE)
+    how = EvaluationParameters(draws=1000 if final else 1)
+    _, (evaluation,) = evaluate([Rival("trained", detector)], data.validation, how)
     outcomes = evaluation.outcomes
     calibration = calibrate(outcomes.scores, outcomes.right)
     probabilities = calibration.probabilities(outcomes.scores)
@@ -86,29 +74,6 @@ def _measured(evaluation: Evaluation, data: TrainingData) -> dict[str, Any]:
             **figures,
             "lamr_interval": [round(end, 4) for end in evaluation.intervals["lamr"]],
             "calibration_error": round(calibration_error(probabilities, outcomes.right), 4),
-        },
-    }
-
-
-def _measured_on_crops(done: Round, detector: PeopleDetector, data: TrainingData, workers: int) -> dict[str, Any]:
-    # Where there is one negative only, it is learnt from and measured on.
-    paths = data.held_negatives or data.negatives.paths
-
-    def work(path: Path) -> NDArray[np.float64]:
-        image = readable(path)
-        return np.empty(0) if image is None else detector.detect(image).scores
-
-    alarms = np.sort(np.concatenate([np.empty(0), *in_order(work, paths, workers)]))[::-1]
-    allowed = int(_FPPI * len(paths))
-    threshold = float(alarms[allowed]) + 1e-6 if allowed < len(alarms) else LEAST_SCORE
-    scores = np.append(done.held_out_margins, alarms)
-    right = np.arange(len(scores)) < len(done.held_out_margins)
-    return {
-        "threshold": _rounded(threshold),
-        "calibration": calibrate(scores, right)._asdict(),
-        "figures": {
-            "crops": len(done.held_out_margins),
-            "crops_found": round(float((done.held_out_margins >= threshold).mean()), 4) if right.any() else None,
         },
     }
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from limo_hog import _core
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.exceptions import ImageError
-from limo_hog.imaging.reading import ReadError
 from limo_hog.learn.labels import LabelWarning
 from limo_hog.learn.windows import (
     Jitter,
@@ -109,7 +108,7 @@ def readable(path: Path) -> NDArray[np.uint8] | None:
     """
     try:
         return read_gray(path)
-    except (ReadError, ImageError, OSError) as error:
+    except (ImageError, OSError) as error:
         warnings.warn(f"left out: {error}", LabelWarning, stacklevel=2)
         return None
 
@@ -212,18 +211,21 @@ def _nothing(number: int, hog: _core.Hog) -> Mined:
     return Mined(number, np.empty((0, 4)), np.empty(0), describe(hog, []))
 
 
-def cut_again(
-    kept: dict[int, NDArray[np.float64]], negatives: Negatives, shape: WindowShape, workers: int
-) -> Iterator[Mined]:
-    """Yield known boxes of pictures again, to go on where an earlier run stopped."""
-    hog = hog_of(shape)
-
-    def work(number: int) -> Mined:
-        image, boxes = read_gray(negatives.paths[number]), kept[number]
-        crops = [cut(image, box, shape.size) for box in boxes]
-        return Mined(number, boxes, np.zeros(len(boxes)), describe(hog, crops))
-
-    return in_order(work, kept, workers)
+def hardest(found: Sequence[Mined], room: int) -> tuple[list[Mined], int]:
+    """Return as many negatives as have room [B], the hardest, in the order they came, and how many were left out."""
+    margins = np.concatenate([np.empty(0), *(mined.margins for mined in found)])
+    size = max((mined.descriptors[0].nbytes for mined in found if len(mined.descriptors)), default=1)
+    most = max(0, room // size)
+    if len(margins) <= most:
+        return list(found), 0
+    kept = np.zeros(len(margins), np.bool_)
+    kept[np.argsort(-margins, kind="stable")[:most]] = True
+    parts = np.split(kept, np.cumsum([len(mined.margins) for mined in found])[:-1])
+    hardest = [
+        Mined(mined.picture, mined.boxes[part], mined.margins[part], mined.descriptors[part])
+        for mined, part in zip(found, parts, strict=True)
+    ]
+    return hardest, len(margins) - most
 
 
 def _search(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from limo_hog.extras import needed
 
-with needed(by="limo-hog train", what="SciPy and threadpoolctl", install="'limo-hog[train]'"):
+with needed(by="limo-hog train"):
     from scipy.optimize import minimize
     from threadpoolctl import threadpool_limits
 

@@ -14,8 +14,7 @@ from limo_hog.imaging.reading import Kind, ReadError, find_sources
 from limo_hog.learn.formats import holds_labels, read_labels
 from limo_hog.learn.labels import LabelError, LabelWarning, Picture, choose, inside, sizes_of
 from limo_hog.learn.mining import Negatives, readable
-from limo_hog.learn.windows import PEOPLE, Region, WindowShape, positive_regions, shape_for
-from limo_hog.models import PersonBox
+from limo_hog.learn.windows import Region, WindowShape, positive_regions, shape_for
 
 #: Fewer objects than this are warned of: a window has thousands of numbers, and so few examples are learnt by heart.
 _FEW = 100
@@ -43,9 +42,7 @@ class TrainingData:
     negatives
         Pictures to take negatives from.
     validation
-        Labelled pictures that are not learnt from; empty where there are only crops.
-    held_negatives
-        Pictures without objects that are not learnt from, where there are only crops: false alarms are counted on them.
+        Labelled pictures that are not learnt from; where there are none, the detector is not measured.
     min_height
         Height [px] from which objects are sought when the detector is measured.
     sources
@@ -56,7 +53,6 @@ class TrainingData:
     regions: tuple[Region, ...]
     negatives: Negatives
     validation: tuple[Picture, ...]
-    held_negatives: tuple[Path, ...]
     min_height: float
     sources: tuple[Source, ...]
 
@@ -71,8 +67,8 @@ class Wanted:
         Labels or folders of crops; folders of pictures without the object.
     validation
         Labels to measure on; None holds back a share of the pictures in `data`.
-    label, window, object_box
-        Which label; the window's size [px]; where the object stands in a crop.
+    label, window
+        Which label; the window's size [px].
     held_out
         Share held back.
     seed
@@ -85,7 +81,6 @@ class Wanted:
     label: str | None = None
     pictures: Path | None = None
     window: tuple[int, int] | None = None
-    object_box: PersonBox | None = None
     held_out: float = 0.2
     seed: int = 0
 
@@ -124,19 +119,16 @@ def gather(wanted: Wanted) -> TrainingData:
         )
     if len(regions) < _FEW:
         warnings.warn(f"{len(regions)} objects only: a detector wants {_FEW} or more", LabelWarning, stacklevel=2)
-    held: set[Path] = set()
     if not validation:
-        count = min(round(wanted.held_out * len(free)), len(free) - 1)
-        rng = np.random.default_rng([wanted.seed, 6])
-        held = {free[i] for i in rng.permutation(len(free))[: max(0, count)]}
+        said = "no labelled picture is left to measure on: the card has no figures; name some by --validate"
+        warnings.warn(said, LabelWarning, stacklevel=2)
     objects = {picture.path: picture.arrays()[0] for picture in training}
     sources = [_source(path, crops, labelled, free) for path in (*wanted.data, *wanted.negatives)]
     return TrainingData(
         shape,
         regions,
-        Negatives((*(path for path in free if path not in held), *objects), objects),
+        Negatives((*free, *objects), objects),
         tuple(validation),
-        tuple(path for path in free if path in held),
         _min_height(training, shape),
         tuple(sources),
     )
@@ -166,7 +158,7 @@ def _clean(pictures: Sequence[Picture], label: str | None) -> list[Picture]:
 def _held_out(pictures: list[Picture], share: float, seed: int) -> tuple[list[Picture], list[Picture]]:
     """Part pictures at random; those with an object are parted on their own, so that both parts have some.
 
-    Where there are too few of them to hold one out, nothing is held out: no figure can be measured without an object.
+    Where there are too few of them to hold one out, nothing is: no figure can be measured without an object.
     """
     rng = np.random.default_rng([seed, 4])
     held: set[int] = set()
@@ -184,7 +176,7 @@ def _held_out(pictures: list[Picture], share: float, seed: int) -> tuple[list[Pi
 def _shape(training: list[Picture], wanted: Wanted) -> WindowShape:
     if training:
         return shape_for(sizes_of(training), wanted.window)
-    return WindowShape(wanted.window or PEOPLE.size, wanted.object_box or PEOPLE.object_box)
+    return WindowShape(wanted.window) if wanted.window else WindowShape()
 
 
 def _min_height(training: list[Picture], shape: WindowShape) -> float:

@@ -13,7 +13,7 @@ from limo_hog.extras import needed
 from limo_hog.learn.labels import Picture
 from limo_hog.models import PERSON_BOX, PersonBox
 
-with needed(by="training", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="training"):
     import cv2
 
 #: Cells are 8 × 8 px, blocks 2 × 2 cells: windows are whole cells, at least one block.
@@ -26,14 +26,13 @@ _OBJECT_AREA_PX2 = 4000.0
 
 @dataclass(frozen=True, slots=True)
 class WindowShape:
-    """A detection window: its width and height [px], and where the object stands in it, as shares of both."""
+    """A detection window: its width and height [px], and where the object stands in it, as shares of both.
 
-    size: tuple[int, int]
+    The defaults are those of crops of people.
+    """
+
+    size: tuple[int, int] = (64, 128)
     object_box: PersonBox = PERSON_BOX
-
-
-#: Of crops of people, unless told otherwise.
-PEOPLE = WindowShape((64, 128))
 
 
 @dataclass(frozen=True, slots=True)

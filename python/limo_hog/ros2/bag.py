@@ -22,7 +22,7 @@ from limo_hog.extras import needed
 from limo_hog.ros2.messages import serialize, typestore
 from limo_hog.ros2.names import DETECTIONS_TYPE, TYPES
 
-with needed(by="a recording", what="MCAP and rosbags", install="'limo-hog[record]'"):
+with needed(by="a recording"):
     import lz4.frame
     import zstandard
     from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Schema

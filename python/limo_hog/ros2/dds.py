@@ -16,7 +16,7 @@ from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.ros2.messages import Field, MessageError, deserialize, fields_of, serialize, typestore
 
-with needed(by="ROS 2 over the network", what="Cyclone DDS", install="'limo-hog[ros2]'"):
+with needed(by="ROS 2 over the network"):
     from cyclonedds import builtin
     from cyclonedds.core import InstanceState as Instance
     from cyclonedds.core import Listener, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet

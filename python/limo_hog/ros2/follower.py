@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from limo_hog.detections import Detector
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, FrameLog
-from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages, names

@@ -244,7 +244,7 @@ def decompressed(message: Any) -> NDArray[np.uint8]:
     MessageError
         The data are no picture.
     """
-    with needed(by="a compressed image", what="OpenCV", install="'limo-hog[cv]'"):
+    with needed(by="a compressed image"):
         import cv2
     data = np.frombuffer(message.data, np.uint8)
     pixels = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR) if data.size else None

@@ -6,10 +6,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from limo_hog.detections import Detections
+from limo_hog.detections import Detections, Detector
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, FrameLog
-from limo_hog.follow.sense.detectors import Detector
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.run.catalogue import load
     from limo_sim.world.variants import of_run
 
-    with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
+    with needed(by="limo-hog run"):
         from limo_sim.ros.apart import run_apart
         from limo_sim.ros.script import score_of
     scenario = of_run(load(args.scenario), args.seed)

@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     if args.action == "grade":
         return _grade(args, node)
     if args.action == "check":
-        with needed(by="limo-hog workshop", what="rosbags", install="'limo-hog[record]'"):
+        with needed(by="limo-hog workshop"):
             from limo_sim.workshop.check import examine
             from limo_sim.workshop.html_report import to_html
             from limo_sim.workshop.report import to_gradescope, to_json
@@ -121,7 +121,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _grade(args: argparse.Namespace, node: str) -> int:
-    with needed(by="limo-hog workshop", what="rosbags", install="'limo-hog[record]'"):
+    with needed(by="limo-hog workshop"):
         from limo_sim.workshop.grade import Limits, grade, nodes_in, write_csv
     if not args.folder.is_dir():
         raise UsageError(f"{args.folder}: no such folder; wanted is one with the nodes' .py files")

@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detections import Detections
-from limo_hog.follow.sense.detectors import Detector, detect_in, is_halved
+from limo_hog.detections import Detections, Detector
+from limo_hog.follow.sense.detectors import detect_in, is_halved
 from limo_hog.follow.sense.region import Region
 from limo_sim.run.matching import NO_PERSON, person_of
 from limo_sim.sensing.camera import HEIGHT, WIDTH

@@ -6,9 +6,10 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from limo_hog.detections import Detector
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, Search
-from limo_hog.follow.sense.detectors import Detector, detect_in
+from limo_hog.follow.sense.detectors import detect_in
 from limo_hog.follow.sense.observation import Sensors
 from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FaultySearch

@@ -13,7 +13,7 @@ from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, WIDTH
 from limo_sim.world.scenario import Camera
 
-with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="the arena's camera"):
     import cv2
 
 U8 = NDArray[np.uint8]

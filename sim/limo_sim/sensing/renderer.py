@@ -39,7 +39,7 @@ from limo_sim.world.furniture import KINDS, Box, Frustum
 from limo_sim.world.person import Pose, body
 from limo_sim.world.scenario import Furniture, Scenario
 
-with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="the arena's camera"):
     import cv2
 
 U8 = NDArray[np.uint8]

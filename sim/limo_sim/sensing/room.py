@@ -15,7 +15,7 @@ from limo_sim.sensing.solids import F32, Sun, slab
 from limo_sim.world.furniture import Rectangle
 from limo_sim.world.scenario import WALL_HEIGHT, Scenario
 
-with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="the arena's camera"):
     import cv2
 
 U8 = NDArray[np.uint8]

@@ -17,7 +17,7 @@ from limo_sim.view.reading import figures
 from limo_sim.world.furniture import Disc
 from limo_sim.world.scenario import Scenario
 
-with needed(by="--plot", what="matplotlib", install="'limo-hog[plot]'"):
+with needed(by="--plot"):
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle, Polygon
     from matplotlib.patches import Rectangle as Bar

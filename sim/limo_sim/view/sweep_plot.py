@@ -10,7 +10,7 @@ from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
 from limo_sim.run.sweep import Summary
 
-with needed(by="--plot", what="matplotlib", install="'limo-hog[plot]'"):
+with needed(by="--plot"):
     from matplotlib.figure import Figure
 
 if TYPE_CHECKING:

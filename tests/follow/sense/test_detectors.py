@@ -63,6 +63,16 @@ def test_large_people_are_searched_in_a_smaller_picture() -> None:
     assert found.boxes.tolist() == [[20, 40, 128, 256]]
 
 
+def test_a_part_keeps_the_models_person_box_and_calibration() -> None:
+    limo = PeopleDetector(model="limo", min_height=None)
+    image = np.zeros((480, 640, 3), np.uint8)
+    whole = limo.detect(image)
+    for height in (150.0, 320.0):
+        part = detect_in(limo, image, Region(0, 0, 400, 400, height))
+        assert (part.person_box, part.calibration) == (whole.person_box, whole.calibration)
+        assert part.calibration is not None
+
+
 def test_a_region_around_a_person_finds_what_the_whole_image_does(frame: NDArray[np.uint8]) -> None:
     detector = detector_named("hog")
     whole = detector.detect(frame).boxes[0]
@@ -121,15 +131,15 @@ def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) ->
         detector_named(f"onnx:{broken}")
     with pytest.raises(DetectorError, match="no such file"):
         detector_named("onnx:absent.onnx")
-    with pytest.raises(DetectorError, match="want one of hog, hog-half, hog-iou, hog-soft, cv2, hog:MODEL, onnx:FILE"):
+    with pytest.raises(DetectorError, match="want one of hog, hog-half, hog:MODEL, cv2, onnx:FILE"):
         detector_named("yolo")
 
 
 def test_one_person_is_one_box_by_each_way_to_suppress(frame: NDArray[np.uint8]) -> None:
     every_hit = PeopleDetector(min_height=None, nms="group", group_threshold=0).detect(frame)
     assert len(every_hit) > 5
-    for name in ("hog", "hog-iou", "hog-soft"):
+    for name in ("hog", "hog:opencv"):
         found = detector_named(name).detect(frame)
         assert len(found) == 1
         assert found.scores[0] > 1
-    assert detector_named("hog-iou").detect(frame).scores[0] == every_hit.scores[0]
+    assert detector_named("hog:opencv").detect(frame).scores[0] == every_hit.scores[0]

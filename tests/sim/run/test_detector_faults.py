@@ -12,9 +12,9 @@ import pytest
 from numpy.typing import NDArray
 from tests.sim.run.steps import figures
 
-from limo_hog.detections import Detections
+from limo_hog.detections import Detections, Detector
 from limo_hog.follow import TrackingController
-from limo_hog.follow.sense.detectors import Detector, HalfSize, detector_named
+from limo_hog.follow.sense.detectors import HalfSize, detector_named
 from limo_hog.follow.sense.region import Region
 from limo_sim.run.catalogue import load
 from limo_sim.run.detector_faults import FaultySearch, fit_of

@@ -6,8 +6,12 @@ from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 from pathlib import Path
 
+from limo_hog.cv2_api.arguments import number as bounded
+
 #: What a picture of `--size` may have: 64 megapixels take 1 GB to draw, and no camera has more.
 _MOST_PIXELS = 64_000_000
+#: What names a model, as help says it.
+MODEL = "opencv, daimler, limo, or the file of a trained model"
 #: Digits of the largest whole number an option takes.
 _MOST_DIGITS = 9
 
@@ -50,12 +54,10 @@ def _cut(text: str) -> str:
 def number(text: str, low: float, high: float, what: str) -> float:
     """Read a number within bounds."""
     try:
-        value = float(text)
+        return bounded(what, float(text), low, high)
     except ValueError:
-        value = float("nan")
-    if not low <= value <= high:
-        raise ArgumentTypeError(f"{_cut(text)} is no {what}; wanted is a number from {low:g} to {high:g}")
-    return value
+        wanted = f"wanted is a number from {low:g} to {high:g}"
+        raise ArgumentTypeError(f"{_cut(text)} is no {what}; {wanted}") from None
 
 
 def metres(text: str) -> float:
@@ -98,13 +100,18 @@ def add_follower(parser: ArgumentParser) -> None:
 
 def add_target_and_detector(parser: ArgumentParser) -> None:
     """Add --target and --detector."""
+    parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
+    add_detector(parser)
+
+
+def add_detector(parser: ArgumentParser) -> None:
+    """Add --detector."""
     from limo_hog.follow.sense.detectors import NAMES
 
-    parser.add_argument("--target", type=metres, metavar="M", help="distance to hold [m], not for approach (1.5)")
     parser.add_argument(
         "--detector",
         default="hog",
-        metavar="|".join((*NAMES, "hog:MODEL", "onnx:FILE")),
-        help="the people detector: ours, ours on the half image, OpenCV's, one that `train` wrote, or a network "
+        metavar="|".join(NAMES),
+        help="the people detector: ours, ours on the half image, ours with another model, OpenCV's, or a network "
         "(%(default)s)",
     )

@@ -142,7 +142,7 @@ class Run:
         def work(source: Source) -> Found | str:
             try:
                 found, picture = self._find(source, 0, read_image(source))
-            except (ReadError, ImageError, OSError) as error:
+            except (ImageError, OSError) as error:
                 return one_line(error)
             if picture is not None:
                 write_image(self._copies[source], picture)

@@ -29,10 +29,6 @@ _KINDS = {
 }
 
 
-class ResumeError(LimoHogError):
-    """The results of an earlier run cannot be continued."""
-
-
 class Results(NamedTuple):
     """A function that writes a result, and the results of an earlier run (None if no file is kept)."""
 
@@ -72,7 +68,7 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
     ------
     UsageError
         The file is there, and the run neither resumes nor overwrites.
-    ResumeError
+    LimoHogError
         The file is not of an earlier run with the same parameters.
     """
     if target is None or target == STDOUT:
@@ -124,13 +120,13 @@ def _continue(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result
     try:
         results = [json.loads(line) for line in text[:whole].splitlines()]
     except (ValueError, RecursionError) as error:
-        raise ResumeError(f"{path}: not the JSON lines of an earlier run") from error
+        raise LimoHogError(f"{path}: not the JSON lines of an earlier run") from error
     for number, result in enumerate(results, 1):
         if not _is_result(result):
-            raise ResumeError(f"{path}: not the JSON lines of an earlier run: line {number} is another")
+            raise LimoHogError(f"{path}: not the JSON lines of an earlier run: line {number} is another")
         if result["parameters"] != parameters:
             different = _difference(result["parameters"], parameters)
-            raise ResumeError(f"{path} was made with other parameters: {different}")
+            raise LimoHogError(f"{path} was made with other parameters: {different}")
     found.replace(part)
     with part.open("rb+") as file:
         file.truncate(whole)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detections import Detections
+from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.follow.sense.region import Region
@@ -22,24 +22,18 @@ if TYPE_CHECKING:
 
 Image = NDArray[np.uint8]
 
-#: Names `detector_named` knows, besides those with a file: `hog:MODEL` and `onnx:FILE`.
-NAMES = ("hog", "hog-half", "hog-iou", "hog-soft", "cv2")
+#: What `--detector` takes.
+NAMES = ("hog", "hog-half", "hog:MODEL", "cv2", "onnx:FILE")
 
 
 class DetectorError(LimoHogError):
     """There is no such detector, or a file is not a network."""
 
 
-class Detector(Protocol):
-    """Finds people in images."""
-
-    def detect(self, image: Image) -> Detections:
-        """Return the people in a uint8 (H, W, 3) BGR image, best first."""
-        ...
-
-
 def detector_named(name: str) -> Detector:
-    """Return a detector: one of `NAMES`, `hog:MODEL` (a model of `PeopleDetector`, as a file), or `onnx:FILE`.
+    """Return one of `NAMES`; MODEL is a model of `PeopleDetector`, by name or file, FILE a network.
+
+    "hog" groups its hits as `cv2.HOGDescriptor` does, "hog:MODEL" suppresses them greedily; neither enlarges the image.
 
     Raises
     ------
@@ -48,20 +42,22 @@ def detector_named(name: str) -> Detector:
     ParameterError, ModelFormatError
         The file holds no model.
     """
+    kind, colon, file = name.partition(":")
+    if kind == "onnx" and colon:
+        return OnnxDetector(Path(file))
     if name == "cv2":
         return Cv2Detector()
-    if name.startswith("onnx:"):
-        return OnnxDetector(Path(name.removeprefix("onnx:")))
+    # Imported here, as a detector of the user's own does not need it.
     from limo_hog.detector import PeopleDetector
 
-    if name.startswith("hog:"):
-        return PeopleDetector(model=name.removeprefix("hog:"), min_height=None)
-    if name not in NAMES:
-        raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}, hog:MODEL, onnx:FILE")
-    kinds: dict[str, Literal["group", "iou", "soft"]] = {"hog-iou": "iou", "hog-soft": "soft"}
-    # Without enlarging, grouped: the rectangles of `cv2.HOGDescriptor`.
-    hog = PeopleDetector(min_height=None, nms=kinds.get(name, "group"))
-    return HalfSize(hog) if name == "hog-half" else hog
+    if kind == "hog" and colon:
+        return PeopleDetector(model=file, min_height=None)
+    hog = PeopleDetector(min_height=None, nms="group")
+    if name == "hog":
+        return hog
+    if name == "hog-half":
+        return HalfSize(hog)
+    raise DetectorError(f"no detector {name!r}: want one of {', '.join(NAMES)}")
 
 
 #: A region whose expected window is at least this high is searched at half size [px]. Chosen above twice HOG's 128, so
@@ -82,7 +78,7 @@ def detect_in(detector: Detector, image: Image, region: Region | None) -> Detect
     if is_halved(region):
         detector = HalfSize(detector)
     found = detector.detect(np.ascontiguousarray(image[rows, columns]))
-    return Detections(found.boxes + np.array([region.x, region.y, 0, 0], np.int32), found.scores)
+    return replace(found, boxes=found.boxes + np.array([region.x, region.y, 0, 0], np.int32))
 
 
 def by_score(boxes: NDArray[Any], scores: NDArray[Any]) -> Detections:
@@ -103,7 +99,7 @@ class HalfSize:
         rows = image[0:height:2].astype(np.uint16) + image[1:height:2]
         half = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
         found = self.detector.detect(half)
-        return Detections(found.boxes * 2, found.scores)
+        return replace(found, boxes=found.boxes * 2)
 
 
 @dataclass(frozen=True)
@@ -127,7 +123,7 @@ class Cv2Detector:
 
     @cached_property
     def _hog(self) -> cv2.HOGDescriptor:
-        with needed(by="the detector cv2", what="OpenCV", install="'limo-hog[cv]'"):
+        with needed(by="the detector cv2"):
             import cv2
         if not hasattr(cv2, "HOGDescriptor"):
             raise DetectorError(f"OpenCV {cv2.__version__} has no HOGDescriptor: use the detector hog, or OpenCV 4")
@@ -192,7 +188,7 @@ class OnnxDetector:
 
     @cached_property
     def _network(self) -> cv2.dnn.Net:
-        with needed(by="an ONNX detector", what="OpenCV", install="'limo-hog[cv]'"):
+        with needed(by="an ONNX detector"):
             import cv2
 
         if not self.path.is_file():

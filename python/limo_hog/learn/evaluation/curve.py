@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.suppression import intersection_over_union, share_inside
+
 #: FPPI at which the log-average miss rate looks: nine, evenly spread over 10⁻²…10⁰ in the logarithm (Dollár 2012).
 LAMR_FPPI = np.logspace(-2, 0, 9)
 #: A miss rate of 0 has no logarithm (Dollár's toolbox has this value, too).
@@ -51,10 +53,8 @@ def match(
     boxes, ignored
         float64 (N, 4) and bool (N,).
     """
-    shared = _shared_areas(found, boxes)
-    areas, box_areas = found[:, 2:].prod(axis=1), boxes[:, 2:].prod(axis=1)
-    iou = shared / np.maximum(areas[:, None] + box_areas - shared, 1e-12)
-    within = shared / np.maximum(areas[:, None], 1e-12)
+    iou = intersection_over_union(found, boxes)
+    within = share_inside(found, boxes)
     of_detection = np.full(len(found), -1, np.intp)
     of_box = np.full(len(boxes), -1, np.intp)
     for i in range(len(found)):
@@ -65,13 +65,6 @@ def match(
         elif (ignored & (within[i] >= min_iou)).any():
             of_detection[i] = -2
     return Match(of_detection, of_box)
-
-
-def _shared_areas(some: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
-    low = np.maximum(some[:, None, :2], others[None, :, :2])
-    high = np.minimum((some[:, :2] + some[:, 2:])[:, None], (others[:, :2] + others[:, 2:])[None])
-    area: NDArray[np.float64] = np.clip(high - low, 0, None).prod(axis=2)
-    return area
 
 
 @dataclass(frozen=True, slots=True)

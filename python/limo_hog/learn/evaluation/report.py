@@ -17,7 +17,7 @@ from limo_hog.learn.evaluation.mistakes import draw_sheet, worst_mistakes
 from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, as_json, compare
 from limo_hog.learn.labels import Picture
 
-with needed(by="--report", what="matplotlib", install="'limo-hog[plot]'"):
+with needed(by="--report"):
     from matplotlib.figure import Figure
 
 if TYPE_CHECKING:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.detections import Detections
+from limo_hog.detections import Detections, Detector
 from limo_hog.learn.evaluation.curve import (
     Curve,
     Figures,
@@ -23,14 +23,6 @@ from limo_hog.learn.evaluation.curve import (
     threshold_at,
 )
 from limo_hog.learn.labels import LabelError, Picture, inside, sizes_of
-
-
-class Detector(Protocol):
-    """What can be evaluated."""
-
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        """Find people, best first."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from limo_hog.extras import needed
 from limo_hog.ros2.messages import ENCODINGS, MessageError, decompressed, pixels_of
 from limo_sim.ros.interfaces import Message, message_class
 
-with needed(by="cv_bridge", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="cv_bridge"):
     import cv2
 
 

@@ -19,7 +19,7 @@ from limo_hog.extras import needed
 from limo_sim.ros.lockstep.records import Found
 from limo_sim.ros.lockstep.world import World
 
-with needed(by="limo-hog run", what="OpenCV", install="'limo-hog[cv]'"):
+with needed(by="limo-hog run"):
     import cv2
 
 _MISSING = object()

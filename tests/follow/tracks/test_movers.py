@@ -192,3 +192,17 @@ def test_returns_are_one_movers_and_those_of_a_persons_legs_first() -> None:
     assert {one.number: one.felt for one in after} == {7: 1.1, None: 1.0}
     both = update((nameless, persons), 1.1, (2.0, -0.02), (2.0, 0.0), (2.0, 0.4), (2.0, 0.42))
     assert {one.number: one.felt for one in both} == {7: 1.1, None: 1.1}
+
+
+@pytest.mark.parametrize(
+    ("off", "beyond", "left"), [(0.028, 0.35, True), (-0.028, 0.35, True), (0.032, 0.35, False), (0.0, 0.25, False)]
+)
+def test_a_place_is_empty_where_the_beams_beside_it_end_three_decimetres_behind(
+    off: float, beyond: float, left: bool
+) -> None:
+    never = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
+    moved = replace(walker(None, 2.0, 0.9), began=(2.0, 0.0), left=False)
+    far = 2.0 - LIMO.lidar_x + beyond
+    behind = LIMO.lidar_x + far * math.cos(off), far * math.sin(off)
+    (after, *_) = update((moved,), 1.1, (2.0, 0.88), (2.0, 0.92), behind, ground=never)
+    assert after.left is left

@@ -109,10 +109,9 @@ def test_people_who_come_are_given_way_to_and_the_person_followed_from_further_o
         assert (given.reason, given.mode) == ("giving way to a person", Mode.FOLLOW)
         assert given.state.gave_way_at == NOW
     # The person followed is taken to walk as fast as they are known to; others come as they do.
-    setting_out = someone(1, 2.6, 0.0, -0.4)
-    assert step(1, setting_out, brisk=1.2).state.way_out is not None
-    for not_given in (step(1, setting_out), step(2, setting_out, aside, brisk=1.2)):
-        assert not_given.state.way_out is None
+    setting_out = someone(1, 3.8, 0.0, -0.4)
+    ways = step(1, setting_out), step(1, setting_out, brisk=1.2), step(2, setting_out, aside, brisk=1.2)
+    assert [given.state.way_out is not None for given in ways] == [False, True, False]
 
 
 def test_a_way_is_remembered_by_its_direction_in_the_odometry_frame_and_since_when() -> None:

@@ -305,14 +305,14 @@ def test_of_ways_that_clear_a_person_alike_it_takes_the_easiest() -> None:
     assert (slow.turn, slow.speed) in ((0.0, -0.2), (0.0, -0.4))
 
 
-def test_a_wall_turns_it_elsewhere_and_returns_on_the_person_or_far_off_do_not() -> None:
+def test_a_wall_behind_turns_it_elsewhere_and_one_far_off_does_not() -> None:
     walker = at_the_robot(1.3, 0.35, followed=True)
     patch = np.array([(dx, dy) for dx in (-0.02, 0.0, 0.02) for dy in (-0.5, -0.02, 0.0, 0.02, 0.5)])
     # Free it backs straight off; a decimetre is kept from what is behind, a metre and a half is looked at.
     free = COMPANY.way_out(STANDING, STANDING, [walker], NO_POINTS, LIMO)
     assert free == Way(0.0, -0.6)
-    for x, turns in ((-1.45, True), (-1.56, False), (walker.x, False)):
-        way = COMPANY.way_out(STANDING, STANDING, [walker], patch * (1.0, x < 0) + (x, 0.0), LIMO)
+    for x, turns in ((-1.45, True), (-1.56, False)):
+        way = COMPANY.way_out(STANDING, STANDING, [walker], patch - (-x, 0.0), LIMO)
         assert (way != free) == turns
     # A way begun is left at once where it leads into a wall.
     back = Way(0.0, -0.4, 0.2)

@@ -165,7 +165,7 @@ def test_a_way_is_chosen_anew_after_eight_tenths_of_a_second() -> None:
         assert (planned([(1.0, 1.0)], at=NOW - ago).planned == NOW) == anew
 
 
-def test_a_place_is_worth_driving_to_that_shows_a_twentieth_of_where_the_person_may_be() -> None:
+def test_a_place_is_worth_driving_to_that_shows_a_twentieth_of_the_places() -> None:
     # All but a few are 20 m off, where no place in the map shows them.
     for few, worth in ((2, False), (4, True)):
         hunt = planned([(1.0, 1.0)] * few + [(20.0, 0.0)] * (50 - few))

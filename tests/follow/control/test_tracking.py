@@ -302,7 +302,7 @@ def test_it_keeps_further_off_a_person_who_walks_where_the_images_come_late() ->
     assert kept[1] > CONTROLLER.target_distance + 0.1
 
 
-def test_how_fast_a_person_walks_is_learnt_within_seconds_and_remembered_while_they_stand() -> None:
+def test_how_fast_a_person_walks_is_learnt_and_remembered_while_they_stand() -> None:
     world = World(person=(2.0, -1.0))
     state = run(world, 3.0).state
     assert state.brisk < 0.2

@@ -90,7 +90,7 @@ def test_what_the_camera_has_shown_for_long_is_counted() -> None:
     assert movers[0].shown == movers[0].scans - 1
 
 
-def test_a_place_is_empty_once_a_beam_ends_behind_it_unless_something_nearer_is_there() -> None:
+def test_a_place_is_empty_once_a_beam_ends_behind_it_and_nothing_is_nearer() -> None:
     never = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
     wall = [(3.5, 0.05 * step - 3.0) for step in range(120)]
     post = [(0.8, 0.0), (0.8, 0.05)]
@@ -139,7 +139,7 @@ def test_legs_are_two_returns_within_a_stride_near_enough_for_a_beam_on_each_shi
             assert len(begun(place, place, pose=pose)) == groups
 
 
-def test_what_is_followed_already_does_not_begin_again_and_what_stands_beside_it_does() -> None:
+def test_what_is_followed_does_not_begin_again_and_what_stands_beside_it_does() -> None:
     first = update((), 0.0, (2.0, -0.05), (2.0, 0.05))
     assert len(update(first, 0.125, (2.0, -0.05), (2.0, 0.05))) == 1
     turn = 0.45 / 2.0

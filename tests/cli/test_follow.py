@@ -62,29 +62,6 @@ def test_without_json_a_person_reads_the_card(capsys: pytest.CaptureFixture[str]
     assert "no person detected" in out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--scenario", "moon"], "unknown scenario moon"),
-        (["--detector", "yolo"], "want one of hog, hog-half, hog:MODEL, cv2, onnx:FILE"),
-        (["--detector", "onnx:absent.onnx"], "absent.onnx: no such file"),
-        (["--controller", "approach", "--target", "1"], "holds no distance"),
-    ],
-)
-def test_what_cannot_be_is_refused_in_one_line(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["follow", "--seconds", "0.2", *arguments]) == 1
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
-
-
-@pytest.mark.parametrize("arguments", [["--seconds", "0"], ["--seed", "-1"], ["--controller", "x"], ["--target", "9"]])
-def test_wrong_arguments_are_refused(arguments: list[str]) -> None:
-    assert main(["follow", *arguments]) == 2
-
-
 def test_score_compares_controllers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, picture = tmp_path / "score.json", tmp_path / "score.png"
     command = ["score", "--scenario", "empty", "followable", "--controller", "proxemic", "tracking", "--seeds", "2"]
@@ -158,23 +135,3 @@ def test_a_suite_is_summed_up_by_group(
     shown = capsys.readouterr().out
     assert "plain" in shown
     assert "places" in shown
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (["--csv", "score.txt"], 2, "wanted is a name that ends in .csv"),
-        (["--seed-start", "-1"], 2, "no seed"),
-        (["--seeds", "0"], 2, "no count"),
-        (["--suite", "v1", "--scenario", "empty"], 2, "not allowed with"),
-        (["--suite", "v0"], 1, "unknown suite v0: want one of v1"),
-        (["--suite", "v1", "--seconds", "60"], 2, "a run of this suite takes 40 s"),
-        (["--controller", "policy:none.npz"], 1, "none.npz: cannot be read as a policy"),
-        (["--controller", "approach", "--against", "ppo"], 2, "--against ppo: is none of the controllers"),
-    ],
-)
-def test_wrong_arguments_of_score_are_refused(
-    arguments: list[str], code: int, told: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["score", *arguments]) == code
-    assert told in capsys.readouterr().err

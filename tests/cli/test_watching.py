@@ -138,14 +138,6 @@ def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, capsys: p
     assert "no images on /other; the recording holds /cmd_vel, " in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("option", "name"), [("--video", "a.avi"), ("--record", "a.bag"), ("--plot", "a.txt"), ("--view", "x:y")]
-)
-def test_a_name_that_cannot_be_is_refused_at_once(option: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["follow", option, name]) == 2
-    assert f"argument {option}" in capsys.readouterr().err
-
-
 def test_a_port_in_use_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -1,4 +1,4 @@
-"""Fifty wrong command lines: each is answered at once, by one line that says what is wrong and what is wanted."""
+"""Wrong command lines: each is answered at once, by one line that says what is wrong and what is wanted."""
 
 from __future__ import annotations
 
@@ -34,6 +34,15 @@ WRONG_ARGUMENTS = [
     ("detect a.jpg --csv t --coco ./t", "--json, --csv and --coco name the same file twice"),
     ("detect a.jpg --json t --csv t", "--json, --csv and --coco name the same file twice"),
     ("detect a.jpg --json folder", "'folder' is a folder"),
+    ("detect a.jpg --json /", "'/' is a folder"),
+    ("bench --json ..", "'..' is a folder"),
+    ("bench --size 99999x99999", "at most 64 megapixels"),
+    (f"bench --size {'9' * 5000}x1", "at most 64 megapixels"),
+    (f"bench --threads {'9' * 5000}", "is no number of threads"),
+    ("bench --sizes=640x480", "unrecognized arguments: --sizes=640x480; did you mean --size?"),
+    ("info more", "unrecognized arguments: more"),
+    ("xyz", "no command 'xyz'; limo-hog --help lists them all"),
+    ("folow", "no command 'folow'; did you mean follow?"),
     ("detect a.jpg --json there.txt", "there.txt would be overwritten: --overwrite replaces it"),
     ("detect a.jpg --outt found", "did you mean --out?"),
     ("detect a.jpg --model nobody.yml", "the path of a model file is wanted"),
@@ -58,6 +67,11 @@ WRONG_ARGUMENTS = [
     ("follow --json folder", "'folder' is a folder"),
     ("score --plot compared.txt", "'compared.txt': wanted is a name that ends in .png or .svg or .pdf"),
     ("score --seeds 0", "'0' is no count"),
+    ("score --csv score.txt", "wanted is a name that ends in .csv"),
+    ("score --seed-start -1", "no seed"),
+    ("score --suite v1 --scenario empty", "not allowed with"),
+    ("score --suite v1 --seconds 60", "a run of this suite takes 40 s"),
+    ("score --controller approach --against ppo", "--against ppo: is none of the controllers"),
     (
         "score --controller zigzag",
         "'zigzag' is no controller; wanted is one of approach, proxemic, tracking, pursuit, ppo",
@@ -97,6 +111,8 @@ IMPOSSIBLE = [
     ("follow --controller approach --target 1", "the approach controller holds no distance: use proxemic or tracking"),
     ("follow --detector yolo", "no detector 'yolo': want one of hog,"),
     ("follow --detector onnx:none.onnx", "none.onnx: no such file; --detector onnx:FILE wants an ONNX network"),
+    ("score --suite v0", "unknown suite v0: want one of v1"),
+    ("score --controller policy:none.npz", "none.npz: cannot be read as a policy"),
     ("score --detector yolo", "no detector 'yolo': want one of hog,"),
     ("score --controller approach --target 2", "the approach controller holds no distance"),
     ("run none.py", "none.py: no such file"),

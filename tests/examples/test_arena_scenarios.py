@@ -30,7 +30,7 @@ def test_a_scenario_is_played_by_the_tracking_controller(path: Path) -> None:
     assert card.in_view
 
 
-def test_in_the_corridor_one_person_walks_ahead_and_the_other_passes_the_standing_robot() -> None:
+def test_in_the_corridor_one_person_walks_ahead_and_the_other_passes_the_robot() -> None:
     arena = Arena(load(str(scenario("corridor"))), 0)
     places = []
     while arena.time < 25.0:

@@ -1,14 +1,17 @@
-"""Looking for a lost person: what the camera shows is empty, and a place to look from is kept until one is better."""
+"""Looking for a lost person: where they can be, what shows that they are not, and the place to look from."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.follow.estimates import upper
 from tests.follow.views import scan
 
+from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.lookout import Hunt, Lookout
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
@@ -17,7 +20,9 @@ from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.places import Places, Wandering
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise
+from limo_hog.follow.twist import Twist
 
+TURN = Twist(0.0, 0.7)
 LOOKOUT, GRID, HERE, NOW = Lookout(), Grid(), Odometry(10.0), 10.0
 #: A scan whose beams tell nothing.
 BLIND = scan(np.full(292, np.nan, np.float32), NOW)
@@ -86,3 +91,149 @@ def test_a_place_that_is_driven_to_is_kept_until_another_is_half_as_good_again()
         mirrored = fresh.way * (1.0, -1.0)
         after = lookout.step(replace(hunt, way=mirrored), BLIND, NOW, HERE, GRID, free_ground(), LIMO)
         assert (after.way[-1, 1] > 0) == kept
+
+
+def ground_of(cells: dict[tuple[int, int], tuple[float, float]]) -> Ground:
+    """Ground of which these cells alone were ever seen: how they are occupied [log-odds], and when seen [s]."""
+    ground = GRID.start(HERE)
+    occupied, seen = ground.occupied.copy(), ground.seen.copy()
+    for at, (log_odds, stamp) in cells.items():
+        occupied[at], seen[at] = log_odds, stamp
+    return replace(ground, occupied=occupied, seen=seen)
+
+
+def command(
+    way: list[tuple[float, float]], facing: tuple[float, float] | None = None, points: Points = NO_POINTS
+) -> tuple[Twist, str]:
+    """Return the command of a robot at the origin that looks along x."""
+    hunt = replace(hunt_for(np.zeros((3, 2)), NOW), way=np.array(way).reshape(-1, 2), facing=facing)
+    return LOOKOUT.command(hunt, Odometry(), points, Detour(), LIMO, TURN)
+
+
+def test_a_way_ends_two_cells_before_its_last_point() -> None:
+    assert command([(0.0, 0.0), (0.21, 0.0)])[0].linear > 0
+    assert command([(0.0, 0.0), (0.19, 0.0)]) == (TURN, "searching for the lost person")
+    assert command([], (0.0, 1.0)) == (Twist(0.0, 1.2), "turning to where the lost person may be")
+    assert command([(0.1, 0.0)], (1.0, -0.1))[0].angular == pytest.approx(-2.0 * math.atan(0.1))
+
+
+def test_the_point_half_a_metre_ahead_on_the_way_is_driven_to_at_six_tenths() -> None:
+    # The way bends to the left; (.3, .4) is the first point that is half a metre off.
+    along = [(0.1 * step, 0.0) for step in range(4)]
+    bend = [(0.3, 0.1 * step) for step in range(1, 20)]
+    off = math.atan2(0.4, 0.3)
+    twist, reason = command(along + bend)
+    assert off > LOOKOUT.aside
+    assert (twist.linear, reason) == (0.0, "looking round for the lost person")
+    assert twist.angular == pytest.approx(min(2.0 * off, 1.2))
+    straight, _ = command([(0.1 * step, 0.0) for step in range(20)])
+    assert straight == Twist(0.6, 0.0)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_it_turns_to_the_way_before_it_drives_where_that_is_half_a_right_angle_aside(side: int) -> None:
+    for off, drives in ((0.75, True), (0.85, False)):
+        place = (2.0 * math.cos(off), side * 2.0 * math.sin(off))
+        twist, _ = command([place])
+        assert twist.linear == (pytest.approx(0.6 * math.cos(off) ** 2) if drives else 0.0)
+        assert twist.angular == pytest.approx(side * 1.2)
+
+
+def test_it_drives_around_what_stands_on_the_way_and_turns_where_nothing_is_free() -> None:
+    post = np.array([(0.5, 0.0), (0.5, 0.03), (0.5, -0.03)])
+    around, _ = command([(2.0, 0.0)], points=post)
+    assert around.linear > 0
+    assert abs(around.angular) > 0.3
+    angles = np.arange(-3.2, 3.2, 0.02)
+    walls = 0.4 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    assert command([(2.0, 0.0)], points=walls)[0] == Twist(0.0, 0.0)
+
+
+def planned(points: list[tuple[float, float]], lookout: Lookout = LOOKOUT, at: float = -math.inf) -> Hunt:
+    return lookout.step(hunt_for(np.array(points), at), BLIND, NOW, HERE, GRID, free_ground(), LIMO)
+
+
+def test_where_all_the_places_are_in_sight_it_turns_to_their_middle_and_stays() -> None:
+    hunt = planned([(1.0, 1.0), (2.0, 1.0)])
+    assert len(hunt.way) == 0
+    assert hunt.facing == pytest.approx((1.5, 1.0))
+    assert hunt.planned == NOW
+
+
+def test_a_way_is_chosen_anew_after_eight_tenths_of_a_second() -> None:
+    for ago, anew in ((0.75, False), (0.85, True)):
+        assert (planned([(1.0, 1.0)], at=NOW - ago).planned == NOW) == anew
+
+
+def test_a_place_is_worth_driving_to_that_shows_a_twentieth_of_the_places() -> None:
+    # All but a few are 20 m off, where no place in the map shows them.
+    for few, worth in ((2, False), (4, True)):
+        hunt = planned([(1.0, 1.0)] * few + [(20.0, 0.0)] * (50 - few))
+        assert (hunt.facing is not None) == worth
+        assert len(hunt.way) == 0
+
+
+def test_from_further_than_three_and_a_half_metres_a_person_is_not_seen() -> None:
+    for far, in_place in ((3.4, True), (3.6, False)):
+        hunt = planned([(far, 0.1)] * 10)
+        assert (len(hunt.way) == 0) == in_place
+        assert hunt.facing == pytest.approx((far, 0.1))
+
+
+def test_a_second_and_a_half_of_looking_is_worth_as_much_as_driving_that_long() -> None:
+    # From here a part of the places is seen at once, from about 1.5 m further on all of them: .6 m/s take 2.5 s more.
+    for here, stays in ((0.5, True), (0.2, False)):
+        near, far = round(50 * here), 50 - round(50 * here)
+        hunt = planned([(3.0, 0.0)] * near + [(5.0, 0.0)] * far, Lookout(candidates=10_000))
+        assert (len(hunt.way) == 0) == stays
+
+
+def test_no_place_begins_on_the_other_side_of_a_wall() -> None:
+    ground = ground_of({(row, 60): (2.0, NOW) for row in range(100)})
+    track = kalman.initiate(NOW, 0.0, 0.5, HERE, Noise())
+    track = replace(track, mean=(0.0, 0.9, 0.0, 0.0), covariance=upper(np.diag([0.04, 0.04, 0.01, 0.01])))
+    places = LOOKOUT.begin(track, 1, GRID, ground).places
+    assert places.points.shape == (150, 2)
+    behind = places.points[:, 1] > 1.1
+    assert not behind.any()
+    moved = (places.points == track.mean[:2]).all(axis=1)
+    # Of a normal distribution of .2 m about .9, a sixth and less lies beyond 1.1 m, and some of it within the wall.
+    assert 0.05 < moved.mean() < 0.4
+
+
+def test_those_who_watch_see_places_and_way_from_the_robot() -> None:
+    hunt = replace(hunt_for(np.array([(1.0, 3.0)]), NOW), way=np.array([(1.0, 1.0), (0.0, 1.0)]))
+    # The robot is at (1, 1) and looks along +y.
+    places, way = LOOKOUT.ways(hunt, Odometry(0.0, 1.0, 1.0, math.pi / 2))
+    assert np.array(places) == pytest.approx(np.array([(2.0, 0.0)]))
+    assert np.array(way) == pytest.approx(np.array([(0.0, 0.0), (0.0, 1.0)]), abs=1e-12)
+
+
+def emptied(ground: Ground, lost_s: float = 4.0) -> Hunt:
+    """The hunt for a person lost here so long ago [s] after beams have passed all the places where they might be."""
+    clear = replace(BLIND, ranges=np.full(292, 8.0, np.float32))
+    hunt = hunt_for(np.full((150, 2), (2.0, 0.0)), -math.inf)
+    track = replace(hunt.track, stamp=NOW - lost_s, mean=(0.0, 0.0, 0.0, 0.0))
+    return LOOKOUT.step(replace(hunt, track=track, facing=(1.0, 1.0)), clear, NOW, HERE, GRID, ground, LIMO)
+
+
+def test_where_no_place_is_left_it_begins_on_free_ground_not_seen_for_two_seconds() -> None:
+    free, unclear, blocked, lately, never, far = (52, 50), (50, 52), (48, 50), (50, 48), (54, 54), (50, 90)
+    stale = NOW - 2.1
+    cells = {free: (-1.0, stale), unclear: (0.0, NOW - 9.0), blocked: (0.1, stale), lately: (-1.0, NOW - 1.9)}
+    ground = ground_of({**cells, never: (-1.0, -math.inf), far: (-1.0, NOW - 9.0)})
+    hunt = emptied(ground)
+    left = {tuple(one) for one in GRID.middle_of(ground, np.array([free, unclear])).tolist()}
+    assert {tuple(one) for one in hunt.places.points.tolist()} == left
+    assert hunt.places.points.shape == (150, 2)
+    # Where there is none it turns on.
+    nowhere = emptied(ground_of({}))
+    assert (nowhere.facing, len(nowhere.way), nowhere.planned) == (None, 0, NOW)
+
+
+@pytest.mark.parametrize("lost_s", [2.0, 8.0])
+def test_a_person_can_be_a_metre_off_and_half_a_metre_more_for_each_second(lost_s: float) -> None:
+    row = GRID.cells // 2
+    ground = ground_of({(row, column): (-1.0, NOW - 3.0) for column in range(GRID.cells)})
+    far = np.hypot(*emptied(ground, lost_s).places.points.T).max()
+    assert 1.0 + 0.5 * lost_s - GRID.cell < far < 1.0 + 0.5 * lost_s

@@ -40,7 +40,7 @@ def choose(choice: Choice, *people: Person) -> Choice:
     return SELECTION.choose(at(NOW, *people), choice)
 
 
-def test_a_track_is_followed_that_is_likelier_than_not_and_three_times_as_likely_as_any_other() -> None:
+def test_a_track_is_followed_that_is_likely_and_three_times_as_likely_as_any_other() -> None:
     both = plain(1), plain(2, 1.0)
     for one, two, number, candidates in (
         (0.52, 0.0, 1, ()),
@@ -85,7 +85,7 @@ def test_after_four_seconds_the_likelier_of_two_is_taken_and_is_as_likely_as_not
             assert (after.number, after.unsure_at) == (1, since)
 
 
-def test_a_person_who_may_be_the_lost_person_by_one_in_ten_is_looked_at_for_four_seconds() -> None:
+def test_a_person_who_may_be_the_lost_person_is_looked_at_for_four_seconds() -> None:
     for chance, since, looked in (
         (0.12, None, True),
         (0.08, None, False),
@@ -154,7 +154,7 @@ def test_people_count_as_measured_for_three_tenths_of_a_second() -> None:
     assert SELECTION.measured(at(NOW, lately, before, weak)) == [lately]
 
 
-def test_before_one_is_followed_the_likeliest_is_meant_less_for_each_radian_and_metre() -> None:
+def test_before_one_is_followed_the_likeliest_near_straight_ahead_is_meant() -> None:
     # One radian aside costs .6, a metre .1: what is said for the image's edge and for two metres.
     def first(one: Person, two: Person) -> int | None:
         return choose(Choice(), one, two).number

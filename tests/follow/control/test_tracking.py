@@ -7,27 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.follow.control.driven import CONTROLLER, run
 from tests.follow.views import NOBODY, World, flat, scan_of
 
 from limo_hog.detections import Detections
-from limo_hog.follow import Decision, Mode, Odometry, TrackingController
+from limo_hog.follow import Decision, Mode, Odometry
 from limo_hog.follow.control.memory import TrackingState
 from limo_hog.follow.sense.clearance import NO_POINTS
-from limo_hog.follow.tracks.poses import pose_at
-
-CONTROLLER = TrackingController()
-
-
-def run(world: World, seconds: float, state: TrackingState | None = None, **seen: bool) -> Decision[TrackingState]:
-    """Let the controller drive the world's robot."""
-    decision = None
-    state = state or CONTROLLER.start()
-    for _ in range(round(seconds / world.period)):
-        decision = CONTROLLER.step(world.observe(**seen), state)
-        state = decision.state
-        world.drive(decision.twist)
-    assert decision is not None
-    return decision
 
 
 def test_it_searches_by_turning_and_does_not_drive() -> None:
@@ -134,21 +120,6 @@ def test_the_search_keeps_its_side_though_the_predicted_bearing_changes_sign() -
     assert set(rates) in ({CONTROLLER.search.rate}, {-CONTROLLER.search.rate})
 
 
-def test_legs_alone_are_followed_for_four_seconds() -> None:
-    world = World(person=(1.6, 0.0))
-    state = run(world, 4.0).state
-    modes = {}
-    for frame in range(1, 66):
-        legs = scan_of([(world.distance, 0.06), (world.distance, -0.06)], world.time)
-        decision = CONTROLLER.step(replace(world.observe(visible=False), scan=legs), state)
-        state = decision.state
-        modes[frame] = decision.mode
-        world.time += world.period
-    assert all(modes[frame] is Mode.HOLD for frame in range(1, 40))
-    assert modes[51] is Mode.LOST
-    assert "lost person" in decision.reason
-
-
 def test_it_asks_for_the_part_of_the_image_where_the_person_will_be() -> None:
     world = World(person=(3.0, -0.5), velocity=(0.0, 0.3))
     decision = run(world, 4.05)
@@ -172,13 +143,6 @@ def test_every_few_frames_it_looks_at_the_whole_image() -> None:
         state = decision.state
         whole += [frame] if decision.region is None else []
     assert np.diff(whole).tolist() == [CONTROLLER.full_every] * 3
-
-
-def test_a_late_frame_is_put_where_the_robot_was_when_it_was_taken() -> None:
-    turning = tuple(Odometry(0.1 * k, yaw=0.1 * k, angular=1.0) for k in range(11))
-    assert pose_at(turning, 0.55).yaw == pytest.approx(0.55)
-    assert pose_at(turning, 1.2).yaw == pytest.approx(1.2)
-    assert pose_at((), 3.0) == Odometry(3.0)
 
 
 def test_a_late_frame_does_not_make_it_swing() -> None:
@@ -218,7 +182,7 @@ def test_nothing_depends_on_anything_but_what_is_handed_in() -> None:
     assert CONTROLLER.step(replace(one.observe(), detections=NOBODY), CONTROLLER.start()).target is None
 
 
-def test_it_does_not_back_into_what_its_map_shows_behind_though_the_lidar_sees_it_no_more() -> None:
+def test_it_does_not_back_into_what_its_map_shows_behind() -> None:
     # A person comes towards it; a wall that it saw before it turned round is .15 m behind.
     world = World()
     state = run(world, 12.0).state
@@ -336,3 +300,22 @@ def test_it_keeps_further_off_a_person_who_walks_where_the_images_come_late() ->
     assert kept[0] == pytest.approx(CONTROLLER.target_distance)
     assert kept[1] is not None
     assert kept[1] > CONTROLLER.target_distance + 0.1
+
+
+def test_how_fast_a_person_walks_is_learnt_and_remembered_while_they_stand() -> None:
+    world = World(person=(2.0, -1.0))
+    state = run(world, 3.0).state
+    assert state.brisk < 0.2
+    world.velocity = (0.0, 0.6)
+    walked = run(world, 3.0, state).state
+    world.velocity = (0.0, 0.0)
+    stood = run(world, 3.0, walked).state
+    assert walked.brisk == pytest.approx(0.6, abs=0.15)
+    assert stood.brisk == pytest.approx(walked.brisk, abs=0.05)
+
+
+def test_where_no_way_is_free_it_stands() -> None:
+    world = World(person=(4.0, 0.0))
+    state = run(world, 2.0).state
+    ring = [(0.5 * math.cos(a), 0.5 * math.sin(a)) for a in np.arange(-1.9, 1.91, 0.03)]
+    assert CONTROLLER.step(replace(world.observe(), scan=scan_of(ring, world.time)), state).mode is Mode.BLOCKED

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from tests.follow.control.test_tracking import CONTROLLER, run
+from tests.follow.control.driven import CONTROLLER, run
 from tests.follow.views import GREEN, RED, World
 
 from limo_hog.detections import Detections

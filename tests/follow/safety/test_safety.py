@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from tests.follow.safety.headstrong import Headstrong, ahead
 from tests.follow.views import boxes, flat, look, scan, scan_of
 
 from limo_hog.detections import Detections
@@ -14,24 +15,6 @@ from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Twist
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.safety.unseen import Look, room_seen_behind
 from limo_hog.follow.sense.clearance import speed_within
-
-
-@dataclass(frozen=True)
-class Headstrong:
-    """Always wants the same."""
-
-    twist: Twist
-
-    def start(self) -> int:
-        return 0
-
-    def step(self, observation: Observation, state: int) -> Decision[int]:
-        del observation
-        return Decision(self.twist, state + 1, Mode.FOLLOW, "because")
-
-
-def ahead(speed: float = 0.5) -> Guard[int]:
-    return Guard(Headstrong(Twist(speed, 0.3)))
 
 
 def test_the_way_is_free_when_nothing_is_there() -> None:
@@ -172,7 +155,7 @@ def test_an_obstacle_on_either_side_behind_the_field_of_view_is_remembered() -> 
             assert len(later.state.scan_points) == len(state.scan_points)
 
 
-def test_an_obstacle_just_behind_the_lidars_field_of_view_is_remembered_though_the_base_would_see_it() -> None:
+def test_an_obstacle_just_behind_the_lidars_field_of_view_is_remembered() -> None:
     guard = Guard(Headstrong(Twist(-0.3, 0.0)))
     state = guard.step(replace(look(), scan=scan_of([(0.6, 0.0)]), odometry=Odometry()), guard.start()).state
     # Drive to where the obstacle is at 109 degrees from the base, and at 121 from the lidar, which sees 115.
@@ -207,9 +190,7 @@ def test_the_depth_image_limits_the_speed_as_far_as_its_reach(depth: float) -> N
 
 
 @pytest.mark.parametrize(("free", "speed"), [(0.0, 0.0), (0.09, 0.2), (0.375, 0.5), (0.84, 0.8)])
-def test_the_robot_stops_60_cm_before_an_obstacle_after_a_quarter_second_by_half_its_brakes(
-    free: float, speed: float
-) -> None:
+def test_the_robot_stops_60_cm_before_an_obstacle_by_half_its_brakes(free: float, speed: float) -> None:
     # speed · 0.25 s + speed² / (2 · 0.5 m/s²) is the free way; the camera is .061 m behind the robot's front.
     view = replace(look(), scan=scan(), depth=flat(free + 0.6 + 0.061))
     assert ahead(2.0).step(view, ahead().start()).twist.linear == pytest.approx(speed, abs=2e-3)

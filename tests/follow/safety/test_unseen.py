@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.safety.test_safety import ahead
+from tests.follow.safety.headstrong import ahead
 from tests.follow.views import look, scan
 
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.safety.unseen import Look, _were_free, room_seen_behind
+from limo_hog.follow.safety.unseen import Look, room_seen_behind
 from limo_hog.follow.sense.observation import Odometry, Scan
 
 #: The documented steps behind the outline [m].
@@ -64,9 +64,6 @@ def test_the_room_is_that_of_plain_geometry_for_random_looks() -> None:
         assert found == pytest.approx(room(looks, pose))
         rooms.append(round(found, 1))
     assert {0.0, 0.1, 0.3, 0.6} <= set(rooms)
-
-
-def test_no_look_shows_no_room() -> None:
     assert room_seen_behind([], Odometry(), LIMO) == 0.0
 
 
@@ -75,15 +72,6 @@ def test_the_ground_that_the_robot_left_straight_on_was_free(driven: float, seen
     blind = Scan(0.0, np.zeros(3, np.float32), -1.0, 1.0, 0.12, 8.0)
     way = [Look(blind, Odometry(0.0, x)) for x in np.arange(0.0, driven, 0.1)] or [Look(blind, Odometry())]
     assert room_seen_behind(way, Odometry(1.0, x=driven), LIMO) == pytest.approx(seen)
-
-
-def test_ground_just_half_a_step_from_the_outline_was_not_covered() -> None:
-    # Half a step of grace, and not a hair more: so far the robot's next look is to show it.
-    blind = Look(Scan(0.0, np.zeros(3, np.float32), -1.0, 1.0, 0.12, 8.0), Odometry())
-    length, width = LIMO.half_length + 0.05, LIMO.half_width + 0.05
-    for x, y in ((length, 0.0), (-length, 0.0), (0.0, width), (0.0, -width)):
-        places = np.array([(x, y), (x * (1 - 1e-9), y * (1 - 1e-9))])
-        assert _were_free(places, [blind], LIMO).tolist() == [[False, True]]
 
 
 def looks_after(*stamps: float) -> list[float]:

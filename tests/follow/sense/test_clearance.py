@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from tests.follow.views import flat, scan
 
-from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import (
     NO_POINTS,
@@ -27,12 +26,6 @@ from limo_hog.follow.sense.clearance import (
 from limo_hog.follow.sense.observation import Odometry
 
 MARGIN = Margin(0.5, 0.2)
-
-
-def wall(x: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """A wall across the way."""
-    y = np.linspace(-3, 3, 121)
-    return np.stack([np.full_like(y, x), y], axis=1)
 
 
 def test_an_obstacle_beside_the_way_is_passed_and_one_in_it_is_not() -> None:
@@ -186,37 +179,3 @@ def test_a_depth_pixel_becomes_a_point_of_the_base_frame() -> None:
     (point,) = DepthGrid(step=1).points(depth, 448.6, 1.8, LIMO)
     assert point == pytest.approx([0.084 + 1.2, (320 - 500.5) / 448.6 * 1.2], abs=1e-6)
     assert len(DepthGrid(step=1).points(depth, 448.6, 1.1, LIMO)) == 0
-
-
-def test_a_way_that_is_free_half_as_far_is_taken_and_a_shorter_one_is_not() -> None:
-    # Wanted: 1.2 m free. Room to a wall is its distance less .145 m of robot and .65 m of margin.
-    detour = Detour()
-    assert detour.heading(wall(1.5), 0.0, 4.0, 0.0, LIMO) == 0.0
-    assert detour.heading(wall(1.1), 0.0, 4.0, 0.0, LIMO) is None
-
-
-def test_the_way_to_the_person_is_looked_at_no_further_than_the_look_ahead_and_up_to_their_legs() -> None:
-    # 1.2 m of way, .145 m of robot and .65 m of margin: a wall at 2 m is as good as none, one at 1.98 m is not.
-    detour = Detour(steps=0)
-    assert detour.heading(wall(2.0), 0.0, 4.0, 0.0, LIMO) == 0.0
-    assert detour.free(wall(1.98), 0.0, 0.0, 1.2, LIMO) is None
-    # A person at 1.7 m: what is free up to .9 m before them is enough.
-    assert detour.heading(wall(1.6), 0.0, 1.7, 0.0, LIMO) == 0.0
-    assert detour.heading(wall(1.19), 0.0, 1.7, 0.0, LIMO) is None
-
-
-def test_of_two_ways_around_the_preferred_one_is_taken() -> None:
-    post = np.array([[1.2, 0.0]])
-    left, right = (Detour().heading(post, 0.0, 4.0, side, LIMO) for side in (0.3, -0.3))
-    assert left is not None
-    assert right is not None
-    assert left > 0.2
-    assert right == pytest.approx(-left)
-
-
-def test_only_what_is_nearer_than_the_person_and_on_the_line_of_sight_hides_them() -> None:
-    detour = Detour()
-    assert detour.hides(np.array([[1.0, 0.05]]), 0.0, 3.0)
-    assert not detour.hides(np.array([[1.0, 0.2], [2.8, 0.0], [-1.0, 0.0]]), 0.0, 3.0)
-    legs = np.array([[2.9, 0.3], [2.0, 0.0]])
-    assert detour.obstacles(legs, 0.0, 3.0).tolist() == [[2.0, 0.0]]

@@ -28,9 +28,7 @@ def test_the_median_is_numpys(count: int) -> None:
         *((-30, 200, False), (WIDTH + 30, 200, False), (300, -30, False), (300, HEIGHT + 30, False)),
     ],
 )
-def test_a_box_at_the_images_edge_is_as_far_as_what_is_left_of_it_and_one_outside_is_unknown(
-    column: int, row: int, known: bool
-) -> None:
+def test_a_box_at_the_images_edge_is_as_far_as_what_is_left_of_it(column: int, row: int, known: bool) -> None:
     box = np.array([column - 30, row - 60, 60, 120], np.int32)
     assert person_depth(flat(2.5), box) == (2.5 if known else None)
 
@@ -188,13 +186,6 @@ def test_a_person_is_hidden_by_what_is_before_their_window_s_middle_and_not_belo
         depth[row - 20 : row + 20, 300:340] = 1.0
         view = replace(look(), depth=depth)
         assert Visibility().expected(0.0, 2.0, 536.0, -120.0, view, confirmed=True) == found
-
-
-def test_a_person_may_be_as_near_as_leaves_six_hundredths_of_the_window_above_the_image() -> None:
-    # A window of 536 px at 1 m whose middle is 120 px above the image's.
-    distance = Visibility().least_distance(536.0, -120.0, 480)
-    top = 240 - 120.0 / distance - 536.0 / distance / 2
-    assert -top == pytest.approx(0.06 * 536.0 / distance)
 
 
 def test_nearer_than_three_decimetres_a_window_grows_no_more() -> None:

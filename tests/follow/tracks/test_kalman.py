@@ -117,8 +117,9 @@ def test_rates_are_how_bearing_and_range_change_with_the_persons_velocity(pose: 
     assert rates(track, pose) == pytest.approx(tuple((ends[0] - ends[1]) / 2e-6), abs=1e-6)
 
 
-def test_a_prediction_is_the_integral_of_a_velocity_that_fades_and_of_white_acceleration() -> None:
-    track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), mean=(3.0, 1.0, 0.4, -0.8))
+def test_a_prediction_is_the_integral_of_a_fading_velocity_and_white_acceleration() -> None:
+    root = np.random.default_rng(4).normal(0.0, 0.5, (4, 4))
+    track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), mean=(3.0, 1.0, 0.4, -0.8), covariance=upper(root @ root.T))
     for dt in (0.1, 0.7, 2.0):
         later = predict(track, dt, NOISE)
         times = np.linspace(0.0, dt, 20_001)
@@ -135,7 +136,7 @@ def test_a_prediction_is_the_integral_of_a_velocity_that_fades_and_of_white_acce
         assert added[0, 0] == pytest.approx(q * trapezoid(left**2, times), rel=1e-4)
         assert added[1, 3] == pytest.approx(q * trapezoid(left, times), rel=1e-4)
         assert added[3, 3] == pytest.approx(q * dt)
-        assert added[0, 1] == added[0, 3] == pytest.approx(0.0)
+        assert (added[0, 1], added[0, 3]) == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
 def test_a_predicted_track_of_the_same_stamp_is_the_track() -> None:
@@ -143,19 +144,6 @@ def test_a_predicted_track_of_the_same_stamp_is_the_track() -> None:
     same = predict(track, 1.0, NOISE)
     assert same.mean == pytest.approx(track.mean)
     assert same.matrix == pytest.approx(track.matrix)
-
-
-def test_what_place_and_velocity_share_is_carried_along_as_the_matrices_say() -> None:
-    random = np.random.default_rng(4)
-    for _ in range(20):
-        root = random.normal(0.0, 0.5, (4, 4))
-        track = replace(initiate(0.0, 0.0, 3.0, HERE, NOISE), covariance=upper(root @ root.T))
-        dt = float(random.uniform(0.05, 2.0))
-        kept = math.exp(-dt / 4.0)
-        move = np.eye(4)
-        move[[0, 1], [2, 3]], move[[2, 3], [2, 3]] = 4.0 * (1 - kept), kept
-        noise = 0.36 * np.kron(np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]), np.eye(2))
-        assert predict(track, dt, NOISE).matrix == pytest.approx(move @ track.matrix @ move.T + noise)
 
 
 def test_a_bearing_and_range_equal_the_textbooks_form_for_any_covariance() -> None:

@@ -90,7 +90,7 @@ def test_what_the_camera_has_shown_for_long_is_counted() -> None:
     assert movers[0].shown == movers[0].scans - 1
 
 
-def test_a_place_is_empty_once_a_beam_ends_behind_it_unless_something_nearer_is_there() -> None:
+def test_a_place_is_empty_once_a_beam_ends_behind_it_and_nothing_is_nearer() -> None:
     never = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
     wall = [(3.5, 0.05 * step - 3.0) for step in range(120)]
     post = [(0.8, 0.0), (0.8, 0.05)]
@@ -139,7 +139,7 @@ def test_legs_are_two_returns_within_a_stride_near_enough_for_a_beam_on_each_shi
             assert len(begun(place, place, pose=pose)) == groups
 
 
-def test_what_is_followed_already_does_not_begin_again_and_what_stands_beside_it_does() -> None:
+def test_what_is_followed_does_not_begin_again_and_what_stands_beside_it_does() -> None:
     first = update((), 0.0, (2.0, -0.05), (2.0, 0.05))
     assert len(update(first, 0.125, (2.0, -0.05), (2.0, 0.05))) == 1
     turn = 0.45 / 2.0
@@ -192,3 +192,17 @@ def test_returns_are_one_movers_and_those_of_a_persons_legs_first() -> None:
     assert {one.number: one.felt for one in after} == {7: 1.1, None: 1.0}
     both = update((nameless, persons), 1.1, (2.0, -0.02), (2.0, 0.0), (2.0, 0.4), (2.0, 0.42))
     assert {one.number: one.felt for one in both} == {7: 1.1, None: 1.1}
+
+
+@pytest.mark.parametrize(
+    ("off", "beyond", "left"), [(0.028, 0.35, True), (-0.028, 0.35, True), (0.032, 0.35, False), (0.0, 0.25, False)]
+)
+def test_a_place_is_empty_where_the_beams_beside_it_end_three_decimetres_behind(
+    off: float, beyond: float, left: bool
+) -> None:
+    never = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
+    moved = replace(walker(None, 2.0, 0.9), began=(2.0, 0.0), left=False)
+    far = 2.0 - LIMO.lidar_x + beyond
+    behind = LIMO.lidar_x + far * math.cos(off), far * math.sin(off)
+    (after, *_) = update((moved,), 1.1, (2.0, 0.88), (2.0, 0.92), behind, ground=never)
+    assert after.left is left

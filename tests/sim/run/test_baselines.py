@@ -15,9 +15,8 @@ from limo_hog.detections import Detections
 from limo_hog.follow.control.naming import ControllerError
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.observation import Observation, Odometry
-from limo_sim.cli import score
 from limo_sim.env import LimoFollowV1
-from limo_sim.run.baselines import BASELINES, PPO_FILE, Policy, PurePursuit, controller_of
+from limo_sim.run.baselines import PPO_FILE, Policy, PurePursuit, controller_of
 from limo_sim.run.last_seen import SIZE, LastSeen
 from limo_sim.sensing.camera import FOCAL_PX
 
@@ -135,10 +134,6 @@ def test_the_policy_that_comes_along_earns_more_than_standing_still() -> None:
             assert not terminated
     assert earned["ppo"] > 200
     assert earned["ppo"] > 1.5 * earned["still"]
-
-
-def test_the_command_line_knows_the_same_names() -> None:
-    assert score._BASELINES == BASELINES
 
 
 def test_another_distance_is_held_where_one_is_asked_for() -> None:

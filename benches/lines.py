@@ -23,7 +23,7 @@ from limo_hog import PeopleDetector, _core
 from limo_hog.cli.support.race import Rounds, race
 from limo_hog.cli.support.scene import street
 from limo_sim.run.arena import Arena
-from limo_sim.run.catalogue import load
+from limo_sim.world.scenario import Scenario
 
 ROUNDS = Rounds(seconds=2.0, most=100_000)
 SEARCH: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
@@ -175,9 +175,9 @@ def guided() -> None:
     limo_hog.set_num_threads(1)
     frames = {
         "street": street(640, 480, 3),
-        "arena, people crossing": Arena(load("crossing"), 0).frame().image,
+        "arena, people crossing": Arena(Scenario.load("crossing"), 0).frame().image,
         "street, nobody": street(640, 480, 3, people=False),
-        "arena, nobody": Arena(load("empty"), 0).frame().image,
+        "arena, nobody": Arena(Scenario.load("empty"), 0).frame().image,
     }
     detectors = [
         PeopleDetector(min_height=None, nms="group", group_threshold=2, search=search) for search in ("guided", "exact")

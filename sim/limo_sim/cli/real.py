@@ -13,7 +13,7 @@ import threading
 
 from limo_hog.cli.support.output import UsageError
 from limo_hog.extras import MissingExtraError
-from limo_sim.run.catalogue import load
+from limo_sim.world.scenario import Scenario
 
 
 def run_real(args: argparse.Namespace) -> int:
@@ -31,7 +31,7 @@ def run_real(args: argparse.Namespace) -> int:
         raise MissingExtraError("limo-hog run --real needs ROS 2's rclpy: source /opt/ros/DISTRO/setup.bash first")
     if not args.node.is_file():
         raise UsageError(f"{args.node}: no such file")
-    load(args.scenario).check_detector_is_plain("a node brings its own detector")
+    Scenario.load(args.scenario).check_detector_is_plain("a node brings its own detector")
     options = ["--scenario", args.scenario, "--seconds", str(args.seconds), "--seed", str(args.seed)]
     # Every word of the command is ours, or was checked when it was read.
     command = [sys.executable, "-m", "limo_hog.cli.main", "arena", "--ros2", *options]

@@ -54,14 +54,14 @@ def run(args: argparse.Namespace) -> int:
         return run_real(args)
     if args.words and not args.node.name.endswith(".launch.py"):
         raise UsageError(f"{args.words[0]}: only a launch file has arguments; a node's come after --ros-args")
-    from limo_sim.run.catalogue import load
     from limo_sim.run.score import Scorer
+    from limo_sim.world.scenario import Scenario
     from limo_sim.world.variants import of_run
 
     with needed(by="limo-hog run", what="rosbags", install="'limo-hog[record]'"):
         from limo_sim.ros.apart import run_apart
         from limo_sim.ros.script import score_of
-    scenario = of_run(load(args.scenario), args.seed)
+    scenario = of_run(Scenario.load(args.scenario), args.seed)
     scorer = Scorer(scenario)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:

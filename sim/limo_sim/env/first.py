@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
-from limo_sim.run.catalogue import load
 from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, Truth
-from limo_sim.world.variants import made_up
 
 ACTIONS_PER_SECOND = 10
 
@@ -66,7 +64,7 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
     Parameters
     ----------
     scenario
-        A `Scenario`, a name or a file that `catalogue.load` knows, or "random": a new one at every reset.
+        A `Scenario`, a name or a file; `[vary]` draws its people at every reset.
     render_mode
         "rgb_array": `render` returns the image of the last observation.
 
@@ -80,11 +78,8 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def __init__(self, scenario: Scenario | str = "workshop", render_mode: str | None = None) -> None:
         self.render_mode = render_mode
-        self._scenario: Scenario | None = None
-        if scenario != "random":
-            self._scenario = scenario if isinstance(scenario, Scenario) else load(scenario)
-            self._scenario.check_detector_is_plain("LimoFollow-v0 gives images, and has no detector")
-        known = self._scenario or Scenario()
+        known = self._scenario = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
+        known.check_detector_is_plain("LimoFollow-v0 gives images, and has no detector")
         speed = known.robot.wheel_speed
         limits = np.array([speed, 2 * speed / LIMO.wheel_separation], np.float32)
         self.action_space = spaces.Box(-limits, limits, dtype=np.float32)
@@ -103,8 +98,7 @@ class LimoFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode; the same `seed` gives the same one."""
         super().reset(seed=seed, options=options)
-        scenario = self._scenario or made_up(int(self.np_random.integers(2**31)))
-        self._arena = Arena(scenario, int(self.np_random.integers(2**31)))
+        self._arena = Arena(self._scenario, int(self.np_random.integers(2**31)))
         return self._observe(), {"time": 0.0}
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:

@@ -17,14 +17,13 @@ from limo_hog.follow.twist import Twist
 from limo_sim.env.first import ACTIONS_PER_SECOND
 from limo_sim.env.glimpse import Glimpse, glimpse, hiding
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
-from limo_sim.run.catalogue import RANDOM, load
 from limo_sim.run.detector_faults import Missing, misses_of
 from limo_sim.run.sighting import SCALE, SIZE, Sighting, sighted, state_of
 from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.schema import ScenarioError
-from limo_sim.world.variants import SIGHTING_STREAM, made_up
+from limo_sim.world.variants import SIGHTING_STREAM
 
 with needed(by="the arena's camera", what="OpenCV", install="'limo-hog[cv]'"):
     import cv2
@@ -99,8 +98,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
     Parameters
     ----------
     scenario
-        A `Scenario`, a name or a file that `catalogue.load` knows, "random" for a new one at every reset, or several of
-        these, of which every reset draws one.
+        A `Scenario`, a name, a file, or several of these, of which every reset draws one; `[vary]` draws its people.
     observe
         "camera", "gray" or "state".
     render_mode
@@ -125,9 +123,9 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self._observe_kind = observe
         names = [scenario] if isinstance(scenario, Scenario | str) else list(scenario)
-        self._scenarios = [one if isinstance(one, Scenario) or one == RANDOM else load(one) for one in names]
+        self._scenarios = [one if isinstance(one, Scenario) else Scenario.load(one) for one in names]
         for one in self._scenarios:
-            if observe != "state" and isinstance(one, Scenario):
+            if observe != "state":
                 one.check_detector_is_plain("images are given, and there is no detector; observe the state")
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = _space(observe)
@@ -138,8 +136,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode; the same `seed` gives the same one."""
         super().reset(seed=seed, options=options)
-        drawn = self._scenarios[int(self.np_random.integers(len(self._scenarios)))]
-        scenario = drawn if isinstance(drawn, Scenario) else made_up(int(self.np_random.integers(2**31)))
+        scenario = self._scenarios[int(self.np_random.integers(len(self._scenarios)))]
         arena = self._arena = Arena(scenario, int(self.np_random.integers(2**31)))
         self._walls = hiding(arena.scenario)
         self._noise = np.random.default_rng([arena.seed, SIGHTING_STREAM])

@@ -170,9 +170,9 @@ class Misses:
 def misses_of(faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> list[Missing]:
     """Return when each person of a run is missed by a camera of `rate_hz` [Hz]."""
     randoms = [np.random.default_rng([seed, MISS_STREAM, person]) for person in range(people)]
-    if faults.model == "none":
+    if faults.misses_like == "none":
         return [Misses(faults, rate_hz, random) for random in randoms]
-    return [FittedMisses(fit_of(faults.model), rate_hz, random) for random in randoms]
+    return [FittedMisses(fit_of(faults.misses_like), rate_hz, random) for random in randoms]
 
 
 class FaultyDetector:
@@ -198,7 +198,7 @@ class FaultyDetector:
     def __init__(self, detector: Detector, faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> None:
         self._detector, self._rate, self._seed = detector, rate_hz, seed
         self._misses = misses_of(faults, rate_hz, people, seed)
-        self._false_rate = faults.false_rate if faults.model == "none" else fit_of(faults.model).false_rate
+        self._false_rate = faults.false_rate if faults.misses_like == "none" else fit_of(faults.misses_like).false_rate
         self._truth: Truth | None = None
         self._region: Region | None = None
 

@@ -11,10 +11,10 @@ from typing import Any
 from limo_hog.imaging.notebook import data_uri
 from limo_hog.imaging.writing import jpeg
 from limo_sim.ros.script import run_script, score_of
-from limo_sim.run.catalogue import load
 from limo_sim.workshop import template
 from limo_sim.workshop.check import examine
 from limo_sim.workshop.html_report import to_html
+from limo_sim.world.scenario import Scenario
 
 _TASKS = {
     "follower": (
@@ -104,7 +104,7 @@ def run(file: str | Path, scenario: str = "workshop", seconds: float = 10.0, see
     lines: list[str] = []
     outcome = run_script(
         Path(file),
-        load(scenario),
+        Scenario.load(scenario),
         seconds,
         seed,
         log=lambda time, level, _name, message: lines.append(f"{time:6.2f} s {level}: {message}"),

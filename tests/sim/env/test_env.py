@@ -117,7 +117,7 @@ def test_touching_the_person_ends_the_episode() -> None:
 
 
 def run(seed: int, observe: str = "state") -> list[Any]:
-    env = LimoFollowV1(("random", "followable", "zigzag"), observe)
+    env = LimoFollowV1(("workshop", "followable", "zigzag"), observe)
     env.reset(seed=seed)
     return [env.step(AHEAD) for _ in range(20)]
 

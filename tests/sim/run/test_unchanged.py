@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import Arena
-from limo_sim.run.catalogue import load
+from limo_sim.world.scenario import Scenario
 
 #: Some bytes of five frames of each scenario, recorded before rooms, people and detectors could vary.
 RECORDED: dict[str, str] = json.loads(Path(__file__).with_name("frames.json").read_text())
@@ -22,7 +22,7 @@ STRIDE = 20_011
 
 def sampled(name: str) -> NDArray[np.uint8]:
     """Return some bytes of the colour images of two seconds."""
-    arena, bytes_ = Arena(load(name), 0), []
+    arena, bytes_ = Arena(Scenario.load(name), 0), []
     for step in range(100):
         if step % 20 == 0:
             bytes_.append(arena.frame().image.ravel()[::STRIDE])

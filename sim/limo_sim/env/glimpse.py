@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from limo_sim.run.arena import Plan
 from limo_sim.run.matching import CRITERIA
 from limo_sim.sensing.camera import FOCAL_PX, HEIGHT, MOUNT_AHEAD, MOUNT_HEIGHT, WIDTH
-from limo_sim.world.furniture import Disc, Rectangle
+from limo_sim.world.paths import FloorPlan
 from limo_sim.world.person import trunk_radius
 from limo_sim.world.scenario import Scenario
 
@@ -50,13 +51,13 @@ class Glimpse:
     found: bool
 
 
-def hiding(scenario: Scenario) -> list[Disc | Rectangle]:
+def hiding(scenario: Scenario) -> FloorPlan:
     """Return what a person may stand behind, unseen."""
     pieces = [piece.footprint for piece in scenario.furniture if piece.kind in _HIDING]
-    return [*pieces, *(wall.footprint for wall in scenario.walls)]
+    return FloorPlan([*pieces, *(wall.footprint for wall in scenario.walls)], scenario.room.half, 0.0)
 
 
-def glimpse(plan: Plan, scenario: Scenario, index: int, walls: Sequence[Disc | Rectangle]) -> Glimpse | None:
+def glimpse(plan: Plan, scenario: Scenario, index: int, walls: FloorPlan) -> Glimpse | None:
     """Return what is seen of a person; None where the person is not in the arena. `walls` is what hides people."""
     pose = plan.people[index] if index < len(plan.people) else None
     if pose is None:
@@ -79,30 +80,8 @@ def glimpse(plan: Plan, scenario: Scenario, index: int, walls: Sequence[Disc | R
     upright = min(head, HEIGHT / 2) + min(MOUNT_HEIGHT * scale, HEIGHT / 2)
     visible = max(across, 0.0) / (2 * half) * upright / height
     camera = x + MOUNT_AHEAD * cos, y + MOUNT_AHEAD * sin
-    if visible > 0.0 and any(_between(camera, (pose.x, pose.y), wall) for wall in walls):
+    if visible > 0.0 and walls.hidden(np.array([camera]), np.array([(pose.x, pose.y)]))[0]:
         visible = 0.0
     found = visible >= CRITERIA.in_view and height >= _LEAST_PX and head <= HEIGHT / 2
     found = found and abs(column) <= WIDTH / 2 - _SIDE_PX
     return Glimpse(bearing, distance, surface, visible, height, found)
-
-
-def _between(start: tuple[float, float], end: tuple[float, float], shape: Disc | Rectangle) -> bool:
-    """Whether a shape cuts the straight line from one place to another."""
-    x0, y0 = start[0] - shape.x, start[1] - shape.y
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    if isinstance(shape, Disc):
-        share = min(max(-(x0 * dx + y0 * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
-        return math.hypot(x0 + share * dx, y0 + share * dy) < shape.radius
-    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
-    first, last = 0.0, 1.0
-    for place, way, half in (
-        (cos * x0 + sin * y0, cos * dx + sin * dy, shape.half_x),
-        (cos * y0 - sin * x0, cos * dy - sin * dx, shape.half_y),
-    ):
-        if abs(way) < 1e-12:
-            if abs(place) > half:
-                return False
-            continue
-        near, far = sorted(((-half - place) / way, (half - place) / way))
-        first, last = max(first, near), min(last, far)
-    return first < last

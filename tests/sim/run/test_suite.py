@@ -10,7 +10,7 @@ import pytest
 
 from limo_sim.run import suite as suites
 from limo_sim.run.arena import Arena
-from limo_sim.run.suite import Suite, file_hash
+from limo_sim.run.suite import Suite
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.schema import ScenarioError
 
@@ -45,15 +45,6 @@ def test_a_file_that_was_changed_is_refused_by_name(tmp_path: Path, monkeypatch:
 def test_an_unknown_suite_is_refused_by_name() -> None:
     with pytest.raises(ScenarioError, match="unknown suite v0: want one of v1"):
         Suite.load("v0")
-
-
-def test_a_hash_is_that_of_the_text_whatever_its_line_ends(tmp_path: Path) -> None:
-    unix, windows = tmp_path / "unix", tmp_path / "windows"
-    unix.write_bytes(b"a = 1\nb = 2\n")
-    windows.write_bytes(b"a = 1\r\nb = 2\r\n")
-    assert file_hash(unix) == file_hash(windows)
-    unix.write_bytes(b"a = 1\nb = 3\n")
-    assert file_hash(unix) != file_hash(windows)
 
 
 def test_the_page_of_the_benchmark_is_about_these_files() -> None:

@@ -117,7 +117,7 @@ def test_touching_the_person_ends_the_episode() -> None:
 
 
 def run(seed: int, observe: str = "state") -> list[Any]:
-    env = LimoFollowV1(("workshop", "followable", "zigzag"), observe)
+    env = LimoFollowV1(("workshop", "followable", "sharp_turns"), observe)
     env.reset(seed=seed)
     return [env.step(AHEAD) for _ in range(20)]
 
@@ -132,7 +132,7 @@ def test_the_same_seed_gives_the_same_episode_whatever_is_observed() -> None:
 def test_vectorised_runs_in_two_processes_equal_runs_in_one() -> None:
     results = []
     for mode in ("async", "sync"):
-        env = gymnasium.make_vec("limo_sim.env:LimoFollow-v1", 2, vectorization_mode=mode, scenario="zigzag")
+        env = gymnasium.make_vec("limo_sim.env:LimoFollow-v1", 2, vectorization_mode=mode, scenario="sharp_turns")
         env.reset(seed=1)
         for _ in range(5):
             states, rewards, *_ = env.step(np.stack([AHEAD, -AHEAD]))

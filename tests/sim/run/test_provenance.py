@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import re
 
-import pytest
-
 from limo_sim.run.provenance import code_version, scenario_hash
 from limo_sim.world.scenario import Camera, Scenario
 
@@ -16,12 +14,7 @@ def test_scenarios_have_hashes_of_their_own_whatever_they_are_called() -> None:
     assert len({scenario_hash(Scenario.load(name)) for name in names}) == len(names)
     workshop = Scenario.load("workshop")
     assert scenario_hash(dataclasses.replace(workshop, name="mine", summary="")) == scenario_hash(workshop)
-
-
-@pytest.mark.parametrize("camera", [Camera(noise=1.001), Camera(rate_hz=11.0)])
-def test_any_value_changes_the_hash(camera: Camera) -> None:
-    workshop = Scenario.load("workshop")
-    assert scenario_hash(dataclasses.replace(workshop, camera=camera)) != scenario_hash(workshop)
+    assert scenario_hash(dataclasses.replace(workshop, camera=Camera(noise=1.001))) != scenario_hash(workshop)
 
 
 def test_a_scenario_that_says_what_it_would_have_left_out_has_the_same_hash() -> None:

@@ -25,7 +25,7 @@ def test_a_scenario_is_played_by_the_tracking_controller(name: str) -> None:
     assert card.in_view
 
 
-def test_in_the_corridor_one_person_walks_ahead_and_the_other_passes_the_standing_robot() -> None:
+def test_in_the_corridor_one_person_walks_ahead_and_the_other_passes_the_robot() -> None:
     arena = Arena(Scenario.load("side_door"), 0)
     places = []
     while arena.time < 25.0:

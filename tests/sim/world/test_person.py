@@ -140,7 +140,7 @@ def test_a_turned_body_is_the_same_body_turned() -> None:
 
 
 @pytest.mark.parametrize("height", [0.9, 1.8])
-def test_a_person_who_sits_is_on_a_stool_with_feet_on_the_floor_and_three_quarters_as_tall(height: float) -> None:
+def test_a_person_who_sits_is_on_a_stool_and_three_quarters_as_tall(height: float) -> None:
     person = Person(route=((2, 0, 0),), height=height, sits=True)
     figure = body(person, Pose(2, 0, 0.4))
     assert lowest(figure) == pytest.approx(0.0, abs=0.01 * height)

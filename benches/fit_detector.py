@@ -293,7 +293,7 @@ def plain(frames: Sequence[tuple[Truth, Detections]]) -> Iterator[Sighting]:
 
 
 def with_model(frames: Sequence[tuple[Truth, Detections]], model: str, seed: int) -> Iterator[Sighting]:
-    """Yield the same with a scenario's `[detector] model` on."""
+    """Yield the same with a scenario's `[detector] misses_like` on."""
     detector = Again()
     faulty = FaultyDetector(detector, DetectorFaults(misses_like=model), 10.0, 1, seed)
     changed = []

@@ -16,7 +16,6 @@ import numpy as np
 
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
-from limo_sim.run.catalogue import load
 from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import CameraPose
 from limo_sim.sensing.renderer import Renderer
@@ -111,12 +110,12 @@ def main() -> None:
     """Print a line a scenario, and a line a distance."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=40.0, help="simulated, of each scenario")
-    parser.add_argument("scenarios", nargs="*", default=[*Scenario.names(), *(f"random:{seed}" for seed in range(10))])
+    parser.add_argument("scenarios", nargs="*", default=Scenario.names())
     args = parser.parse_args()
     cv2.setNumThreads(1)
     print(f"{'ms':20}{'frame: median p95 max':>27}{'scan: median p95 max':>27}")
     for name in args.scenarios:
-        frames, scans = zip(*drive(load(name), args.seconds), strict=True)
+        frames, scans = zip(*drive(Scenario.load(name), args.seconds), strict=True)
         print(f"{name:20}{summary(frames)} {summary(scans)}", flush=True)
     for people, word in ((1, "person"), (2, "two")):
         for distance in (0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 3.0, 4.0, 6.0):

@@ -155,10 +155,11 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
         "| scenario | what happens | SHA-256 of the file |",
         "|---|---|---|",
     ]
-    from limo_sim.run.catalogue import load
+    from limo_sim.world.scenario import Scenario
 
     lines += [
-        f"| `{entry.name}` | {load(suite.path(entry)).summary} | `{entry.sha256[:16]}` |" for entry in suite.scenarios
+        f"| `{entry.name}` | {Scenario.load(suite.path(entry)).summary} | `{entry.sha256[:16]}` |"
+        for entry in suite.scenarios
     ]
     with whole_file(DOCS / "benchmark.md") as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")

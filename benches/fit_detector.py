@@ -2,7 +2,8 @@
 
     uv run python benches/fit_detector.py ../shared/data --frames TUD
 
-writes `sim/limo_sim/run/detector_fit.json`, which `[detector] model` reads, and the plot of docs/detector-model.md.
+writes `sim/limo_sim/run/detector_fit.json`, which `[detector] misses_like` reads, and the plot of
+docs/detector-model.md.
 TUD is a folder with frames 1 to 41 of TUD-Stadtmitte (docs/models.md says where they are); the rest lies in the data.
 """
 
@@ -292,9 +293,11 @@ def plain(frames: Sequence[tuple[Truth, Detections]]) -> Iterator[Sighting]:
 
 
 def with_model(frames: Sequence[tuple[Truth, Detections]], model: str, seed: int) -> Iterator[Sighting]:
-    """Yield the same with a scenario's `[detector] model` on."""
+    """Yield the same with a scenario's `[detector] misses_like` on."""
     detector, newest = Again(), frames[0][0]
-    scenario = Scenario(name=model, people=(Person(route=((2.0, 0.0, 3600.0),)),), detector=DetectorFaults(model=model))
+    scenario = Scenario(
+        name=model, people=(Person(route=((2.0, 0.0, 3600.0),)),), detector=DetectorFaults(misses_like=model)
+    )
     search = FaultySearch(scenario, seed, lambda: newest)
     changed = []
     for truth, found in frames:

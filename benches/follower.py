@@ -24,7 +24,6 @@ import numpy as np
 import limo_hog
 from limo_hog.follow import controller_named, detector_named
 from limo_hog.follow.safety.guard import Guard
-from limo_sim.run.catalogue import load
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.log import Step
 from limo_sim.run.matching import CRITERIA
@@ -43,7 +42,7 @@ OWN_SPEED = 0.03
 def play(kind: str, controller: str, seed: int, seconds: float, target: float | None) -> dict[str, Any]:
     """Play one run and return its figures."""
     name = KINDS.get(kind, kind)
-    scenario = dataclasses.replace(of_run(load(name), seed), name=kind)
+    scenario = dataclasses.replace(of_run(Scenario.load(name), seed), name=kind)
     steps: list[Step] = []
     with timed() as spent:
         episode = run_episode(

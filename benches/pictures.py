@@ -1,6 +1,6 @@
 """Draw the photographs of the documentation, docs/images/*.jpg: `uv run python -m benches.pictures`.
 
-The scenarios in examples/arena are seen by the robot's camera at chosen instants, side by side. The live page needs
+Five scenarios of rooms and people are seen by the robot's camera at chosen instants, side by side. The live page needs
 Chromium and is left as it is where there is none. `benches/benchmark.py` and `benches/fit_detector.py` draw the
 plots.
 """
@@ -36,14 +36,14 @@ from limo_sim.world.person import Pose
 from limo_sim.world.scenario import Furniture, Person, Robot, Scenario
 
 ROOT = Path(__file__).parents[1]
-SCENARIOS, IMAGES = ROOT / "examples" / "arena", ROOT / "docs" / "images"
+IMAGES = ROOT / "docs" / "images"
 #: For each picture the views: seconds after the start, and where the robot stands (x, y, yaw); None: at its start.
 VIEWS: dict[str, list[tuple[float, tuple[float, float, float] | None]]] = {
     "flat": [(2.0, None), (8.0, (1.9, -0.8, 1.3))],
-    "corridor": [(3.0, None), (9.5, (-4.0, 0.3, -0.05))],
-    "crowd": [(2.0, None), (4.5, None)],
-    "adult": [(0.5, None), (2.5, None)],
-    "posters": [(1.0, None), (7.0, (1.6, -0.6, 0.35))],
+    "side_door": [(3.0, None), (9.5, (-4.0, 0.3, -0.05))],
+    "gathering": [(2.0, None), (4.5, None)],
+    "tall": [(0.5, None), (2.5, None)],
+    "poster_wall": [(1.0, None), (7.0, (1.6, -0.6, 0.35))],
 }
 SEEN = 400  # rows of a frame; below them there is only floor [px]
 WIDTH = 480  # of each view in a picture [px]
@@ -64,8 +64,8 @@ def view(scenario: Scenario, seconds: float, place: tuple[float, float, float] |
 
 
 def room(name: str) -> NDArray[np.uint8]:
-    """Return the views of one of the scenarios in examples/arena, side by side."""
-    scenario = Scenario.load(SCENARIOS / f"{name}.toml")
+    """Return the views of a scenario, side by side."""
+    scenario = Scenario.load(name)
     return np.hstack([view(scenario, *one) for one in VIEWS[name]])
 
 

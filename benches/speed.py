@@ -25,7 +25,7 @@ from limo_hog.cli.bench import PARAMETERS
 from limo_hog.cli.support.race import Rounds, race
 from limo_hog.cli.support.scene import street
 from limo_sim.run.arena import Arena
-from limo_sim.run.catalogue import load
+from limo_sim.world.scenario import Scenario
 
 ROUNDS = Rounds(seconds=0.6, most=100_000)
 WINDOWS = {"people": (64, 128), "Daimler": (48, 96), "random": (64, 128)}
@@ -138,9 +138,9 @@ def guided() -> Iterator[Line]:
     """Yield either search of `PeopleDetector` at 640×480, with people in sight and without."""
     frames = {
         "street": street(640, 480, 3),
-        "arena, people crossing": Arena(load("crossing"), 0).frame().image,
+        "arena, people crossing": Arena(Scenario.load("crossing"), 0).frame().image,
         "street, nobody": street(640, 480, 3, people=False),
-        "arena, nobody": Arena(load("empty"), 0).frame().image,
+        "arena, nobody": Arena(Scenario.load("empty"), 0).frame().image,
     }
     hog = detector(cv2, "people")
     for (name, frame), colour, kind in itertools.product(frames.items(), ("gray", "BGR"), ("guided", "exact")):

@@ -23,7 +23,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from limo_hog.atomic import whole_file
 
 #: Scenarios to learn in: one person, slow and fast, in view at first or not.
-SCENARIOS = ("followable", "standing", "zigzag", "late")
+SCENARIOS = ("followable", "standing", "sharp_turns", "late")
 
 
 def environment() -> gymnasium.Env[Any, Any]:

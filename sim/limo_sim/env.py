@@ -15,17 +15,16 @@ from numpy.typing import NDArray
 from limo_hog.extras import needed
 from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena, Plan
-from limo_sim.run.catalogue import RANDOM, load
 from limo_sim.run.detector_faults import Missing, misses_of
 from limo_sim.run.last_seen import SCALE, SIZE, LastSeen, sighted, state_of
 from limo_sim.run.matching import CRITERIA
 from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import FOCAL_PX, HEIGHT, MOUNT_AHEAD, MOUNT_HEIGHT, WIDTH
-from limo_sim.world.furniture import Disc, Rectangle
+from limo_sim.world.paths import FloorPlan
 from limo_sim.world.person import trunk_radius
 from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.schema import ScenarioError
-from limo_sim.world.variants import SIGHTING_STREAM, made_up
+from limo_sim.world.variants import SIGHTING_STREAM
 
 with needed(by="the arena's camera"):
     import cv2
@@ -136,8 +135,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
     Parameters
     ----------
     scenario
-        A `Scenario`, a name or a file that `catalogue.load` knows, "random" for a new one at every reset, or several of
-        these, of which every reset draws one.
+        A `Scenario`, a name, a file, or several of these, of which every reset draws one; `[vary]` draws its people.
     observe
         "camera", "gray" or "state".
     render_mode
@@ -162,9 +160,9 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self._observe_kind = observe
         names = [scenario] if isinstance(scenario, Scenario | str) else list(scenario)
-        self._scenarios = [one if isinstance(one, Scenario) or one == RANDOM else load(one) for one in names]
+        self._scenarios = [one if isinstance(one, Scenario) else Scenario.load(one) for one in names]
         for one in self._scenarios:
-            if observe != "state" and isinstance(one, Scenario):
+            if observe != "state":
                 one.check_detector_is_plain("images are given, and there is no detector; observe the state")
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = _space(observe)
@@ -175,8 +173,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode; the same `seed` gives the same one."""
         super().reset(seed=seed, options=options)
-        drawn = self._scenarios[int(self.np_random.integers(len(self._scenarios)))]
-        scenario = drawn if isinstance(drawn, Scenario) else made_up(int(self.np_random.integers(2**31)))
+        scenario = self._scenarios[int(self.np_random.integers(len(self._scenarios)))]
         arena = self._arena = Arena(scenario, int(self.np_random.integers(2**31)))
         self._walls = hiding(arena.scenario)
         self._noise = np.random.default_rng([arena.seed, SIGHTING_STREAM])
@@ -301,13 +298,13 @@ def _rgb(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return rgb
 
 
-def hiding(scenario: Scenario) -> list[Disc | Rectangle]:
+def hiding(scenario: Scenario) -> FloorPlan:
     """Return what a person may stand behind, unseen."""
     pieces = [piece.footprint for piece in scenario.furniture if piece.kind in _HIDING]
-    return [*pieces, *(wall.footprint for wall in scenario.walls)]
+    return FloorPlan([*pieces, *(wall.footprint for wall in scenario.walls)], scenario.room.half, 0.0)
 
 
-def glimpse(plan: Plan, scenario: Scenario, index: int, walls: Sequence[Disc | Rectangle]) -> Glimpse | None:
+def glimpse(plan: Plan, scenario: Scenario, index: int, walls: FloorPlan) -> Glimpse | None:
     """Return what is seen of a person; None where the person is not in the arena. `walls` is what hides people."""
     pose = plan.people[index] if index < len(plan.people) else None
     if pose is None:
@@ -330,33 +327,8 @@ def glimpse(plan: Plan, scenario: Scenario, index: int, walls: Sequence[Disc | R
     upright = min(head, HEIGHT / 2) + min(MOUNT_HEIGHT * scale, HEIGHT / 2)
     visible = max(across, 0.0) / (2 * half) * upright / height
     camera = x + MOUNT_AHEAD * cos, y + MOUNT_AHEAD * sin
-    if visible > 0.0 and any(_between(camera, (pose.x, pose.y), wall) for wall in walls):
+    if visible > 0.0 and walls.hidden(np.array([camera]), np.array([(pose.x, pose.y)]))[0]:
         visible = 0.0
     found = visible >= CRITERIA.in_view and height >= _LEAST_PX and head <= HEIGHT / 2
     found = found and abs(column) <= WIDTH / 2 - _SIDE_PX
     return Glimpse(bearing, distance, surface, visible, height, found)
-
-
-def _between(start: tuple[float, float], end: tuple[float, float], shape: Disc | Rectangle) -> bool:
-    """Whether a shape cuts the straight line from one place to another."""
-    x0, y0 = start[0] - shape.x, start[1] - shape.y
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    if isinstance(shape, Disc):
-        share = min(max(-(x0 * dx + y0 * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
-        return math.hypot(x0 + share * dx, y0 + share * dy) < shape.radius
-    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
-    first, last = 0.0, 1.0
-    for place, way, half in (
-        (cos * x0 + sin * y0, cos * dx + sin * dy, shape.half_x),
-        (cos * y0 - sin * x0, cos * dy - sin * dx, shape.half_y),
-    ):
-        if abs(way) < 1e-12:
-            if abs(place) > half:
-                return False
-            continue
-        near, far = sorted(((-half - place) / way, (half - place) / way))
-        first, last = max(first, near), min(last, far)
-    return first < last
-
-
-gymnasium.register("LimoFollow-v1", entry_point="limo_sim.env:LimoFollowV1", max_episode_steps=600)

@@ -32,11 +32,11 @@ from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
 from limo_sim.ros.apart import run_apart
 from limo_sim.ros.script import score_of
-from limo_sim.run.catalogue import load
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.log import Step
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
+from limo_sim.world.scenario import Scenario
 
 READERS, STALLED = 15, 5
 #: Control periods of a run, at most.
@@ -105,7 +105,7 @@ def watch_a_page(seconds: float, seed: int) -> None:
     # Of the thread that simulates, so that what else the machine does counts little; without growing lists.
     times, took = array("d", bytes(8 * STEPS)), array("d", bytes(8 * STEPS))
     made, last = 0, [time.thread_time(), 0.0]
-    scenario = load("workshop")
+    scenario = Scenario.load("workshop")
 
     with View(scenario, pace=Pace(0)) as view:
         command = [sys.executable, "-m", "tests.hardening.soak", "clients", "--url", view.url]
@@ -167,7 +167,7 @@ async def read_pages(url: str) -> None:
 
 def run_a_node(seconds: float, seed: int) -> None:
     """Run a node in a process of its own, and score it as it goes."""
-    scenario = load("followable")
+    scenario = Scenario.load("followable")
     rows: list[tuple[float, float, float]] = []
 
     def watch(step: Step) -> None:

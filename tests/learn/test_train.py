@@ -21,7 +21,7 @@ from limo_hog.imaging.writing import write_image
 from limo_hog.models import load_model
 
 LIMO_HOG = Path(sys.executable).with_name("limo-hog")
-YARD = Path(__file__).parents[2] / "examples" / "bollards.toml"
+YARD = "bollards"
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def test_the_arenas_bollards_are_learnt_and_found_in_pictures_of_unseen_seeds(
 ) -> None:
     """The commands of docs/training.md."""
     for name, frames, seed in (("a", "500", "0"), ("b", "150", "1")):
-        command = ["export", "--scenario", str(YARD), "--out", str(tmp_path / name), "--frames", frames]
+        command = ["export", "--scenario", YARD, "--out", str(tmp_path / name), "--frames", frames]
         assert main([*command, "--seed", seed]) == 0
     model = tmp_path / "bollard.yml"
     start = time.perf_counter()
@@ -175,7 +175,7 @@ def test_the_arenas_bollards_are_learnt_and_found_in_pictures_of_unseen_seeds(
     assert json.loads(capsys.readouterr().out)["models"][0]["ap"] >= 0.95
     # The robot drives to the nearest bollard.
     follow = ["--controller", "approach", "--detector", f"hog:{model}", "--seconds", "15", "--json", "-"]
-    assert main(["follow", "--scenario", str(YARD), *follow]) == 0
+    assert main(["follow", "--scenario", YARD, *follow]) == 0
     card = json.loads(capsys.readouterr().out)
     assert card["path_m"] > 0.5
     assert card["contacts_wall"] == 0

@@ -124,7 +124,7 @@ def test_a_contact_with_the_wall_costs_once_and_the_episode_goes_on() -> None:
 
 
 def run(seed: int, observe: str = "state") -> list[Any]:
-    env = LimoFollowV1(("random", "followable", "zigzag"), observe)
+    env = LimoFollowV1(("workshop", "followable", "sharp_turns"), observe)
     env.reset(seed=seed)
     return [env.step(AHEAD) for _ in range(20)]
 
@@ -139,7 +139,7 @@ def test_the_same_seed_gives_the_same_episode_whatever_is_observed() -> None:
 def test_vectorised_runs_in_two_processes_equal_runs_in_one() -> None:
     results = []
     for mode in ("async", "sync"):
-        env = gymnasium.make_vec("limo_sim.env:LimoFollow-v1", 2, vectorization_mode=mode, scenario="zigzag")
+        env = gymnasium.make_vec("limo_sim.env:LimoFollow-v1", 2, vectorization_mode=mode, scenario="sharp_turns")
         env.reset(seed=1)
         for _ in range(5):
             states, rewards, *_ = env.step(np.stack([AHEAD, -AHEAD]))
@@ -191,7 +191,7 @@ def test_a_glimpse_is_what_the_camera_shows() -> None:
         place = (distance * math.cos(bearing), distance * math.sin(bearing))
         arena = Arena(Scenario(people=(Person(route=((*place, 0.0),)),)))
         truth = arena.truth().people[0]
-        seen = glimpse(arena.plan(), arena.scenario, 0, [])
+        seen = glimpse(arena.plan(), arena.scenario, 0, hiding(arena.scenario))
         assert truth is not None
         assert seen is not None
         assert (seen.distance, seen.bearing) == pytest.approx((truth.distance, truth.bearing))
@@ -249,7 +249,7 @@ def test_a_person_behind_a_wall_or_a_pillar_is_not_seen(stands: dict[str, Any], 
 @pytest.mark.parametrize(("place", "found"), [((2.5, 0.0), True), ((1.2, 0.0), False), ((4.6, 0.0), False)])
 def test_what_hog_cannot_find_is_not_found(place: tuple[float, float], found: bool) -> None:
     scenario = Scenario(people=(Person(route=((*place, 0.0),)),), robot=Robot())
-    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(*place, 0.0),)), scenario, 0, [])
+    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(*place, 0.0),)), scenario, 0, hiding(scenario))
     assert seen is not None
     assert seen.found == found
 
@@ -261,7 +261,7 @@ def test_a_person_near_a_side_of_the_image_is_seen_and_not_found(column: float, 
     # 320 px from the middle to a side, of which the last 60 are too near to it.
     place = (2.5, -column * (2.5 - MOUNT_AHEAD) / FOCAL_PX)
     scenario = Scenario(people=(Person(route=((*place, 0.0),)),))
-    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(*place, 0.0),)), scenario, 0, [])
+    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(*place, 0.0),)), scenario, 0, hiding(scenario))
     assert seen is not None
     assert seen.visible == pytest.approx(1.0)
     assert seen.found == found
@@ -312,7 +312,7 @@ def test_the_state_is_of_the_scenarios_first_person(others: tuple[tuple[float, f
 @pytest.mark.parametrize("ahead", [0.0, 0.084 + 0.04, -2.0])
 def test_of_a_person_behind_or_at_the_camera_nothing_is_seen(ahead: float) -> None:
     scenario = Scenario(people=(Person(route=((2.0, 0.0, 0.0),)),))
-    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(ahead, 0.3, 0.0),)), scenario, 0, [])
+    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(ahead, 0.3, 0.0),)), scenario, 0, hiding(scenario))
     assert seen is not None
     assert (seen.visible, seen.height_px, seen.found) == (0.0, 0.0, False)
     assert seen.distance == pytest.approx(math.hypot(ahead, 0.3))

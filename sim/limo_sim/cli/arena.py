@@ -36,9 +36,9 @@ def run(args: argparse.Namespace) -> int:
     if args.plot:
         raise UsageError(f"--plot {args.plot}: an arena has no run to draw; use it with follow or run")
     from limo_sim.ros.live import run_live
-    from limo_sim.run.catalogue import load
+    from limo_sim.world.scenario import Scenario
 
-    scenario = load(args.scenario)
+    scenario = Scenario.load(args.scenario)
     bus: Bus | None = None
     if args.ros2:
         from limo_hog.ros2.dds import Bus

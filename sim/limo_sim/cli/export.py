@@ -43,14 +43,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Write the pictures, then the labels: of those written, if it is stopped."""
     from limo_hog.atomic import about, write_text
-    from limo_sim.run.catalogue import load
     from limo_sim.run.export import labelled_frames, labels_of
     from limo_sim.run.provenance import code_version, scenario_hash
+    from limo_sim.world.scenario import Scenario
 
     folder: Path = args.out
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is there already, and not empty; wanted is a new folder")
-    scenario = load(args.scenario)
+    scenario = Scenario.load(args.scenario)
     labels = sorted({"person", *labels_of(scenario)})
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []

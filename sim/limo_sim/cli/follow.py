@@ -37,12 +37,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Run one episode and show its score card."""
-    from limo_sim.run.catalogue import load
     from limo_sim.run.episode import run_episode, score
     from limo_sim.view.tuning import Tunable
+    from limo_sim.world.scenario import Scenario
     from limo_sim.world.variants import of_run
 
-    scenario = of_run(load(args.scenario), args.seed)
+    scenario = of_run(Scenario.load(args.scenario), args.seed)
     controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
     with watching(args, scenario, controller) as audience:

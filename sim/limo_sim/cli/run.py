@@ -46,13 +46,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Run the node and show its score card."""
-    from limo_sim.run.catalogue import load
+    from limo_sim.world.scenario import Scenario
     from limo_sim.world.variants import of_run
 
     with needed(by="limo-hog run"):
         from limo_sim.ros.apart import run_apart
         from limo_sim.ros.script import score_of
-    scenario = of_run(load(args.scenario), args.seed)
+    scenario = of_run(Scenario.load(args.scenario), args.seed)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
             # What the node prints must not mix with the JSON.

@@ -134,7 +134,6 @@ def run(args: argparse.Namespace) -> int:
 def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
     """Return the runs that are asked for; what is wrong with a name is told here, before the work."""
     from limo_sim.run.baselines import controller_of
-    from limo_sim.run.catalogue import load
     from limo_sim.run.sweep import Run
     from limo_sim.world.scenario import Scenario
 
@@ -151,7 +150,7 @@ def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
     # The table and the score cards know a scenario by the name it gives itself.
     called: dict[str, str] = {}
     for name in scenarios:
-        title = load(name).name
+        title = Scenario.load(name).name
         if title in called:
             raise UsageError(f"{name}: is called {title!r}, as {called[title]} is; give it another name")
         called[title] = name

@@ -170,9 +170,9 @@ class Misses:
 def misses_of(faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> list[Missing]:
     """Return when each person of a run is missed by a camera of `rate_hz` [Hz]."""
     randoms = [np.random.default_rng([seed, MISS_STREAM, person]) for person in range(people)]
-    if faults.model == "none":
+    if faults.misses_like == "none":
         return [Misses(faults, rate_hz, random) for random in randoms]
-    return [FittedMisses(fit_of(faults.model), rate_hz, random) for random in randoms]
+    return [FittedMisses(fit_of(faults.misses_like), rate_hz, random) for random in randoms]
 
 
 class FaultySearch:
@@ -193,7 +193,7 @@ class FaultySearch:
         faults = scenario.detector
         self._seed, self._truth, self._rate = seed, truth, scenario.camera.rate_hz
         self._misses = misses_of(faults, self._rate, len(scenario.people), seed)
-        self._false_rate = faults.false_rate if faults.model == "none" else fit_of(faults.model).false_rate
+        self._false_rate = faults.false_rate if faults.misses_like == "none" else fit_of(faults.misses_like).false_rate
 
     def __call__(self, detector: Detector, image: NDArray[np.uint8], region: Region | None) -> Detections:
         """Find people in a region of the newest frame, or in all of it; best first."""

@@ -19,13 +19,18 @@ _DIGITS = 16
 _LOOKS_ON = "view"
 
 
+def fingerprint(data: bytes) -> str:
+    """Return the SHA-256 of a text, the same whatever its line ends are: 64 hexadecimal digits."""
+    return hashlib.sha256(data.replace(b"\r\n", b"\n")).hexdigest()
+
+
 def scenario_hash(scenario: Scenario) -> str:
-    """Return 16 hexadecimal digits of the SHA-256 of what a scenario says, its name and summary left out.
+    """Return 16 digits of the fingerprint of what a scenario says, its name and summary left out.
 
     Values that are the defaults are left out as well, so that a new option leaves the hashes of old scenarios alone.
     """
     table = _told(dataclasses.replace(scenario, name="", summary=""))
-    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()[:_DIGITS]
+    return fingerprint(json.dumps(table, sort_keys=True).encode())[:_DIGITS]
 
 
 def _told(value: Any) -> Any:
@@ -47,15 +52,15 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 
 @cache
 def code_version() -> str:
-    """Return the versions of limo-hog and limo-sim, and 16 hexadecimal digits of the SHA-256 of their Python sources.
+    """Return the versions of limo-hog and limo-sim, and 16 digits of the fingerprint of their Python sources.
 
     The compiled part differs from one platform to the next; its version stands for it.
     """
-    digest = hashlib.sha256()
+    sources = []
     for package in (Path(limo_hog.__file__).parent, Path(__file__).parents[1]):
         for path in sorted(package.rglob("*.py"), key=lambda path: path.relative_to(package).as_posix()):
             name = path.relative_to(package)
             if name.parts[0] != _LOOKS_ON:
-                digest.update(f"{package.name}/{name.as_posix()}\n".encode())
-                digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
-    return f"limo-hog {version('limo-hog')}, limo-sim {version('limo-sim')}, {digest.hexdigest()[:_DIGITS]}"
+                sources += [f"{package.name}/{name.as_posix()}\n".encode(), path.read_bytes()]
+    digest = fingerprint(b"".join(sources))[:_DIGITS]
+    return f"limo-hog {version('limo-hog')}, limo-sim {version('limo-sim')}, {digest}"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from limo_sim.run.provenance import fingerprint
 from limo_sim.world.schema import ScenarioError, build
 
 if sys.version_info >= (3, 11):
@@ -73,15 +73,10 @@ class Suite:
         table = tomllib.loads((_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
         suite = build(Suite, {"name": name, **table}, f"suite {name}: ")
         for entry in suite.scenarios:
-            found = file_hash(suite.path(entry))
+            found = fingerprint(suite.path(entry).read_bytes())
             if found != entry.sha256:
                 raise ScenarioError(
                     f"suite {name}: {entry.name}.toml has the SHA-256 {found[:16]}…, want {entry.sha256[:16]}…: its "
                     "figures would be those of another suite; restore the file, or give a copy by --scenario"
                 )
         return suite
-
-
-def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a text file, the same whatever its line ends are."""
-    return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()

@@ -12,9 +12,9 @@ from statistics import NormalDist, fmean, stdev
 import limo_hog
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.baselines import controller_of
-from limo_sim.run.catalogue import load
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.score import ScoreCard
+from limo_sim.world.scenario import Scenario
 
 #: Figures of a score card that are summed up, in the order they are shown.
 MEASURES = (
@@ -114,7 +114,7 @@ def play(run: Run) -> ScoreCard:
     cv2.setNumThreads(1)
     controller = controller_of(run.controller, run.target)
     names = (run.controller, run.detector)
-    scenario, detector = load(run.scenario), detector_named(run.detector)
+    scenario, detector = Scenario.load(run.scenario), detector_named(run.detector)
     return score(run_episode(scenario, controller, detector, run.seconds, run.seed, names=names))
 
 

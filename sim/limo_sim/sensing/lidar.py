@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO
 from limo_sim.world.furniture import Disc, Rectangle
+from limo_sim.world.rays import meet
 from limo_sim.world.scenario import ROOM_HALF
 
 BEAMS = 292
@@ -55,20 +55,8 @@ def cast(
         ranges = np.minimum(ranges, hits.min(axis=0))
     for shape in shapes:
         if isinstance(shape, Rectangle):
-            ranges = np.minimum(ranges, _rectangle(shape, x, y, angles))
+            ranges = np.minimum(ranges, meet(shape, x, y, cos, sin)[0])
     return ranges
-
-
-def _rectangle(shape: Rectangle, x: float, y: float, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
-    from_x, from_y = cos * (x - shape.x) + sin * (y - shape.y), cos * (y - shape.y) - sin * (x - shape.x)
-    ahead_x, ahead_y = np.cos(angles - shape.yaw), np.sin(angles - shape.yaw)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x0, x1 = (-shape.half_x - from_x) / ahead_x, (shape.half_x - from_x) / ahead_x
-        y0, y1 = (-shape.half_y - from_y) / ahead_y, (shape.half_y - from_y) / ahead_y
-    enters = np.maximum(np.minimum(x0, x1), np.minimum(y0, y1))
-    leaves = np.minimum(np.maximum(x0, x1), np.maximum(y0, y1))
-    return np.where((enters < leaves) & (enters > 0), enters, np.inf)
 
 
 def measure(ranges: NDArray[np.float64], noise_m: float, noise: np.random.Generator) -> NDArray[np.float32]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, MOUNT_HEIGHT, WIDTH, CameraPose
 from limo_sim.world.furniture import Rectangle
-from limo_sim.world.people import doors
+from limo_sim.world.people import door_of
 from limo_sim.world.scenario import WALL_HEIGHT, Scenario
 
 with needed(by="the arena's camera"):
@@ -92,11 +92,8 @@ class Paint:
         self._doors: list[tuple[tuple[float, float], float]] = []
         around = scenario.surroundings
         for person in scenario.people:
-            enters, exits = doors(person, around) if person.yields else ((0.0, 0.0), (0.0, 0.0))
-            if person.walks_in:
-                self._doors.append((enters, person.height))
-            if person.yields and math.isfinite(person.leaves_s):
-                self._doors.append((exits, person.height))
+            if person.walks_in or (person.yields and math.isfinite(person.leaves_s)):
+                self._doors.append((door_of(person, around), person.height))
         plain = self._texture.kind == "plain" and not self._texture.posters
         self._bare = {
             number

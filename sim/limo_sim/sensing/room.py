@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from limo_hog.extras import needed
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, MOUNT_HEIGHT, WIDTH, CameraPose
 from limo_sim.sensing.paint import Paint, sides_of
-from limo_sim.sensing.solids import F32, Sun, slab
-from limo_sim.world.furniture import Rectangle
+from limo_sim.sensing.solids import F32, Sun
+from limo_sim.world.rays import meet
 from limo_sim.world.scenario import WALL_HEIGHT, Scenario
 
 with needed(by="the arena's camera"):
@@ -51,7 +51,7 @@ class Room:
         faces = np.where(to_x < to_y, 2 * (ahead_x < 0), 1 + 2 * (ahead_y < 0))
         # All walls are equally high and higher than the camera: of a column's walls, the nearest hides the others.
         for number, shape in enumerate(self._walls, start=1):
-            enters, face = _nearest_face(shape, camera, ahead_x, ahead_y)
+            enters, face = meet(shape, camera.x, camera.y, ahead_x, ahead_y)
             nearer = enters < wall
             wall, faces = np.where(nearer, enters, wall), np.where(nearer, 4 * number + face, faces)
         depth: F32 = np.minimum(FLOOR_DEPTH, wall)
@@ -106,19 +106,3 @@ class Room:
             facings += [cos * x + sin * y, cos * y - sin * x, -cos * x - sin * y, sin * x - cos * y]
         wall = 255 * self._scenario.light.wall
         return [min(wall * (0.895 + 0.095 * facing), 255.0) for facing in facings]
-
-
-def _nearest_face(shape: Rectangle, camera: CameraPose, ahead_x: F32, ahead_y: F32) -> tuple[F32, NDArray[np.int64]]:
-    """Where each column's ray meets an upright block: depth float32 (W,) [m], inf where it does not, and on which side.
-
-    The sides are numbered 0 … 3: +x, +y, -x, -y of the block's own frame.
-    """
-    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
-    from_x, from_y = camera.x - shape.x, camera.y - shape.y
-    along_x, along_y = cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
-    in_x, out_x = slab(cos * from_x + sin * from_y, along_x, shape.half_x)
-    in_y, out_y = slab(cos * from_y - sin * from_x, along_y, shape.half_y)
-    enters = np.maximum(in_x, in_y)
-    hit = (enters < np.minimum(out_x, out_y)) & (enters > 0)
-    face = np.where(in_x > in_y, 2 * (along_x > 0), 1 + 2 * (along_y > 0))
-    return np.where(hit, enters, np.inf).astype(np.float32), face

@@ -179,13 +179,6 @@ def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int
     canvas.slab((*bounds, *sides, look_cos, look_sin, look_sin, -look_cos, *tones))
 
 
-def slab(origin: float, direction: F32, half: float) -> tuple[F32, F32]:
-    """Where rays enter and leave the layer -half … half."""
-    inverse = 1.0 / np.where(np.abs(direction) < 1e-9, np.float32(1e-9), direction)
-    one, other = (-half - origin) * inverse, (half - origin) * inverse
-    return np.minimum(one, other), np.maximum(one, other)
-
-
 def upright_bounds(x: float, z: float, radius: float, low: float, high: float, near: float = NEAR) -> Bounds | None:
     """Image box that holds what of an upright cylinder is beyond `near` [m]; None if nothing is."""
     near, far = max(z - radius, near), z + radius

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from limo_sim.world.furniture import KINDS, reach
 from limo_sim.world.movers import Movers
 from limo_sim.world.paths import FloorPlan
-from limo_sim.world.people import ROBOT_RADIUS, Person, before_door, doors
+from limo_sim.world.people import ROBOT_RADIUS, Person, before_door, door_of
 from limo_sim.world.person import STRIDE, Pose, Walk, smooth
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.social_force import People, SocialForce, acceleration
@@ -85,23 +85,18 @@ class Walker:
     """One person who yields: where they are, and what they want."""
 
     def __init__(self, person: Person, scenario: Scenario, plan: FloorPlan, random: np.random.Generator) -> None:
-        self.person, self.random = person, random
+        self.person, self.random, self.speed = person, random, person.speed
         self.position: Point = person.route[0][:2]
         self.velocity: Point = (0.0, 0.0)
         self.yaw = person.facing
         self.stage = _AWAY
         self._plan, self._half = plan, scenario.room.half
-        self._enters, self._exits = doors(person, scenario.surroundings)
+        self._door = door_of(person, scenario.surroundings)
         self._corner = 0  # the one that the person walks to, or stands at
         self._pauses_until: float | None = None
         self._stuck_s = 0.0
         self._waypoint, self._looked = self.position, -math.inf
         self._phase = self._swinging = 0.0
-
-    @property
-    def speed(self) -> float:
-        """Wanted on the way to the present corner [m/s]."""
-        return self.person.speeds[self._corner - 1] if self.person.speeds else self.person.speed
 
     @property
     def feels_walls(self) -> bool:
@@ -121,8 +116,8 @@ class Walker:
         if self.stage == _AWAY and time >= person.arrives_s:
             if person.walks_in:
                 self.stage = _ENTERING
-                self.position = before_door(self._enters, half, -MANNERS.outside_m)
-                self.yaw = self._direction(before_door(self._enters, half, person.way_margin))
+                self.position = before_door(self._door, half, -MANNERS.outside_m)
+                self.yaw = self._direction(self._before_door())
             else:
                 self.stage = _INSIDE
                 self._corner = min(1, len(person.route) - 1)
@@ -133,7 +128,7 @@ class Walker:
             self.stage = _INSIDE
         if self.stage == _INSIDE and time >= person.leaves_s:
             self.stage, self._looked = _LEAVING, -math.inf
-        if self.stage == _LEAVING and self._distance(self._before_exit()) < MANNERS.reached * person.height:
+        if self.stage == _LEAVING and self._distance(self._before_door()) < MANNERS.reached * person.height:
             self.stage = _GOING_OUT
         if self.stage == _GOING_OUT and outmost > half + 0.9 * MANNERS.outside_m:
             self.stage = _GONE
@@ -141,11 +136,11 @@ class Walker:
     def wants(self, time: float, robot: RobotPose) -> tuple[Point, float | None]:
         """Return the velocity that the person wants [m/s], and in which direction they look while standing [rad]."""
         if self.stage == _ENTERING:
-            return self._straight(before_door(self._enters, self._half, self.person.way_margin), self.speed), None
+            return self._straight(self._before_door(), self.speed), None
         if self.stage == _LEAVING:
-            return self._towards(self._before_exit(), time, self.speed), None
+            return self._towards(self._before_door(), time, self.speed), None
         if self.stage == _GOING_OUT:
-            return self._straight(before_door(self._exits, self._half, -2 * MANNERS.outside_m), self.speed), None
+            return self._straight(before_door(self._door, self._half, -2 * MANNERS.outside_m), self.speed), None
         reacts = self._react(time, robot)
         return reacts or (self._walk(time), self.person.facing if len(self.person.route) == 1 else None)
 
@@ -168,8 +163,8 @@ class Walker:
         most = STEP_S / MANNERS.ease_s
         self._swinging += min(max(min(1.0, speed / (0.3 * self.speed)) - self._swinging, -most), most)
 
-    def _before_exit(self) -> Point:
-        return before_door(self._exits, self._half, self.person.way_margin)
+    def _before_door(self) -> Point:
+        return before_door(self._door, self._half, self.person.way_margin)
 
     def _react(self, time: float, robot: RobotPose) -> tuple[Point, float] | None:
         """Approach the robot or stand in its way, where it is near and in sight."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_sim.world.furniture import Disc, Rectangle
+from limo_sim.world.rays import slab
 
 F64 = NDArray[np.float64]
 Point = tuple[float, float]
@@ -144,11 +145,8 @@ class FloorPlan:
                 (self._cos * dx + self._sin * dy, self._cos * way_x + self._sin * way_y, self._halves[:, 0]),
                 (self._cos * dy - self._sin * dx, self._cos * way_y - self._sin * way_x, self._halves[:, 1]),
             ):
-                inverse = 1.0 / np.where(np.abs(way) < 1e-12, 1e-12, way)
-                wide = half[:, None] + margin
-                one, other = (-wide - origin) * inverse, (wide - origin) * inverse
-                enters = np.maximum(enters, np.minimum(one, other))
-                leaves = np.minimum(leaves, np.maximum(one, other))
+                first, last = slab(origin, way, half[:, None] + margin)
+                enters, leaves = np.maximum(enters, first), np.minimum(leaves, last)
             crossed |= (enters < leaves).any(axis=0)
         if len(self._radii):
             apart = start[None] - self._middle[count:, None]

@@ -40,8 +40,6 @@ class Person:
         each on arrival [m, m, s]. One corner: the person stands there.
     speed
         Walking speed [m/s].
-    speeds
-        Walking speed from each corner to the next, one for each corner [m/s]; without them, `speed` everywhere.
     height
         Stature [m]; the whole body scales with it.
     girth
@@ -58,9 +56,9 @@ class Person:
     reaction
         To the robot, with "social_force": "avoid" (keeps clear of it, as of any obstacle), "ignore", "approach" (comes
         up to it) or "block" (stands in its way).
-    enters, exits
-        Doors in an outer wall, with "social_force": x, y [m]. A person who arrives comes in by the one, a person who
-        leaves goes out by the other; without them, by the door nearest to the first corner.
+    enters
+        Door in an outer wall, with "social_force": x, y [m]. A person who arrives comes in by it, a person who leaves
+        goes out by it; without it, by the door nearest to the first corner.
     sits
         Whether a person whose route has a single corner sits there, on a stool.
     shirt, trousers, skin, hair
@@ -69,7 +67,6 @@ class Person:
 
     route: tuple[tuple[float, float, float], ...] = required(-WIDEST, 3600.0)
     speed: float = within(0.75, 0.05, 2.0)
-    speeds: tuple[float, ...] = within((), 0.05, 2.0)
     height: float = within(0.9, 0.6, 2.0)
     girth: float = within(1.0, 0.7, 1.4)
     arrives_s: float = within(0.0, 0.0, 3600.0)
@@ -78,7 +75,6 @@ class Person:
     behaviour: str = one_of(("route", SOCIAL_FORCE), "route")
     reaction: str = one_of(("avoid", "ignore", "approach", "block"), "avoid")
     enters: tuple[float, ...] = within((), -WIDEST, WIDEST)
-    exits: tuple[float, ...] = within((), -WIDEST, WIDEST)
     sits: bool = False
     shirt: tuple[float, float, float] = within((34, 52, 128), 0, 255)
     trousers: tuple[float, float, float] = within((38, 42, 56), 0, 255)
@@ -214,10 +210,6 @@ def check_person(person: Person, around: Surroundings, where: str) -> None:
             )
         if pause < 0:
             raise ScenarioError(f"{where}.route[{index}]: pause {pause:g} s, want 0 … 3600")
-    if person.speeds and len(person.speeds) != len(person.route):
-        raise ScenarioError(
-            f"{where}.speeds: got {len(person.speeds)} values, want one for each of {len(person.route)} corners"
-        )
     if person.leaves_s <= person.arrives_s:
         raise ScenarioError(
             f"{where}.leaves_s: got {person.leaves_s:g}, want more than arrives_s, {person.arrives_s:g}"
@@ -239,7 +231,7 @@ def check_person(person: Person, around: Surroundings, where: str) -> None:
 
 def _check_timetable(person: Person, around: Surroundings, where: str) -> None:
     """Refuse what needs a person who yields, and a route that leads through something."""
-    for key, value in (("reaction", person.reaction), ("enters", person.enters), ("exits", person.exits)):
+    for key, value in (("reaction", person.reaction), ("enters", person.enters)):
         if value and value != "avoid":
             raise ScenarioError(f'{where}.{key}: got {value!r}, want behaviour = "{SOCIAL_FORCE}" with it')
     for index, corner in enumerate(person.route):
@@ -265,14 +257,12 @@ def _check_yielding(person: Person, around: Surroundings, where: str) -> None:
                 )
     first = person.route[0][:2]
     ends = [(f"route[{index}]", corner[:2]) for index, corner in enumerate(person.route)]
-    for key, door in (("enters", person.enters), ("exits", person.exits)):
-        if not door:
-            continue
+    if door := person.enters:
         if len(door) != 2 or abs(max(map(abs, door)) - around.half) > _ON_WALL:
             raise ScenarioError(
-                f"{where}.{key}: got {list(door)}, want [x, y] on an outer wall: the one or the other ±{around.half:g}"
+                f"{where}.enters: got {list(door)}, want [x, y] on an outer wall: the one or the other ±{around.half:g}"
             )
-        ends.append((key, before_door((door[0], door[1]), around.half, person.way_margin)))
+        ends.append(("enters", before_door((door[0], door[1]), around.half, person.way_margin)))
     plan = around.plan(person.way_margin)
     for key, end in ends:
         if math.isinf(plan.way(first, end)[1]):
@@ -290,17 +280,17 @@ def before_door(door: tuple[float, float], half: float, distance: float) -> tupl
     return x, math.copysign(half - distance, y)
 
 
-def doors(person: Person, around: Surroundings) -> tuple[tuple[float, float], tuple[float, float]]:
+def door_of(person: Person, around: Surroundings) -> tuple[float, float]:
     """Return where on the outer walls a person who yields comes in and goes out [m]."""
+    if person.enters:
+        return person.enters[0], person.enters[1]
     x, y, _ = person.route[0]
     half, plan = around.half, around.plan(person.way_margin)
 
     def length(door: tuple[float, float]) -> float:
         return plan.way((x, y), before_door(door, half, person.way_margin))[1]
 
-    nearest = min(((half, y), (-half, y), (x, half), (x, -half)), key=length)
-    enters = (person.enters[0], person.enters[1]) if person.enters else nearest
-    return enters, ((person.exits[0], person.exits[1]) if person.exits else enters)
+    return min(((half, y), (-half, y), (x, half), (x, -half)), key=length)
 
 
 def _gap(start: tuple[float, float, float], end: tuple[float, float, float], shape: Disc | Rectangle) -> float:

@@ -80,8 +80,6 @@ class _RouteLeg:
         When the leg begins within a lap, and how long the walk takes [s].
     walked, length
         Way walked in the lap before, and on this leg [m].
-    speed
-        Of the walk [m/s].
     heading
         Direction of the walk [rad].
     pause_before, pause_after
@@ -92,7 +90,6 @@ class _RouteLeg:
     duration: float
     walked: float
     length: float
-    speed: float
     heading: float
     pause_before: float
     pause_after: float
@@ -106,13 +103,11 @@ class Walk:
         self._legs: list[_RouteLeg] = []
         clock = walked = 0.0
         corners = person.route
-        speeds = person.speeds or (person.speed,) * len(corners)
-        ways = zip(corners, corners[1:] + corners[:1], speeds, strict=True)
-        for (x, y, pause), (next_x, next_y, next_pause), speed in ways:
+        for (x, y, pause), (next_x, next_y, next_pause) in zip(corners, corners[1:] + corners[:1], strict=True):
             length = math.hypot(next_x - x, next_y - y)
             heading = math.atan2(next_y - y, next_x - x) if length else person.facing
-            duration = length / speed
-            self._legs.append(_RouteLeg(clock, duration, walked, length, speed, heading, pause, next_pause))
+            duration = length / person.speed
+            self._legs.append(_RouteLeg(clock, duration, walked, length, heading, pause, next_pause))
             clock += duration + next_pause
             walked += length
         self._begins = [leg.begins for leg in self._legs]
@@ -130,7 +125,7 @@ class Walk:
         index = bisect_right(self._begins, clock) - 1
         leg = self._legs[index]
         clock -= leg.begins
-        walked = min(clock * leg.speed, leg.length)
+        walked = min(clock * person.speed, leg.length)
         x, y, _ = person.route[index]
         metres = laps * self._lap_m + leg.walked + walked
         return Pose(

@@ -186,7 +186,7 @@ class DetectorFaults:
 
     Attributes
     ----------
-    model
+    misses_like
         "opencv" or "limo": misses by the person's height in the image, bursts and false boxes as that model of people
         has them on photographs (docs/detector-model.md); the other keys are then left out. "none": those count.
     recall
@@ -198,18 +198,18 @@ class DetectorFaults:
         Mean number of false boxes in a frame that is searched as a whole.
     """
 
-    model: str = one_of(("none", "opencv", "limo"), "none")
+    misses_like: str = one_of(("none", "opencv", "limo"), "none")
     recall: float = within(1.0, 0.0, 1.0)
     burst_s: float = within(0.3, 0.02, 60.0)
     false_rate: float = within(0.0, 0.0, 20.0)
 
     def check(self, rate_hz: float, where: str) -> None:
         """Raise `ScenarioError` unless these keys go together, and a camera of `rate_hz` can show such bursts."""
-        for name in ("recall", "burst_s", "false_rate") if self.model != "none" else ():
+        for name in ("recall", "burst_s", "false_rate") if self.misses_like != "none" else ():
             if getattr(self, name) != getattr(DetectorFaults(), name):
                 raise ScenarioError(
-                    f"{where}{name}: got {getattr(self, name):g} beside model {self.model!r}, which has its own; "
-                    f"give one of the two"
+                    f"{where}{name}: got {getattr(self, name):g} beside misses_like {self.misses_like!r}, "
+                    f"which has its own; give one of the two"
                 )
         if not 0.0 < self.recall < 1.0:
             return
@@ -283,8 +283,6 @@ class Scenario:
     @staticmethod
     def load(name_or_path: str | Path) -> Scenario:
         """Read one of `Scenario.names()`, or a TOML file.
-
-        `limo_sim.run.catalogue.load` also returns scenarios that are drawn from a seed.
 
         Raises
         ------

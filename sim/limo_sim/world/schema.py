@@ -47,7 +47,7 @@ def within(default: Any, low: float, high: float) -> Any:
 
 def required(low: float, high: float) -> Any:
     """Return a dataclass field without a default and the range it must stay in."""
-    return dataclasses.field(metadata={"limits": Limits(low, high)})
+    return within(dataclasses.MISSING, low, high)
 
 
 def one_of(words: tuple[str, ...], default: Any = dataclasses.MISSING) -> Any:

@@ -16,7 +16,6 @@ from limo_hog.detections import Detections, Detector
 from limo_hog.follow import TrackingController
 from limo_hog.follow.sense.detectors import HalfSize, detector_named
 from limo_hog.follow.sense.region import Region
-from limo_sim.run.catalogue import load
 from limo_sim.run.detector_faults import FaultySearch, fit_of
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.sweep import Run, play_all
@@ -177,7 +176,7 @@ def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np
         def detect(self, _image: NDArray[np.uint8]) -> Detections:
             return Detections(window, np.array([1.0]))
 
-    faulty = Faulty(SeesOne(), DetectorFaults(model=model), seed)
+    faulty = Faulty(SeesOne(), DetectorFaults(misses_like=model), seed)
     truths = [Truth(frame / 10, (0.0, 0.0, 0.0), (person, None), Contacts()) for frame in range(frames)]
     return np.array([(faulty.at(now).boxes == window).all(axis=1).any() for now in truths])
 
@@ -205,7 +204,7 @@ def test_a_model_misses_in_bursts_as_long_as_its_memory() -> None:
 def test_a_models_misses_and_false_boxes_are_those_of_the_seed() -> None:
     np.testing.assert_array_equal(at_height(130, "limo", 100, 3), at_height(130, "limo", 100, 3))
     assert (at_height(130, "limo", 100, 3) != at_height(130, "limo", 100, 4)).any()
-    frames = seen(DetectorFaults(model="opencv"), 10_000)
+    frames = seen(DetectorFaults(misses_like="opencv"), 10_000)
     extra = [len(found) - found_of([found], 0)[0] - found_of([found], 1)[0] for found in frames]
     rate = fit_of("opencv").false_rate
     assert abs(np.mean(extra) - rate) < 4 * math.sqrt(rate / 10_000)
@@ -232,7 +231,7 @@ def unkind(tmp_path: Path) -> str:
 
 
 def test_in_the_closed_loop_the_card_shows_the_recall(unkind: str) -> None:
-    episode = run_episode(load(unkind), TrackingController(), detector_named("hog"), 20.0, 0)
+    episode = run_episode(Scenario.load(unkind), TrackingController(), detector_named("hog"), 20.0, 0)
     card = score(episode)
     assert card.detected is not None
     # 200 frames of a chain with a correlation of 0: four standard errors.

@@ -12,11 +12,11 @@ def test_every_card_belongs_to_its_run_whatever_the_scenario_calls_itself(tmp_pa
     file.write_text('name = "another name"\n', encoding="utf-8")
     runs = [
         Run(str(file), "proxemic", "hog", 0, 0.2, 1.8),
-        Run("random:3", "approach", "hog", 1, 0.4),
+        Run("workshop", "approach", "hog", 1, 0.4),
         Run("empty", "proxemic", "hog", 2, 0.1),
     ]
     cards = dict(play_all(runs, 1))
     assert set(cards) == set(runs)
-    assert [cards[run].scenario for run in runs] == ["another name", "random:3", "empty"]
+    assert [cards[run].scenario for run in runs] == ["another name", "workshop", "empty"]
     assert [cards[run].target_m for run in runs] == [1.8, None, 1.5]
     assert [cards[run].seed for run in runs] == [0, 1, 2]

@@ -10,8 +10,8 @@ import pytest
 
 from limo_sim.run import suite as suites
 from limo_sim.run.arena import Arena
-from limo_sim.run.catalogue import load
-from limo_sim.run.suite import Suite, file_hash
+from limo_sim.run.suite import Suite
+from limo_sim.world.scenario import Scenario
 from limo_sim.world.schema import ScenarioError
 
 V1 = Suite.load("v1")
@@ -25,7 +25,7 @@ def test_the_first_suite_has_twenty_scenarios_in_four_groups() -> None:
 
 @pytest.mark.parametrize("entry", V1.scenarios, ids=lambda entry: entry.name)
 def test_every_scenario_can_be_run_with_ten_seeds_and_its_people_differ(entry: suites.Entry) -> None:
-    scenario = load(V1.path(entry))
+    scenario = Scenario.load(V1.path(entry))
     assert scenario.summary
     assert len({Arena(scenario, seed).scenario.people for seed in range(10)}) == 10
 
@@ -47,16 +47,7 @@ def test_an_unknown_suite_is_refused_by_name() -> None:
         Suite.load("v0")
 
 
-def test_a_hash_is_that_of_the_text_whatever_its_line_ends(tmp_path: Path) -> None:
-    unix, windows = tmp_path / "unix", tmp_path / "windows"
-    unix.write_bytes(b"a = 1\nb = 2\n")
-    windows.write_bytes(b"a = 1\r\nb = 2\r\n")
-    assert file_hash(unix) == file_hash(windows)
-    unix.write_bytes(b"a = 1\nb = 3\n")
-    assert file_hash(unix) != file_hash(windows)
-
-
 def test_the_page_of_the_benchmark_is_about_these_files() -> None:
     page = (Path(__file__).parents[3] / "docs" / "benchmark.md").read_text(encoding="utf-8")
     for entry in V1.scenarios:
-        assert f"| `{entry.name}` | {load(V1.path(entry)).summary} | `{entry.sha256[:16]}` |" in page
+        assert f"| `{entry.name}` | {Scenario.load(V1.path(entry)).summary} | `{entry.sha256[:16]}` |" in page

@@ -99,7 +99,7 @@ def spread(line: NDArray[np.float64]) -> tuple[float, float]:
     return float(mean), float(math.sqrt(((columns - mean) ** 2 * line).sum() / line.sum()))
 
 
-def test_what_moves_while_the_shutter_is_open_is_blurred_by_that_much_and_what_rests_is_not() -> None:
+def test_what_moves_while_the_shutter_is_open_is_blurred_by_that_much() -> None:
     exposure, rate = 0.04, 0.6
     sharp, blurred = turned(Camera(), rate), turned(Camera(exposure_s=exposure), rate)
     # The pole at the height of the horizon: a box filter as long as the turn, to the side it came from.

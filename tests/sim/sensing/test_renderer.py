@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -322,22 +320,3 @@ def test_shadow_falls_on_the_floor_beneath() -> None:
     row = round(CENTRE_Y + FOCAL_PX * 0.175 / 1.88)
     assert shaded[row, 320, 0] < lit[row, 320, 0] - 10
     assert shaded[470, 320, 0] == lit[470, 320, 0]
-
-
-def test_the_gait_sheet_shows_a_person_from_four_sides() -> None:
-    """Draws 4 directions × 6 phases for people to look at: out/gait.png."""
-    rows = []
-    for yaw in (0.0, math.pi / 2, math.pi, math.pi / 4):
-        tiles = [
-            picture(Pose(1.5, 0.0, yaw, phase, 1.0), scenario=Scenario())[0][10:310, 240:400]
-            for phase in np.arange(6) * math.tau / 6
-        ]
-        rows.append(np.hstack(tiles))
-    sheet = np.vstack(rows)
-    out = Path(__file__).parents[3] / "out"
-    out.mkdir(exist_ok=True)
-    cv2.imwrite(str(out / "gait.png"), sheet)
-    assert sheet.shape == (1200, 960, 3)
-    blue = sheet[..., 0].astype(int) - sheet[..., 2]
-    shirts = [(blue[300 * r : 300 * r + 300, 160 * c : 160 * c + 160] > 30).sum() for r in range(4) for c in range(6)]
-    assert min(shirts) > 1500

@@ -48,16 +48,6 @@ def test_the_corners_of_the_route_are_visited_in_order_with_their_pauses() -> No
     assert 0.8 < still < 2.0
 
 
-def test_each_leg_is_walked_at_its_own_speed() -> None:
-    person = dataclasses.replace(YIELDS, route=((-3, 1, 0), (3, 1, 0), (3, -1, 0)), speeds=(0.4, 0.9, 0.6))
-    seen = [there(one) for (one,) in poses(Scenario(people=(person,), robot=CORNER), 18.0)]
-    paces = [math.dist((a.x, a.y), (b.x, b.y)) / STEP_S for a, b in pairwise(seen)]
-    first = [pace for pace, pose in zip(paces, seen, strict=False) if -1 < pose.x < 2.5 and pose.y > 0.95]
-    second = [pace for pace, pose in zip(paces, seen, strict=False) if pose.x > 2.7 and -0.5 < pose.y < 0]
-    assert np.mean(first) == pytest.approx(0.4, rel=0.05)
-    assert np.mean(second) == pytest.approx(0.9, rel=0.05)
-
-
 def test_headings_and_gait_are_those_of_a_person_who_walks() -> None:
     seen = [there(one) for (one,) in poses(Scenario(people=(YIELDS,), robot=CORNER), 25.0)]
     turns = [math.remainder(b.yaw - a.yaw, math.tau) for a, b in pairwise(seen)]
@@ -79,20 +69,20 @@ def test_somebody_finds_the_door_between_two_rooms() -> None:
 
 
 def test_a_person_who_arrives_walks_in_through_a_door_and_who_leaves_walks_out() -> None:
-    person = dataclasses.replace(YIELDS, arrives_s=1.0, leaves_s=14.0, enters=(-4.9, 2.0), exits=(0.5, 4.9))
+    person = dataclasses.replace(YIELDS, arrives_s=1.0, leaves_s=14.0, enters=(-4.9, 2.0))
     seen = [one for (one,) in poses(Scenario(people=(person,), robot=CORNER), 30.0)]
     assert seen[49] is None
     first, inside = there(seen[50]), [pose for pose in seen if pose is not None]
     assert (first.x, first.y) == pytest.approx((-5.4, 2.0), abs=0.05)
     assert seen[-1] is None
     last = inside[-1]
-    assert (last.x, last.y) == pytest.approx((0.5, 5.4), abs=0.1)
+    assert (last.x, last.y) == pytest.approx((-5.4, 2.0), abs=0.1)
     steps = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(inside)]
     assert max(steps) < 1.3 * 0.75 * STEP_S + 1e-9
-    # In the outer walls' plane they are within a door, nowhere else.
+    # In the outer wall's plane they are within the door, nowhere else.
     for pose in inside:
         if max(abs(pose.x), abs(pose.y)) > 4.6:
-            assert min(math.hypot(pose.y - 2.0, pose.x + 4.9), math.hypot(pose.x - 0.5, pose.y - 4.9)) < 0.65
+            assert math.hypot(pose.y - 2.0, pose.x + 4.9) < 0.65
 
 
 def test_without_a_door_of_their_own_people_take_the_nearest() -> None:
@@ -215,8 +205,8 @@ def test_a_crowd_in_a_furnished_room_stays_inside_and_out_of_the_furniture() -> 
         ("reaction = 'block'", "people[0].reaction: got 'block', want behaviour = \"social_force\" with it"),
         ("enters = [4.9, 1]", "people[0].enters: got (4.9, 1.0), want behaviour"),
         (
-            "behaviour = 'social_force'\nexits = [4.0, 1.0]",
-            "people[0].exits: got [4.0, 1.0], want [x, y] on an outer wall: the one or the other ±4.9",
+            "behaviour = 'social_force'\nenters = [4.0, 1.0]",
+            "people[0].enters: got [4.0, 1.0], want [x, y] on an outer wall: the one or the other ±4.9",
         ),
         ("behaviour = 'social_force'\nenters = [4.9]", "people[0].enters: got [4.9], want [x, y] on an outer wall"),
         (

@@ -22,6 +22,7 @@ from limo_sim.run.matching import CRITERIA, NO_PERSON, Criteria, person_of
 from limo_sim.run.provenance import code_version, scenario_hash
 from limo_sim.run.score.card import ScoreCard
 from limo_sim.run.score.subject import Mean, Subject
+from limo_sim.world.furniture import Rectangle, distance_to
 from limo_sim.world.robot import max_turn_rate
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, Truth
@@ -232,13 +233,10 @@ def _jerk(poses: Sequence[tuple[float, float, float, float]]) -> float:
 def _clearance(truth: Truth, radii: Sequence[float]) -> float:
     """Return the smallest gap between the robot's rectangle and a person's cylinder [m]; infinite without people."""
     x, y, yaw = truth.robot
-    least = math.inf
+    robot, least = Rectangle(x, y, LIMO.half_length, LIMO.half_width, yaw), math.inf
     for person, radius in zip(truth.people, radii, strict=False):
         if person is not None:
-            dx, dy = person.x - x, person.y - y
-            ahead = abs(dx * math.cos(yaw) + dy * math.sin(yaw)) - LIMO.half_length
-            beside = abs(dy * math.cos(yaw) - dx * math.sin(yaw)) - LIMO.half_width
-            least = min(least, math.hypot(max(ahead, 0), max(beside, 0)) - radius)
+            least = min(least, distance_to(robot, person.x, person.y) - radius)
     return least
 
 

@@ -1,8 +1,6 @@
-"""The scenarios in examples/arena run: robot and people meet as their summaries say."""
+"""Scenarios of rooms and people run: robot and people meet as their summaries say."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,20 +8,16 @@ import pytest
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.arena import Arena
 from limo_sim.run.baselines import controller_of
-from limo_sim.run.catalogue import load
 from limo_sim.run.episode import run_episode, score
 from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
+from limo_sim.world.scenario import Scenario
 
-SCENARIOS = sorted((Path(__file__).parents[2] / "examples" / "arena").glob("*.toml"))
-
-
-def scenario(name: str) -> Path:
-    return next(path for path in SCENARIOS if path.stem == name)
+SCENARIOS = ("flat", "gathering", "poster_wall", "side_door", "tall")
 
 
-@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_a_scenario_is_played_by_the_tracking_controller(path: Path) -> None:
-    episode = run_episode(load(str(path)), controller_of("tracking", None), detector_named("hog"), 4.0, 0)
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_scenario_is_played_by_the_tracking_controller(name: str) -> None:
+    episode = run_episode(Scenario.load(name), controller_of("tracking", None), detector_named("hog"), 4.0, 0)
     card = score(episode)
     assert card.frames == 40
     assert card.contacts_person == card.contacts_wall == 0
@@ -31,7 +25,7 @@ def test_a_scenario_is_played_by_the_tracking_controller(path: Path) -> None:
 
 
 def test_in_the_corridor_one_person_walks_ahead_and_the_other_passes_the_robot() -> None:
-    arena = Arena(load(str(scenario("corridor"))), 0)
+    arena = Arena(Scenario.load("side_door"), 0)
     places = []
     while arena.time < 25.0:
         arena.step()
@@ -45,7 +39,7 @@ def test_in_the_corridor_one_person_walks_ahead_and_the_other_passes_the_robot()
 
 
 def test_the_adult_is_as_tall_in_the_image_as_at_that_distance_and_found() -> None:
-    arena = Arena(load(str(scenario("adult"))), 0)
+    arena = Arena(Scenario.load("tall"), 0)
     detector = detector_named("hog")
     found = 0
     for _ in range(5):

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Controller, Decision
-from limo_hog.follow.safety.guard import Guard
-from limo_hog.follow.sense.detectors import Detector, detect_in
+from limo_hog.follow.safety import Guard
+from limo_hog.follow.sense.detectors import Detector, Region, detect_in
 from limo_hog.follow.sense.observation import Odometry, Scan, observed
-from limo_hog.follow.sense.region import Region
 
 S = TypeVar("S")
 

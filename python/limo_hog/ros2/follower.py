@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.detectors import Detector
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.dds import Bus, Endpoints
 from limo_hog.ros2.messages import MessageError

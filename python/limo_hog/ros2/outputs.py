@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.pipeline import Sighting
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_hog.imaging.drawing import annotate
 from limo_hog.ros2 import findings, messages, names
 from limo_hog.ros2.dds import Bus

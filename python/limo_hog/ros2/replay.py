@@ -13,8 +13,8 @@ from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, Sighting
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.detectors import Detector
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import Record, to_detections
 from limo_hog.ros2.names import COMMAND, DETECTIONS_TYPE, IMAGE, STAMPED_COMMAND_TYPE, TYPES

@@ -10,8 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import LIMO
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import LIMO, Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.run.catalogue import load
 from limo_sim.sensing import lidar

@@ -13,7 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from limo_hog.extras import needed
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.env.first import ACTIONS_PER_SECOND
 from limo_sim.env.glimpse import Glimpse, glimpse, hiding
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, Sensors
-from limo_hog.follow.sense.detectors import Detector
+from limo_hog.follow.sense.detectors import Detector, Region
 from limo_hog.follow.sense.observation import Odometry, Scan
-from limo_hog.follow.sense.region import Region
 from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FaultyDetector
 from limo_sim.sensing.camera import FOCAL_PX, Frame

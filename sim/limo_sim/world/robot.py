@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from limo_hog.follow.robot import LIMO
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import LIMO, Twist
 
 
 @dataclass(slots=True)

@@ -10,13 +10,11 @@ import pytest
 from tests.follow.control.test_backing import AHEAD, BACKING, BESIDE, GRID, HERE, NEAR, is_free_behind, looked, places
 
 from limo_hog.follow.control.backing import Other
-from limo_hog.follow.control.detour import Detour
-from limo_hog.follow.control.steer import Aim, Steering
+from limo_hog.follow.control.steer import Aim, Detour, Steering
 from limo_hog.follow.decision import Mode
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.clearance import Margin
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.twist import Twist
 
 NOBODY = places()
 

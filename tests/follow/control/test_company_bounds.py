@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from limo_hog.follow import TrackingController
 from limo_hog.follow.control.backing import Backing, Poses
 from limo_hog.follow.control.company import Company, Walker, Way, _outline_gap
-from limo_hog.follow.robot import LIMO
-from limo_hog.follow.safety.guard import Guard
+from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.safety import Guard
 from limo_hog.follow.sense.clearance import NO_POINTS
-from limo_hog.follow.twist import Twist
 
 COMPANY, STANDING = Company(), Twist()
 

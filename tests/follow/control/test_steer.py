@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from limo_hog.follow import Mode, Twist
-from limo_hog.follow.control.detour import Detour
-from limo_hog.follow.control.steer import Aim, Steering
+from limo_hog.follow.control.steer import Aim, Detour, Steering
 from limo_hog.follow.robot import LIMO
 
 STEERING = Steering()

@@ -11,9 +11,9 @@ from tests.follow.views import NOBODY, World, flat, scan_of
 
 from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Mode, Odometry, TrackingController
-from limo_hog.follow.control.memory import TrackingState
+from limo_hog.follow.control.selection import TrackingState
 from limo_hog.follow.sense.clearance import NO_POINTS
-from limo_hog.follow.tracks.poses import pose_at
+from limo_hog.follow.sense.observation import pose_at
 
 CONTROLLER = TrackingController()
 

@@ -13,8 +13,7 @@ from tests.follow.control.test_tracking_bounds import CONTROLLER, GRID, NOW, blo
 from tests.follow.views import World, flat, scan_of
 
 from limo_hog.follow import Decision, Mode, Odometry, Twist
-from limo_hog.follow.control.memory import TrackingState
-from limo_hog.follow.control.selection import Choice
+from limo_hog.follow.control.selection import Choice, TrackingState
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.sense.clearance import NO_POINTS, scan_points
 from limo_hog.follow.tracks.person import Person

@@ -14,8 +14,7 @@ from tests.follow.tracks.test_scan_movers import person, walker
 from tests.follow.views import flat, look, scan_of
 
 from limo_hog.follow import Decision, Mode, Observation, Odometry, TrackingController, Twist
-from limo_hog.follow.control.memory import TrackingState, believed
-from limo_hog.follow.control.selection import Choice
+from limo_hog.follow.control.selection import Choice, TrackingState, believed
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.sense.clearance import NO_POINTS
 from limo_hog.follow.space.grid import Ground

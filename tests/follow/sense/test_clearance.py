@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.follow.views import flat, scan
 
-from limo_hog.follow.control.detour import Detour
+from limo_hog.follow.control.steer import Detour
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import (
     NO_POINTS,

@@ -13,8 +13,8 @@ from tests.follow.tracks.test_scan_movers import FREE, GRID, HALF_VIEW, MOVERS, 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.tracks.association import Returns, all_distances
 from limo_hog.follow.tracks.kalman import Track
-from limo_hog.follow.tracks.legs import Returns, all_distances
 from limo_hog.follow.tracks.movers import Mover, is_in_view, named
 
 Place = tuple[float, float]

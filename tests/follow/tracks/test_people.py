@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from tests.follow.views import boxes, flat, look, scan_of
 
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.measurement import Measurement, measure
+from limo_hog.follow.sense.detectors import Region
+from limo_hog.follow.sense.measurement import Measurement, Visibility, measure
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.sense.region import Region
-from limo_hog.follow.sense.visibility import Visibility
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to, initiate, predict

@@ -13,8 +13,8 @@ from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid
+from limo_hog.follow.tracks.association import Returns
 from limo_hog.follow.tracks.kalman import Noise, Track
-from limo_hog.follow.tracks.legs import Returns
 from limo_hog.follow.tracks.movers import Mover, Movers
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.tracker import Tracker, Tracks

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_hog.follow import TrackingController
-from limo_hog.follow.sense.detectors import HalfSize, detect_in, detector_named
-from limo_hog.follow.sense.region import Region
+from limo_hog.follow.sense.detectors import HalfSize, Region, detect_in, detector_named
 from limo_sim.run.catalogue import load
 from limo_sim.run.detector_faults import FaultyDetector, fit_of
 from limo_sim.run.episode import run_episode

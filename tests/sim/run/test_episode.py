@@ -22,7 +22,7 @@ from limo_hog.follow import (
     Twist,
     controller_named,
 )
-from limo_hog.follow.control.memory import TrackingState
+from limo_hog.follow.control.selection import TrackingState
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.episode import Episode, run_episode
 from limo_sim.run.score import Scorer, score

@@ -12,7 +12,7 @@ import pytest
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Belief, Decision, Mode
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.run.episode import Episode, FrameRecord, Step
 from limo_sim.run.matching import Criteria
 from limo_sim.run.score import ScoreCard, Scorer, score

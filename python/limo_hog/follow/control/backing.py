@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.parameters import bounded
-from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Margin, Points, places_behind, rooms_ahead, to_odometry
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
-from limo_hog.follow.twist import Twist
 
 Poses: TypeAlias = NDArray[np.float64]
 """(..., 3): x, y [m], yaw [rad]."""

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.control.backing import Poses
+from limo_hog.follow.control.steer import advanced, all_advanced, stoppable_turn
 from limo_hog.follow.parameters import bounded
-from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Track
-from limo_hog.follow.twist import Twist
-from limo_hog.follow.wheels import advanced, all_advanced, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,26 +10,20 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.control.backing import Backing, Poses
 from limo_hog.follow.control.company import Company, Way, walker_of
-from limo_hog.follow.control.detour import Detour
-from limo_hog.follow.control.lookout import Lookout
-from limo_hog.follow.control.memory import TrackingState, believed
-from limo_hog.follow.control.search import Search
-from limo_hog.follow.control.selection import Choice, Selection
-from limo_hog.follow.control.steer import Aim, Steering
+from limo_hog.follow.control.lookout import Lookout, Search
+from limo_hog.follow.control.selection import Choice, Selection, TrackingState, believed
+from limo_hog.follow.control.steer import Aim, Detour, Steering, Wheels, stoppable_turn
 from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import bounded
-from limo_hog.follow.robot import LIMO, RobotGeometry
+from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, Points, scan_points, to_odometry
-from limo_hog.follow.sense.observation import Observation, Odometry, Scan
-from limo_hog.follow.sense.region import Region, RegionSize
+from limo_hog.follow.sense.detectors import Region, RegionSize
+from limo_hog.follow.sense.observation import Observation, Odometry, Scan, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.routes import point_ahead
 from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates, wrap
 from limo_hog.follow.tracks.person import Person
-from limo_hog.follow.tracks.poses import pose_at
 from limo_hog.follow.tracks.tracker import Tracker
-from limo_hog.follow.twist import Twist
-from limo_hog.follow.wheels import Wheels, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from limo_hog.follow.sense.appearance import Clothes, chi_squared
+from limo_hog.follow.sense.observation import Clothes, chi_squared
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
 

@@ -19,8 +19,8 @@ from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
+from limo_hog.follow.tracks.association import Legs, Returns, all_distances, distances
 from limo_hog.follow.tracks.kalman import Noise, Track
-from limo_hog.follow.tracks.legs import Legs, Returns, all_distances, distances
 from limo_hog.follow.tracks.person import Person
 
 

@@ -9,20 +9,15 @@ from functools import partial
 import numpy as np
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.sense.appearance import Clothes
 from limo_hog.follow.sense.clearance import Points
-from limo_hog.follow.sense.measurement import Measurement, measure
-from limo_hog.follow.sense.observation import Observation, Odometry
-from limo_hog.follow.sense.visibility import Visibility
+from limo_hog.follow.sense.measurement import Measurement, Visibility, measure
+from limo_hog.follow.sense.observation import Clothes, Observation, Odometry, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
-from limo_hog.follow.tracks.association import Association
-from limo_hog.follow.tracks.existence import Existence, Recall
+from limo_hog.follow.tracks.association import Association, Legs, Returns, returns_of
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
-from limo_hog.follow.tracks.legs import Legs, Returns, returns_of
 from limo_hog.follow.tracks.movers import Mover, Movers, named
-from limo_hog.follow.tracks.person import Person, initiate, predict
-from limo_hog.follow.tracks.poses import pose_at
+from limo_hog.follow.tracks.person import Existence, Person, Recall, initiate, predict
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,8 +58,3 @@ class Twist:
 
     linear: float = 0.0
     angular: float = 0.0
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether both speeds are numbers a motor can be given."""
-        return math.isfinite(self.linear) and math.isfinite(self.angular)

@@ -186,7 +186,7 @@ class Guard(Generic[S]):
         def decision(twist: Twist, mode: Mode, reason: str) -> Decision[GuardState[S]]:
             return Decision(twist, state, mode, reason, proposed.target, proposed.region, proposed.belief)
 
-        if not proposed.twist.is_finite:
+        if not (math.isfinite(proposed.twist.linear) and math.isfinite(proposed.twist.angular)):
             return decision(Twist(), Mode.BLOCKED, "the controller's command is not a number")
         if scan is not None and now - scan.stamp > self.max_age_s:
             return decision(Twist(), Mode.BLOCKED, f"the scan is {now - scan.stamp:.1f} s old")

@@ -16,7 +16,7 @@ from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.places import Places, Wandering
 from limo_hog.follow.space.routes import Router, point_ahead
-from limo_hog.follow.tracks.kalman import Track, wrap
+from limo_hog.follow.tracks.kalman import Track
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +210,7 @@ class Lookout:
         return Places(now, chosen, np.zeros((count, 2)), hunt.places.seed + 1)
 
     def _off(self, goal: Points, pose: Odometry) -> float:
-        return wrap(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.yaw)
+        return math.remainder(math.atan2(goal[1] - pose.y, goal[0] - pose.x) - pose.yaw, math.tau)
 
 
 @dataclass(frozen=True, slots=True)

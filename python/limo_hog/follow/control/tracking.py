@@ -21,7 +21,7 @@ from limo_hog.follow.sense.detectors import Region, RegionSize
 from limo_hog.follow.sense.observation import Observation, Odometry, Scan, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.routes import point_ahead
-from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates, wrap
+from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.tracker import Tracker
 
@@ -196,7 +196,7 @@ class TrackingController:
         begun = None
         if state.way_out is not None:
             yaw, speed, since = state.way_out
-            begun = Way(wrap(yaw - pose.yaw), speed, now - since)
+            begun = Way(math.remainder(yaw - pose.yaw, math.tau), speed, now - since)
 
         tracks, seen, own = self.tracker.around(state.tracks, person, now, self.steering.coast_s)
         felt = self.tracker.movers.felt(state.tracks.movers, now)
@@ -371,7 +371,7 @@ class TrackingController:
     def _along(self, way: Points, obstacles: Points, pose: Odometry) -> float:
         """Return the direction along a way [rad], or one near it that is free."""
         x, y = point_ahead(way, pose, self.lookout.ahead)
-        off = wrap(math.atan2(y - pose.y, x - pose.x) - pose.yaw)
+        off = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.yaw, math.tau)
         near = self.detour.near(obstacles, off, self.robot) if abs(off) < self.lookout.aside else None
         return off if near is None else near
 

@@ -61,8 +61,8 @@ class Measurement:
 def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]:
     """Return every box as a measurement, in the boxes' order; the range is from the depth image."""
     measurements = []
-    depths = observation.depth
-    for index, (box, score) in enumerate(observation.detections):
+    depths, found = observation.depth, observation.detections
+    for index, (box, score) in enumerate(zip(found.boxes, found.scores.tolist(), strict=True)):
         clothes = None if observation.clothes is None else observation.clothes[index]
         if clothes is not None and not np.isfinite(clothes).all():
             clothes = None
@@ -86,7 +86,7 @@ def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]
 
 def box_centre(box: NDArray[np.int32]) -> tuple[int, int]:
     """Return the centre [px] of an int32 (4,) box x, y, w, h."""
-    x, y, w, h = (int(value) for value in box)
+    x, y, w, h = box.tolist()
     return x + w // 2, y + h // 2
 
 
@@ -168,7 +168,7 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
     strips
         Where to look.
     """
-    x, y, w, h = (int(value) for value in box)
+    x, y, w, h = box.tolist()
     band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
     centre = x + w / 2
 
@@ -184,7 +184,7 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
     seen = [side for side in sides if side is not None]
     if middle is None or not seen:
         return None
-    return len(seen) / sum(1.0 / side for side in seen) - middle
+    return len(seen) / sum([1.0 / side for side in seen]) - middle
 
 
 @dataclass(frozen=True, slots=True)

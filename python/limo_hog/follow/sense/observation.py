@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,6 +205,8 @@ class Observation:
     remembered
         float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
         not look. `Guard` fills it in; None without it.
+    now
+        The newest stamp of all sensors [s]: a camera frame may arrive late.
     """
 
     stamp: float
@@ -219,13 +222,12 @@ class Observation:
     clothes: Clothes | None = None
     between: tuple[tuple[Scan, Odometry], ...] = ()
     remembered: NDArray[np.float64] | None = None
+    now: float = field(init=False)
 
-    @property
-    def now(self) -> float:
-        """The newest stamp of all sensors [s]: a camera frame may arrive late."""
-        scan, odometry = self.scan, self.odometry
-        newest = self.stamp if scan is None else max(self.stamp, scan.stamp)
-        return newest if odometry is None else max(newest, odometry.stamp)
+    def __post_init__(self) -> None:
+        newest = self.stamp if self.scan is None else max(self.stamp, self.scan.stamp)
+        newest = newest if self.odometry is None else max(newest, self.odometry.stamp)
+        object.__setattr__(self, "now", newest)
 
 
 def observed(
@@ -265,7 +267,7 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
         x = last.x + last.linear * ahead * math.cos(last.yaw)
         y = last.y + last.linear * ahead * math.sin(last.yaw)
         return Odometry(stamp, x, y, yaw, last.linear, last.angular)
-    after = bisect.bisect_left(poses, stamp, key=lambda pose: pose.stamp)
+    after = bisect.bisect_left(poses, stamp, key=attrgetter("stamp"))
     if after == 0:
         first = poses[0]
         return Odometry(stamp, first.x, first.y, first.yaw, last.linear, last.angular)

@@ -23,7 +23,7 @@ from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry, Scan
-from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update, wrap
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to
 
 
@@ -144,7 +144,7 @@ class Association:
         """Whether two boxes are on one person: at the same place, in the same clothes."""
         if self.appearance.cost(other.clothes, seen.clothes) > self.appearance.other:
             return False
-        turn = wrap(seen.bearing - other.bearing)
+        turn = math.remainder(seen.bearing - other.bearing, math.tau)
         one, two = seen.range or other.range, other.range or seen.range
         if one is None or two is None:
             return abs(turn) < self.same_place / self.unknown.distance

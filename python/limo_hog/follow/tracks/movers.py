@@ -295,4 +295,5 @@ def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeo
     """Whether the lidar looked at a track's place, `half_view` [rad] to either side of straight ahead."""
     pose = returns.pose
     x, y = lidar_at(pose, robot)
-    return abs(kalman.wrap(math.atan2(track.mean[1] - y, track.mean[0] - x) - pose.yaw)) < half_view
+    off = math.atan2(track.mean[1] - y, track.mean[0] - x) - pose.yaw
+    return abs(math.remainder(off, math.tau)) < half_view

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Clothes, Odometry
 from limo_hog.follow.tracks import kalman
-from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, wrap
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +43,8 @@ class Person:
         Clothes and window as the last box showed them; None where it did not.
     strained
         Whether the last box was not where the person was expected, or not of their size.
+    measured
+        Stamp of the last frame or scan that showed the person [s].
     """
 
     number: int
@@ -59,16 +61,15 @@ class Person:
     worn: Clothes | None = None
     tall: float | None = None
     strained: bool = False
+    measured: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "measured", max(self.seen, self.felt))
 
     @property
     def existence(self) -> float:
         """Probability of being a person [0 … 1]."""
         return 1.0 / (1.0 + math.exp(-self.log_odds))
-
-    @property
-    def measured(self) -> float:
-        """Stamp of the last frame or scan that showed the person [s]."""
-        return max(self.seen, self.felt)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +120,7 @@ def separation(one: Person, other: Person) -> float:
 def distance_to(person: Person, seen: Measurement, pose: Odometry) -> float:
     """Return the distance between a track and a box [m]; to a box without a range, across the line of sight."""
     bearing, distance = bearing_range(person.track, pose)
-    turn = wrap(seen.bearing - bearing)
+    turn = math.remainder(seen.bearing - bearing, math.tau)
     if seen.range is None:
         return abs(distance * math.tan(turn)) if abs(turn) < 1 else math.inf
     return math.hypot(distance - seen.range * math.cos(turn), seen.range * math.sin(turn))

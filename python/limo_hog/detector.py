@@ -269,13 +269,14 @@ class PeopleDetector:
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Return the indices of the hits that stay, best first, and their scores."""
         overlap = _NMS[self.nms] if self.overlap is None else self.overlap
-        # People are compared, not windows: those of two people side by side share most of their margins.
-        boxes = self._model.person_box.inside(windows)
         if overlap is None:
             kept = np.argsort(-scores, kind="stable")
-        elif self.nms == "soft":
+            return kept, scores[kept]
+        # People are compared, not windows: those of two people side by side share most of their margins.
+        boxes = self._model.person_box.inside(windows)
+        if self.nms == "soft":
             return soft_nms(boxes, scores, overlap**2, threshold)
-        elif self.nms == "overlap":
+        if self.nms == "overlap":
             kept = nms(boxes, scores, overlap, intersection_over_smaller)
         else:
             kept = nms(boxes, scores, overlap)

@@ -191,12 +191,12 @@ class Guard(Generic[S]):
         if scan is not None and now - scan.stamp > self.max_age_s:
             return decision(Twist(), Mode.BLOCKED, f"the scan is {now - scan.stamp:.1f} s old")
         around = from_odometry(state.scan_points, pose)
-        ahead = self._speed(room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot))
-        room = room_behind(around, self.margin, self.robot)
-        behind = self._speed(room)
+        room = room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot)
+        ahead = speed_within(room, self.braking, self.reaction_s)
+        behind = speed_within(room_behind(around, self.margin, self.robot), self.braking, self.reaction_s)
         fastest = self.max_blind
         if scan is not None and odometry is not None and proposed.twist.linear < 0:
-            seen = self._speed(room_seen_behind(state.looks, pose, self.robot))
+            seen = speed_within(room_seen_behind(state.looks, pose, self.robot), self.braking, self.reaction_s)
             behind, fastest = min(behind, max(seen, self.unseen_speed)), self.max_backward
         wanted = max(proposed.twist.linear, -fastest)
         linear = min(max(wanted, -behind), ahead)
@@ -207,9 +207,6 @@ class Guard(Generic[S]):
         if linear == 0:
             return decision(twist, Mode.BLOCKED, f"an obstacle is too close {where}")
         return decision(twist, proposed.mode, f"slowed by an obstacle {where}")
-
-    def _speed(self, room: float) -> float:
-        return speed_within(room, self.braking, self.reaction_s)
 
     def _remember(self, state: GuardState[S], scan: Scan | None, odometry: Odometry | None) -> GuardState[S]:
         """Add a new scan; of earlier returns, keep those that are recent and out of the lidar's field of view now."""
@@ -283,10 +280,6 @@ def _boxes(observation: Observation) -> str:
 _STEP = 40
 
 
-def _any_valid(depth: NDArray[np.float32]) -> bool:
-    return bool(np.any(np.isfinite(depth) & (depth > 0)))
-
-
 def _depth(observation: Observation) -> str:
     depth = observation.depth
     if depth is None:
@@ -294,9 +287,10 @@ def _depth(observation: Observation) -> str:
     if depth.shape != (observation.height, observation.width):
         return f"the depth image is {depth.shape}, the camera's {(observation.height, observation.width)}"
     # Among a few pixels one is nearly always valid; to look at all takes a tenth of the follower's time.
-    if not _any_valid(depth[::_STEP, ::_STEP]) and not _any_valid(depth):
-        return "the depth image has no valid pixel"
-    return ""
+    for some in (depth[::_STEP, ::_STEP], depth):
+        if (np.isfinite(some) & (some > 0)).any():
+            return ""
+    return "the depth image has no valid pixel"
 
 
 def scan_fault(scan: Scan | None) -> str:
@@ -321,4 +315,4 @@ def _odometry(odometry: Odometry | None) -> str:
     if odometry is None:
         return ""
     values = (odometry.x, odometry.y, odometry.yaw, odometry.linear, odometry.angular)
-    return "" if all(math.isfinite(value) for value in values) else "the odometry is not a number"
+    return "" if all(map(math.isfinite, values)) else "the odometry is not a number"

@@ -83,9 +83,10 @@ class Watching:
 
     def watch(self, moment: Moment) -> None:
         """Keep and show a moment; returns when the run may go on."""
-        with held():
-            for keep in self.keepers:
-                keep(moment)
+        if self.keepers:
+            with held():
+                for keep in self.keepers:
+                    keep(moment)
         if self.view is not None:
             self.view.watch(moment)
 

@@ -205,13 +205,13 @@ class Company:
             At most so fast it backs onto other ground [m/s].
         """
         people = np.array([(one.x, one.y, one.vx, one.vy) for one in walkers]).reshape(-1, 4)
-        is_followed = np.array([one.followed for one in walkers], bool)
         pace = np.hypot(people[:, 2], people[:, 3])
         coming = pace > self.slowest
         # Those who come no nearer than they are, whatever the robot does, need no way.
         coming &= (people[:, :2] * people[:, 2:]).sum(axis=1) < 0
         if not coming.any():
             return None
+        is_followed = np.array([one.followed for one in walkers], bool)
         goal = people[is_followed]
         people, is_followed = people[coming], is_followed[coming]
         straight = self._driven_on(wanted, now, acceleration, robot)

@@ -105,18 +105,18 @@ class Selection:
             return choice
         likeness = self.identity.update(choice.likeness, tracks)
         choice = replace(choice, likeness=likeness)
-        about = [one for one in self.measured(tracks) if likeness.of(one.number) >= self.possible]
-        about.sort(key=lambda one: -likeness.of(one.number))
+        chances, measured = dict(likeness.chances), self.measured(tracks)
+        about = [one for one in measured if chances[one.number] >= self.possible]
+        about.sort(key=lambda one: -chances[one.number])
         if about:
             best, *rest = about
-            chance = likeness.of(best.number)
-            next_best = likeness.of(rest[0].number) if rest else 0.0
+            chance = chances[best.number]
+            next_best = chances[rest[0].number] if rest else 0.0
             if chance >= self.likely and chance >= self.odds * next_best:
-                measured = best.measured if chance >= self.identity.sure else choice.measured
-                return Choice(best.number, likeness, measured)
+                return Choice(best.number, likeness, best.measured if chance >= self.identity.sure else choice.measured)
             since = now if choice.unsure_at is None else choice.unsure_at
             choice = replace(choice, unsure_at=since)
-            if rest and sum(likeness.of(one.number) for one in about) >= self.likely:
+            if rest and sum(chances[one.number] for one in about) >= self.likely:
                 if now - since > self.decide_s:
                     likeness = replace(likeness, chances=((best.number, self.likely),))
                     return Choice(best.number, likeness, choice.measured)
@@ -125,7 +125,7 @@ class Selection:
                 # The person may have come back: they are looked at, not turned away from.
                 return replace(choice, candidates=(best.number,))
         choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)
-        if followed is not None and followed in self.measured(tracks) and likeness.of(followed.number) < self.possible:
+        if followed is not None and followed in measured and chances[followed.number] < self.possible:
             # The track went over to another person.
             return replace(choice, number=None)
         if followed is not None and not self.is_candidate(followed):

@@ -106,9 +106,8 @@ class Steering:
         """
         heading = aim.bearing if aim.heading is None else aim.heading
         most = self.max_angular if abs(aim.bearing) < robot.field_of_view / 2 else self.regain_angular
-        facing, angular = (
-            min(max(self.angular_gain * off + aim.bearing_rate, -most), most) for off in (aim.bearing, heading)
-        )
+        facing = min(max(self.angular_gain * aim.bearing + aim.bearing_rate, -most), most)
+        angular = min(max(self.angular_gain * heading + aim.bearing_rate, -most), most)
         error = aim.distance - robot.camera_x - target_distance
         # Driving sideways to the person would lose sight of them: turn first, then drive.
         linear = (self.linear_gain * error + aim.range_rate) * max(math.cos(heading), 0.0) ** 2
@@ -229,14 +228,15 @@ class Detour:
         most = self.steps if steps is None else steps
         # What is further off is in no direction's way.
         near = obstacles.compress(np.hypot(*obstacles.T) < reach + robot.half_length + self.margin.ahead, axis=0)
-        detours = [self.step * index for index in range(-most, most + 1)]
-        detours.sort(key=lambda detour: abs(detour) + self.preference * abs(detour - preferred))
+        detours = self.step * np.arange(-most, most + 1)
+        costs = np.abs(detours) + self.preference * np.abs(detours - preferred)
+        detours = detours[costs.argsort(kind="stable")]
         # Mostly the best is free: to look at it alone takes half of the time of all.
         for some in (detours[:1], detours[1:]):
-            rooms = rooms_ahead(near, bearing + np.array(some), self.margin, robot)
+            rooms = rooms_ahead(near, bearing + some, self.margin, robot)
             free = (rooms >= reach).nonzero()[0]
             if len(free):
-                return bearing + some[int(free[0])]
+                return bearing + float(some[free[0]])
         return None
 
 

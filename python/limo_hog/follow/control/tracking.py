@@ -165,8 +165,8 @@ class TrackingController:
         off = aim.bearing if aim.heading is None else max(aim.bearing, aim.heading, key=abs)
         most = float(stoppable_turn(off, state.acceleration, self.robot)) + abs(aim.bearing_rate)
         twist = Twist(twist.linear, min(max(twist.angular, -most), most))
-        pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
-        facing, others = np.array([0.0, 0.0, aim.bearing]), state.others
+        others, wanted = state.others, aim.distance - self.robot.camera_x - keeps
+        pose, facing = pose_at(state.tracks.poses, observation.now), np.array([0.0, 0.0, aim.bearing])
         if twist.linear < 0 and not self.backing.is_free_behind(
             facing, pose, self.grid, state.ground, others, self.robot
         ):

@@ -19,10 +19,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
+from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement
-from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry, Scan
+from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to
 
@@ -81,14 +80,17 @@ class Association:
         matches = []
         for who, person in enumerate(people):
             for which, seen in enumerate(measurements):
-                if (
-                    (who, which) in others
-                    or self._is_behind(person, seen, pose)
-                    or (person.confirmed and which in flat)
-                ):
+                if (who, which) in others or (person.confirmed and which in flat):
                     continue
-                clothes_cost = self.appearance_cost(person, seen)
-                ranged = self.without_bad_range(person, seen)
+                ranged, clothes_cost = seen, 0.0
+                if self.fits_size(person, seen):
+                    clothes_cost = self.appearance.cost(person.clothes, seen.clothes, slips=seen.is_low(self.low))
+                elif seen.range is not None:
+                    if seen.range > bearing_range(person.track, pose)[1] + self.same_place:
+                        # On something behind the person: further away, and of another size.
+                        continue
+                    # On a part of the body: its patches are not on shirt and trousers; or something stands before it.
+                    ranged = replace(seen, range=None)
                 fit = innovation(person.track, ranged.bearing, ranged.range, pose, noise)
                 cost = fit.distance2 + fit.log_volume_ratio + clothes_cost
                 # A confirmed person may turn sharply, out of the gate; a pillar does not.
@@ -108,15 +110,6 @@ class Association:
         found = (person for person in people if person.misses == 0)
         return all(distance_to(person, seen, pose) >= self.same_place for person in found)
 
-    def appearance_cost(self, person: Person, seen: Measurement) -> float:
-        """Return how much the clothes in a box differ from the person's (chi-squared); 0 where they cannot be told.
-
-        A box of another size than the person's is on a part of a body, and its patches are not on shirt and trousers.
-        """
-        if not self.fits_size(person, seen):
-            return 0.0
-        return self.appearance.cost(person.clothes, seen.clothes, slips=seen.is_low(self.low))
-
     def fits_size(self, person: Person, seen: Measurement) -> bool:
         """Whether a box is as high as the person's window at its range; true where the range is unknown."""
         if seen.range is None:
@@ -129,16 +122,6 @@ class Association:
         Where the head is cut off, or the box sits lower, they are not.
         """
         return seen.clothes if seen.range is None or (seen.whole and not seen.is_low(self.low)) else None
-
-    def without_bad_range(self, person: Person, seen: Measurement) -> Measurement:
-        """Return a box without its range where its size contradicts it: something stands in front of the person."""
-        return seen if self.fits_size(person, seen) else replace(seen, range=None)
-
-    def _is_behind(self, person: Person, seen: Measurement, pose: Odometry) -> bool:
-        """Whether a box is on something behind the person: further away, and of another size."""
-        if seen.range is None or self.fits_size(person, seen):
-            return False
-        return seen.range > bearing_range(person.track, pose)[1] + self.same_place
 
     def _is_double(self, seen: Measurement, other: Measurement) -> bool:
         """Whether two boxes are on one person: at the same place, in the same clothes."""
@@ -168,11 +151,6 @@ class Returns:
     stamp: float
     points: Points
     pose: Odometry
-
-
-def returns_of(scan: Scan, pose: Odometry, robot: RobotGeometry) -> Returns:
-    """Take a scan into the odometry frame; `pose` is where the robot was when it was taken."""
-    return Returns(scan.stamp, to_odometry(scan_points(scan, robot), pose), pose)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,14 +207,14 @@ class Legs:
 
         The track is predicted for the scan's stamp; `pose` is where the robot was then.
         """
-        distance = bearing_range(track, pose)[1]
+        x, y, vx, vy = track.mean
+        distance = math.hypot(x - pose.x, y - pose.y)
         if len(legs) < self.fewest or distance > self.reach:
             return None
         # Of a few points, lists are faster than arrays.
         xs, ys = legs.T.tolist()
         if math.hypot(max(xs) - min(xs), max(ys) - min(ys)) > self.widest:
             return None
-        _, _, vx, vy = track.mean
         dx = sum(xs) / len(xs) + self.trail_s * vx - pose.x
         dy = sum(ys) / len(ys) + self.trail_s * vy - pose.y
         bearing = math.atan2(dy, dx) - pose.yaw

@@ -265,12 +265,13 @@ class Movers:
         group, (first,) = begins.cumsum() - 1, begins.nonzero()
         count = np.bincount(group)
         here, last = returns.pose, first + count - 1
-        begun, ended = (np.hypot(x[at] - here.x, y[at] - here.y) for at in (first[1:], last[:-1]))
+        far = np.hypot(x - here.x, y - here.y)
+        begun, ended = far[first[1:]], far[last[:-1]]
         legs = count >= self.legs.fewest
         legs[1:] &= ended >= begun
         legs[:-1] &= begun >= ended
-        wide = np.hypot(*(np.maximum.reduceat(column, first) - np.minimum.reduceat(column, first) for column in (x, y)))
-        legs &= wide < self.legs.widest
+        extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
+        legs &= np.hypot(*extent.T) < self.legs.widest
         middle = np.empty((len(first), 2))
         middle[:, 0], middle[:, 1] = np.bincount(group, x) / count, np.bincount(group, y) / count
         near = np.hypot(middle[:, 0] - here.x, middle[:, 1] - here.y) < self.legs.reach

@@ -239,7 +239,7 @@ class PeopleDetector:
             )
             for hog in self._hogs
         ]
-        boxes, scores = (np.concatenate(parts) for parts in zip(*hits, strict=True))
+        boxes, scores = map(np.concatenate, zip(*hits, strict=True))
         kept, scores = self._one_of_many(boxes, scores, threshold)
         zoom = np.array(first_level) / image.shape[1::-1]
         found = boxes[kept] / np.tile(zoom, 2)

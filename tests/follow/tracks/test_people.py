@@ -240,7 +240,6 @@ def test_a_box_is_as_high_as_the_person_to_within_35_hundredths() -> None:
     for share, fits in ((0.66, True), (0.64, False), (1.34, True), (1.36, False)):
         seen = replace(box(2.0), height=100, range=share * WINDOW / 100)
         assert TRACKER.association.fits_size(a_person(1, 2.0), seen) == fits
-        assert (TRACKER.association.without_bad_range(a_person(1, 2.0), seen) is seen) == fits
     assert TRACKER.association.fits_size(a_person(1, 2.0), replace(box(2.0), range=None))
 
 

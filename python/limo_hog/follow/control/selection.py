@@ -95,7 +95,6 @@ class Selection:
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
         """Follow the track that is the person followed so far; before there is one, the likeliest person in view."""
         now = tracks.stamp or 0.0
-        followed = tracks.person(choice.number)
         if choice.likeness is None or choice.measured is None or now - choice.measured > self.reidentify_s:
             choice = self._anybody(tracks, choice)
             followed = tracks.person(choice.number)
@@ -125,6 +124,7 @@ class Selection:
                 # The person may have come back: they are looked at, not turned away from.
                 return replace(choice, candidates=(best.number,))
         choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)
+        followed = tracks.person(choice.number)
         if followed is not None and followed in measured and chances[followed.number] < self.possible:
             # The track went over to another person.
             return replace(choice, number=None)

@@ -13,6 +13,7 @@ from limo_hog.follow.decision import Mode
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Margin, Points, rooms_ahead
+from limo_hog.follow.sense.measurement import PERSON_RADIUS
 from limo_hog.follow.sense.observation import Odometry
 
 
@@ -160,7 +161,7 @@ class Detour:
         Along a planned way, directions tried to either side [1], and how far one must be free [m]. Chosen: 1.2 rad, as
         the corner of a corridor of 1 m needs; almost the robot's length.
     person_radius
-        Returns nearer than this to the person are the person's own [m]. Chosen: legs in mid-stride and an arm.
+        Returns nearer than this to the person are the person's own [m].
     occluder_half_width
         Something so near to the line of sight hides the person [m]. Chosen: a pillar this wide hides half of a body.
     """
@@ -173,7 +174,7 @@ class Detour:
     lean_s: float = 2.0
     steps_near: int = 15
     creep: float = 0.25
-    person_radius: float = 0.45
+    person_radius: float = PERSON_RADIUS
     occluder_half_width: float = 0.12
 
     def obstacles(self, points: Points, bearing: float, distance: float) -> Points:

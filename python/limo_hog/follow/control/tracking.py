@@ -165,14 +165,14 @@ class TrackingController:
         off = aim.bearing if aim.heading is None else max(aim.bearing, aim.heading, key=abs)
         most = float(stoppable_turn(off, state.acceleration, self.robot)) + abs(aim.bearing_rate)
         twist = Twist(twist.linear, min(max(twist.angular, -most), most))
-        others, wanted = state.others, aim.distance - self.robot.camera_x - keeps
-        pose, facing = pose_at(state.tracks.poses, observation.now), np.array([0.0, 0.0, aim.bearing])
-        if twist.linear < 0 and not self.backing.is_free_behind(
-            facing, pose, self.grid, state.ground, others, self.robot
-        ):
-            if self.backing.is_blocked(pose, self.grid, state.ground, self.robot):
+        wanted = aim.distance - self.robot.camera_x - keeps
+        if twist.linear < 0:
+            facing, others = np.array([0.0, 0.0, aim.bearing]), state.others
+            pose, ground = pose_at(state.tracks.poses, observation.now), state.ground
+            seen_free = self.backing.is_free_behind(facing, pose, self.grid, ground, others, self.robot)
+            if not seen_free and self.backing.is_blocked(pose, self.grid, ground, self.robot):
                 twist = Twist(0.0, twist.angular)
-            else:
+            elif not seen_free:
                 limit = self.backing.blind_limit(others, pose, self.robot, observation.now)
                 twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None

@@ -13,6 +13,10 @@ from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Clothes, Observation
 
+#: What is nearer than this to a person's axis is the person's own [m]. Chosen: legs in mid-stride and an arm.
+PERSON_RADIUS = 0.45
+#: How fast people walk whom nothing shows [m/s]. Chosen: a brisk walk; the workshop's person walks at .75.
+WALK = 1.0
 #: Height of HOG's window, in statures: the person in it is 96 of 128 px high (Dalal and Triggs 2005).
 WINDOW_PER_STATURE = 4 / 3
 
@@ -181,10 +185,10 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
 
     middle = depth_of(-strips.chest, strips.chest)
     sides = [depth_of(-strips.outer, -strips.inner), depth_of(strips.inner, strips.outer)]
-    seen = [side for side in sides if side is not None]
-    if middle is None or not seen:
+    inverse = [1.0 / side for side in sides if side is not None]
+    if middle is None or not inverse:
         return None
-    return len(seen) / sum([1.0 / side for side in seen]) - middle
+    return len(inverse) / sum(inverse) - middle
 
 
 @dataclass(frozen=True, slots=True)

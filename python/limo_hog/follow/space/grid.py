@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, beam_directions, lidar_at, to_odometry
+from limo_hog.follow.sense.measurement import PERSON_RADIUS
 from limo_hog.follow.sense.observation import Odometry, Scan
 
 Cells = NDArray[np.int64]
@@ -68,7 +69,7 @@ class Grid:
     lowest, highest
         Limits of the log-odds. Chosen: what has moved away is forgotten after seven scans, about a second.
     person_radius
-        Returns nearer than this to a tracked person are the person's and fill no cell [m]. Chosen: as `Detour`'s.
+        Returns nearer than this to a tracked person are the person's and fill no cell [m].
     period_s
         A scan sooner after the last one entered is left out [s]. Chosen: half the computing, and nothing that stands is
         missed.
@@ -87,7 +88,7 @@ class Grid:
     hit: float = 0.9
     lowest: float = -1.2
     highest: float = 2.5
-    person_radius: float = 0.45
+    person_radius: float = PERSON_RADIUS
     period_s: float = 0.2
     lasts_s: float = 6.0
     own_radius: float = 0.2

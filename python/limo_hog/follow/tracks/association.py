@@ -233,5 +233,5 @@ def distances(points: Points, track: Track) -> NDArray[np.float64]:
 
 def all_distances(points: Points, tracks: Sequence[Track]) -> NDArray[np.float64]:
     """Return `distances` of M tracks at once, float64 (M, N) [m]."""
-    places = np.array([track.place for track in tracks]).reshape(-1, 2, 1)
-    return np.asarray(np.hypot(points[:, 0] - places[:, 0], points[:, 1] - places[:, 1]))
+    means = np.array([track.mean for track in tracks]).reshape(-1, 4, 1)
+    return np.asarray(np.hypot(points[:, 0] - means[:, 0], points[:, 1] - means[:, 1]))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from limo_hog.follow.sense.measurement import WALK
 from limo_hog.follow.sense.observation import Clothes, chi_squared
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
@@ -150,7 +151,7 @@ class Identity:
     swaps: float = 0.2
     unseen_s: float = 0.3
     reach: float = 0.5
-    speed: float = 1.0
+    speed: float = WALK
     clear: float = 6.0
     rate: float = 0.05
     remembered: int = 8

@@ -161,8 +161,8 @@ class Movers:
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
-        places = [one.track.place for one in movers if now - one.felt < self.forget_s]
-        return np.array(places).reshape(-1, 2)
+        means = [one.track.mean for one in movers if now - one.felt < self.forget_s]
+        return np.array(means).reshape(-1, 4)[:, :2]
 
     def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
         """Note whose legs they are: one mover to one person found by the camera, the nearest first."""

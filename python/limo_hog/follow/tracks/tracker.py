@@ -10,7 +10,7 @@ import numpy as np
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
-from limo_hog.follow.sense.measurement import Measurement, Visibility, measure
+from limo_hog.follow.sense.measurement import WALK, Measurement, Visibility, measure
 from limo_hog.follow.sense.observation import Clothes, Observation, Odometry, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
@@ -100,7 +100,7 @@ class Tracker:
     scan_period_s
         A scan may be so much older than the image it is used with [s]: the lidar's period of 0.125 s at 8 Hz.
     walk
-        How fast people walk who are not measured [m/s]. Chosen: a brisk walk.
+        How fast people walk who are not measured [m/s].
     min_period_s, max_period_s
         Limits of the time between two frames as it is used to predict the next [s]. Chosen: 2 to 50 Hz.
     robot
@@ -123,7 +123,7 @@ class Tracker:
     poses_s: float = 2.0
     scans_s: float = 1.0
     scan_period_s: float = 0.13
-    walk: float = 1.0
+    walk: float = WALK
     min_period_s: float = 0.02
     max_period_s: float = 0.5
     robot: RobotGeometry = LIMO
@@ -260,10 +260,11 @@ class Tracker:
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
                 track = self.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
-        for mover in self.movers.moving(tracks.movers) if unseen > 0 else ():
-            # What stands could be a chair; what moved on from where the person was is the person.
-            if mover.number == person.number and mover.felt > now.measured:
-                now = replace(now, track=mover.track, felt=mover.felt)
+        if unseen > 0:
+            for mover in self.movers.moving(tracks.movers):
+                # What stands could be a chair; what moved on from where the person was is the person.
+                if mover.number == person.number and mover.felt > now.measured:
+                    now = replace(now, track=mover.track, felt=mover.felt)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
         people = [kept if one.number == person.number else one for one in tracks.people]
         return now, replace(tracks, people=tuple(people))
@@ -286,7 +287,8 @@ class Tracker:
         movers, new = tracks.movers, [one for one in tracks.scans if one.stamp > tracks.moved_at]
         if not new:
             return tracks
-        people, seen = tracks.people, [one for one in tracks.in_view if one.confirmed]
+        people = tracks.people
+        seen = [one for one in people if one.confirmed and one.seen == tracks.stamp]
         for returns in new:
             movers = self.movers.update(movers, returns, half_view, self.noise, grid, ground, camera)
             movers = self.movers.assign(movers, seen, returns.stamp)

@@ -239,7 +239,7 @@ class PeopleDetector:
             )
             for hog in self._hogs
         ]
-        boxes, scores = map(np.concatenate, zip(*hits, strict=True))
+        boxes, scores = (np.concatenate(parts) for parts in zip(*hits, strict=True))
         kept, scores = self._one_of_many(boxes, scores, threshold)
         zoom = np.array(first_level) / image.shape[1::-1]
         found = boxes[kept] / np.tile(zoom, 2)
@@ -269,14 +269,13 @@ class PeopleDetector:
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Return the indices of the hits that stay, best first, and their scores."""
         overlap = _NMS[self.nms] if self.overlap is None else self.overlap
-        if overlap is None:
-            kept = np.argsort(-scores, kind="stable")
-            return kept, scores[kept]
         # People are compared, not windows: those of two people side by side share most of their margins.
         boxes = self._model.person_box.inside(windows)
-        if self.nms == "soft":
+        if overlap is None:
+            kept = np.argsort(-scores, kind="stable")
+        elif self.nms == "soft":
             return soft_nms(boxes, scores, overlap**2, threshold)
-        if self.nms == "overlap":
+        elif self.nms == "overlap":
             kept = nms(boxes, scores, overlap, intersection_over_smaller)
         else:
             kept = nms(boxes, scores, overlap)

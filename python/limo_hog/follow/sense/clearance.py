@@ -174,11 +174,11 @@ def from_odometry(points: Points, pose: Odometry) -> Points:
 
 
 #: Ground is looked at so far behind the outline, in such steps [m]. Chosen: from .6 m/s the robot stops within .51 m.
-FARTHEST, STEP = 0.6, 0.1
-_DEPTHS = tuple(np.arange(STEP, FARTHEST + 1e-9, STEP).tolist())
+FARTHEST_BEHIND, STEP_BEHIND = 0.6, 0.1
+_DEPTHS_BEHIND = tuple(np.arange(STEP_BEHIND, FARTHEST_BEHIND + 1e-9, STEP_BEHIND).tolist())
 #: A beam must reach further than the ground it shows to be free by this [m]. Chosen: three standard deviations and more
 #: of the lidar's .01 m.
-BEYOND = 0.05
+BEAM_BEYOND = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +190,7 @@ class Look:
 
 
 def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry) -> float:
-    """Return how far behind the robot's outline the ground was seen to be free [m]; `FARTHEST` at most.
+    """Return how far behind the robot's outline the ground was seen to be free [m]; `FARTHEST_BEHIND` at most.
 
     Parameters
     ----------
@@ -203,9 +203,9 @@ def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry
     """
     if not looks:
         return 0.0
-    places = to_odometry(places_behind(_DEPTHS, robot), pose)
-    unseen = ~_were_free(places, looks, robot).any(axis=0).reshape(len(_DEPTHS), -1).all(axis=1)
-    return _DEPTHS[int(np.argmax(unseen))] - STEP if unseen.any() else FARTHEST
+    places = to_odometry(places_behind(_DEPTHS_BEHIND, robot), pose)
+    unseen = ~_were_free(places, looks, robot).any(axis=0).reshape(len(_DEPTHS_BEHIND), -1).all(axis=1)
+    return _DEPTHS_BEHIND[int(np.argmax(unseen))] - STEP_BEHIND if unseen.any() else FARTHEST_BEHIND
 
 
 def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> NDArray[np.bool_]:
@@ -225,7 +225,8 @@ def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> N
     dx, dy = points[:, 0] - x, points[:, 1] - y
     ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
     # Half a step of grace: the ground just behind the outline was under it a moment ago.
-    covered = (np.abs(ahead) < robot.half_length + STEP / 2) & (np.abs(aside) < robot.half_width + STEP / 2)
+    grace = STEP_BEHIND / 2
+    covered = (np.abs(ahead) < robot.half_length + grace) & (np.abs(aside) < robot.half_width + grace)
     distance = np.hypot(ahead - robot.lidar_x, aside)
     angle = np.arctan2(aside, ahead - robot.lidar_x)
     beam = np.rint((angle - angle_min) / ((angle_max - angle_min) / np.maximum(count - 1, 1)))
@@ -236,5 +237,5 @@ def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> N
         (begins + np.minimum(np.maximum(beam, 0), count - 1)).astype(np.int64)
     ]
     # A beam that is no number, or shorter than the lidar can measure, shows nothing.
-    passed = inside & (ranges >= range_min) & (np.minimum(ranges, range_max) > distance + BEYOND)
+    passed = inside & (ranges >= range_min) & (np.minimum(ranges, range_max) > distance + BEAM_BEYOND)
     return np.asarray(covered | passed)

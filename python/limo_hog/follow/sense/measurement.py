@@ -175,16 +175,13 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
     x, y, w, h = box.tolist()
     band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
     centre = x + w / 2
-
-    def depth_of(left: float, right: float) -> float | None:
+    depths = []
+    for left, right in (-strips.chest, strips.chest), (-strips.outer, -strips.inner), (strips.inner, strips.outer):
         strip = band[:, max(round(centre + left * w), 0) : max(round(centre + right * w), 0)]
-        if strip.size == 0:
-            return None
         valid = strip[(strip > 0) & (strip < np.inf)]
-        return median(valid) if valid.size > strips.known * strip.size else strips.beyond
-
-    middle = depth_of(-strips.chest, strips.chest)
-    sides = [depth_of(-strips.outer, -strips.inner), depth_of(strips.inner, strips.outer)]
+        known = median(valid) if valid.size > strips.known * strip.size else strips.beyond
+        depths.append(known if strip.size else None)
+    middle, *sides = depths
     inverse = [1.0 / side for side in sides if side is not None]
     if middle is None or not inverse:
         return None

@@ -223,10 +223,8 @@ class Grid:
         steps = np.arange(0.5, self.reach / self.cell) * self.cell
         # So far before the end that it is in another cell.
         free = steps < clear[:, None] - 1.5 * self.cell
-        row, column = (
-            np.floor((start + steps * along[:, None]) / self.cell).astype(np.int64) - corner
-            for start, along, corner in zip(at, directions.T, ground.corner, strict=True)
-        )
+        row = np.floor((at[0] + steps * directions[:, :1]) / self.cell).astype(np.int64) - ground.corner[0]
+        column = np.floor((at[1] + steps * directions[:, 1:]) / self.cell).astype(np.int64) - ground.corner[1]
         inside = (row.view(np.uint64) < self.cells) & (column.view(np.uint64) < self.cells)
         passed: NDArray[np.int64] = (row * self.cells + column)[free & inside]
         return passed

@@ -100,9 +100,10 @@ class Association:
                     matches.append((not person.confirmed, cost, who, which))
         pairs: dict[int, int] = {}
         for _, _, who, which in sorted(matches):
-            taken = [measurements[other] for other in pairs.values()]
-            if who not in pairs and not any(self._is_double(measurements[which], other) for other in taken):
-                pairs[who] = which
+            if who not in pairs:
+                seen = measurements[which]
+                if not any(self._is_double(seen, measurements[other]) for other in pairs.values()):
+                    pairs[who] = which
         return pairs
 
     def is_new(self, seen: Measurement, people: Sequence[Person], pose: Odometry) -> bool:
@@ -195,7 +196,7 @@ class Legs:
         `is_ground` tells of points (N, 2), odometry frame, which of them are on what is known to stand there: no legs.
         """
         track = predict(track, returns.stamp, noise)
-        if bearing_range(track, returns.pose)[1] > self.reach:
+        if math.dist(track.mean[:2], (returns.pose.x, returns.pose.y)) > self.reach:
             return None
         legs = returns.points.compress(distances(returns.points, track) < self.radius, axis=0)
         if is_ground is not None and len(legs):

@@ -143,7 +143,6 @@ class Tracker:
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
-        walking = {one.number for one in moving}
         others = self.movers.others(moving, known, measured, pose, self.noise)
         pairs = self.association.pair(known, measured, pose, self.noise, flat, others)
         people: list[Person] = []
@@ -162,7 +161,8 @@ class Tracker:
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
                 # that there is one.
-                evidence = 0.0 if person.number in walking else self.existence.of_miss(chance)
+                walks = any(one.number == person.number for one in moving)
+                evidence = 0.0 if walks else self.existence.of_miss(chance)
                 people.append(self.existence.update(person, evidence, found=False))
             else:
                 people.append(person)

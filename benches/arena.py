@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 import cv2
 import numpy as np
 
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.sensing import lidar
 from limo_sim.sensing.camera import CameraPose

@@ -23,7 +23,7 @@ import numpy as np
 
 import limo_hog
 from limo_hog.follow import controller_named, detector_named
-from limo_hog.follow.safety.guard import Guard
+from limo_hog.follow.safety import Guard
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.log import Step
 from limo_sim.run.matching import CRITERIA

@@ -13,7 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from limo_hog.extras import needed
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena, Plan
 from limo_sim.run.detector_faults import Missing, misses_of
 from limo_sim.run.last_seen import SCALE, SIZE, LastSeen, sighted, state_of

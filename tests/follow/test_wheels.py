@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.control.steer import Wheels, advanced, all_advanced
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.twist import Twist
-from limo_hog.follow.wheels import Wheels, advanced, all_advanced
 
 WHEELS, PERIOD, STEP = Wheels(), 0.1, 0.02
 

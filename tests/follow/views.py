@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Observation, Odometry, Scan
-from limo_hog.follow.twist import Twist
 
 WIDTH, HEIGHT, FOCAL = 640, 480, 448.6
 RED, GREEN, BLUE = (40, 40, 170), (50, 140, 50), (130, 50, 35)

@@ -21,8 +21,8 @@ import numpy as np
 import limo_hog
 from limo_hog import HOGDescriptor
 from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_sim.world.scenario import Scenario
 

@@ -33,7 +33,7 @@ FOLLOW, ROS2, SIM = "python/limo_hog/follow", "python/limo_hog/ros2", "sim/limo_
 #: What is changed, and the tests that must notice.
 ROOMS: dict[str, tuple[list[str], list[str]]] = {
     "safety": (
-        [f"{FOLLOW}/safety/*.py", f"{FOLLOW}/sense/clearance.py"],
+        [f"{FOLLOW}/safety.py", f"{FOLLOW}/sense/clearance.py"],
         ["tests/follow/safety", "tests/follow/sense/test_clearance.py", "tests/follow/test_pipeline.py"],
     ),
     "score": (
@@ -44,7 +44,7 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
         ],
     ),
     "control": (
-        [f"{FOLLOW}/control/*.py", f"{FOLLOW}/twist.py", f"{FOLLOW}/zones.py"],
+        [f"{FOLLOW}/control/*.py", f"{FOLLOW}/robot.py"],
         [
             *("tests/follow/control", "tests/follow/sense/test_clearance.py", "tests/follow/tracks"),
             "tests/follow/test_pipeline.py",
@@ -58,9 +58,9 @@ ROOMS: dict[str, tuple[list[str], list[str]]] = {
         ],
     ),
     "sense": (
-        [f"{FOLLOW}/sense/{name}.py" for name in ("appearance", "measurement", "ranging", "region", "visibility")],
+        [f"{FOLLOW}/sense/{name}.py" for name in ("detectors", "measurement", "observation")],
         [
-            *(f"tests/follow/sense/test_{name}.py" for name in ("appearance", "region", "ranging")),
+            *(f"tests/follow/sense/test_{name}.py" for name in ("appearance", "detectors", "region", "ranging")),
             "tests/follow/tracks",
             *(
                 f"tests/follow/control/test_{name}.py"

@@ -9,8 +9,8 @@ import struct
 import numpy as np
 import pytest
 
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 
 

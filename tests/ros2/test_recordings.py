@@ -22,8 +22,8 @@ from limo_hog.detections import Detections
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import MAX_RECORD, BagError, bag_writer, read_bag
 from limo_hog.ros2.findings import detections_message

@@ -9,13 +9,11 @@ from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.pipeline import Follower, FrameLog
-from limo_hog.follow.safety.guard import Guard
-from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.follow.robot import Twist
+from limo_hog.follow.safety import Guard
+from limo_hog.follow.sense.detectors import Region, detector_named
+from limo_hog.follow.sense.measurement import Zone, person_depth, zone_of
 from limo_hog.follow.sense.observation import Frame, Observation, Odometry, Scan, Sensors
-from limo_hog.follow.sense.ranging import person_depth
-from limo_hog.follow.sense.region import Region
-from limo_hog.follow.twist import Twist
-from limo_hog.follow.zones import Zone, zone_of
 
 __all__ = [
     "CONTROLLERS",

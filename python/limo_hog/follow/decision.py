@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
+from limo_hog.follow.robot import Twist
+from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Observation
-from limo_hog.follow.sense.region import Region
-from limo_hog.follow.twist import Twist
 
 S = TypeVar("S")
 

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from limo_hog.detections import Detections, Detector
 from limo_hog.follow.decision import Controller, Decision
-from limo_hog.follow.safety.guard import Guard
-from limo_hog.follow.sense.detectors import detect_in
+from limo_hog.follow.safety import Guard
+from limo_hog.follow.sense.detectors import Region, detect_in
 from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors, observed
-from limo_hog.follow.sense.region import Region
 
 S = TypeVar("S")
 

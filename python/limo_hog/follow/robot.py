@@ -1,6 +1,6 @@
-"""The Limo: its outline, where its sensors and wheels sit, and what its camera sees.
+"""The Limo: its outline, where its sensors and wheels sit, what its camera sees, and the command it is given.
 
-Everything is in the base frame: x forward, y left, z up, origin on the floor below the middle of the body.
+Lengths are in the base frame: x forward, y left, z up, origin on the floor below the middle of the body.
 """
 
 from __future__ import annotations
@@ -42,3 +42,19 @@ class RobotGeometry:
 
 
 LIMO = RobotGeometry()
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """What a differential-drive robot is told to do; the default is to stop.
+
+    Attributes
+    ----------
+    linear
+        Forward speed [m/s], along the robot's x axis.
+    angular
+        Turn rate [rad/s] about the robot's z axis, counter-clockwise positive.
+    """
+
+    linear: float = 0.0
+    angular: float = 0.0

@@ -8,7 +8,7 @@ from typing import Any
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Believed
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.messages import default_message, to_time
 

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 from limo_hog.detections import Detector
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, FrameLog
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Frame
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.dds import Bus, BusError, Endpoints
 from limo_hog.ros2.messages import MessageError

@@ -37,8 +37,8 @@ from rosbags.typesys.stores.ros2_humble import std_msgs__msg__Header as Header
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2.definitions import add_to
 
 CAMERA_FRAME = "depth_link"

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from limo_hog.follow.pipeline import FrameLog
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_hog.imaging.drawing import annotate
 from limo_hog.ros2 import findings, messages, names
 from limo_hog.ros2.dds import Bus

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 from limo_hog.detections import Detections, Detector
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, FrameLog
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Frame
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import BagError, Record, to_detections
 from limo_hog.ros2.names import COMMAND, DETECTIONS_TYPE, IMAGE, STAMPED_COMMAND_TYPE, TYPES

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.pipeline import FrameLog
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Sensors
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
 from limo_sim.ros.lockstep.calls import PUBLISHED
 from limo_sim.run.arena import Arena

@@ -14,9 +14,8 @@ from functools import partial
 import numpy as np
 import pymunk
 
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
-from limo_hog.follow.twist import Twist
 from limo_sim.sensing import imu, lidar
 from limo_sim.sensing.camera import FOCAL_PX, CameraPose, TrueFrame
 from limo_sim.sensing.delivery import Channel, Exposure

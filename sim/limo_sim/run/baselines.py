@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from limo_hog.follow.control.naming import CONTROLLERS, ControllerError, controller_named
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.parameters import bounded
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.measurement import measure
 from limo_hog.follow.sense.observation import Observation, Odometry
-from limo_hog.follow.twist import Twist
 from limo_sim.run.last_seen import SCALE, SIZE, LastSeen, sighted, state_of
 
 #: Names that `controller_of` knows beside those of `limo_hog.follow` and "policy:FILE.npz".

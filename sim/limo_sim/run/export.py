@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from limo_hog.follow.pipeline import CONTROL_PERIOD
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Scan
-from limo_hog.follow.twist import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.sensing.camera import TrueFrame
 from limo_sim.world.scenario import Scenario

@@ -10,7 +10,7 @@ import numpy as np
 
 from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
-from limo_hog.follow.zones import ZONE_ENDS, Zone
+from limo_hog.follow.sense.measurement import ZONE_ENDS, Zone
 from limo_sim.run.episode import Episode
 from limo_sim.run.log import Step
 from limo_sim.view.reading import figures

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.pipeline import FrameLog
+from limo_hog.follow.sense.measurement import box_centre, person_depth, zone_of
 from limo_hog.follow.sense.observation import Scan
-from limo_hog.follow.sense.ranging import box_centre, person_depth
-from limo_hog.follow.zones import zone_of
 from limo_hog.imaging.drawing import annotate
 from limo_sim.run.log import Step
 from limo_sim.sensing.camera import WIDTH

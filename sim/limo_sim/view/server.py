@@ -24,7 +24,7 @@ from aiohttp import WSMsgType, web
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
-from limo_hog.follow.zones import ZONE_ENDS
+from limo_hog.follow.sense.measurement import ZONE_ENDS
 from limo_hog.imaging.writing import jpeg
 from limo_sim.run.log import Step
 from limo_sim.sensing.camera import FIELD

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from limo_hog.follow.robot import LIMO
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import LIMO, Twist
 
 
 @dataclass(slots=True)
@@ -37,7 +36,7 @@ class Drive:
 
     def command(self, twist: Twist, time: float) -> None:
         """Take a command at `time` [s]; one that is not finite stops the robot and is counted."""
-        if not twist.is_finite:
+        if not (math.isfinite(twist.linear) and math.isfinite(twist.angular)):
             self.rejected += 1
             twist = Twist()
         self._wanted = twist

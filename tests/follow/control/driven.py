@@ -11,7 +11,7 @@ from tests.follow.tracks.walkers import person
 from tests.follow.views import World, look
 
 from limo_hog.follow import Decision, Observation, Odometry, TrackingController
-from limo_hog.follow.control.memory import TrackingState
+from limo_hog.follow.control.selection import TrackingState
 from limo_hog.follow.space.grid import Ground
 from limo_hog.follow.tracks.identity import Likeness, Traits
 from limo_hog.follow.tracks.person import Person

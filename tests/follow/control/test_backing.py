@@ -10,11 +10,10 @@ import pytest
 
 from limo_hog.follow.control.backing import Backing, Other
 from limo_hog.follow.control.steer import Aim
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.space.grid import Grid, Ground
-from limo_hog.follow.twist import Twist
 
 BACKING, GRID = Backing(), Grid()
 NEAR = Aim(bearing=-0.1, distance=1.0, bearing_rate=0.0, range_rate=0.0, heading=-0.1, hidden=False)

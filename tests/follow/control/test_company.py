@@ -12,12 +12,11 @@ from tests.follow.estimates import upper
 
 from limo_hog.follow.control.backing import Poses
 from limo_hog.follow.control.company import Company, Walker, Way, walker_of
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.control.steer import Wheels
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Track
-from limo_hog.follow.twist import Twist
-from limo_hog.follow.wheels import Wheels
 
 COMPANY, WHEELS, STANDING = Company(), Wheels(), Twist()
 PERIOD, STEP = 0.1, 0.02

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_hog.follow.control.detour import Detour
+from limo_hog.follow.control.steer import Detour
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.clearance import Margin
 

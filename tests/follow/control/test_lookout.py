@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from tests.follow.estimates import upper
 from tests.follow.views import scan
 
-from limo_hog.follow.control.detour import Detour
 from limo_hog.follow.control.lookout import Hunt, Lookout
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.control.steer import Detour
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.places import Places, Wandering
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise
-from limo_hog.follow.twist import Twist
 
 TURN = Twist(0.0, 0.7)
 LOOKOUT, GRID, HERE, NOW = Lookout(), Grid(), Odometry(10.0), 10.0

@@ -12,7 +12,7 @@ from tests.follow.views import NOBODY, World, flat, scan_of
 
 from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Mode, Odometry
-from limo_hog.follow.control.memory import TrackingState
+from limo_hog.follow.control.selection import TrackingState
 from limo_hog.follow.sense.clearance import NO_POINTS
 
 

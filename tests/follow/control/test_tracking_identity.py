@@ -10,8 +10,8 @@ from tests.follow.views import GREEN, RED, World
 
 from limo_hog.detections import Detections
 from limo_hog.follow import Mode, Observation, Odometry
-from limo_hog.follow.control.memory import TrackingState
-from limo_hog.follow.sense.appearance import clothes_in
+from limo_hog.follow.control.selection import TrackingState
+from limo_hog.follow.sense.observation import clothes_in
 
 
 def test_it_stays_with_the_person_it_began_with() -> None:

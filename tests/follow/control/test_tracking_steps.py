@@ -12,8 +12,7 @@ from tests.follow.control.driven import CONTROLLER, GRID, NOW, blocked, likely, 
 from tests.follow.views import World, flat, scan_of
 
 from limo_hog.follow import Decision, Mode, Observation, Odometry
-from limo_hog.follow.control.memory import TrackingState, believed
-from limo_hog.follow.control.selection import Choice
+from limo_hog.follow.control.selection import Choice, TrackingState, believed
 from limo_hog.follow.space.grid import Ground
 from limo_hog.follow.tracks.kalman import Noise
 from limo_hog.follow.tracks.person import Person

@@ -10,7 +10,7 @@ from tests.follow.views import NOBODY, boxes, flat, look
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow import ApproachController, Mode, ProxemicController, Twist, Zone, controller_named, zone_of
-from limo_hog.follow.sense.ranging import person_depth
+from limo_hog.follow.sense.measurement import person_depth
 
 
 def test_both_stop_when_nobody_is_seen() -> None:

@@ -13,8 +13,7 @@ from tests.follow.views import boxes, flat, look, scan, scan_of
 from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Twist
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.safety.unseen import Look, room_seen_behind
-from limo_hog.follow.sense.clearance import speed_within
+from limo_hog.follow.sense.clearance import Look, room_seen_behind, speed_within
 
 
 def test_the_way_is_free_when_nothing_is_there() -> None:

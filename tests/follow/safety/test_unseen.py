@@ -12,7 +12,7 @@ from tests.follow.safety.headstrong import ahead
 from tests.follow.views import look, scan
 
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.safety.unseen import Look, room_seen_behind
+from limo_hog.follow.sense.clearance import Look, room_seen_behind
 from limo_hog.follow.sense.observation import Odometry, Scan
 
 #: The documented steps behind the outline [m].

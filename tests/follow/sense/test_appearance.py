@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from tests.follow.views import BLUE, GREEN, RED, dressed
 
-from limo_hog.follow.sense.appearance import Appearance, clothes_in
+from limo_hog.follow.sense.observation import Appearance, clothes_in
 
 APPEARANCE = Appearance()
 OTHER_CLOTHES = APPEARANCE.other

@@ -17,11 +17,11 @@ from limo_hog.follow.sense.detectors import (
     DetectorError,
     HalfSize,
     OnnxDetector,
+    Region,
     by_score,
     detect_in,
     detector_named,
 )
-from limo_hog.follow.sense.region import Region
 from limo_sim.run.arena import Arena
 from limo_sim.world.scenario import Scenario
 

@@ -9,9 +9,15 @@ import pytest
 from tests.follow.views import FOCAL, HEIGHT, WIDTH, boxes, flat, look
 
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.measurement import Measurement, measure
-from limo_hog.follow.sense.ranging import median, person_depth, stands_out, top_row
-from limo_hog.follow.sense.visibility import Visibility
+from limo_hog.follow.sense.measurement import (
+    Measurement,
+    Visibility,
+    measure,
+    median,
+    person_depth,
+    stands_out,
+    top_row,
+)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 100, 399, 400])

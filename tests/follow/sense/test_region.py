@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from limo_hog.follow.sense.region import RegionSize
+from limo_hog.follow.sense.detectors import RegionSize
 
 FOCAL = 448.6
 

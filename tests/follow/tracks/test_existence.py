@@ -10,9 +10,8 @@ import pytest
 from tests.follow.tracks.people import NOISE, POSE, a_person, box
 from tests.follow.views import FOCAL, HEIGHT, before_wall, flat
 
-from limo_hog.follow.sense.ranging import stands_out, top_row
-from limo_hog.follow.tracks.existence import Existence, Recall
-from limo_hog.follow.tracks.person import Person, UnknownRange, initiate
+from limo_hog.follow.sense.measurement import stands_out, top_row
+from limo_hog.follow.tracks.person import Existence, Person, Recall, UnknownRange, initiate
 
 EXISTENCE = Existence()
 BOX = np.array([260, 120, 120, 240], np.int32)

@@ -12,8 +12,8 @@ from tests.follow.tracks.walkers import FREE, GRID, HALF_VIEW, MOVERS, NOISE, SC
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.tracks.association import Returns
 from limo_hog.follow.tracks.kalman import Track
-from limo_hog.follow.tracks.legs import Returns
 from limo_hog.follow.tracks.movers import Mover, is_in_view
 
 Place = tuple[float, float]

@@ -11,10 +11,9 @@ from tests.follow.tracks.people import IN_GREEN, IN_RED, NOISE, POSE, WINDOW, a_
 from tests.follow.views import boxes, flat, look, scan_of
 
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.measurement import Measurement, measure
+from limo_hog.follow.sense.detectors import Region
+from limo_hog.follow.sense.measurement import Measurement, Visibility, measure
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.sense.region import Region
-from limo_hog.follow.sense.visibility import Visibility
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to, initiate, predict
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
@@ -216,7 +215,6 @@ def test_a_box_is_as_high_as_the_person_to_within_35_hundredths() -> None:
     for share, fits in ((0.66, True), (0.64, False), (1.34, True), (1.36, False)):
         seen = replace(box(2.0), height=100, range=share * WINDOW / 100)
         assert TRACKER.association.fits_size(a_person(1, 2.0), seen) == fits
-        assert (TRACKER.association.without_bad_range(a_person(1, 2.0), seen) is seen) == fits
     assert TRACKER.association.fits_size(a_person(1, 2.0), replace(box(2.0), range=None))
 
 

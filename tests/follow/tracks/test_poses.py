@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.tracks.poses import pose_at
+from limo_hog.follow.sense.observation import Odometry, pose_at
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.6, 2.0, -2.5])

@@ -14,10 +14,9 @@ from tests.follow.views import boxes, flat, look, scan_of
 
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_hog.follow.tracks import kalman
-from limo_hog.follow.tracks.existence import Existence, Recall
+from limo_hog.follow.tracks.association import Legs, Returns
 from limo_hog.follow.tracks.kalman import Track
-from limo_hog.follow.tracks.legs import Legs, Returns
-from limo_hog.follow.tracks.person import Person
+from limo_hog.follow.tracks.person import Existence, Person, Recall
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
 
 TRACKER = Tracker()

@@ -12,7 +12,7 @@ from tests.follow.views import look
 
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.tracks.legs import Returns
+from limo_hog.follow.tracks.association import Returns
 from limo_hog.follow.tracks.movers import Mover, named
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
 

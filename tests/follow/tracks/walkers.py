@@ -11,8 +11,8 @@ from tests.follow.estimates import upper
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
+from limo_hog.follow.tracks.association import Returns
 from limo_hog.follow.tracks.kalman import Noise, Track
-from limo_hog.follow.tracks.legs import Returns
 from limo_hog.follow.tracks.movers import Mover, Movers
 from limo_hog.follow.tracks.person import Person
 

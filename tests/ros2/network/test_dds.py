@@ -24,8 +24,8 @@ from cyclonedds.topic import Topic
 
 from limo_hog.cli.main import main
 from limo_hog.cli.topic import as_yaml
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Scan
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import dds, follower, messages, names
 from limo_sim.run.arena import Arena
 from limo_sim.world.scenario import Scenario

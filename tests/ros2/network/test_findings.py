@@ -18,8 +18,8 @@ from cyclonedds.idl import make_idl_struct, types
 from limo_hog.detections import Detections
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.decision import Believed
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.detectors import detector_named
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import dds, findings, follower, frames, messages, names
 from limo_hog.ros2.bag import to_detections
 from limo_hog.ros2.outputs import Commands

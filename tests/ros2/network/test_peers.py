@@ -16,7 +16,7 @@ pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Believed
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_hog.ros2 import dds, findings, messages, names
 
 HERE = Path(__file__).parent / "peer"

@@ -12,8 +12,8 @@ import numpy as np
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.pipeline import FrameLog
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Sensors
-from limo_hog.follow.twist import Twist
 from limo_sim.run.episode import Episode, score
 from limo_sim.run.log import Step
 from limo_sim.run.matching import CRITERIA, Criteria

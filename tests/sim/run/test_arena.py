@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from limo_hog.follow import detector_named
-from limo_hog.follow.robot import LIMO
-from limo_hog.follow.sense.ranging import person_depth
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.sense.measurement import person_depth
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.sensing.camera import CENTRE_X, FOCAL_PX, CameraPose
 from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Person, Robot, Room, Scenario, Vary, Wall, Wheels

@@ -14,8 +14,7 @@ from tests.sim.run.steps import figures
 
 from limo_hog.detections import Detections, Detector
 from limo_hog.follow import TrackingController
-from limo_hog.follow.sense.detectors import HalfSize, detector_named
-from limo_hog.follow.sense.region import Region
+from limo_hog.follow.sense.detectors import HalfSize, Region, detector_named
 from limo_sim.run.detector_faults import FaultySearch, fit_of
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.sweep import Run, play_all

@@ -24,7 +24,7 @@ from limo_hog.follow import (
     Twist,
     controller_named,
 )
-from limo_hog.follow.control.memory import TrackingState
+from limo_hog.follow.control.selection import TrackingState
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.episode import Episode, run_episode, score
 from limo_sim.view.tuning import Tunable

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.sensing.camera import CameraPose
 from limo_sim.sensing.renderer import Renderer

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.person import Pose

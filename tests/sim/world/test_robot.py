@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.world.robot import Drive, integrate
 from limo_sim.world.scenario import Person, Robot, Scenario, Wheels

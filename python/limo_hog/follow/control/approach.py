@@ -8,9 +8,9 @@ import numpy as np
 
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.parameters import bounded
+from limo_hog.follow.robot import Twist
+from limo_hog.follow.sense.measurement import box_centre
 from limo_hog.follow.sense.observation import Observation
-from limo_hog.follow.sense.ranging import box_centre
-from limo_hog.follow.twist import Twist
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.control.steer import Aim
 from limo_hog.follow.parameters import bounded
-from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Margin, Points, places_behind, rooms_ahead, to_odometry
+from limo_hog.follow.sense.measurement import WALK
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
-from limo_hog.follow.twist import Twist
 
 Poses: TypeAlias = NDArray[np.float64]
 """(..., 3): x, y [m], yaw [rad]."""
@@ -81,7 +81,7 @@ class Backing:
     lately_s: float = bounded(5.0, 0, 600)
     unseen_s: float = bounded(0.8, 0, 60)
     same: float = bounded(0.5, 0, 5)
-    walk: float = bounded(1.0, 0, 5)
+    walk: float = bounded(WALK, 0, 5)
     blind_speed: float = bounded(0.2, 0, 1)
     glance_turn: float = bounded(3.0, 0, 6)
     glance_from: float = bounded(0.25, 0, 2)

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.control.backing import Poses
+from limo_hog.follow.control.steer import advanced, all_advanced, stoppable_turn
 from limo_hog.follow.parameters import bounded
-from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.measurement import PERSON_RADIUS
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks.kalman import Track
-from limo_hog.follow.twist import Twist
-from limo_hog.follow.wheels import advanced, all_advanced, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class Company:
         Distance kept from everything else [m]. Chosen: `Guard` keeps more ahead and behind, where it can.
     near, person_radius
         What the lidar sees further off than `near`, or nearer than `person_radius` to one who comes, is no wall [m].
-        Chosen: what the robot backs in two and a half seconds; as `Grid`'s.
+        Chosen: what the robot backs in two and a half seconds.
     never
         What a way costs that ends at a wall or backs blindly [m]. Chosen: more than all distances together are worth.
     speeds, turns
@@ -158,7 +158,7 @@ class Company:
     short: float = 2.0
     walls: float = 0.1
     near: float = 1.5
-    person_radius: float = 0.45
+    person_radius: float = PERSON_RADIUS
     never: float = 2.0
     speeds: tuple[float, ...] = (-0.6, -0.2, 0.0, 0.3, 0.6)
     turns: tuple[float, ...] = (-1.6, -1.1, -0.5, 0.0, 0.5, 1.1, 1.6)
@@ -206,13 +206,13 @@ class Company:
             At most so fast it backs onto other ground [m/s].
         """
         people = np.array([(one.x, one.y, one.vx, one.vy) for one in walkers]).reshape(-1, 4)
-        is_followed = np.array([one.followed for one in walkers], bool)
         pace = np.hypot(people[:, 2], people[:, 3])
         coming = pace > self.slowest
         # Those who come no nearer than they are, whatever the robot does, need no way.
         coming &= (people[:, :2] * people[:, 2:]).sum(axis=1) < 0
         if not coming.any():
             return None
+        is_followed = np.array([one.followed for one in walkers], bool)
         goal = people[is_followed]
         people, is_followed = people[coming], is_followed[coming]
         straight = self._driven_on(wanted, now, acceleration, robot)

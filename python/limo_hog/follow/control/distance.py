@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from limo_hog.follow.control.approach import best_box, no_detection
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.parameters import bounded
+from limo_hog.follow.robot import Twist
+from limo_hog.follow.sense.measurement import person_depth, zone_of
 from limo_hog.follow.sense.observation import Observation
-from limo_hog.follow.sense.ranging import person_depth
-from limo_hog.follow.twist import Twist
-from limo_hog.follow.zones import zone_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,14 +1,24 @@
-"""Which of the tracked people to follow: stay with one, say so where that is not sure, recognise them after a loss."""
+"""Which of the tracked people to follow, and what else the tracking controller remembers from frame to frame.
+
+It stays with one person, says so where it is not sure which that is, and recognises them after a loss.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
+from limo_hog.follow.control.backing import Other
+from limo_hog.follow.control.lookout import Hunt
+from limo_hog.follow.decision import Believed
 from limo_hog.follow.parameters import bounded
+from limo_hog.follow.robot import Twist
+from limo_hog.follow.sense.clearance import NO_POINTS, Points
+from limo_hog.follow.sense.observation import pose_at
+from limo_hog.follow.space.grid import Ground
 from limo_hog.follow.tracks.identity import Identity, Likeness
-from limo_hog.follow.tracks.kalman import bearing_range
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, predict
 from limo_hog.follow.tracks.person import Person
-from limo_hog.follow.tracks.poses import pose_at
 from limo_hog.follow.tracks.tracker import Tracks
 
 
@@ -85,7 +95,6 @@ class Selection:
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
         """Follow the track that is the person followed so far; before there is one, the likeliest person in view."""
         now = tracks.stamp or 0.0
-        followed = tracks.person(choice.number)
         if choice.likeness is None or choice.measured is None or now - choice.measured > self.reidentify_s:
             choice = self._anybody(tracks, choice)
             followed = tracks.person(choice.number)
@@ -95,18 +104,18 @@ class Selection:
             return choice
         likeness = self.identity.update(choice.likeness, tracks)
         choice = replace(choice, likeness=likeness)
-        about = [one for one in self.measured(tracks) if likeness.of(one.number) >= self.possible]
-        about.sort(key=lambda one: -likeness.of(one.number))
+        chances, measured = dict(likeness.chances), self.measured(tracks)
+        about = [one for one in measured if chances[one.number] >= self.possible]
+        about.sort(key=lambda one: -chances[one.number])
         if about:
             best, *rest = about
-            chance = likeness.of(best.number)
-            next_best = likeness.of(rest[0].number) if rest else 0.0
+            chance = chances[best.number]
+            next_best = chances[rest[0].number] if rest else 0.0
             if chance >= self.likely and chance >= self.odds * next_best:
-                measured = best.measured if chance >= self.identity.sure else choice.measured
-                return Choice(best.number, likeness, measured)
+                return Choice(best.number, likeness, best.measured if chance >= self.identity.sure else choice.measured)
             since = now if choice.unsure_at is None else choice.unsure_at
             choice = replace(choice, unsure_at=since)
-            if rest and sum(likeness.of(one.number) for one in about) >= self.likely:
+            if rest and sum(chances[one.number] for one in about) >= self.likely:
                 if now - since > self.decide_s:
                     likeness = replace(likeness, chances=((best.number, self.likely),))
                     return Choice(best.number, likeness, choice.measured)
@@ -115,7 +124,8 @@ class Selection:
                 # The person may have come back: they are looked at, not turned away from.
                 return replace(choice, candidates=(best.number,))
         choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)
-        if followed is not None and followed in self.measured(tracks) and likeness.of(followed.number) < self.possible:
+        followed = tracks.person(choice.number)
+        if followed is not None and followed in measured and chances[followed.number] < self.possible:
             # The track went over to another person.
             return replace(choice, number=None)
         if followed is not None and not self.is_candidate(followed):
@@ -153,3 +163,84 @@ class Selection:
     def is_stranger(self, person: Person, choice: Choice) -> bool:
         """Whether a person is not the one followed before."""
         return choice.likeness is not None and choice.likeness.of(person.number) < self.likely
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingState:
+    """What the controller remembers.
+
+    Attributes
+    ----------
+    tracks
+        All tracked people.
+    choice
+        Which of them is followed.
+    side
+        Which way to search: 1 left, -1 right.
+    detour
+        How far off the direct way to the person the robot drives [rad].
+    since_full
+        Frames since the whole image was searched [1].
+    ground
+        What stands where; None before the first scan.
+    known
+        The followed person's track when last measured; None before anyone was followed.
+    hunt
+        What is remembered while looking for that person; None while they are measured.
+    way, way_at
+        float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
+    way_out
+        Direction in the odometry frame [rad] and speed [m/s] by which it gives way, and since when [s]; None while it
+        does not.
+    gave_way_at
+        When it last gave way [s].
+    acceleration
+        Of the wheels, as learnt [m/s²].
+    sent
+        The last command.
+    others
+        Other people than the followed one, measured lately.
+    brisk
+        How fast the followed person walks at most, as far as known [m/s].
+    """
+
+    tracks: Tracks = field(default_factory=Tracks)
+    choice: Choice = field(default_factory=Choice)
+    side: float = 1.0
+    detour: float = 0.0
+    since_full: int = 0
+    ground: Ground | None = None
+    known: Track | None = None
+    hunt: Hunt | None = None
+    way: Points = field(default_factory=lambda: NO_POINTS)
+    way_at: float = -math.inf
+    way_out: tuple[float, float, float] | None = None
+    gave_way_at: float = -math.inf
+    acceleration: float = 1.0
+    sent: Twist = field(default_factory=Twist)
+    others: tuple[Other, ...] = ()
+    brisk: float = 0.0
+
+
+def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:
+    """Return everyone tracked, in the base frame, as of the newest stamp `now` [s]."""
+    boxes, likeness = dict(state.tracks.boxes), state.choice.likeness
+    pose = pose_at(state.tracks.poses, now)
+    people = []
+    for one in state.tracks.people:
+        track = predict(one.track, now, noise)
+        bearing, distance = bearing_range(track, pose)
+        speed, heading = math.hypot(*track.mean[2:]), math.atan2(track.mean[3], track.mean[2]) - pose.yaw
+        people.append(
+            Believed(
+                distance * math.cos(bearing),
+                distance * math.sin(bearing),
+                one.existence,
+                one.number,
+                speed * math.cos(heading),
+                speed * math.sin(heading),
+                boxes.get(one.number),
+                None if likeness is None else likeness.of(one.number),
+            )
+        )
+    return tuple(people)

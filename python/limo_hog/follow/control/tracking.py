@@ -10,26 +10,20 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.control.backing import Backing, Poses
 from limo_hog.follow.control.company import Company, Way, walker_of
-from limo_hog.follow.control.detour import Detour
-from limo_hog.follow.control.lookout import Lookout
-from limo_hog.follow.control.memory import TrackingState, believed
-from limo_hog.follow.control.search import Search
-from limo_hog.follow.control.selection import Choice, Selection
-from limo_hog.follow.control.steer import Aim, Steering
+from limo_hog.follow.control.lookout import Lookout, Search
+from limo_hog.follow.control.selection import Choice, Selection, TrackingState, believed
+from limo_hog.follow.control.steer import Aim, Detour, Steering, Wheels, stoppable_turn
 from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import bounded
-from limo_hog.follow.robot import LIMO, RobotGeometry
+from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, Points, scan_points, to_odometry
-from limo_hog.follow.sense.observation import Observation, Odometry, Scan
-from limo_hog.follow.sense.region import Region, RegionSize
+from limo_hog.follow.sense.detectors import Region, RegionSize
+from limo_hog.follow.sense.observation import Observation, Odometry, Scan, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.routes import point_ahead
-from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates, wrap
+from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates
 from limo_hog.follow.tracks.person import Person
-from limo_hog.follow.tracks.poses import pose_at
 from limo_hog.follow.tracks.tracker import Tracker
-from limo_hog.follow.twist import Twist
-from limo_hog.follow.wheels import Wheels, stoppable_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,14 +165,14 @@ class TrackingController:
         off = aim.bearing if aim.heading is None else max(aim.bearing, aim.heading, key=abs)
         most = float(stoppable_turn(off, state.acceleration, self.robot)) + abs(aim.bearing_rate)
         twist = Twist(twist.linear, min(max(twist.angular, -most), most))
-        pose, wanted = pose_at(state.tracks.poses, observation.now), aim.distance - self.robot.camera_x - keeps
-        facing, others = np.array([0.0, 0.0, aim.bearing]), state.others
-        if twist.linear < 0 and not self.backing.is_free_behind(
-            facing, pose, self.grid, state.ground, others, self.robot
-        ):
-            if self.backing.is_blocked(pose, self.grid, state.ground, self.robot):
+        wanted = aim.distance - self.robot.camera_x - keeps
+        if twist.linear < 0:
+            facing, others = np.array([0.0, 0.0, aim.bearing]), state.others
+            pose, ground = pose_at(state.tracks.poses, observation.now), state.ground
+            seen_free = self.backing.is_free_behind(facing, pose, self.grid, ground, others, self.robot)
+            if not seen_free and self.backing.is_blocked(pose, self.grid, ground, self.robot):
                 twist = Twist(0.0, twist.angular)
-            else:
+            elif not seen_free:
                 limit = self.backing.blind_limit(others, pose, self.robot, observation.now)
                 twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None
@@ -202,7 +196,7 @@ class TrackingController:
         begun = None
         if state.way_out is not None:
             yaw, speed, since = state.way_out
-            begun = Way(wrap(yaw - pose.yaw), speed, now - since)
+            begun = Way(math.remainder(yaw - pose.yaw, math.tau), speed, now - since)
 
         tracks, seen, own = self.tracker.around(state.tracks, person, now, self.steering.coast_s)
         felt = self.tracker.movers.felt(state.tracks.movers, now)
@@ -377,7 +371,7 @@ class TrackingController:
     def _along(self, way: Points, obstacles: Points, pose: Odometry) -> float:
         """Return the direction along a way [rad], or one near it that is free."""
         x, y = point_ahead(way, pose, self.lookout.ahead)
-        off = wrap(math.atan2(y - pose.y, x - pose.x) - pose.yaw)
+        off = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.yaw, math.tau)
         near = self.detour.near(obstacles, off, self.robot) if abs(off) < self.lookout.aside else None
         return off if near is None else near
 

@@ -1,17 +1,22 @@
-"""A detection as a measurement: bearing and range from the robot's centre."""
+"""A detection as a measurement: bearing, range and size by the depth image, and whether one is to be expected."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.appearance import Clothes
-from limo_hog.follow.sense.observation import Observation
-from limo_hog.follow.sense.ranging import box_centre, person_depth, stands_out, top_row
+from limo_hog.follow.sense.detectors import Region
+from limo_hog.follow.sense.observation import Clothes, Observation
 
+#: What is nearer than this to a person's axis is the person's own [m]. Chosen: legs in mid-stride and an arm.
+PERSON_RADIUS = 0.45
+#: How fast people walk whom nothing shows [m/s]. Chosen: a brisk walk; the workshop's person walks at .75.
+WALK = 1.0
 #: Height of HOG's window, in statures: the person in it is 96 of 128 px high (Dalal and Triggs 2005).
 WINDOW_PER_STATURE = 4 / 3
 
@@ -60,8 +65,8 @@ class Measurement:
 def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]:
     """Return every box as a measurement, in the boxes' order; the range is from the depth image."""
     measurements = []
-    depths = observation.depth
-    for index, (box, score) in enumerate(observation.detections):
+    depths, found = observation.depth, observation.detections
+    for index, (box, score) in enumerate(zip(found.boxes, found.scores.tolist(), strict=True)):
         clothes = None if observation.clothes is None else observation.clothes[index]
         if clothes is not None and not np.isfinite(clothes).all():
             clothes = None
@@ -81,3 +86,263 @@ def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]
         middle = (robot.camera_z - stature / 2) * observation.focal_px
         measurements.append(replace(seen, window=window, middle=middle, whole=top > 0))
     return measurements
+
+
+def box_centre(box: NDArray[np.int32]) -> tuple[int, int]:
+    """Return the centre [px] of an int32 (4,) box x, y, w, h."""
+    x, y, w, h = box.tolist()
+    return x + w // 2, y + h // 2
+
+
+def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int = 20) -> float | None:
+    """Return how far away the person in a box is [m]; None where the camera does not know.
+
+    The median of the valid depths in a square at the centre of the box: pixels that see past the person, or nothing,
+    do not change it as long as they are less than half.
+
+    Parameters
+    ----------
+    depth
+        float32 (H, W) [m], not finite or <= 0 where unknown.
+    box
+        int32 (4,): x, y, w, h [px].
+    side
+        Side of the square [px]; the workshop's is 20.
+    """
+    x, y = box_centre(box)
+    half = side // 2
+    patch = depth[max(y - half, 0) : max(y + half, 0), max(x - half, 0) : max(x + half, 0)]
+    valid = patch[(patch > 0) & (patch < np.inf)]
+    return median(valid) if valid.size else None
+
+
+def median(values: NDArray[np.float32]) -> float:
+    """Return the median of (N,) finite numbers, N > 0: as `numpy.median`, without the checks that take most of it."""
+    half, values = len(values) // 2, values.copy()
+    values.partition(half)
+    if len(values) % 2:
+        return float(values[half])
+    return float((values[:half].max() + values[half]) / 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Strips:
+    """Where a detection window shows a person's chest, and what is beside it.
+
+    Attributes
+    ----------
+    top, bottom
+        Of the rows looked at [window heights]. Chosen: the chest, .27 to .5 of HOG's window.
+    chest
+        Half the width of the strip in the middle [window widths]. Chosen: narrower than a person seen from the side.
+    inner, outer
+        Edges of the two strips beside it, from the middle [window widths]. Chosen: outside of the arms, which reach to
+        .25, and inside of the window, in which HOG was trained to find background.
+    beyond
+        Depth taken where the camera sees none [m]: further than it reaches.
+    known
+        Share of pixels that must be valid for a depth to be known [1].
+    """
+
+    top: float = 0.27
+    bottom: float = 0.5
+    chest: float = 0.06
+    inner: float = 0.36
+    outer: float = 0.46
+    beyond: float = 20.0
+    known: float = 0.2
+
+
+STRIPS = Strips()
+
+
+def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strips = STRIPS) -> float | None:
+    """Return how far the surroundings of a box are behind its middle [m]; None where the depth does not tell.
+
+    The inverse depth of a plane is linear in the image, so the plane through the strips left and right of the person
+    has, in the middle between them, the mean of their inverse depths. A picture on a wall is in that plane, seen from
+    whatever side: 0.
+
+    Parameters
+    ----------
+    depth
+        float32 (H, W) [m], not finite or <= 0 where unknown.
+    box
+        int32 (4,): x, y, w, h [px].
+    strips
+        Where to look.
+    """
+    x, y, w, h = box.tolist()
+    band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
+    centre = x + w / 2
+    depths = []
+    for left, right in (-strips.chest, strips.chest), (-strips.outer, -strips.inner), (strips.inner, strips.outer):
+        strip = band[:, max(round(centre + left * w), 0) : max(round(centre + right * w), 0)]
+        valid = strip[(strip > 0) & (strip < np.inf)]
+        known = median(valid) if valid.size > strips.known * strip.size else strips.beyond
+        depths.append(known if strip.size else None)
+    middle, *sides = depths
+    inverse = [1.0 / side for side in sides if side is not None]
+    if middle is None or not inverse:
+        return None
+    return len(inverse) / sum(inverse) - middle
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """How a person's outline is followed upwards in the depth image.
+
+    Attributes
+    ----------
+    half_width
+        Half the width of the strip looked at [window widths]. Chosen: a head is a quarter of HOG's window wide.
+    least_half_px
+        And at least this [px]: the middle of a box strays by 3 px.
+    tolerance
+        Depth within which a pixel is the person's [m]. Chosen: a trunk and an arm; people keep more from walls.
+    share
+        Part of the valid pixels of a row that must be the person's [1].
+    gap_px
+        So many rows without the person end the outline [px]. Chosen: more than the depth image's holes.
+    """
+
+    half_width: float = 0.08
+    least_half_px: int = 4
+    tolerance: float = 0.35
+    share: float = 0.25
+    gap_px: int = 5
+
+
+OUTLINE = Outline()
+
+
+def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, outline: Outline = OUTLINE) -> int:
+    """Return the highest image row [px] of the person in a box; 0 where they reach the image's edge or beyond.
+
+    Parameters
+    ----------
+    depth
+        float32 (H, W) [m], not finite or <= 0 where unknown.
+    box
+        int32 (4,): x, y, w, h [px].
+    person
+        Depth of the person [m].
+    outline
+        How to follow the outline.
+    """
+    column, row = box_centre(box)
+    half = max(round(outline.half_width * int(box[2])), outline.least_half_px)
+    # A copy by columns: the sums over a row's few pixels are sums of long vectors.
+    strip = np.ascontiguousarray(depth[: max(row, 1), max(column - half, 0) : max(column + half, 1)].T)
+    with np.errstate(invalid="ignore"):
+        near = (np.abs(strip - person) < outline.tolerance).sum(axis=0, dtype=np.int16)
+    known = ((strip > 0) & (strip < np.inf)).sum(axis=0, dtype=np.int16)
+    gap = 0
+    for at, empty in enumerate((near < np.maximum(outline.share * known, 1))[::-1].tolist(), 1):
+        gap = gap + 1 if empty else 0
+        if gap == outline.gap_px:
+            return len(near) - at + gap
+    return 0
+
+
+@dataclass(frozen=True, slots=True)
+class Visibility:
+    """Where HOG finds people.
+
+    Attributes
+    ----------
+    smallest_window
+        Height of the model's window, and so of the smallest person's [px].
+    near
+        Nearer than this a person is often missed, and boxes are on parts of the body [m]. Measured in the arena, by
+        robot-centre distance: found at 1.5 m .67, 1.6 m .92, 1.65 m 1.0 of the frames.
+    widest
+        Larger bearings are out of any image [rad]: twice the Limo's half field of view of 0.62.
+    shown
+        The part of half a window, above and below its middle, that must be in the image [window heights]. Chosen: .5
+        is the whole window; .02 less allows for the middle's own error.
+    cut
+        Share of the window that may be above the image where a distance is chosen [window heights]. Measured in the
+        arena, by camera distance: a .9 m person is found in .92 of the frames at 1.52 m, where .05 is cut, a 1.75 m
+        person in .69 at 3.0 m (.10) and in all at 3.5 m (0).
+    occluder
+        Something nearer than the person by more than this hides them [m]. Measured: the depth at a box's centre was
+        never more than 0.5 m off the person in 3,500 frames.
+    """
+
+    smallest_window: float = 128
+    near: float = 1.7
+    widest: float = 1.2
+    shown: float = 0.48
+    cut: float = 0.06
+    occluder: float = 0.5
+
+    def least_distance(self, window: float, centre: float, image_height: int) -> float:
+        """Return how near a person may be with their window in the image, but for `cut` of it [m].
+
+        Parameters
+        ----------
+        window, centre
+            Height of the detection window, and its middle below the image's, times the distance [px m].
+        image_height
+            Of the camera [px].
+        """
+        return ((0.5 - self.cut) * window - centre) / (image_height / 2)
+
+    def expected(
+        self, bearing: float, distance: float, window: float, centre: float, observation: Observation, confirmed: bool
+    ) -> bool:
+        """Whether a person's whole window should be in the part of the image that was searched.
+
+        Parameters
+        ----------
+        bearing, distance
+            Of the person, from the robot's centre [rad, m].
+        window, centre
+            Height of the detection window, and its middle below the image's, times the distance [px m].
+        observation
+            The image that was searched, with its depth.
+        confirmed
+            Whether the track is known to be a person. Near by, the head and the space HOG wants above it are out of
+            the image: that excuses a miss of a person, and not of a track that has yet to prove itself.
+        """
+        if abs(bearing) > self.widest:
+            return False
+        column = observation.width / 2 - observation.focal_px * math.tan(bearing)
+        height = window / max(distance, 0.3)
+        middle = observation.height / 2 + centre / max(distance, 0.3)
+        if height < self.smallest_window:
+            return False
+        cut_off = not self.shown * height <= middle <= observation.height - self.shown * height
+        if confirmed and (cut_off or distance < self.near):
+            return False
+        if not (observation.region or Region(0, 0, observation.width, observation.height, height)).holds(column):
+            return False
+        return not self._hidden(observation.depth, column, middle, distance)
+
+    def _hidden(self, depth: NDArray[np.float32] | None, column: float, row: float, distance: float) -> bool:
+        if depth is None:
+            return False
+        there = person_depth(depth, np.array([column, row, 0, 0], np.int32))
+        return there is not None and there < distance - self.occluder
+
+
+class Zone(str, Enum):
+    """Hall's zones of personal space (The Hidden Dimension, 1966), nearest first."""
+
+    INTIMATE = "intimate"
+    PERSONAL = "personal"
+    SOCIAL = "social"
+    PUBLIC = "public"
+
+
+#: Where each zone but the last ends [m].
+ZONE_ENDS = {Zone.INTIMATE: 0.45, Zone.PERSONAL: 1.2, Zone.SOCIAL: 3.6}
+
+
+def zone_of(distance: float) -> Zone:
+    """Return the zone of a person `distance` [m] away."""
+    for zone, end in ZONE_ENDS.items():
+        if distance <= end:
+            return zone
+    return Zone.PUBLIC

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, beam_directions, lidar_at, to_odometry
+from limo_hog.follow.sense.measurement import PERSON_RADIUS
 from limo_hog.follow.sense.observation import Odometry, Scan
 
 Cells = NDArray[np.int64]
@@ -68,7 +69,7 @@ class Grid:
     lowest, highest
         Limits of the log-odds. Chosen: what has moved away is forgotten after seven scans, about a second.
     person_radius
-        Returns nearer than this to a tracked person are the person's and fill no cell [m]. Chosen: as `Detour`'s.
+        Returns nearer than this to a tracked person are the person's and fill no cell [m].
     period_s
         A scan sooner after the last one entered is left out [s]. Chosen: half the computing, and nothing that stands is
         missed.
@@ -87,7 +88,7 @@ class Grid:
     hit: float = 0.9
     lowest: float = -1.2
     highest: float = 2.5
-    person_radius: float = 0.45
+    person_radius: float = PERSON_RADIUS
     period_s: float = 0.2
     lasts_s: float = 6.0
     own_radius: float = 0.2
@@ -222,10 +223,8 @@ class Grid:
         steps = np.arange(0.5, self.reach / self.cell) * self.cell
         # So far before the end that it is in another cell.
         free = steps < clear[:, None] - 1.5 * self.cell
-        row, column = (
-            np.floor((start + steps * along[:, None]) / self.cell).astype(np.int64) - corner
-            for start, along, corner in zip(at, directions.T, ground.corner, strict=True)
-        )
+        row = np.floor((at[0] + steps * directions[:, :1]) / self.cell).astype(np.int64) - ground.corner[0]
+        column = np.floor((at[1] + steps * directions[:, 1:]) / self.cell).astype(np.int64) - ground.corner[1]
         inside = (row.view(np.uint64) < self.cells) & (column.view(np.uint64) < self.cells)
         passed: NDArray[np.int64] = (row * self.cells + column)[free & inside]
         return passed

@@ -1,20 +1,28 @@
-"""Which box belongs to which person: a gate, a cost, and a greedy assignment.
+"""Which box, and which legs in the scan, belong to which person.
 
-The cost is minus twice the log-likelihood of a match but for a constant: the squared Mahalanobis distance, the log
-volume of the prediction's uncertainty, and the difference of the clothes.
+Boxes by a gate, a cost and a greedy assignment. The cost is minus twice the log-likelihood of a match but for a
+constant: the squared Mahalanobis distance, the log volume of the prediction's uncertainty, and the difference of the
+clothes.
+
+Legs keep a track alive where the camera does not show the person: HOG needs space above the head, so nearer than about
+1.6 m, beside the image or between two frames, only the lidar tells where a person is. It cannot tell a person from a
+chair: it may continue a track and never begins one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
-from limo_hog.follow.sense.appearance import Appearance, Clothes
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement
-from limo_hog.follow.sense.observation import Odometry
-from limo_hog.follow.tracks.kalman import Noise, bearing_range, innovation, wrap
+from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry
+from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to
 
 
@@ -72,14 +80,17 @@ class Association:
         matches = []
         for who, person in enumerate(people):
             for which, seen in enumerate(measurements):
-                if (
-                    (who, which) in others
-                    or self._is_behind(person, seen, pose)
-                    or (person.confirmed and which in flat)
-                ):
+                if (who, which) in others or (person.confirmed and which in flat):
                     continue
-                clothes_cost = self.appearance_cost(person, seen)
-                ranged = self.without_bad_range(person, seen)
+                ranged, clothes_cost = seen, 0.0
+                if self.fits_size(person, seen):
+                    clothes_cost = self.appearance.cost(person.clothes, seen.clothes, slips=seen.is_low(self.low))
+                elif seen.range is not None:
+                    if seen.range > bearing_range(person.track, pose)[1] + self.same_place:
+                        # On something behind the person: further away, and of another size.
+                        continue
+                    # On a part of the body: its patches are not on shirt and trousers; or something stands before it.
+                    ranged = replace(seen, range=None)
                 fit = innovation(person.track, ranged.bearing, ranged.range, pose, noise)
                 cost = fit.distance2 + fit.log_volume_ratio + clothes_cost
                 # A confirmed person may turn sharply, out of the gate; a pillar does not.
@@ -89,24 +100,16 @@ class Association:
                     matches.append((not person.confirmed, cost, who, which))
         pairs: dict[int, int] = {}
         for _, _, who, which in sorted(matches):
-            taken = [measurements[other] for other in pairs.values()]
-            if who not in pairs and not any(self._is_double(measurements[which], other) for other in taken):
-                pairs[who] = which
+            if who not in pairs:
+                seen = measurements[which]
+                if not any(self._is_double(seen, measurements[other]) for other in pairs.values()):
+                    pairs[who] = which
         return pairs
 
     def is_new(self, seen: Measurement, people: Sequence[Person], pose: Odometry) -> bool:
         """Whether a box without a match is a new person, not a second box on a person found in this frame."""
         found = (person for person in people if person.misses == 0)
         return all(distance_to(person, seen, pose) >= self.same_place for person in found)
-
-    def appearance_cost(self, person: Person, seen: Measurement) -> float:
-        """Return how much the clothes in a box differ from the person's (chi-squared); 0 where they cannot be told.
-
-        A box of another size than the person's is on a part of a body, and its patches are not on shirt and trousers.
-        """
-        if not self.fits_size(person, seen):
-            return 0.0
-        return self.appearance.cost(person.clothes, seen.clothes, slips=seen.is_low(self.low))
 
     def fits_size(self, person: Person, seen: Measurement) -> bool:
         """Whether a box is as high as the person's window at its range; true where the range is unknown."""
@@ -121,22 +124,115 @@ class Association:
         """
         return seen.clothes if seen.range is None or (seen.whole and not seen.is_low(self.low)) else None
 
-    def without_bad_range(self, person: Person, seen: Measurement) -> Measurement:
-        """Return a box without its range where its size contradicts it: something stands in front of the person."""
-        return seen if self.fits_size(person, seen) else replace(seen, range=None)
-
-    def _is_behind(self, person: Person, seen: Measurement, pose: Odometry) -> bool:
-        """Whether a box is on something behind the person: further away, and of another size."""
-        if seen.range is None or self.fits_size(person, seen):
-            return False
-        return seen.range > bearing_range(person.track, pose)[1] + self.same_place
-
     def _is_double(self, seen: Measurement, other: Measurement) -> bool:
         """Whether two boxes are on one person: at the same place, in the same clothes."""
         if self.appearance.cost(other.clothes, seen.clothes) > self.appearance.other:
             return False
-        turn = wrap(seen.bearing - other.bearing)
+        turn = math.remainder(seen.bearing - other.bearing, math.tau)
         one, two = seen.range or other.range, other.range or seen.range
         if one is None or two is None:
             return abs(turn) < self.same_place / self.unknown.distance
         return math.hypot(one - two * math.cos(turn), two * math.sin(turn)) < self.same_place
+
+
+@dataclass(frozen=True, slots=True)
+class Returns:
+    """A scan's returns in the odometry frame.
+
+    Attributes
+    ----------
+    stamp
+        Of the scan [s].
+    points
+        float64 (N, 2) [m].
+    pose
+        Where the robot was.
+    """
+
+    stamp: float
+    points: Points
+    pose: Odometry
+
+
+@dataclass(frozen=True, slots=True)
+class Legs:
+    """Finds a tracked person's legs in a scan.
+
+    Attributes
+    ----------
+    radius
+        Returns nearer than this to the predicted position are taken for legs [m]. Chosen: half a stride of 0.75 m.
+    widest
+        A wider group is a wall or a piece of furniture [m]. Chosen: in mid-stride the shins of a 0.9 m person are .3 m
+        apart, an adult's .55 m.
+    reach
+        Further away legs are not looked for [m]. Chosen: at 2.2 m a shin of 5 cm is less than 2 of the Limo's beams.
+    sigma
+        Standard deviation of the middle of two walking legs from the person's axis [m]. Chosen: of one leg alone, where
+        it hides the other, the axis is up to .17 m off.
+    trail_s
+        The middle of the legs is where the person was so long ago [s]: the shin that swings trails the trunk. Measured
+        in the arena, 1,000 scans: .05 m at .85 m/s, .02 m at half of it.
+    fewest
+        So many returns at least [1].
+    """
+
+    radius: float = 0.35
+    widest: float = 0.55
+    reach: float = 2.2
+    sigma: float = 0.1
+    trail_s: float = 0.05
+    fewest: int = 2
+
+    def update(
+        self,
+        track: Track,
+        returns: Returns,
+        noise: Noise,
+        is_ground: Callable[[Points], NDArray[np.bool_]] | None = None,
+    ) -> Track | None:
+        """Return the track predicted for the scan's stamp and corrected by its legs; None where there are none.
+
+        `is_ground` tells of points (N, 2), odometry frame, which of them are on what is known to stand there: no legs.
+        """
+        track = predict(track, returns.stamp, noise)
+        if math.dist(track.mean[:2], (returns.pose.x, returns.pose.y)) > self.reach:
+            return None
+        legs = returns.points.compress(distances(returns.points, track) < self.radius, axis=0)
+        if is_ground is not None and len(legs):
+            legs = legs[~is_ground(legs)]
+        return self.corrected(track, legs, returns.pose, noise)
+
+    def corrected(self, track: Track, legs: Points, pose: Odometry, noise: Noise) -> Track | None:
+        """Return the track corrected by the returns (N, 2) near it, odometry frame; None where these are no legs.
+
+        The track is predicted for the scan's stamp; `pose` is where the robot was then.
+        """
+        x, y, vx, vy = track.mean
+        distance = math.hypot(x - pose.x, y - pose.y)
+        if len(legs) < self.fewest or distance > self.reach:
+            return None
+        # Of a few points, lists are faster than arrays.
+        xs, ys = legs.T.tolist()
+        if math.hypot(max(xs) - min(xs), max(ys) - min(ys)) > self.widest:
+            return None
+        dx = sum(xs) / len(xs) + self.trail_s * vx - pose.x
+        dy = sum(ys) / len(ys) + self.trail_s * vy - pose.y
+        bearing = math.atan2(dy, dx) - pose.yaw
+        return update(track, innovation(track, bearing, math.hypot(dx, dy), pose, self.noise_at(distance, noise)))
+
+    def noise_at(self, distance: float, noise: Noise) -> Noise:
+        """Return the noise with that of legs measured at a distance [m]."""
+        return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma)
+
+
+def distances(points: Points, track: Track) -> NDArray[np.float64]:
+    """Return the distance from a track to each of (N, 2) points, odometry frame, float64 (N,) [m]."""
+    x, y, _, _ = track.mean
+    return np.asarray(np.hypot(points[:, 0] - x, points[:, 1] - y))
+
+
+def all_distances(points: Points, tracks: Sequence[Track]) -> NDArray[np.float64]:
+    """Return `distances` of M tracks at once, float64 (M, N) [m]."""
+    means = np.array([track.mean for track in tracks]).reshape(-1, 4, 1)
+    return np.asarray(np.hypot(points[:, 0] - means[:, 0], points[:, 1] - means[:, 1]))

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from limo_hog.follow.sense.appearance import Clothes, chi_squared
+from limo_hog.follow.sense.measurement import WALK
+from limo_hog.follow.sense.observation import Clothes, chi_squared
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
 
@@ -65,7 +66,7 @@ class Likeness:
 
     def of(self, number: int) -> float:
         """Return the probability that a track is the person followed."""
-        return next((chance for track, chance in self.chances if track == number), 0.0)
+        return dict(self.chances).get(number, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +151,7 @@ class Identity:
     swaps: float = 0.2
     unseen_s: float = 0.3
     reach: float = 0.5
-    speed: float = 1.0
+    speed: float = WALK
     clear: float = 6.0
     rate: float = 0.05
     remembered: int = 8
@@ -163,21 +164,22 @@ class Identity:
 
     def update(self, known: Likeness, tracks: Tracks) -> Likeness:
         """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
-        people = {one.number: one for one in tracks.people}
+        people, seen = {one.number: one for one in tracks.people}, tracks.in_view
         walking = {one.number for one in tracks.people if self._walks_on(one, tracks)}
+        alone = {one.number for one in seen if self._is_alone(one, tracks)}
         chances = self._passed(known, people, tracks, walking)
-        odds = dict(chances)
-        for one in tracks.in_view:
-            if not self._is_alone(one, tracks):
+        odds, before = dict(chances), dict(known.chances)
+        for one in seen:
+            if one.number not in alone:
                 continue
-            stays = known.of(one.number) >= self.stays and one.number in walking
+            stays = before.get(one.number, 0.0) >= self.stays and one.number in walking
             evidence = self._evidence(known, one, first=one.age <= 1)
             odds[one.number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
         chances = {number: value / total for number, value in odds.items()}
         known = replace(known, chances=tuple(chances.items()))
-        for one in tracks.in_view:
-            known = self._learnt(known, one, tracks)
+        for one in seen:
+            known = self._learnt(known, one, chances[one.number], alone=one.number in alone)
         return known
 
     def _passed(
@@ -228,17 +230,19 @@ class Identity:
 
     def _walks_on(self, person: Person, tracks: Tracks) -> bool:
         """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""
-        legs = [one for one in tracks.movers if one.number == person.number and one.felt - one.named >= self.legs_s]
-        others = [one for one in tracks.movers if one.left and one.number != person.number]
-        return any(
-            all(math.dist(own.track.place, other.track.place) > self.legs_apart for other in others) for own in legs
-        )
+        others = [one.track.place for one in tracks.movers if one.left and one.number != person.number]
+        for own in tracks.movers:
+            if own.number == person.number and own.felt - own.named >= self.legs_s:
+                gaps = [math.dist(own.track.place, place) for place in others]
+                if min(gaps, default=math.inf) > self.legs_apart:
+                    return True
+        return False
 
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:
         """Whether nobody is so near that a person's box may show both or the other."""
         lately = (tracks.stamp or 0.0) - self.unseen_s
-        others = [one for one in tracks.people if one is not person and one.measured >= lately]
-        return all(separation(one, person) > self.meets for one in others)
+        gaps = [separation(one, person) for one in tracks.people if one is not person and one.measured >= lately]
+        return min(gaps, default=math.inf) > self.meets
 
     def _evidence(self, known: Likeness, person: Person, *, first: bool) -> float:
         """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""
@@ -246,7 +250,7 @@ class Identity:
         others = [traits for traits in known.others if traits.number == person.number]
         others = others or [traits for traits in known.others if traits.number != known.traits.number]
         same, strange = self._fit(person, known.traits, first=first), self._fit(person, None, first=first)
-        evidence = same - max([strange, *(self._fit(person, traits, first=first) for traits in others)])
+        evidence = same - max([strange, *[self._fit(person, traits, first=first) for traits in others]])
         return min(max(evidence, -self.most), self.most)
 
     def _fit(self, person: Person, traits: Traits | None, *, first: bool) -> float:
@@ -269,12 +273,14 @@ class Identity:
             stature = math.log((1.0 - self.odd_stature) * same + self.odd_stature * self.strange_stature)
         return clothes + stature if first else self.again * clothes + self.steady * stature
 
-    def _learnt(self, known: Likeness, person: Person, tracks: Tracks) -> Likeness:
-        """Learn from a box who looks how: of the person followed where that is sure, of others where they are not."""
-        chance = known.of(person.number)
+    def _learnt(self, known: Likeness, person: Person, chance: float, *, alone: bool) -> Likeness:
+        """Learn from a box who looks how: of the person followed where that is sure, of others where they are not.
+
+        `chance` is the probability that this is the person followed; `alone`, whether the box shows nobody else.
+        """
         if chance >= self.sure:
             x, y, _, _ = person.track.mean
-            traits = self._moved(known.traits, person) if self._is_alone(person, tracks) else known.traits
+            traits = self._moved(known.traits, person) if alone else known.traits
             return replace(known, place=(x, y), at=person.measured, traits=traits)
         if not person.confirmed or chance > 1.0 - self.sure:
             return known

@@ -127,10 +127,10 @@ def predict(track: Track, stamp: float, noise: Noise) -> Track:
 
 
 def bearing_range(track: Track, pose: Odometry) -> tuple[float, float]:
-    """Return bearing and distance of the track from the robot [rad, m]."""
+    """Return bearing, within ±pi, and distance of the track from the robot [rad, m]."""
     x, y, _, _ = track.mean
     dx, dy = x - pose.x, y - pose.y
-    return wrap(math.atan2(dy, dx) - pose.yaw), math.hypot(dx, dy)
+    return math.remainder(math.atan2(dy, dx) - pose.yaw, math.tau), math.hypot(dx, dy)
 
 
 def rates(track: Track, pose: Odometry) -> tuple[float, float]:
@@ -200,29 +200,27 @@ def innovation(track: Track, bearing: float, distance: float | None, pose: Odome
         bx * rx * xx + (bx * ry + by * rx) * xy + by * ry * yy,
         rx * rx * xx + 2 * rx * ry * xy + ry * ry * yy + of_range,
     )
-    turned = wrap(bearing - wrap(math.atan2(dy, dx) - pose.yaw))
+    turned = math.remainder(bearing - math.remainder(math.atan2(dy, dx) - pose.yaw, math.tau), math.tau)
     further = None if distance is None else distance - expected
     return Innovation(turned, further, by_bearing, by_range, covariance, variances)
 
 
 def update(track: Track, measured: Innovation) -> Track:
     """Correct the track by a measurement."""
-    (bx, by), (rx, ry), (a, b, d) = measured.by_bearing, measured.by_range, measured.covariance
+    (to_x, to_y), (a, b, d), turned = measured.by_bearing, measured.covariance, measured.bearing
     xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = track.covariance
-    rows = ((xx, xy), (xy, yy), (xu, yu), (xv, yv))
     # Covariances of the state with bearing and range, and from these the gain.
-    bearing = [bx * of_x + by * of_y for of_x, of_y in rows]
+    bx, by, bu, bv = to_x * xx + to_y * xy, to_x * xy + to_y * yy, to_x * xu + to_y * yu, to_x * xv + to_y * yv
     if measured.range is None:
-        ranged, gain_range, further = [0.0] * 4, [0.0] * 4, 0.0
-        gain_bearing = [of / a for of in bearing]
+        rx = ry = ru = rv = lx = ly = lu = lv = further = 0.0
+        kx, ky, ku, kv = bx / a, by / a, bu / a, bv / a
     else:
-        ranged, further = [rx * of_x + ry * of_y for of_x, of_y in rows], measured.range
-        det = a * d - b * b
-        gain_bearing = [(d * one - b * other) / det for one, other in zip(bearing, ranged, strict=True)]
-        gain_range = [(a * other - b * one) / det for one, other in zip(bearing, ranged, strict=True)]
-    (bx, by, bu, bv), (rx, ry, ru, rv) = bearing, ranged
-    (kx, ky, ku, kv), (lx, ly, lu, lv) = gain_bearing, gain_range
-    turned = measured.bearing
+        (to_x, to_y), further, det = measured.by_range, measured.range, a * d - b * b
+        rx, ry, ru, rv = to_x * xx + to_y * xy, to_x * xy + to_y * yy, to_x * xu + to_y * yu, to_x * xv + to_y * yv
+        kx, lx = (d * bx - b * rx) / det, (a * rx - b * bx) / det
+        ky, ly = (d * by - b * ry) / det, (a * ry - b * by) / det
+        ku, lu = (d * bu - b * ru) / det, (a * ru - b * bu) / det
+        kv, lv = (d * bv - b * rv) / det, (a * rv - b * bv) / det
     x, y, u, v = track.mean
     mean = (
         x + kx * turned + lx * further,
@@ -251,8 +249,3 @@ def loosened(track: Track, place: float, speed: float) -> Track:
     place2, speed2 = place**2, speed**2
     covariance = xx + place2, xy, xu, xv, yy + place2, yu, yv, uu + speed2, uv, vv + speed2
     return Track(track.stamp, track.mean, covariance)
-
-
-def wrap(angle: float) -> float:
-    """Return the same angle within ±pi [rad]."""
-    return math.remainder(angle, math.tau)

@@ -19,8 +19,8 @@ from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
+from limo_hog.follow.tracks.association import Legs, Returns, all_distances, distances
 from limo_hog.follow.tracks.kalman import Noise, Track
-from limo_hog.follow.tracks.legs import Legs, Returns, all_distances, distances
 from limo_hog.follow.tracks.person import Person
 
 
@@ -161,8 +161,8 @@ class Movers:
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
-        places = [one.track.place for one in movers if now - one.felt < self.forget_s]
-        return np.array(places).reshape(-1, 2)
+        means = [one.track.mean for one in movers if now - one.felt < self.forget_s]
+        return np.array(means).reshape(-1, 4)[:, :2]
 
     def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
         """Note whose legs they are: one mover to one person found by the camera, the nearest first."""
@@ -265,12 +265,13 @@ class Movers:
         group, (first,) = begins.cumsum() - 1, begins.nonzero()
         count = np.bincount(group)
         here, last = returns.pose, first + count - 1
-        begun, ended = (np.hypot(x[at] - here.x, y[at] - here.y) for at in (first[1:], last[:-1]))
+        far = np.hypot(x - here.x, y - here.y)
+        begun, ended = far[first[1:]], far[last[:-1]]
         legs = count >= self.legs.fewest
         legs[1:] &= ended >= begun
         legs[:-1] &= begun >= ended
-        wide = np.hypot(*(np.maximum.reduceat(column, first) - np.minimum.reduceat(column, first) for column in (x, y)))
-        legs &= wide < self.legs.widest
+        extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
+        legs &= np.hypot(*extent.T) < self.legs.widest
         middle = np.empty((len(first), 2))
         middle[:, 0], middle[:, 1] = np.bincount(group, x) / count, np.bincount(group, y) / count
         near = np.hypot(middle[:, 0] - here.x, middle[:, 1] - here.y) < self.legs.reach
@@ -295,4 +296,5 @@ def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeo
     """Whether the lidar looked at a track's place, `half_view` [rad] to either side of straight ahead."""
     pose = returns.pose
     x, y = lidar_at(pose, robot)
-    return abs(kalman.wrap(math.atan2(track.mean[1] - y, track.mean[0] - x) - pose.yaw)) < half_view
+    off = math.atan2(track.mean[1] - y, track.mean[0] - x) - pose.yaw
+    return abs(math.remainder(off, math.tau)) < half_view

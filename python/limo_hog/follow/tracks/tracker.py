@@ -9,20 +9,15 @@ from functools import partial
 import numpy as np
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.sense.appearance import Clothes
-from limo_hog.follow.sense.clearance import Points
-from limo_hog.follow.sense.measurement import Measurement, measure
-from limo_hog.follow.sense.observation import Observation, Odometry
-from limo_hog.follow.sense.visibility import Visibility
+from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
+from limo_hog.follow.sense.measurement import WALK, Measurement, Visibility, measure
+from limo_hog.follow.sense.observation import Clothes, Observation, Odometry, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
-from limo_hog.follow.tracks.association import Association
-from limo_hog.follow.tracks.existence import Existence, Recall
+from limo_hog.follow.tracks.association import Association, Legs, Returns
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
-from limo_hog.follow.tracks.legs import Legs, Returns, returns_of
 from limo_hog.follow.tracks.movers import Mover, Movers, named
-from limo_hog.follow.tracks.person import Person, initiate, predict
-from limo_hog.follow.tracks.poses import pose_at
+from limo_hog.follow.tracks.person import Existence, Person, Recall, initiate, predict
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +55,10 @@ class Tracks:
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
-        return next((one for one in self.people if one.number == number), None)
+        for one in self.people:
+            if one.number == number:
+                return one
+        return None
 
     @property
     def in_view(self) -> list[Person]:
@@ -102,7 +100,7 @@ class Tracker:
     scan_period_s
         A scan may be so much older than the image it is used with [s]: the lidar's period of 0.125 s at 8 Hz.
     walk
-        How fast people walk who are not measured [m/s]. Chosen: a brisk walk.
+        How fast people walk who are not measured [m/s].
     min_period_s, max_period_s
         Limits of the time between two frames as it is used to predict the next [s]. Chosen: 2 to 50 Hz.
     robot
@@ -125,7 +123,7 @@ class Tracker:
     poses_s: float = 2.0
     scans_s: float = 1.0
     scan_period_s: float = 0.13
-    walk: float = 1.0
+    walk: float = WALK
     min_period_s: float = 0.02
     max_period_s: float = 0.5
     robot: RobotGeometry = LIMO
@@ -137,21 +135,24 @@ class Tracker:
         """
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
-        known = [one for one in tracks.people if stamp - one.measured < self.forget_s]
-        if observation.between:
-            known = [self._walked(one, tracks.scans, stamp) for one in known]
-        known = [predict(one, stamp, self.noise) for one in known]
+        known: list[Person] = []
+        for one in tracks.people:
+            if stamp - one.measured < self.forget_s:
+                walked = self._walked(one, tracks.scans, stamp) if observation.between else one
+                known.append(predict(walked, stamp, self.noise))
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
-        walking = {one.number for one in moving}
         others = self.movers.others(moving, known, measured, pose, self.noise)
         pairs = self.association.pair(known, measured, pose, self.noise, flat, others)
         people: list[Person] = []
         recall = tracks.recall
         for who, person in enumerate(known):
-            expected = self._expected(person, pose, observation)
-            height = person.window / max(bearing_range(person.track, pose)[1], 0.3)
+            bearing, distance = bearing_range(person.track, pose)
+            expected = self.visibility.expected(
+                bearing, distance, person.window, person.centre, observation, confirmed=person.confirmed
+            )
+            height = person.window / max(distance, 0.3)
             chance = self.existence.recall_of(tracks.recall, height)
             if expected and person.confirmed:
                 recall = self.existence.learn(recall, height, found=who in pairs)
@@ -160,7 +161,8 @@ class Tracker:
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
                 # that there is one.
-                evidence = 0.0 if person.number in walking else self.existence.of_miss(chance)
+                walks = any(one.number == person.number for one in moving)
+                evidence = 0.0 if walks else self.existence.of_miss(chance)
                 people.append(self.existence.update(person, evidence, found=False))
             else:
                 people.append(person)
@@ -188,7 +190,8 @@ class Tracker:
         `recall` is the share of frames in which a person of this size is found.
         """
         window, centre = person.window, person.centre
-        if seen.range is not None and self.existence.is_solid(seen):
+        solid, fits = self.existence.is_solid(seen), self.association.fits_size(person, seen)
+        if seen.range is not None and solid:
             # A range that contradicts the size counts too: the size may have been wrong from the beginning.
             if seen.whole:
                 window += self.size_rate * (seen.window - window)
@@ -197,16 +200,18 @@ class Tracker:
                 window, centre = seen.window, seen.middle
         off = 0.0 if seen.range is None else abs(seen.range - bearing_range(person.track, pose)[1])
         in_place = off < self.astray
-        worn = self.association.worn(seen) if self.association.fits_size(person, seen) else None
+        worn = self.association.worn(seen) if fits else None
         # A box on a part of the body still shows the stature, by the depth image.
         tall = seen.window if in_place and seen.whole and seen.window and seen.range else None
         if seen.range is not None and seen.range < self.stature_from:
             tall = None
         evidence = self.existence.of_box(seen, recall)
-        if person.confirmed and self.existence.is_solid(seen):
+        if person.confirmed and solid:
             # Near by, and on parts of the body, HOG's scores are low for people, too.
             evidence = max(evidence, 0.0)
-        seen = self.association.without_bad_range(person, seen)
+        if not fits:
+            # Something stands in front of the person.
+            seen = replace(seen, range=None)
         track = person.track
         if seen.range is not None and track.stamp - person.measured > self.restart_s:
             track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, self.noise)
@@ -240,9 +245,10 @@ class Tracker:
         unseen = tracks.stamp - person.seen
         if not person.confirmed:
             return person, tracks
-        height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
-        if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
-            return person, tracks
+        if person.misses:
+            height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
+            if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
+                return person, tracks
         # Walls and furniture that are known already are nobody's legs.
         is_ground = None if ground is None else partial(grid.is_near_blocked, ground)
         now = person
@@ -254,13 +260,14 @@ class Tracker:
             if (unseen == 0 or returns.stamp > person.felt) and returns.stamp > now.track.stamp - self.scan_period_s:
                 track = self.legs.update(now.track, returns, self.noise, is_ground)
                 now = now if track is None else replace(now, track=track, felt=returns.stamp)
-        for mover in self.movers.moving(tracks.movers):
-            # What stands could be a chair; what moved on from where the person was is the person.
-            if unseen > 0 and mover.number == person.number and mover.felt > now.measured:
-                now = replace(now, track=mover.track, felt=mover.felt)
+        if unseen > 0:
+            for mover in self.movers.moving(tracks.movers):
+                # What stands could be a chair; what moved on from where the person was is the person.
+                if mover.number == person.number and mover.felt > now.measured:
+                    now = replace(now, track=mover.track, felt=mover.felt)
         kept = now if unseen > 0 else replace(person, felt=now.felt)
-        people = tuple(kept if one.number == person.number else one for one in tracks.people)
-        return now, replace(tracks, people=people)
+        people = [kept if one.number == person.number else one for one in tracks.people]
+        return now, replace(tracks, people=tuple(people))
 
     def _walked(self, person: Person, scans: tuple[Returns, ...], stamp: float) -> Person:
         """Bring a person up to the last scan before a frame of `stamp` [s] that shows their legs.
@@ -280,16 +287,19 @@ class Tracker:
         movers, new = tracks.movers, [one for one in tracks.scans if one.stamp > tracks.moved_at]
         if not new:
             return tracks
-        people, seen = tracks.people, [one for one in tracks.in_view if one.confirmed]
+        people = tracks.people
+        seen = [one for one in people if one.confirmed and one.seen == tracks.stamp]
         for returns in new:
             movers = self.movers.update(movers, returns, half_view, self.noise, grid, ground, camera)
             movers = self.movers.assign(movers, seen, returns.stamp)
             movers = self._come_back(movers, people, returns.stamp)
+            unseen = {one.number for one in people if one.confirmed and one.seen != tracks.stamp}
+            if not unseen:
+                continue
             walking = {one.number for one in self.movers.moving(movers)}
             people = tuple(
                 self.movers.continued(one, movers, returns, self.noise)
-                if one.confirmed
-                and one.seen != tracks.stamp
+                if one.number in unseen
                 and ((tracks.stamp or 0.0) - one.seen < self.legs_only_s or one.number in walking)
                 else one
                 for one in people
@@ -302,6 +312,8 @@ class Tracker:
         Only where they can be one person's alone, and that person has no others to choose from.
         """
         lost = [one for one in people if one.confirmed and self.scan_period_s < stamp - one.measured < self.legs_only_s]
+        if not lost:
+            return movers
         walking = [one for one in self.movers.moving(movers) if one.number is None and one.felt == stamp]
         pairs = [
             (one.number, mover)
@@ -361,19 +373,14 @@ class Tracker:
         poses, scans = tracks.poses, tracks.scans
         for scan, odometry in (*observation.between, (observation.scan, observation.odometry)):
             if odometry is not None:
-                poses = (*(pose for pose in poses if odometry.stamp - pose.stamp < self.poses_s), odometry)
+                poses = (*[pose for pose in poses if odometry.stamp - pose.stamp < self.poses_s], odometry)
             if scan is not None and (not scans or scan.stamp > scans[-1].stamp):
-                young = (one for one in scans if scan.stamp - one.stamp < self.scans_s)
-                scans = (*young, returns_of(scan, pose_at(poses, scan.stamp), self.robot))
+                at = pose_at(poses, scan.stamp)
+                new = Returns(scan.stamp, to_odometry(scan_points(scan, self.robot), at), at)
+                scans = (*[one for one in scans if scan.stamp - one.stamp < self.scans_s], new)
         period = tracks.period if tracks.stamp is None else observation.stamp - tracks.stamp
         period = min(max(period, self.min_period_s), self.max_period_s)
         return replace(tracks, poses=poses, scans=scans, stamp=observation.stamp, period=period)
-
-    def _expected(self, person: Person, pose: Odometry, observation: Observation) -> bool:
-        bearing, distance = bearing_range(person.track, pose)
-        return self.visibility.expected(
-            bearing, distance, person.window, person.centre, observation, confirmed=person.confirmed
-        )
 
     def _clothes(self, person: Person, worn: Clothes | None) -> Clothes | None:
         """Return a person's clothes after one more box: quickly learnt until they are confirmed, then slowly."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.pipeline import Periods
-from limo_hog.follow.twist import Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.ros.interfaces import Message
 from limo_sim.run.log import Step
 from limo_sim.run.score import Scorer

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.pipeline import FrameLog, Periods
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Sensors
-from limo_hog.follow.twist import Twist
 from limo_hog.ros2 import names
 from limo_hog.ros2.messages import to_twist
 from limo_sim.ros.interfaces import Message, from_wire

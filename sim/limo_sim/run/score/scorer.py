@@ -16,7 +16,7 @@ import numpy as np
 
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.robot import LIMO
-from limo_hog.follow.zones import Zone, zone_of
+from limo_hog.follow.sense.measurement import Zone, zone_of
 from limo_sim.run.log import Step
 from limo_sim.run.matching import CRITERIA, NO_PERSON, Criteria, person_of
 from limo_sim.run.provenance import code_version, scenario_hash

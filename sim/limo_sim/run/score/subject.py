@@ -7,7 +7,7 @@ from array import array
 from collections import Counter
 from collections.abc import Sequence
 
-from limo_hog.follow.zones import Zone, zone_of
+from limo_hog.follow.sense.measurement import Zone, zone_of
 from limo_sim.run.log import Step
 from limo_sim.run.matching import Criteria
 from limo_sim.sensing.camera import WIDTH

@@ -1,4 +1,4 @@
-"""The last stage before the wheels: it lets a command through, slows it, or stops the robot and says why.
+"""The last stage before the wheels: it checks the senses, then lets a command through, slows it, or stops the robot.
 
 That no person is detected is no proof that none is there, so clearance is kept by the lidar and the depth image,
 whatever the boxes say. The lidar does not look behind; what it saw there shortly before is remembered.
@@ -14,23 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Controller, Decision, Mode
-from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.safety.faults import find_fault, scan_fault
-from limo_hog.follow.safety.unseen import Look, room_seen_behind
+from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import (
     NO_POINTS,
     DepthGrid,
+    Look,
     Margin,
     Points,
     from_odometry,
     room_ahead,
     room_behind,
+    room_seen_behind,
     scan_points,
     speed_within,
     to_odometry,
 )
 from limo_hog.follow.sense.observation import Observation, Odometry, Scan
-from limo_hog.follow.twist import Twist
 
 S = TypeVar("S")
 
@@ -187,17 +186,17 @@ class Guard(Generic[S]):
         def decision(twist: Twist, mode: Mode, reason: str) -> Decision[GuardState[S]]:
             return Decision(twist, state, mode, reason, proposed.target, proposed.region, proposed.belief)
 
-        if not proposed.twist.is_finite:
+        if not (math.isfinite(proposed.twist.linear) and math.isfinite(proposed.twist.angular)):
             return decision(Twist(), Mode.BLOCKED, "the controller's command is not a number")
         if scan is not None and now - scan.stamp > self.max_age_s:
             return decision(Twist(), Mode.BLOCKED, f"the scan is {now - scan.stamp:.1f} s old")
         around = from_odometry(state.scan_points, pose)
-        ahead = self._speed(room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot))
-        room = room_behind(around, self.margin, self.robot)
-        behind = self._speed(room)
+        room = room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot)
+        ahead = speed_within(room, self.braking, self.reaction_s)
+        behind = speed_within(room_behind(around, self.margin, self.robot), self.braking, self.reaction_s)
         fastest = self.max_blind
         if scan is not None and odometry is not None and proposed.twist.linear < 0:
-            seen = self._speed(room_seen_behind(state.looks, pose, self.robot))
+            seen = speed_within(room_seen_behind(state.looks, pose, self.robot), self.braking, self.reaction_s)
             behind, fastest = min(behind, max(seen, self.unseen_speed)), self.max_backward
         wanted = max(proposed.twist.linear, -fastest)
         linear = min(max(wanted, -behind), ahead)
@@ -208,9 +207,6 @@ class Guard(Generic[S]):
         if linear == 0:
             return decision(twist, Mode.BLOCKED, f"an obstacle is too close {where}")
         return decision(twist, proposed.mode, f"slowed by an obstacle {where}")
-
-    def _speed(self, room: float) -> float:
-        return speed_within(room, self.braking, self.reaction_s)
 
     def _remember(self, state: GuardState[S], scan: Scan | None, odometry: Odometry | None) -> GuardState[S]:
         """Add a new scan; of earlier returns, keep those that are recent and out of the lidar's field of view now."""
@@ -243,3 +239,80 @@ class Guard(Generic[S]):
         if young and scan.stamp - young[-1].scan.stamp < self.look_every_s:
             return young
         return (*young, Look(scan, pose))
+
+
+def find_fault(observation: Observation, last_stamp: float | None) -> str:
+    """Return what is wrong with an observation, in one line; "" if nothing is.
+
+    Parameters
+    ----------
+    observation
+        The sensors' readings and the detections.
+    last_stamp
+        Stamp of the observation before [s]; None for the first.
+    """
+    if observation.fault:
+        return observation.fault
+    if not math.isfinite(observation.stamp):
+        return f"the frame's stamp is {observation.stamp}, not a time"
+    if last_stamp is not None and observation.stamp < last_stamp:
+        return f"time runs backwards: a frame of {observation.stamp:.3f} s after one of {last_stamp:.3f} s"
+    return _boxes(observation) or _depth(observation) or scan_fault(observation.scan) or _odometry(observation.odometry)
+
+
+def _boxes(observation: Observation) -> str:
+    boxes, scores = observation.detections.boxes, observation.detections.scores
+    if boxes.ndim != 2 or boxes.shape[1] != 4 or len(boxes) != len(scores):
+        return f"boxes {boxes.shape} and scores {scores.shape} do not belong together"
+    if not all(map(math.isfinite, scores.tolist())):
+        return "a box has a score that is not a number"
+    clothes = observation.clothes
+    if clothes is not None and clothes.shape != (len(boxes), 2, 3):
+        return f"clothes {clothes.shape} and boxes {boxes.shape} do not belong together"
+    for x, y, w, h in boxes.tolist():
+        inside = 0 <= x + w / 2 < observation.width and 0 <= y + h / 2 < observation.height
+        if not inside or w <= 0 or h <= 0:
+            return f"box ({x}, {y}, {w}, {h}) lies outside the {observation.width}x{observation.height} image"
+    return ""
+
+
+#: One in so many rows and columns of the depth image is looked at first [px].
+_STEP = 40
+
+
+def _depth(observation: Observation) -> str:
+    depth = observation.depth
+    if depth is None:
+        return ""
+    if depth.shape != (observation.height, observation.width):
+        return f"the depth image is {depth.shape}, the camera's {(observation.height, observation.width)}"
+    # Among a few pixels one is nearly always valid; to look at all takes a tenth of the follower's time.
+    for some in (depth[::_STEP, ::_STEP], depth):
+        if (np.isfinite(some) & (some > 0)).any():
+            return ""
+    return "the depth image has no valid pixel"
+
+
+def scan_fault(scan: Scan | None) -> str:
+    """Return what is wrong with a scan, in one line; "" if nothing is, or if there is none.
+
+    A range below `range_min` is no measurement, inf is a beam that met nothing (REP-117, sensor_msgs/LaserScan).
+    """
+    if scan is None:
+        return ""
+    if scan.ranges.size == 0:
+        return "the scan is empty"
+    if not math.isfinite(scan.stamp):
+        return f"the scan's stamp is {scan.stamp}, not a time"
+    if not -math.inf < scan.angle_min < scan.angle_max < math.inf:
+        return f"the scan's angles, {scan.angle_min} to {scan.angle_max} rad, do not go from right to left"
+    if not scan.range_min < scan.range_max or not (scan.ranges >= scan.range_min).any():
+        return f"the scan has no valid range from {scan.range_min} to {scan.range_max} m"
+    return ""
+
+
+def _odometry(odometry: Odometry | None) -> str:
+    if odometry is None:
+        return ""
+    values = (odometry.x, odometry.y, odometry.yaw, odometry.linear, odometry.angular)
+    return "" if all(map(math.isfinite, values)) else "the odometry is not a number"

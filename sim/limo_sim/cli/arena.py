@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from limo_hog.cli.support.output import UsageError
 from limo_sim.cli.options import add_scenario
-from limo_sim.cli.watching import add_watching, watching
+from limo_sim.cli.watching import add_watching, observing
 
 if TYPE_CHECKING:
     from limo_hog.ros2.dds import Bus
@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> int:
 
         bus = Bus()
         print(f"arena {scenario.name!r} is on ROS domain {bus.domain}; Ctrl-C ends it", file=sys.stderr)
-    with watching(args, scenario) as audience:
-        arena = run_live(scenario, args.seed, args.seconds, bus, audience.watch if audience else None)
+    with observing(args, scenario) as observers:
+        arena = run_live(scenario, args.seed, args.seconds, bus, observers.notify if observers else None)
     contacts = arena.contacts
     print(
         f"{arena.time:.1f} s; contacts: person {contacts.person}, wall {contacts.wall}; "

@@ -11,7 +11,7 @@ from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.cli.options import add_json, add_scenario
-from limo_sim.cli.watching import add_watching, watching
+from limo_sim.cli.watching import add_watching, observing
 
 if TYPE_CHECKING:
     from limo_sim.run.log import Step
@@ -45,13 +45,13 @@ def run(args: argparse.Namespace) -> int:
     scenario = of_run(Scenario.load(args.scenario), args.seed)
     controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
-    with watching(args, scenario, controller) as audience:
+    with observing(args, scenario, controller) as observers:
         with progress("s") as bar:
             task = bar.add_task("search", total=args.seconds)
 
             def watch(step: Step) -> None:
                 bar.update(task, completed=round(step.log.time, 1), description=step.log.decision.mode.value)
-                audience.watch(step)
+                observers.notify(step)
 
             episode = run_episode(
                 scenario,
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
                 watch=watch,
             )
         card = score(episode)
-        audience.end(episode, card)
+        observers.end(episode, card)
     if args.json:
         write_json(args.json, card.to_json())
     if args.json != STDOUT:

@@ -13,7 +13,7 @@ from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_sim.cli.options import add_json, add_scenario
-from limo_sim.cli.watching import add_watching, watching
+from limo_sim.cli.watching import add_watching, observing
 
 if TYPE_CHECKING:
     from limo_sim.run.log import Step
@@ -57,13 +57,13 @@ def run(args: argparse.Namespace) -> int:
         if args.json == STDOUT:
             # What the node prints must not mix with the JSON.
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))
-        audience = stack.enter_context(watching(args, scenario))
+        observers = stack.enter_context(observing(args, scenario))
         bar = stack.enter_context(progress("s"))
         task = bar.add_task("runs", total=args.seconds)
 
         def watch(step: Step) -> None:
             bar.update(task, completed=round(step.log.time, 1))
-            audience.watch(step)
+            observers.notify(step)
 
         def log(time: float, level: str, name: str, message: str) -> None:
             line = f"[{level}] [{time:.9f}] [{name}]: {message}"
@@ -77,11 +77,11 @@ def run(args: argparse.Namespace) -> int:
             arguments=["--ros-args", *args.ros_args],
             log=log,
             watch=watch,
-            pictures=bool(audience),
+            pictures=bool(observers),
         )
         card = score_of(ended)
         bar.stop()
-        audience.end(ended.episode, card)
+        observers.end(ended.episode, card)
     if args.json:
         write_json(args.json, card.to_json())
     if args.json != STDOUT:

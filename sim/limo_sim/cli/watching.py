@@ -60,8 +60,8 @@ def _address(text: str) -> tuple[str, int]:
 
 
 @dataclass
-class Watching:
-    """The watchers of one run: pass `watch` to the run, and call `end` after it.
+class Observers:
+    """Those who look on at one run: pass `notify` to the run, and call `end` after it.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Watching:
         """Whether a run needs to be shown to it."""
         return bool(self.keepers) or self.view is not None
 
-    def watch(self, step: Step) -> None:
+    def notify(self, step: Step) -> None:
         """Keep and show a step; returns when the run may go on."""
         if self.plot is not None:
             self._steps.append(step.bare())
@@ -104,36 +104,36 @@ class Watching:
 
 
 @contextmanager
-def watching(
+def observing(
     args: argparse.Namespace, scenario: Scenario, controller: Tunable[Any] | None = None
-) -> Iterator[Watching]:
+) -> Iterator[Observers]:
     """Open every output that was asked for; a missing library is named first. Ctrl-C and SIGTERM leave whole files.
 
     `controller` is the one whose parameters the page may set.
     """
     stopped: KeyboardInterrupt | None = None
     with ExitStack() as stack:
-        all_ = Watching()
+        observers = Observers()
         if args.plot is not None:
             # Drawn at the end; a missing library is named now.
             import limo_sim.view.plot  # noqa: F401
 
-            all_.plot = args.plot
+            observers.plot = args.plot
         if args.video is not None:
             from limo_sim.view.video import filmed
 
-            all_.keepers.append(stack.enter_context(filmed(args.video, scenario.camera.rate_hz)))
+            observers.keepers.append(stack.enter_context(filmed(args.video, scenario.camera.rate_hz)))
         if args.record is not None:
             from limo_sim.view.record import recorded
 
-            all_.keepers.append(stack.enter_context(recorded(args.record, scenario.camera)))
+            observers.keepers.append(stack.enter_context(recorded(args.record, scenario.camera)))
         if args.view is not None:
             from limo_sim.view.server import View
 
-            all_.view = stack.enter_context(View(scenario, controller, *args.view))
-            print(f"watch the run at {all_.view.url}", file=sys.stderr)
+            observers.view = stack.enter_context(View(scenario, controller, *args.view))
+            print(f"watch the run at {observers.view.url}", file=sys.stderr)
         try:
-            yield all_
+            yield observers
         except KeyboardInterrupt as error:
             stopped = error
     if stopped is not None:

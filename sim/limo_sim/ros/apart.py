@@ -164,7 +164,7 @@ def _listen(
         if told == "step":
             step, asked, target = content
             past.add(step)
-            past.asked, past.target_distance = asked, target
+            past.detector_inputs, past.target_distance = asked, target
             watch(step)
             connection.send_bytes(b"go on")
         elif told == "commands":
@@ -233,7 +233,7 @@ class _Link:
         if world is None:
             return
         told = step if self._pictures else step.bare()
-        self.tell("step", (told, list(world.asked), world.target_distance))
+        self.tell("step", (told, list(world.detector_inputs), world.target_distance))
         self._connection.recv_bytes()
 
 
@@ -284,4 +284,4 @@ def _run(connection: Connection, job: _Job) -> None:
     except (LimoHogError, OSError, MemoryError) as error:
         link.tell("error", error)
     else:
-        link.tell("end", Ended(outcome.episode, outcome.failure, outcome.traceback, outcome.asked))
+        link.tell("end", Ended(outcome.episode, outcome.failure, outcome.traceback, outcome.used_hog))

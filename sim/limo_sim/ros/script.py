@@ -40,14 +40,14 @@ class Ended:
         One line that names the fault; "" without one.
     traceback
         The script's part of the traceback; "" without an exception.
-    asked
+    used_hog
         Whether the script used cv2's HOG detector.
     """
 
     episode: Episode
     failure: str
     traceback: str
-    asked: bool
+    used_hog: bool
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def finished(world: World) -> Outcome:
         world.advance()
     failure = _failure(world, failed_at)
     shown = "" if world.fault is None else _script_traceback(world.fault)
-    return Outcome(world.episode(), failure, shown, bool(world.asked), world)
+    return Outcome(world.episode(), failure, shown, bool(world.detector_inputs), world)
 
 
 def score_of(outcome: Ended) -> ScoreCard:
@@ -143,7 +143,7 @@ def score_of(outcome: Ended) -> ScoreCard:
     Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
     """
     card, driving = score(outcome.episode), outcome.episode.scorer.driving
-    if outcome.asked:
+    if outcome.used_hog:
         return card
     return replace(
         card,

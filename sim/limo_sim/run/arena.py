@@ -19,7 +19,7 @@ from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_sim.sensing import imu, lidar
 from limo_sim.sensing.camera import FOCAL_PX, CameraPose, TrueFrame
 from limo_sim.sensing.delivery import Channel, Exposure
-from limo_sim.sensing.renderer import Past, Renderer, Seen
+from limo_sim.sensing.renderer import Earlier, Renderer, Seen
 from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
 from limo_sim.world.movers import Movers
@@ -200,7 +200,7 @@ class Arena:
                 self._stream(CAMERA_STREAM, exposure),
                 self._movers.at(exposure.state.time),
                 time=exposure.state.time,
-                past=Past(partial(self._earlier, exposure.state), exposure.state.turn_rate),
+                past=Earlier(partial(self._earlier, exposure.state), exposure.state.turn_rate),
             )
             truth = self._truth_at(exposure.state, seen)
             self._frame = TrueFrame(exposure.state.time, image, FOCAL_PX, depth, truth)

@@ -58,7 +58,7 @@ _NEAR = -_FAR
 
 
 @dataclass(frozen=True, slots=True)
-class Past:
+class Earlier:
     """What the camera saw before.
 
     Attributes
@@ -103,7 +103,7 @@ class Renderer:
         movers: Sequence[Furniture] = (),
         *,
         time: float = 0.0,
-        past: Past | None = None,
+        past: Earlier | None = None,
     ) -> tuple[U8, F32, list[Seen]]:
         """Expose one frame.
 
@@ -174,7 +174,7 @@ class Renderer:
         bent = self._lens.box(box)
         return (0.0, None) if bent is None else (share, bent)
 
-    def _picture(self, past: Past, age: float) -> U8:
+    def _picture(self, past: Earlier, age: float) -> U8:
         """Draw the scene as it was some seconds before the stamp, without noise."""
         self._draw(self._colours, *past.before(age))
         return cv2.cvtColor(_bytes(self._colours), cv2.COLOR_BGRA2BGR).astype(np.uint8, copy=False)

@@ -130,7 +130,7 @@ def _fault(script: Path, take: Take) -> Verdict | None:
         return None
     frames = traceback.extract_tb(outcome.world.fault.__traceback__)
     line = next((frame.lineno for frame in reversed(frames) if frame.filename == str(script)), None)
-    not_bytes = [asked for asked in outcome.world.asked if not asked.startswith("uint8")]
+    not_bytes = [asked for asked in outcome.world.detector_inputs if not asked.startswith("uint8")]
     if not_bytes:
         said = f"the detector was given {not_bytes[0]}: it reads uint8, as imgmsg_to_cv2(message, 'bgr8') gives it"
         return Verdict(2, "people are found", False, said, line=line)

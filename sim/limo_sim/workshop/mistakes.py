@@ -56,11 +56,11 @@ def no_detection(script: Path, takes: Sequence[Take]) -> Finding | None:
         if line is None:
             return Finding(False, "self.hog.detectMultiScale was never called")
         return Finding(False, "detectMultiScale was never called: this line never runs", line)
-    untaught = takes[0].calls.untaught
-    if untaught != 0:
+    searched_without_svm = takes[0].calls.searched_without_svm
+    if searched_without_svm != 0:
         said = "detectMultiScale ran before setSVMDetector, so it finds nothing; in __init__, call\n"
         said += "hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())"
-        return Finding(False, said, untaught)
+        return Finding(False, said, searched_without_svm)
     return None
 
 

@@ -199,7 +199,7 @@ DETECTOR_SCENES = (LEFT, RIGHT, NOBODY)
 
 def no_hog(takes: Sequence[Take]) -> Finding:
     """Whether people are found without OpenCV's HOG detector: a red box is on the person."""
-    if any(take.outcome is not None and take.outcome.world.asked for take in takes):
+    if any(take.outcome is not None and take.outcome.world.detector_inputs for take in takes):
         return Finding(False, "cv2's HOGDescriptor is still asked: detectMultiScale runs")
     return red_on_person(takes)
 

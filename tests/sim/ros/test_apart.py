@@ -59,7 +59,7 @@ def test_a_run_apart_is_the_run_in_this_process(script: Callable[[str], Path]) -
     assert log(here_steps) == log(there_steps)
     assert len(there_steps) > 10
     assert figures(here) == figures(there)
-    assert (here.failure, here.asked) == (there.failure, there.asked) == ("", True)
+    assert (here.failure, here.used_hog) == (there.failure, there.used_hog) == ("", True)
     for name in ("scenario", "controller", "detector", "seed", "seconds", "contacts", "target_distance"):
         assert getattr(here.episode, name) == getattr(there.episode, name), name
 

@@ -23,7 +23,7 @@ const PATIENCE: Duration = Duration::from_millis(2);
 
 /// Work that several threads do together.
 pub(crate) trait Shared: Send + Sync + 'static {
-    /// Does a part of the work after the other; called once by every thread, and over when no part is left to take.
+    /// Every thread calls this once; it takes parts of the work until none is left.
     fn work(&self, interrupt: &Interrupt) -> Result<()>;
 }
 

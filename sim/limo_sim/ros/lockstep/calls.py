@@ -23,7 +23,7 @@ class Calls:
         Whether `spin` or `spin_once` ran, of rclpy or of an executor.
     images
         How many camera images the script's callbacks were given.
-    untaught
+    searched_without_svm
         Line of a `detectMultiScale` before `setSVMDetector`; 0 where there was none.
     """
 
@@ -34,7 +34,7 @@ class Calls:
     windows: dict[str, int | None] = field(default_factory=dict)
     spun: bool = False
     images: int = 0
-    untaught: int | None = 0
+    searched_without_svm: int | None = 0
 
 
 def nearest_topic(topic: str) -> str:

@@ -85,7 +85,7 @@ class Past:
         When the last control period began.
     found
         Whether a control period had a target.
-    asked, target_distance
+    detector_inputs, target_distance
         As `World` has them.
     """
 
@@ -93,7 +93,7 @@ class Past:
     commands: array[float] = field(default_factory=lambda: array("d"))
     periods: Periods = field(default_factory=Periods)
     found: bool = False
-    asked: list[str] = field(default_factory=list)
+    detector_inputs: list[str] = field(default_factory=list)
     target_distance: float | None = None
 
     def add(self, step: Step) -> None:

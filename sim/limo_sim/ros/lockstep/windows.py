@@ -118,10 +118,10 @@ def _watched(base: Any, world: World) -> Any:
 
         def detectMultiScale(self, img: Any, *args: Any, **kwargs: Any) -> Any:  # noqa: N802 — OpenCV's name
             looked_at = f"{getattr(img, 'dtype', type(img).__name__)} {np.shape(img)}"
-            if looked_at not in world.asked:
-                world.asked.append(looked_at)
+            if looked_at not in world.detector_inputs:
+                world.detector_inputs.append(looked_at)
             if not self._has_svm:
-                world.calls.untaught = world.line()
+                world.calls.searched_without_svm = world.line()
             began = time.perf_counter()
             rects, weights = self._descriptor.detectMultiScale(img, *args, **kwargs)
             ms = 1e3 * (time.perf_counter() - began)

@@ -53,7 +53,7 @@ class World:
         Every Twist on /cmd_vel.
     found
         What the script's detector found since the last camera frame.
-    asked
+    detector_inputs
         Types and shapes of the images given to the detector, as "uint8 (480, 640, 3)", each once.
     longest
         The callback that slept longest; None while none has slept.
@@ -109,7 +109,7 @@ class World:
         self._unanswered: dict[str, float] = {}
         self.fault: BaseException | None = None
         self.longest: Callback | None = None
-        self.asked: list[str] = []
+        self.detector_inputs: list[str] = []
         self.parameters: dict[str, Any] = {}
         self._outlet = Outlet(self.arena)
         self.scorer = Scorer(self.arena.scenario)
@@ -253,7 +253,7 @@ class World:
         while arena.time < until - 1e-9:
             arena.step()
         self.scorer, self._periods = past.scorer, past.periods
-        self.asked, self.parameters = list(past.asked), {"target_distance": past.target_distance}
+        self.detector_inputs, self.parameters = list(past.detector_inputs), {"target_distance": past.target_distance}
         self._seen_before = past.found
 
     def episode(self) -> Episode:
@@ -261,7 +261,7 @@ class World:
         return Episode(
             scenario=self.arena.scenario,
             controller=self.script.name,
-            detector="hog" if self.asked else "the node's own",
+            detector="hog" if self.detector_inputs else "the node's own",
             seed=self.arena.seed,
             seconds=self.time,
             scorer=self.scorer,
@@ -315,7 +315,7 @@ class World:
         found = self._in_frame_pixels(frame) if new else Detections.none()
         target = int(np.argmax(found.scores)) if len(found) else None
         twist = self.commands[-1].twist if self.commands else Twist()
-        if self.asked:
+        if self.detector_inputs:
             mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
         else:
             # Whether a node with a detector of its own searches or follows is not known.

@@ -52,7 +52,7 @@ class Subject:
         self.zones: Counter[Zone] = Counter()
         # Distances held before the controller first says which one it keeps, and after that what it keeps, and by how
         # much the person was off.
-        self._unsaid, self._said, self._squares = Mean(), Mean(), 0.0
+        self._kept_unknown, self._kept_known, self._squares = Mean(), Mean(), 0.0
         self._keeps: float | None = None
         self._gaps: list[float] = []
         self._length = self._searched = 0.0
@@ -69,9 +69,9 @@ class Subject:
         self.zones[zone_of(person.distance)] += 1
         self._keeps = step.log.decision.belief.keeps or self._keeps
         if self._keeps is None:
-            self._unsaid.add(person.surface_distance)
+            self._kept_unknown.add(person.surface_distance)
         else:
-            self._said.add(self._keeps)
+            self._kept_known.add(self._keeps)
             self._squares += (person.surface_distance - self._keeps) ** 2
 
     def _add_frame(self, step: Step, seen: Truth, found: bool, targeted: bool) -> None:
@@ -118,13 +118,13 @@ class Subject:
 
     def kept(self, target: float) -> float | None:
         """Return the mean of the distance that a controller held whose target is `target` [m]."""
-        count = self._unsaid.count + self._said.count
-        return (self._unsaid.count * target + self._said.total) / count if count else None
+        count = self._kept_unknown.count + self._kept_known.count
+        return (self._kept_unknown.count * target + self._kept_known.total) / count if count else None
 
     def distance_error(self, target: float) -> float | None:
         """Return the root mean square of the distance's error, the controller's target being `target` [m]."""
-        count = self._unsaid.count + self._said.count
-        return math.sqrt((self._unsaid.squares(target) + self._squares) / count) if count else None
+        count = self._kept_unknown.count + self._kept_known.count
+        return math.sqrt((self._kept_unknown.squares(target) + self._squares) / count) if count else None
 
 
 class Mean:

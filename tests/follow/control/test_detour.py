@@ -77,3 +77,10 @@ def test_a_detour_is_kept_while_the_other_side_is_not_a_third_of_it() -> None:
         across = wall(1.2, right_end, 0.14)
         assert narrow.heading(across, 0.0, 4.0, 4 * 0.08, LIMO) == pytest.approx(0.08 * steps)
         assert narrow.heading(across, 0.0, 4.0, 0.0, LIMO) == pytest.approx(-0.16 if steps > 0 else -0.08)
+
+
+def test_along_a_way_a_direction_is_free_for_a_third_of_a_quarter_of_a_metre() -> None:
+    # To a wall: .145 m of robot, .65 m of margin.
+    straight = Detour(steps_near=0)
+    for room, heading in ((0.25 / 3 + 0.005, 0.0), (0.25 / 3 - 0.005, None)):
+        assert straight.near(wall(0.795 + room), 0.0, LIMO) == heading

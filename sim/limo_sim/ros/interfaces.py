@@ -18,10 +18,10 @@ from rosbags.typesys import get_types_from_msg
 from limo_hog.ros2.messages import Field, element_type, fields_of, typestore
 
 #: What `import` finds.
-PACKAGES = (
-    *("builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "nav_msgs", "people_msgs", "rosgraph_msgs"),
-    *("sensor_msgs", "shape_msgs", "std_msgs", "stereo_msgs", "tf2_msgs", "trajectory_msgs", "vision_msgs"),
-    *("unique_identifier_msgs", "visualization_msgs"),
+PACKAGES = tuple(
+    "builtin_interfaces diagnostic_msgs geometry_msgs nav_msgs people_msgs rosgraph_msgs sensor_msgs "
+    "shape_msgs std_msgs stereo_msgs tf2_msgs trajectory_msgs vision_msgs unique_identifier_msgs "
+    "visualization_msgs".split()
 )
 
 #: Services that `import` finds, by package and name: the fields of request and response.

@@ -11,22 +11,9 @@ from numpy.typing import NDArray
 from limo_sim.ros.rclpy_stub.partial import PartialApi
 
 #: Names of ROS 2's `PinholeCameraModel` that are not offered.
-_MISSING = (
-    "rectifyImage",
-    "rectifyPoint",
-    "unrectifyPoint",
-    "rectify_image",
-    "rectify_point",
-    "unrectify_point",
-    "getDeltaU",
-    "getDeltaV",
-    "getDeltaX",
-    "getDeltaY",
-    "fullResolution",
-    "fullIntrinsicMatrix",
-    "fullProjectionMatrix",
-    "tfFrame_",
-    "stamp_",
+_MISSING = tuple(
+    "rectifyImage rectifyPoint unrectifyPoint rectify_image rectify_point unrectify_point getDeltaU getDeltaV "
+    "getDeltaX getDeltaY fullResolution fullIntrinsicMatrix fullProjectionMatrix tfFrame_ stamp_".split()
 )
 
 

@@ -49,17 +49,10 @@ _Track = list[tuple[int, Rigid]]
 
 
 #: Names of ROS 2's `Buffer` that are not offered.
-_MISSING = (
-    "lookup_transform_full",
-    "lookup_transform_full_async",
-    "lookup_transform_async",
-    "transform_full",
-    "can_transform_full",
-    "wait_for_transform_async",
-    "wait_for_transform_full_async",
-    "all_frames_as_yaml",
-    "set_transform_callback",
-    "get_latest_common_time",
+_MISSING = tuple(
+    "lookup_transform_full lookup_transform_full_async lookup_transform_async transform_full "
+    "can_transform_full wait_for_transform_async wait_for_transform_full_async all_frames_as_yaml "
+    "set_transform_callback get_latest_common_time".split()
 )
 
 

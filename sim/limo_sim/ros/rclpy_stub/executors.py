@@ -20,13 +20,9 @@ _THREADS = 4
 
 
 #: Names of rclpy's `Executor` that are not offered.
-_MISSING = (
-    "wait_for_ready_callbacks",
-    "spin_once_until_future_complete",
-    "can_execute",
-    "create_timer",
-    "add_to_context",
-    "guard_condition",
+_MISSING = tuple(
+    "wait_for_ready_callbacks spin_once_until_future_complete can_execute create_timer add_to_context "
+    "guard_condition".split()
 )
 
 

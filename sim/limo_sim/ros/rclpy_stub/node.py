@@ -24,47 +24,22 @@ class NotInitializedException(Exception):  # noqa: N818 — rclpy's name
 
 
 #: Options of rclpy's Node that change nothing here.
-_WITHOUT_EFFECT = (
-    *("context", "enable_rosout", "rosout_qos_profile", "start_parameter_services", "enable_logger_service"),
+_WITHOUT_EFFECT = tuple(
+    "context enable_rosout rosout_qos_profile start_parameter_services enable_logger_service".split()
 )
 
 
 #: Names of rclpy's `Node` that are not offered.
-_MISSING = (
-    "create_guard_condition",
-    "destroy_guard_condition",
-    "guards",
-    "handle",
-    "context",
-    "wait_for_node",
-    "waitables",
-    "add_waitable",
-    "remove_waitable",
-    "set_descriptor",
-    "describe_parameter",
-    "describe_parameters",
-    "list_parameters",
-    "get_parameter_types",
-    "get_parameter_type",
-    "set_parameters_atomically",
-    "PARAM_REL_TOL",
-    "get_service_names_and_types",
-    "get_node_names",
-    "count_clients",
-    "count_services",
-    "get_publishers_info_by_topic",
-    "get_subscriptions_info_by_topic",
-    "get_fully_qualified_node_names",
-    "get_publisher_names_and_types_by_node",
-    "get_subscriber_names_and_types_by_node",
-    "get_service_names_and_types_by_node",
-    "get_client_names_and_types_by_node",
-    "get_node_names_and_namespaces",
-    "get_node_names_and_namespaces_with_enclaves",
-    "add_pre_set_parameters_callback",
-    "remove_pre_set_parameters_callback",
-    "add_post_set_parameters_callback",
-    "remove_post_set_parameters_callback",
+_MISSING = tuple(
+    "create_guard_condition destroy_guard_condition guards handle context wait_for_node waitables add_waitable "
+    "remove_waitable set_descriptor describe_parameter describe_parameters list_parameters get_parameter_types "
+    "get_parameter_type set_parameters_atomically PARAM_REL_TOL get_service_names_and_types get_node_names "
+    "count_clients count_services get_publishers_info_by_topic get_subscriptions_info_by_topic "
+    "get_fully_qualified_node_names get_publisher_names_and_types_by_node "
+    "get_subscriber_names_and_types_by_node get_service_names_and_types_by_node "
+    "get_client_names_and_types_by_node get_node_names_and_namespaces "
+    "get_node_names_and_namespaces_with_enclaves add_pre_set_parameters_callback "
+    "remove_pre_set_parameters_callback add_post_set_parameters_callback remove_post_set_parameters_callback".split()
 )
 
 

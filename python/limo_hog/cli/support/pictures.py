@@ -45,7 +45,7 @@ Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
-class Found:
+class Row:
     """The people found in one picture."""
 
     source: str
@@ -139,7 +139,7 @@ class Run:
         cv2.setNumThreads(1 if many else threads)
 
     def _look_at_images(self, sources: list[Source]) -> None:
-        def work(source: Source) -> Found | str:
+        def work(source: Source) -> Row | str:
             try:
                 found, picture = self._find(source, 0, read_image(source))
             except (ImageError, OSError) as error:
@@ -184,7 +184,7 @@ class Run:
                 except ReadError as error:
                     self._fail(str(error))
 
-            def work(job: tuple[int, Image]) -> tuple[Found, Image | None]:
+            def work(job: tuple[int, Image]) -> tuple[Row, Image | None]:
                 return self._find(source, *job)
 
             try:
@@ -199,14 +199,14 @@ class Run:
                 if source.kind not in (Kind.CAMERA, Kind.STREAM):
                     raise
 
-    def _find(self, source: Source, frame: int, image: Image) -> tuple[Found, Image | None]:
+    def _find(self, source: Source, frame: int, image: Image) -> tuple[Row, Image | None]:
         start = time.perf_counter()
         detections = self._detector.detect(image)
         ms = 1e3 * (time.perf_counter() - start)
         height, width = image.shape[:2]
         boxes = detections.person_boxes if self._args.person_box else detections.boxes
         scores = detections.scores.tolist()
-        found = Found(source.name, frame, width, height, boxes.tolist(), scores, round(ms, 3))
+        found = Row(source.name, frame, width, height, boxes.tolist(), scores, round(ms, 3))
         if source not in self._copies:
             return found, None
         return found, annotate(image, boxes, [f"{score:.1f}" for score in scores])
@@ -229,7 +229,7 @@ class Run:
         if self._bar and self._task is not None:
             self._bar.advance(self._task)
 
-    def _keep(self, found: Found) -> None:
+    def _keep(self, found: Row) -> None:
         self._write(vars(found))
         if self.results is not None:
             self.results.append(vars(found))

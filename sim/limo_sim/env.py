@@ -332,3 +332,6 @@ def glimpse(plan: Plan, scenario: Scenario, index: int, walls: FloorPlan) -> Gli
     found = visible >= CRITERIA.in_view and height >= _LEAST_PX and head <= HEIGHT / 2
     found = found and abs(column) <= WIDTH / 2 - _SIDE_PX
     return Glimpse(bearing, distance, surface, visible, height, found)
+
+
+gymnasium.register("LimoFollow-v1", entry_point="limo_sim.env:LimoFollowV1", max_episode_steps=600)

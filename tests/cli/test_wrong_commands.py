@@ -106,7 +106,7 @@ WRONG_ARGUMENTS = [
 IMPOSSIBLE = [
     ("detect a.jpg --model there.txt", "there.txt"),
     ("bench --image there.txt", "there.txt: not an image that OpenCV can read (4 bytes)"),
-    ("follow --scenario nowhere", "unknown scenario nowhere: want one of crossing,"),
+    ("follow --scenario nowhere", "unknown scenario nowhere: want one of bollards, crossing,"),
     ("follow --scenario nowhere.toml", "nowhere.toml: cannot be read: No such file or directory"),
     ("follow --controller approach --target 1", "the approach controller holds no distance: use proxemic or tracking"),
     ("follow --detector yolo", "no detector 'yolo': want one of hog,"),

@@ -100,7 +100,7 @@ def main() -> int:
         faulthandler.enable()
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         here = mmap.mmap(args.marks, 8)
-        json.dump(batch(*args.batch, here), sys.stdout)
+        json.dump(batch(args.batch[0], args.batch[1], here), sys.stdout)
         return 0
     state: dict[str, Any] = {"next": args.first, "ends": {}, "findings": [], "seconds": 0.0}
     if args.state and args.state.exists():

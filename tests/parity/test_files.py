@@ -114,7 +114,7 @@ def test_a_file_written_by_hand_may_use_yamls_other_forms(tmp_path: Path) -> Non
     assert (hog.winSize, hog.blockSize, hog.blockStride, hog.nlevels) == ((16, 16), (8, 8), (8, 8), 3)
 
 
-def test_missing_values_count_as_zero_and_a_missing_detector_keeps_the_old_as_in_opencv(tmp_path: Path) -> None:
+def test_as_in_opencv_missing_values_are_zero_and_a_missing_detector_keeps_the_old(tmp_path: Path) -> None:
     path = tmp_path / "bare.yml"
     path.write_text(
         "%YAML:1.0\n---\nbare:\n   winSize: [ 64, 128 ]\n   blockSize: [ 16, 16 ]\n   blockStride: [ 8, 8 ]\n"

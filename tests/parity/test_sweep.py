@@ -76,9 +76,10 @@ def same_people(s: Search) -> None:
     weights = hogs[1].detectMultiScale(image, -1e9, *arguments, 0)[1]
     threshold = float(Draw(s.seed).choice(weights)) if len(weights) else 0.0
     groupings: list[tuple[float, float, bool]] = [(threshold, 0, False), (threshold, 1, False), (threshold, 2.7, False)]
-    # The density of mean-shift is one only where all weights are positive; its time grows with the cube of the hits.
+    # The density of mean-shift is one only where all weights are positive; its time grows with the cube of the hits,
+    # and for windows of a few pixels it takes minutes, in OpenCV too.
     strong = max(float(np.sort(weights)[-40:][0]), 0.01) if len(weights) else math.inf
-    if 0 < np.count_nonzero(np.asarray(weights) >= strong) <= 60:
+    if min(s.geometry[0]) >= 16 and 0 < np.count_nonzero(np.asarray(weights) >= strong) <= 60:
         groupings.append((strong, 0.1, True))
     for hit_threshold, group_threshold, mean_shift in groupings:
         found, expected = (

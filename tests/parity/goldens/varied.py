@@ -113,7 +113,8 @@ def edges() -> Iterator[Case]:
     for name, size in (("exact-fit", (128, 64)), ("one-pixel-more", (129, 65)), ("no-window", (128, 56))):
         yield Case(f"compute-{name}", "windows at the image's edge", partial(images.noise, 33, *size), "compute")
     arguments = {"hitThreshold": -0.8, "winStride": (8, 8), "padding": (8, 8)}
-    for name, picture in {"street": STREET, "street-gray": of_street, "crowd": CROWD}.items():
+    pictures = {"street": STREET, "street-gray": of_street, "crowd": CROWD}
+    for name, picture in pictures.items():
         why = "persons of 96 px and what looks like them"
         yield Case(f"detect-{name}", why, picture, "detect", arguments, detector="default")
     yield Case("detect-lonely", "one window, one person", LONELY, "detect", detector="default")

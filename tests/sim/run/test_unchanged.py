@@ -32,7 +32,7 @@ def sampled(name: str) -> NDArray[np.uint8]:
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_an_old_scenario_shows_the_frames_it_showed_before_rooms_and_detectors_could_vary(name: str) -> None:
+def test_an_old_scenario_shows_the_frames_that_were_recorded_of_it(name: str) -> None:
     recorded = np.frombuffer(bytes.fromhex(RECORDED[name]), np.uint8)
     # Another CPU or numpy may round a value to the next level; anything else is another picture.
     np.testing.assert_allclose(sampled(name).astype(int), recorded, rtol=0, atol=1)

@@ -7,7 +7,6 @@ plots.
 
 from __future__ import annotations
 
-import asyncio
 import dataclasses
 import math
 import tempfile
@@ -15,11 +14,10 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-import aiohttp
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from tests.sim.chromium import CHROMIUM, chromium, open_tab
+from tests.sim.view.browser import CHROMIUM, chromium
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
@@ -144,18 +142,14 @@ def live_page() -> NDArray[np.uint8]:
             target=run_episode, args=(scenario, controller, detector, shown + 1.0, 0), kwargs={"watch": watch}
         )
 
-        async def look() -> None:
-            with chromium(Path(folder) / "profile") as port:
-                async with aiohttp.ClientSession() as session:
-                    tab = await open_tab(session, port, page.url)
-                    await tab.look(1400, 845)
-                    run.start()
-                    while not there.is_set():
-                        await asyncio.sleep(0.2)
-                    await asyncio.sleep(2.0)
-                    await tab.screenshot(picture)
-
-        asyncio.run(look())
+        with chromium() as browser:
+            tab = browser.new_page(viewport={"width": 1400, "height": 845})
+            tab.goto(page.url)
+            run.start()
+            while not there.is_set():
+                tab.wait_for_timeout(200)
+            tab.wait_for_timeout(2000)
+            tab.screenshot(path=picture, full_page=True)
         page.pace.resume()
         run.join()
         return np.asarray(cv2.imread(str(picture))[:PAGE_SHOWN], np.uint8)

@@ -27,8 +27,8 @@ fuzz_target!(|case: Case| {
         return;
     };
     assert_eq!(found.len(), to.width * to.height * channels);
-    let across: Vec<_> = taps(width, to.width).collect();
-    for (y, down) in taps(height, to.height).enumerate() {
+    let across: Vec<_> = taps(width, to.width, 0..to.width).collect();
+    for (y, down) in taps(height, to.height, 0..to.height).enumerate() {
         assert!(down.first < height && down.second < height && down.weight <= 256);
         for (x, tap) in across.iter().enumerate() {
             assert!(tap.first < width && tap.second < width && tap.weight <= 256);

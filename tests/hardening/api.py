@@ -3,7 +3,7 @@
 `python -m tests.hardening.api --calls 10000000 --state FILE` makes the calls in processes of 100,000 each and writes
 what it found to FILE; started again, it goes on where it stopped. `--only N` makes call N alone, here.
 
-A share of the calls with ordinary arguments is also put to OpenCV 4.14 (`opencv.py`), in a process of its own.
+`tests/parity/test_sweep.py` puts calls with ordinary arguments to OpenCV, too.
 """
 
 from __future__ import annotations
@@ -25,9 +25,8 @@ from types import FrameType
 from typing import Any
 
 from tests.hardening.calls import call
-from tests.hardening.opencv import Asked, Opencv, disagreement
 
-#: Calls of one process: each costs two seconds to start, with OpenCV beside it.
+#: Calls of one process: each costs a second to start.
 BATCH = 100_000
 #: A call that computes longer is a finding [s of this process's time].
 LATEST = 30
@@ -35,8 +34,8 @@ LATEST = 30
 MEMORY = 3_000_000_000
 
 
-def batch(first: int, count: int, here: mmap.mmap | None, asked: int) -> dict[str, Any]:
-    """Make calls `first` to `first + count - 1`; every `asked`th number is put to OpenCV instead."""
+def batch(first: int, count: int, here: mmap.mmap) -> dict[str, Any]:
+    """Make calls `first` to `first + count - 1`."""
 
     def late(_signal: int, _frame: FrameType | None) -> None:
         raise RuntimeError(f"longer than {LATEST} s")
@@ -44,34 +43,24 @@ def batch(first: int, count: int, here: mmap.mmap | None, asked: int) -> dict[st
     signal.signal(signal.SIGPROF, late)
     ends: Counter[str] = Counter()
     findings: list[str] = []
-    opencv = Opencv() if asked else None
     for number in range(first, first + count):
-        if here is not None:
-            here[:8] = struct.pack("<q", number)
+        here[:8] = struct.pack("<q", number)
         signal.setitimer(signal.ITIMER_PROF, LATEST)
         try:
-            if opencv is not None and number % asked == 0:
-                ends["compared with OpenCV"] += 1
-                difference = disagreement(Asked.of(number), opencv)
-                if difference:
-                    findings.append(f"call {number}: {difference}")
-            else:
-                ends[call(number)] += 1
+            ends[call(number)] += 1
         except Exception as error:
             told = " ".join(str(error).split())[:300]
             findings.append(f"call {number}: {type(error).__name__}: {told}")
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
-    if opencv is not None:
-        opencv.close()
     return {"ends": ends, "findings": findings}
 
 
-def in_a_process(first: int, count: int, asked: int) -> dict[str, Any]:
+def in_a_process(first: int, count: int) -> dict[str, Any]:
     """Make a batch in a process of its own; where it dies, the call is a finding and the rest follows."""
     with tempfile.TemporaryFile() as marks:
         marks.truncate(8)
-        command = [sys.executable, "-m", "tests.hardening.api", "--batch", str(first), str(count), str(asked)]
+        command = [sys.executable, "-m", "tests.hardening.api", "--batch", str(first), str(count)]
         done = subprocess.run(
             [*command, "--marks", str(marks.fileno())],
             capture_output=True,
@@ -87,9 +76,9 @@ def in_a_process(first: int, count: int, asked: int) -> dict[str, Any]:
         (last,) = struct.unpack("<q", marks.read(8))
     told = " ".join(done.stderr.split())[-300:]
     findings = [f"call {last}: the process ended with status {done.returncode}: {told}"]
-    before = in_a_process(first, last - first, asked) if last > first else {"ends": {}, "findings": []}
+    before = in_a_process(first, last - first) if last > first else {"ends": {}, "findings": []}
     left = first + count - last - 1
-    after = in_a_process(last + 1, left, asked) if left else {"ends": {}, "findings": []}
+    after = in_a_process(last + 1, left) if left else {"ends": {}, "findings": []}
     ends = Counter(before["ends"]) + Counter(after["ends"])
     return {"ends": ends, "findings": [*before["findings"], *findings, *after["findings"]]}
 
@@ -99,23 +88,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--calls", type=lambda text: int(float(text)), default=200_000)
     parser.add_argument("--first", type=int, default=0, help="number of the first call")
-    parser.add_argument("--asked", type=int, default=500, help="every how manieth call is put to OpenCV; 0: none")
     parser.add_argument("--state", type=Path, help="where counts and findings are kept")
     parser.add_argument("--only", type=int, help="make this call alone, in this process")
-    parser.add_argument("--batch", type=int, nargs=3, help=argparse.SUPPRESS)
+    parser.add_argument("--batch", type=int, nargs=2, help=argparse.SUPPRESS)
     parser.add_argument("--marks", type=int, help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.only is not None:
-        if args.asked and args.only % args.asked == 0:
-            print(disagreement(Asked.of(args.only), Opencv()) or "as OpenCV")
-        else:
-            print(call(args.only) or "answered")
+        print(call(args.only) or "answered")
         return 0
     if args.batch:
         faulthandler.enable()
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         here = mmap.mmap(args.marks, 8)
-        json.dump(batch(args.batch[0], args.batch[1], here, args.batch[2]), sys.stdout)
+        json.dump(batch(args.batch[0], args.batch[1], here), sys.stdout)
         return 0
     state: dict[str, Any] = {"next": args.first, "ends": {}, "findings": [], "seconds": 0.0}
     if args.state and args.state.exists():
@@ -123,7 +108,7 @@ def main() -> int:
     last = args.first + args.calls
     while state["next"] < last:
         began, count = time.monotonic(), min(BATCH, last - state["next"])
-        found = in_a_process(state["next"], count, args.asked)
+        found = in_a_process(state["next"], count)
         state["next"] += count
         state["ends"] = Counter(state["ends"]) + Counter(found["ends"])
         state["findings"] += found["findings"]

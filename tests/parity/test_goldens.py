@@ -23,11 +23,6 @@ FUSED = "AVX2" in cv2.getCPUFeaturesLine().replace("*", "").split()
 TOLERANCE = {"grad": 4e-5, "angleOfs": 0.0, "descriptors": 4e-7}
 WEIGHT_TOLERANCE = 1e-5
 
-MODELS = {
-    "default": (limo_hog.HOGDescriptor_getDefaultPeopleDetector, "922af740ae80bd3b7fd10c084ec634e8"),
-    "daimler": (limo_hog.HOGDescriptor_getDaimlerPeopleDetector, "760da90c11fc443763c08adbc6058919"),
-}
-
 
 def of(kind: str) -> list[Any]:
     return [pytest.param(case, id=case.name) for case in CASES if case.method.startswith(kind)]
@@ -65,10 +60,11 @@ def test_places_and_weights_are_opencvs_in_its_order(case: Case) -> None:
     np.testing.assert_allclose(found[weights], expected[weights], rtol=0, atol=WEIGHT_TOLERANCE)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", ["Default", "Daimler"])
 def test_the_people_models_are_opencvs(name: str) -> None:
-    model, md5 = MODELS[name]
-    assert digest(model()) == md5
+    ours, theirs = (getattr(library, f"HOGDescriptor_get{name}PeopleDetector")() for library in (limo_hog, cv2))
+    assert ours.dtype == np.float32
+    np.testing.assert_array_equal(ours, np.ravel(theirs))
 
 
 def test_every_case_has_one_name_and_one_answer() -> None:

@@ -57,7 +57,7 @@ def test_what_does_not_fit_into_four_gigabytes_is_a_memory_error_with_its_bytes(
     assert " bytes" in message, message
 
 
-def test_a_search_of_an_8k_image_takes_its_pixels_and_less_than_four_megabytes_a_thread() -> None:
+def test_a_search_of_an_8k_image_takes_its_pixels_and_four_megabytes_a_thread() -> None:
     program = """
     import resource
     limo_hog.set_num_threads(2)

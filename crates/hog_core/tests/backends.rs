@@ -3,66 +3,32 @@
 
 mod common;
 
-use common::{Detector, PADDED, Picture, assert_same, available, reached_by};
+use common::{ALL_WINDOWS, Detector, PADDED, Picture, assert_same, available, case, reached_by};
 use hog_core::group::{Candidate, clip, group_candidates, mean_shift};
 use hog_core::pyramid::{Pyramid, levels, resize, to_image};
 use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
 use proptest::prelude::*;
 
-const ALL_WINDOWS: f64 = -1e9;
-
 fn hog(detector: &Detector, backend: Backend) -> Hog {
     Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap()
 }
 
-/// Every backend scores every window as the exact path does, and decides as it does where the threshold is exactly the
-/// score of a window.
 fn compare(detector: &Detector, size: (usize, usize), channels: usize, search: Search, seed: u32) {
-    let picture = Picture::new(size.0, size.1, channels, seed);
-    let image = picture.view();
-    let wanted = detector.every_window(image, &search);
-    for backend in available() {
-        let what = format!("{} {size:?}x{channels} {search:?}", backend.name());
-        let hog = hog(detector, backend);
-        let found = hog
-            .detect(image, &Search { hit_threshold: ALL_WINDOWS, ..search }, None, &Interrupt::NEVER)
-            .unwrap();
-        assert_same(&found, &wanted, detector.rounding(), &what);
-        if wanted.is_empty() {
-            continue;
-        }
-        for share in [0.0, 0.02, 0.5] {
-            let hit_threshold = reached_by(&wanted, share);
-            let found =
-                hog.detect(image, &Search { hit_threshold, ..search }, None, &Interrupt::NEVER).unwrap();
-            let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
-            assert_same(&found, &hits, detector.rounding(), &format!("{what} at {hit_threshold}"));
-        }
-    }
+    common::compare(detector, &Picture::new(size.0, size.1, channels, seed), search, detector.rounding());
 }
 
-/// `cases`, unless PROPTEST_CASES says otherwise.
-fn cases(cases: u32) -> ProptestConfig {
+/// 96 cases, unless PROPTEST_CASES says otherwise.
+fn cases() -> ProptestConfig {
     let config = ProptestConfig::default();
-    if std::env::var_os("PROPTEST_CASES").is_some() { config } else { ProptestConfig { cases, ..config } }
+    if std::env::var_os("PROPTEST_CASES").is_some() { config } else { ProptestConfig { cases: 96, ..config } }
 }
 
 proptest! {
-    #![proptest_config(cases(24))]
+    #![proptest_config(cases())]
 
     #[test]
-    fn every_backend_finds_what_the_exact_path_finds(
-        width in 1usize..260,
-        height in 1usize..200,
-        colour in any::<bool>(),
-        people in any::<bool>(),
-        stride in (1i64..5, 1i64..5),
-        padding in (0i64..40, 0i64..40),
-        seed in any::<u32>(),
-    ) {
-        let search = Search { hit_threshold: 0.0, win_stride: (4 * stride.0, 4 * stride.1), padding };
-        let detector = if people { Detector::people() } else { Detector::daimler() };
-        compare(&detector, (width, height), if colour { 3 } else { 1 }, search, seed);
+    fn every_backend_finds_what_the_exact_path_finds(bytes in prop::collection::vec(any::<u8>(), 64..256)) {
+        case::check(&bytes);
     }
 }
 
@@ -275,41 +241,6 @@ fn square(win: i64, block: i64, stride: i64, cell: i64) -> HogParams {
     HogParams { win_size, block_size, block_stride, cell_size, ..HogParams::default() }
 }
 
-proptest! {
-    #![proptest_config(cases(48))]
-
-    #[test]
-    fn geometries_without_kernels_find_what_the_exact_path_finds(
-        cell in (1i64..12, 1i64..12),
-        cells in (1i64..5, 1i64..5),
-        block_stride in (1i64..20, 1i64..20),
-        blocks in (1i64..5, 1i64..5),
-        nbins in 1i64..20,
-        (signed_gradient, gamma_correction) in any::<(bool, bool)>(),
-        win_stride in (1i64..12, 1i64..12),
-        padding in (0i64..20, 0i64..20),
-        (width, height) in (1usize..260, 1usize..120),
-        colour in any::<bool>(),
-        seed in any::<u32>(),
-    ) {
-        let block_size = (cell.0 * cells.0, cell.1 * cells.1);
-        let win_size =
-            (block_size.0 + (blocks.0 - 1) * block_stride.0, block_size.1 + (blocks.1 - 1) * block_stride.1);
-        let params = HogParams {
-            win_size,
-            block_size,
-            block_stride,
-            cell_size: cell,
-            nbins,
-            signed_gradient,
-            gamma_correction,
-            ..HogParams::default()
-        };
-        let search = Search { hit_threshold: 0.0, win_stride, padding };
-        compare(&of_geometry(params), (width, height), if colour { 3 } else { 1 }, search, seed);
-    }
-}
-
 #[test]
 fn a_window_asked_for_by_its_place_weighs_what_the_exact_path_says() {
     let picture = Picture::new(131, 170, 3, 6);
@@ -352,7 +283,7 @@ fn common_geometries_without_kernels_find_what_the_exact_path_finds() {
 }
 
 #[test]
-fn a_detector_with_a_weight_that_is_no_number_has_no_hits_and_with_an_infinite_one_the_exact_paths() {
+fn a_weight_that_is_no_number_gives_no_hits_and_an_infinite_one_the_exact_paths() {
     let picture = Picture::new(90, 140, 1, 3);
     let search = Search { hit_threshold: ALL_WINDOWS, win_stride: (8, 8), padding: (0, 0) };
     for weight in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {

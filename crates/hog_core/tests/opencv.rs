@@ -338,7 +338,7 @@ fn cells_of_one_pixel_are_served_and_sides_of_none_refused() {
 }
 
 #[test]
-fn the_score_counts_every_element_also_of_blocks_whose_length_is_no_multiple_of_four() {
+fn the_score_counts_every_element_of_blocks_whose_length_is_no_multiple_of_four() {
     for nbins in [1, 2, 3, 5, 7, 9] {
         let params = HogParams { win_size: (16, 8), block_size: (8, 8), nbins, ..HogParams::default() };
         let spec = HogSpec::new(&params).unwrap();

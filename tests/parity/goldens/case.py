@@ -43,9 +43,9 @@ class Case:
 
 
 def coefficients(detector: str | int, library: Any, size: int) -> NDArray[np.float32]:
-    """Take a model from the library under test, or make one of `size` weights and a bias from a seed."""
+    """Take a model from the library under test, or make one of `size` weights from a seed; an odd one adds a bias."""
     if isinstance(detector, int):
-        drawn = np.random.default_rng(detector).integers(-1000, 1001, size + 1)
+        drawn = np.random.default_rng(detector).integers(-1000, 1001, size + detector % 2)
         return (drawn / 1000).astype(np.float32)
     if detector == "daimler":
         return np.ravel(library.HOGDescriptor_getDaimlerPeopleDetector())

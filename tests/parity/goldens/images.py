@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,7 @@ def view(seed: int) -> Image:
     return noise(seed, 300, 300, 3)[20:200, 30:150]
 
 
+@cache
 def photograph(name: str) -> Image:
     """Read a photograph of scikit-image's wheel, colours in OpenCV's order."""
     import skimage.data  # here, so that the drawn images need numpy alone

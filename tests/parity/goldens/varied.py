@@ -1,8 +1,9 @@
-"""Sizes, channels, strides, paddings, scales, groupings, geometries and drawn people, varied one or two at a time."""
+"""Searches drawn at random, edges of images, and drawn people whose search is varied one option at a time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from tests.parity.goldens import images
 from tests.parity.goldens.case import DAIMLER, PEOPLE, Case
 from tests.parity.goldens.images import Figure, Image
+from tests.searches import some_search
 
 Pictures = dict[str, Callable[[], Image]]
 
@@ -65,16 +67,38 @@ def read_only() -> Image:
     return image
 
 
-def gradients() -> Iterator[Case]:
-    for width in (1, 2, 3, 7, 15, 16, 17, 33):
-        image = partial(images.noise, width, 9, width, 3, values=5)
-        yield Case(f"grad-width-{width}", "colours tie around the ends of vectors", image, "computeGradient")
+#: How many searches are drawn, and OpenCV's clipping values among them.
+DRAWN, CLIPS = 48, (0.2, 0.2, 0.05, 0.7)
+
+
+def drawn() -> Iterator[Case]:
+    for seed in range(DRAWN):
+        search = some_search(seed, CLIPS[seed % len(CLIPS)])
+        case = partial(Case, why="drawn at random", image=search.image, geometry=search.geometry)
+        top_left, bottom_right = search.around
+        around = {"paddingTL": top_left, "paddingBR": bottom_right}
+        yield case(f"grad-{seed}", method="computeGradient", arguments=around)
+        if search.fits("compute"):
+            steps: dict[str, Any] = {"winStride": search.win_stride, "padding": search.padding}
+            yield case(f"compute-{seed}", method="compute", arguments=steps)
+        # Few windows, for their places are recorded in full.
+        search = replace(search, win_stride=(24, 40))
+        steps = {"hitThreshold": -1e9, "winStride": search.win_stride, "padding": search.padding}
+        for method, more in (("detect", {}), ("detectMultiScale", {"scale": search.scale + 0.2, "groupThreshold": 0})):
+            if search.fits(method) and search.steps(method)[1]:
+                yield case(f"{method}-{seed}", method=method, arguments=steps | more, detector=search.detector)
+
+
+def edges() -> Iterator[Case]:
     pictures: Pictures = {
+        **{
+            f"width-{width}": partial(images.noise, width, 9, width, 3, values=5)
+            for width in (1, 2, 3, 7, 15, 16, 17, 33)
+        },
         "one-pixel": partial(images.noise, 1, 1, 1),
         "one-row": partial(images.noise, 2, 1, 40),
         "ramp": partial(images.ramp, 60, 90),
         "checkers": partial(images.checkers, 64, 64, 5),
-        "flat": partial(images.flat, 200, 20, 30, 3),
         "4k-strip": partial(images.noise, 21, 6, 3840, 3),
         "tall": partial(images.noise, 22, 1500, 5, 3),
         "people": STREET,
@@ -84,88 +108,18 @@ def gradients() -> Iterator[Case]:
     crop = {"paddingTL": (-7, -3), "paddingBR": (-2, 9)}
     yield Case("grad-crop", "a negative padding crops", CROWD, "computeGradient", crop)
     around = {"paddingTL": (50, 40), "paddingBR": (31, 77)}
-    yield Case(
-        "grad-mirrored", "paddings larger than the image", partial(images.noise, 4, 6, 9), "computeGradient", around
-    )
-    for nbins, signed, gamma in product((1, 2, 31, 128), (False, True), (False, True)):
-        geometry = (*PEOPLE[:4], nbins, 1, -1.0, 0, 0.2, gamma, 64, signed)
-        name = f"grad-bins-{nbins}{'-signed' * signed}{'-gamma' * gamma}"
-        image = partial(images.noise, nbins, 24, 37, 3)
-        yield Case(name, "how angles are quantised", image, "computeGradient", geometry=geometry)
-
-
-#: Geometries that no people model has: window, block, block stride and cell [px], bins, aperture, sigma, norm, clip,
-#: gamma correction, levels, signed gradient.
-ODD: dict[str, tuple[Any, ...]] = {
-    "cells-5x7": ((30, 49), (15, 14), (5, 7), (5, 7), 12),
-    "one-cell-blocks": ((40, 40), (8, 8), (8, 8), (8, 8), 9),
-    "dense-blocks": ((36, 40), (12, 16), (3, 4), (6, 8), 9),
-    "gaps-between-blocks": ((56, 56), (16, 16), (20, 20), (8, 8), 9),
-    "three-by-four-cells": ((33, 42), (21, 28), (6, 7), (7, 7), 7),
-    "signed-18": ((64, 128), (16, 16), (8, 8), (8, 8), 18, 1, -1.0, 0, 0.2, False, 64, True),
-    "sharp-gaussian": ((32, 32), (16, 16), (8, 8), (8, 8), 9, 1, 0.8, 0, 0.2, True),
-    "wide-gaussian": ((32, 32), (16, 16), (8, 8), (8, 8), 9, 1, 30.0, 0, 0.2, True),
-    "clip-0.05": ((64, 128), (16, 16), (8, 8), (8, 8), 9, 1, -1.0, 0, 0.05, True),
-    "clip-0.7": ((64, 128), (16, 16), (8, 8), (8, 8), 9, 1, -1.0, 0, 0.7, True),
-    "wide-window": ((128, 32), (16, 16), (8, 8), (8, 8), 9, 1, -1.0, 0, 0.2, True),
-    "tall-window": ((16, 256), (16, 16), (8, 8), (8, 8), 9, 1, -1.0, 0, 0.2, True),
-    "one-block": ((16, 16), (16, 16), (8, 8), (8, 8), 9),
-    "two-bins": ((32, 32), (16, 16), (8, 8), (8, 8), 2),
-}
-
-
-def descriptors() -> Iterator[Case]:
-    strides, paddings = (None, (4, 4), (3, 5), (16, 8), (100, 100)), (None, (8, 8), (13, 3), (-5, 40))
-    for stride, padding in product(strides, paddings):
-        name = f"compute-stride-{stride}-padding-{padding}".replace(" ", "")
-        image = partial(images.noise, 31, 140, 75, 3)
-        yield Case(name, "grids of windows", image, "compute", {"winStride": stride, "padding": padding})
-    for name, geometry in ODD.items():
-        arguments = {"winStride": (19, 16), "padding": (3, 6)}
-        image = partial(images.noise, 32, 262, 140, 3)
-        yield Case(f"compute-{name}", "a geometry of its own", image, "compute", arguments, geometry)
-    pictures: Pictures = {
-        "exact-fit": partial(images.noise, 33, 128, 64),
-        "one-pixel-more": partial(images.noise, 33, 129, 65),
-        "ramp": partial(images.ramp, 140, 80),
-        "checkers": partial(images.checkers, 130, 66, 8),
-        "fortran-order": fortran,
-        "flipped": flipped,
-        "read-only": read_only,
-    }
+    small = partial(images.noise, 4, 6, 9)
+    yield Case("grad-mirrored", "paddings larger than the image", small, "computeGradient", around)
+    for name, size in (("exact-fit", (128, 64)), ("one-pixel-more", (129, 65)), ("no-window", (128, 56))):
+        yield Case(f"compute-{name}", "windows at the image's edge", partial(images.noise, 33, *size), "compute")
+    arguments = {"hitThreshold": -0.8, "winStride": (8, 8), "padding": (8, 8)}
+    pictures = {"street": STREET, "street-gray": of_street, "crowd": CROWD}
     for name, picture in pictures.items():
-        yield Case(f"compute-{name}", f"an image of its own: {name}", picture, "compute", {"winStride": (32, 32)})
-    # Narrower by a stride: with one more pixel OpenCV would read beyond the image.
-    yield Case("compute-no-window", "a grid of no windows", partial(images.noise, 34, 128, 56), "compute")
-
-
-def single_scale() -> Iterator[Case]:
-    everything: dict[str, Any] = {"hitThreshold": -1e9, "winStride": (24, 40), "padding": (8, 8)}
-    for name, geometry in ODD.items():
-        image = partial(images.noise, 41, 270, 135, 3)
-        yield Case(
-            f"detect-{name}", "random coefficients", image, "detect", everything | {"padding": (0, 0)}, geometry, 6
-        )
-    pictures: Pictures = {
-        "street": STREET,
-        "street-gray": of_street,
-        "crowd": CROWD,
-        "flat": partial(images.flat, 9, 200, 90),
-    }
-    for name, picture in pictures.items():
-        arguments = everything | {"hitThreshold": -0.8, "winStride": (8, 8)}
-        yield Case(
-            f"detect-{name}",
-            "persons of 96 px and what looks like them",
-            picture,
-            "detect",
-            arguments,
-            detector="default",
-        )
-        arguments = everything | {"winStride": (72, 64)}
-        yield Case(f"detect-scores-{name}", "every score", picture, "detect", arguments, detector="default")
+        why = "persons of 96 px and what looks like them"
+        yield Case(f"detect-{name}", why, picture, "detect", arguments, detector="default")
     yield Case("detect-lonely", "one window, one person", LONELY, "detect", detector="default")
-    yield Case("detect-no-detector", "without a detector nothing is found", LONELY, "detect")
+    for method in ("detect", "detectMultiScale"):
+        yield Case(f"{method}-no-detector", "without a detector nothing is found", LONELY, method)
 
 
 #: Images searched without grouping, and the threshold of their hits.
@@ -244,13 +198,8 @@ def multi_scale() -> Iterator[Case]:
         yield daimler(f"dms-daimler-{name}", "the other people model", picture, arguments=usual | {"padding": (16, 16)})
         arguments = usual | {"scale": 1.3, "groupThreshold": 0.4, "useMeanshiftGrouping": True}
         yield daimler(f"dms-daimler-meanshift-{name}", "modes of its hits' density", picture, arguments=arguments)
-    for name, geometry in ODD.items():
-        arguments = {"hitThreshold": 0.0, "winStride": (30, 28), "padding": (0, 0), "scale": 1.25, "groupThreshold": 0}
-        image = partial(images.noise, 58, 300, 150, 3)
-        yield Case(f"dms-{name}", "random coefficients", image, "detectMultiScale", arguments, geometry, 9)
-    yield Case("dms-no-detector", "without a detector nothing is found", LONELY, "detectMultiScale")
 
 
 def varied() -> Iterator[Case]:
-    for room in (gradients, descriptors, single_scale, multi_scale):
+    for room in (drawn, edges, multi_scale):
         yield from room()

@@ -34,5 +34,5 @@ def sampled(name: str) -> NDArray[np.uint8]:
 @pytest.mark.parametrize("name", RECORDED)
 def test_an_old_scenario_shows_the_frames_it_always_showed(name: str) -> None:
     recorded = np.frombuffer(bytes.fromhex(RECORDED[name]), np.uint8)
-    # Another CPU or numpy may round a pixel differently; another seed of the noise leaves half of them unequal.
-    assert (sampled(name) == recorded).mean() > 0.97
+    # Another CPU or numpy may round a value to the next level; anything else is another picture.
+    np.testing.assert_allclose(sampled(name).astype(int), recorded, rtol=0, atol=1)

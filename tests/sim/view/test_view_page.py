@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import aiohttp
 import pytest
-from tests.sim.view.chromium import CHROMIUM, Tab, chromium, open_tab
+from playwright.sync_api import Browser, Page, expect
+from tests.sim.view.browser import CHROMIUM, chromium
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
@@ -46,28 +46,37 @@ def running() -> Iterator[tuple[View, Tunable[Any]]]:
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
-def test_a_browser_sees_the_run_move_and_steers_it(running: tuple[View, Tunable[Any]], tmp_path: Path) -> None:
+def test_a_browser_sees_the_run_move_and_steers_it(running: tuple[View, Tunable[Any]]) -> None:
     view, controller = running
+    with chromium() as browser:
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.goto(view.url)
+        _see_it_move(page)
+        _steer_it(page, view)
+        _see_it_on_a_phone(browser, view, controller)
+        view.pace.set_speed(0)
+        page.click("#pause")
+        _see_it_end(page)
 
-    async def look() -> None:
-        with chromium(tmp_path / "profile") as port:
-            async with aiohttp.ClientSession() as session:
-                await _see_it_move(tab := await open_tab(session, port, view.url))
-                await _steer_it(tab, view, controller)
-                await _see_it_end(tab)
 
-    asyncio.run(look())
+def _until(page: Page, expression: str, seconds: float = 30) -> None:
+    """Wait until JavaScript gives something true. (`wait_for_function` needs an `eval`, which the page forbids.)"""
+    deadline = time.monotonic() + seconds
+    while not page.evaluate(expression):
+        assert time.monotonic() < deadline, f"not within {seconds} s: {expression}"
+        page.wait_for_timeout(100)
 
 
-async def _see_it_move(tab: Tab) -> None:
-    await tab.look(1280, 900)
-    await tab.until("document.querySelector('#camera').dataset.count > 2 && now.boxes > 0 && now.time > 5")
-    before = await tab.value("[document.querySelector('#camera').src, document.querySelector('#depth').src]")
-    await tab.until(f"document.querySelector('#camera').src !== {before[0]!r}")
-    await tab.until(f"document.querySelector('#depth').src !== {before[1]!r}")
-    await tab.until("document.querySelector('#camera').naturalWidth === 640")
+def _see_it_move(page: Page) -> None:
+    _until(page, "now && document.querySelector('#camera').dataset.count > 2 && now.boxes > 0 && now.time > 5")
+    for picture in ("#camera", "#depth"):
+        before = page.get_attribute(picture, "src")
+        assert before
+        expect(page.locator(picture)).not_to_have_attribute("src", before)
+    expect(page.locator("#camera")).to_have_js_property("naturalWidth", 640)
     # Boxes: the arena itself has nothing that is as green or as red.
-    await tab.until(
+    _until(
+        page,
         """(() => {
             const sheet = Object.assign(document.createElement("canvas"), { width: 640, height: 480 });
             const pen = sheet.getContext("2d");
@@ -76,83 +85,104 @@ async def _see_it_move(tab: Tab) -> None:
             let coloured = 0;
             for (let i = 0; i < p.length; i += 4) coloured += Math.max(p[i], p[i + 1]) > 2 * Math.min(p[i], p[i + 1]);
             return coloured > 200;
-        })()"""
+        })()""",
     )
     for canvas in ("map", "plot-error", "plot-distance", "plot-speed", "scale"):
-        await tab.until(
+        _until(
+            page,
             f"""(() => {{
-                const canvas = document.querySelector("#{canvas}");
+                const canvas = document.getElementById("{canvas}");
                 const {{ data }} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
                 return new Set(new Uint32Array(data.buffer)).size > 5;
-            }})()"""
+            }})()""",
         )
 
 
-async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
-    await tab.value("document.querySelector('#pause').click()")
-    await tab.until("now.paused")
+def _step(page: Page) -> float:
+    """One control period; return how long it was [s]."""
+    stood = page.evaluate("now.time")
+    page.click("#step")
+    _until(page, f"now.time > {stood}")
+    return float(page.evaluate("now.time") - stood)
+
+
+def _steer_it(page: Page, view: View) -> None:
+    page.click("#pause")
+    _until(page, "now.paused")
     assert view.pace.paused
-    await asyncio.sleep(0.3)
-    stood = await tab.value("now.time")
-    await asyncio.sleep(0.5)
-    assert await tab.value("now.time") == stood
-    await tab.value("document.querySelector('#step').click()")
-    await tab.until(f"now.time > {stood}")
-    assert await tab.value("now.time") - stood == pytest.approx(0.1, abs=0.03)
+    page.wait_for_timeout(300)
+    stood = page.evaluate("now.time")
+    page.wait_for_timeout(500)
+    assert page.evaluate("now.time") == stood
+    assert _step(page) == pytest.approx(0.1, abs=0.03)
     # The pictures that are kept show a followed person.
-    while await tab.value("now.error_px") is None:
-        stood = await tab.value("now.time")
-        await tab.value("document.querySelector('#step').click()")
-        await tab.until(f"now.time > {stood}")
-    for width, height, dark in ((1280, 900, False), (1280, 900, True), (390, 844, False), (390, 844, True)):
-        await tab.look(width, height, dark)
-        await tab.screenshot(PICTURES / f"{'phone' if width < 600 else 'desk'}-{'dark' if dark else 'light'}.png")
-        assert await tab.value("document.documentElement.scrollWidth") <= width
-    # On the phone: the caption is text, not part of the picture, and every parameter tells what it is.
-    assert await tab.value("parseFloat(getComputedStyle(document.querySelector('#seen')).fontSize)") >= 14
-    fields = await tab.value(
+    while page.evaluate("now.error_px") is None:
+        _step(page)
+    _take_light_and_dark(page, "desk")
+
+
+def _see_it_on_a_phone(browser: Browser, view: View, controller: Tunable[Any]) -> None:
+    page = browser.new_page(viewport={"width": 390, "height": 844}, device_scale_factor=2, is_mobile=True)
+    page.goto(view.url)
+    _until(page, "now && now.paused")
+    expect(page.locator("#camera")).to_have_js_property("naturalWidth", 640)
+    _take_light_and_dark(page, "phone")
+    # The caption is text, not part of the picture, and every parameter tells what it is.
+    assert page.evaluate("parseFloat(getComputedStyle(document.querySelector('#seen')).fontSize)") >= 14
+    fields = page.evaluate(
         "[...document.querySelectorAll('#fields label')].map((l) => [l.title, l.querySelector('input').max])"
     )
     assert len(fields) == len(controller.parameters)
     assert all(len(title) > 20 and float(high) > 0 for title, high in fields)
     # Both distances are told, each with a word of its own.
-    shown = await tab.value("['measured', 'distance'].map((id) => document.getElementById(id).parentNode.innerText)")
+    shown = page.evaluate("['measured', 'distance'].map((id) => document.getElementById(id).parentNode.innerText)")
     assert [text.split("\n")[0] for text in shown] == ["distance seen", "true distance"]
     assert all(0.5 < float(text.split("\n")[1].split()[0]) < 5 for text in shown)
-    set_field = "Object.assign(document.querySelector('[name=target_distance]'), {value: %s}).onchange()"
-    await tab.value(set_field % "2.5")
-    await tab.value(set_field % "-1")
-    await tab.until("document.querySelector('#complaint').textContent.includes('want a number from')")
+    for value in ("2.5", "-1"):
+        page.fill("[name=target_distance]", value)
+        page.press("[name=target_distance]", "Tab")
+    expect(page.locator("#complaint")).to_contain_text("want a number from")
     assert controller.parameters["target_distance"].value == 2.5
-    view.pace.set_speed(0)
-    await tab.value("document.querySelector('#pause').click()")
+    page.context.close()
 
 
-async def _see_it_end(tab: Tab) -> None:
-    await tab.until("document.querySelector('#notice').textContent.startsWith('The run has ended')", 60)
-    await tab.screenshot(PICTURES / "ended.png")
+def _take_light_and_dark(page: Page, name: str) -> None:
+    size = page.viewport_size
+    assert size
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        page.wait_for_timeout(300)
+        page.screenshot(path=PICTURES / f"{name}-{scheme}.png", full_page=True)
+        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+
+
+def _see_it_end(page: Page) -> None:
+    expect(page.locator("#notice")).to_contain_text("The run has ended", timeout=120_000)
+    page.screenshot(path=PICTURES / "ended.png", full_page=True)
     # The timeline goes back over the finished run: numbers, map and camera are those of then.
-    await tab.value("document.querySelector('#span').onchange({target: {value: '0'}})")
-    newest = await tab.value("[document.querySelector('#camera').src, document.querySelector('#distance').innerText]")
-    await tab.value("document.querySelector('#timeline').oninput({target: {valueAsNumber: 5}})")
-    assert await tab.value("document.querySelector('#shown').textContent") == "5.0 s"
-    then = await tab.value("[document.querySelector('#camera').src, document.querySelector('#distance').innerText]")
+    page.select_option("#span", "0")
+    newest = page.get_attribute("#camera", "src"), page.inner_text("#distance")
+    page.fill("#timeline", "5")
+    assert page.inner_text("#shown") == "5.0 s"
+    then = page.get_attribute("#camera", "src"), page.inner_text("#distance")
     assert then[0] != newest[0]
     assert then[1] != newest[1]
-    at = await tab.value("number(nearest(history, 5)[DISTANCE], 2)")
-    assert then[1].split()[0] == at
+    assert then[1].split()[0] == page.evaluate("number(nearest(history, 5)[DISTANCE], 2)")
     # A cursor on a plot reads the values, the wheel zooms.
-    await tab.value(
-        "(() => { const c = document.querySelector('#plot-distance'), b = c.getBoundingClientRect();"
-        "c.onpointermove({currentTarget: c, clientX: b.left + LEFT + (b.width - LEFT - 4) / 2}); })()"
-    )
-    await tab.screenshot(PICTURES / "timeline.png")
-    begin, end = await tab.value("shownTimes()")
-    assert await tab.value("cursor") == pytest.approx((begin + end) / 2, abs=0.1)
-    await tab.value("document.querySelector('#plot-speed').dispatchEvent(new WheelEvent('wheel', {deltaY: -1}))")
-    assert (end - begin) * 0.8 == pytest.approx(await tab.value("shownTimes()[1] - shownTimes()[0]"))
-    await tab.value("document.querySelector('#live').click()")
-    assert await tab.value("document.querySelector('#shown').textContent") == "now"
+    plot = page.locator("#plot-distance")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    assert box
+    left = page.evaluate("LEFT")
+    page.mouse.move(box["x"] + left + (box["width"] - left - 4) / 2, box["y"] + box["height"] / 2)
+    page.screenshot(path=PICTURES / "timeline.png", full_page=True)
+    begin, end = page.evaluate("shownTimes()")
+    assert page.evaluate("cursor") == pytest.approx((begin + end) / 2, abs=0.1)
+    page.mouse.wheel(0, -1)
+    _until(page, f"shownTimes()[1] - shownTimes()[0] < {end - begin}")
+    assert page.evaluate("shownTimes()[1] - shownTimes()[0]") == pytest.approx((end - begin) * 0.8)
+    page.click("#live")
+    assert page.inner_text("#shown") == "now"
     # The page keeps what it showed last.
-    await tab.until("document.querySelector('#camera').naturalWidth === 640")
-    assert await tab.value("document.querySelector('#pause').disabled") is True
+    expect(page.locator("#camera")).to_have_js_property("naturalWidth", 640)
+    assert page.is_disabled("#pause")

@@ -1,10 +1,13 @@
 //! Images and the exact path's answers, for the tests of the fast path.
 #![allow(dead_code, reason = "each test binary uses a part")]
 
+pub mod case;
+
 use hog_core::exact::{self, RowVotes, Svm, Tables};
 use hog_core::pyramid::{Grid, Steps};
 use hog_core::{Backend, Hit, Hog, HogParams, HogSpec, ImageView, Interrupt, Search, Size, model};
 
+pub const ALL_WINDOWS: f64 = -1e9;
 /// Windows every 8 px inside of the image.
 pub const STEPS: Search = Search { hit_threshold: 0.0, win_stride: (8, 8), padding: (0, 0) };
 /// Those of OpenCV's samples, 4 px beyond its edges too.
@@ -137,6 +140,33 @@ pub fn assert_same(found: &[Hit], wanted: &[Hit], tolerance: f64, what: &str) {
     assert_eq!(places(found), places(wanted), "{what}");
     for (found, wanted) in found.iter().zip(wanted) {
         let off = (found.weight - wanted.weight).abs();
-        assert!(off <= tolerance, "{what}: {wanted:?} is off by {off:e}");
+        assert!(found.weight == wanted.weight || off <= tolerance, "{what}: {wanted:?} is off by {off:e}");
     }
+}
+
+/// Every backend scores every window as the exact path does, and decides as it does where the threshold is exactly the
+/// score of a window. Returns the windows.
+pub fn compare(detector: &Detector, picture: &Picture, search: Search, tolerance: f64) -> Vec<Hit> {
+    let image = picture.view();
+    let mut wanted = detector.every_window(image, &search);
+    wanted.retain(|hit| hit.weight >= ALL_WINDOWS);
+    for backend in available() {
+        let what = format!("{} {:?} {:?} {search:?}", backend.name(), image.size(), detector.params);
+        let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
+        let check = |hit_threshold, hits: &[Hit]| {
+            let search = Search { hit_threshold, ..search };
+            let found = hog.detect(image, &search, None, &Interrupt::NEVER).unwrap();
+            assert_same(&found, hits, tolerance, &format!("{what} at {hit_threshold}"));
+        };
+        check(ALL_WINDOWS, &wanted);
+        if wanted.is_empty() {
+            continue;
+        }
+        for share in [0.0, 0.02, 0.5] {
+            let hit_threshold = reached_by(&wanted, share);
+            let hits: Vec<Hit> = wanted.iter().copied().filter(|hit| hit.weight >= hit_threshold).collect();
+            check(hit_threshold, &hits);
+        }
+    }
+    wanted
 }

@@ -37,113 +37,77 @@ def offered() -> dict[str, dict[str, Any]]:
     return found
 
 
+def _of(module: Any, names: str) -> dict[str, Any]:
+    """Return what a module of ours has under ROS 2's names."""
+    return {name: getattr(module, name) for name in names.split()}
+
+
 def _rclpy() -> dict[str, dict[str, Any]]:
+    context = {"ok": _ok, "shutdown": _shutdown, "try_shutdown": _shutdown}
     return {
         "rclpy": {
+            **context,
             "init": _init,
-            "shutdown": _shutdown,
-            "try_shutdown": _shutdown,
-            "ok": _ok,
             "create_node": node.create_node,
             "get_global_executor": executors.global_executor,
-            "spin": executors.spin,
-            "spin_once": executors.spin_once,
-            "spin_until_future_complete": executors.spin_until_future_complete,
+            **_of(executors, "spin spin_once spin_until_future_complete"),
             "Parameter": parameters.Parameter,
             "Future": future.Future,
         },
-        "rclpy.node": {"Node": node.Node},
-        "rclpy.publisher": {"Publisher": topics.Publisher},
-        "rclpy.subscription": {"Subscription": topics.Subscription},
-        "rclpy.service": {"Service": services.Service},
-        "rclpy.client": {"Client": services.Client},
-        "rclpy.task": {"Future": future.Future, "Task": future.Task},
+        "rclpy.node": _of(node, "Node"),
+        "rclpy.publisher": _of(topics, "Publisher"),
+        "rclpy.subscription": _of(topics, "Subscription"),
+        "rclpy.service": _of(services, "Service"),
+        "rclpy.client": _of(services, "Client"),
+        "rclpy.task": _of(future, "Future Task"),
         "rclpy.qos": qos.OFFERED,
-        "rclpy.time": {"Time": clock.Time},
-        "rclpy.duration": {"Duration": clock.Duration},
-        "rclpy.clock": {"Clock": clock.Clock, "ClockType": clock.ClockType},
-        "rclpy.timer": {"Timer": clock.Timer, "Rate": clock.Rate},
-        "rclpy.logging": {
-            "get_logger": logger.get_logger,
-            "set_logger_level": logger.set_logger_level,
-            "LoggingSeverity": logger.LoggingSeverity,
-        },
-        "rclpy.parameter": {
-            "Parameter": parameters.Parameter,
-            "ParameterType": parameters.ParameterType,
-            "ParameterValue": parameters.ParameterValue,
-        },
+        "rclpy.time": _of(clock, "Time"),
+        "rclpy.duration": _of(clock, "Duration"),
+        "rclpy.clock": _of(clock, "Clock ClockType"),
+        "rclpy.timer": _of(clock, "Timer Rate"),
+        "rclpy.logging": _of(logger, "get_logger set_logger_level LoggingSeverity"),
+        "rclpy.parameter": _of(parameters, "Parameter ParameterType ParameterValue"),
         "rclpy.exceptions": {
-            "ParameterException": parameters.ParameterException,
-            "ParameterNotDeclaredException": parameters.ParameterNotDeclaredException,
-            "ParameterAlreadyDeclaredException": parameters.ParameterAlreadyDeclaredException,
-            "InvalidParameterTypeException": parameters.InvalidParameterTypeException,
-            "NotInitializedException": node.NotInitializedException,
+            **_of(parameters, "ParameterException ParameterNotDeclaredException ParameterAlreadyDeclaredException"),
+            **_of(parameters, "InvalidParameterTypeException"),
+            **_of(node, "NotInitializedException"),
         },
         "rclpy.executors": {
-            "Executor": executors.Executor,
-            "SingleThreadedExecutor": executors.SingleThreadedExecutor,
-            "MultiThreadedExecutor": executors.MultiThreadedExecutor,
-            "ExternalShutdownException": turns.ExternalShutdownException,
+            **_of(executors, "Executor SingleThreadedExecutor MultiThreadedExecutor"),
+            **_of(turns, "ExternalShutdownException"),
         },
-        "rclpy.callback_groups": {
-            "CallbackGroup": groups.CallbackGroup,
-            "MutuallyExclusiveCallbackGroup": groups.MutuallyExclusiveCallbackGroup,
-            "ReentrantCallbackGroup": groups.ReentrantCallbackGroup,
-        },
-        "rclpy.utilities": {"ok": _ok, "shutdown": _shutdown, "try_shutdown": _shutdown},
+        "rclpy.callback_groups": _of(groups, "CallbackGroup MutuallyExclusiveCallbackGroup ReentrantCallbackGroup"),
+        "rclpy.utilities": context,
         "rcl_interfaces": {},
-        "rcl_interfaces.msg": {
-            "SetParametersResult": parameters.SetParametersResult,
-            "ParameterDescriptor": parameters.ParameterDescriptor,
-            "ParameterType": parameters.ParameterType,
-            "ParameterValue": parameters.ParameterValue,
-        },
+        "rcl_interfaces.msg": _of(parameters, "SetParametersResult ParameterDescriptor ParameterType ParameterValue"),
     }
 
 
 def _companions() -> dict[str, dict[str, Any]]:
-    exceptions = {
-        "TransformException": tf2.TransformException,
-        "LookupException": tf2.LookupException,
-        "ConnectivityException": tf2.ConnectivityException,
-        "ExtrapolationException": tf2.ExtrapolationException,
-        "InvalidArgumentException": tf2.InvalidArgumentException,
-        "TimeoutException": tf2.TimeoutException,
-    }
-    listener = {"Buffer": tf2.Buffer, "TransformListener": tf2.TransformListener}
-    moving, fixed = tf2.TransformBroadcaster, tf2.StaticTransformBroadcaster
-    broadcasters = {"TransformBroadcaster": moving, "StaticTransformBroadcaster": fixed}
+    share = {"get_package_share_directory": packages.share_directory}
+    geometry = {name: interfaces.message_class(f"geometry_msgs/msg/{name}") for name in _STAMPED.split()}
     return {
-        "message_filters": {
-            "SimpleFilter": filters.SimpleFilter,
-            "Subscriber": filters.Subscriber,
-            "TimeSynchronizer": filters.TimeSynchronizer,
-            "ApproximateTimeSynchronizer": filters.ApproximateTimeSynchronizer,
-        },
-        "ament_index_python": {"get_package_share_directory": packages.share_directory},
-        "ament_index_python.packages": {"get_package_share_directory": packages.share_directory},
-        "cv_bridge": {"CvBridge": bridge.CvBridge, "CvBridgeError": bridge.CvBridgeError},
-        "image_geometry": {"PinholeCameraModel": camera_model.PinholeCameraModel},
-        "tf2_ros": {**listener, **broadcasters, **exceptions},
-        "tf2_ros.buffer": {"Buffer": tf2.Buffer},
-        "tf2_ros.transform_listener": {"TransformListener": tf2.TransformListener},
-        "tf2_ros.transform_broadcaster": {"TransformBroadcaster": moving},
-        "tf2_ros.static_transform_broadcaster": {"StaticTransformBroadcaster": fixed},
-        "tf2_geometry_msgs": {
-            "do_transform_point": tf2_geometry.do_transform_point,
-            "do_transform_pose": tf2_geometry.do_transform_pose,
-            "do_transform_pose_stamped": tf2_geometry.do_transform_pose_stamped,
-            "do_transform_vector3": tf2_geometry.do_transform_vector3,
-            "PointStamped": interfaces.message_class("geometry_msgs/msg/PointStamped"),
-            "PoseStamped": interfaces.message_class("geometry_msgs/msg/PoseStamped"),
-            "Vector3Stamped": interfaces.message_class("geometry_msgs/msg/Vector3Stamped"),
-        },
-        "tf_transformations": {
-            "euler_from_quaternion": quaternions.euler_from_quaternion,
-            "quaternion_from_euler": quaternions.quaternion_from_euler,
-        },
+        "message_filters": _of(filters, "SimpleFilter Subscriber TimeSynchronizer ApproximateTimeSynchronizer"),
+        "ament_index_python": share,
+        "ament_index_python.packages": share,
+        "cv_bridge": _of(bridge, "CvBridge CvBridgeError"),
+        "image_geometry": _of(camera_model, "PinholeCameraModel"),
+        "tf2_ros": _of(tf2, _TF2_ROS),
+        "tf2_ros.buffer": _of(tf2, "Buffer"),
+        "tf2_ros.transform_listener": _of(tf2, "TransformListener"),
+        "tf2_ros.transform_broadcaster": _of(tf2, "TransformBroadcaster"),
+        "tf2_ros.static_transform_broadcaster": _of(tf2, "StaticTransformBroadcaster"),
+        "tf2_geometry_msgs": _of(tf2_geometry, _TRANSFORMS) | geometry,
+        "tf_transformations": _of(quaternions, "euler_from_quaternion quaternion_from_euler"),
     }
+
+
+_TF2_ROS = (
+    "Buffer TransformListener TransformBroadcaster StaticTransformBroadcaster TransformException LookupException "
+    "ConnectivityException ExtrapolationException InvalidArgumentException TimeoutException"
+)
+_TRANSFORMS = "do_transform_point do_transform_pose do_transform_pose_stamped do_transform_vector3"
+_STAMPED = "PointStamped PoseStamped Vector3Stamped"
 
 
 def _init(

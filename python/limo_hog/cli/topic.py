@@ -22,10 +22,6 @@ if TYPE_CHECKING:
 _SHOWN = 128
 
 
-class TopicError(LimoHogError):
-    """A topic is not there, or says nothing."""
-
-
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `topic`."""
     parser = subparsers.add_parser(
@@ -60,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     found = bus.topics(2.0, enough=lambda topics: topic in topics and args.action != "info")
     if topic not in found:
         known = ", ".join(found) or "none"
-        raise TopicError(f"topic {topic} is not there in ROS domain {bus.domain}; there are: {known}")
+        raise LimoHogError(f"topic {topic} is not there in ROS domain {bus.domain}; there are: {known}")
     if args.action == "info":
         ends = found[topic]
         print(f"Type: {ends.type_name}")
@@ -89,7 +85,7 @@ def _hz(bus: Bus, subscription: Subscription, topic: str, args: argparse.Namespa
             said = time.monotonic()
             _say_rate(gaps)
     if not gaps:
-        raise TopicError(f"topic {topic}: no two messages came in {args.seconds:g} s")
+        raise LimoHogError(f"topic {topic}: no two messages came in {args.seconds:g} s")
     _say_rate(gaps)
 
 
@@ -111,7 +107,7 @@ def _echo(bus: Bus, subscription: Subscription, topic: str, args: argparse.Names
             if args.once:
                 return
     if not heard:
-        raise TopicError(f"topic {topic}: no message came in {args.seconds:g} s")
+        raise LimoHogError(f"topic {topic}: no message came in {args.seconds:g} s")
 
 
 def as_yaml(message: Any) -> str:

@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from limo_sim.run.log import Step
 
 
-class ScriptError(LimoHogError):
-    """The node failed; its traceback has been printed before."""
-
-
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `run`."""
     parser = subparsers.add_parser(
@@ -92,5 +88,5 @@ def run(args: argparse.Namespace) -> int:
         # What was printed before comes first, where both go to one terminal or file.
         sys.stdout.flush()
         sys.stderr.write(ended.traceback)
-        raise ScriptError(ended.failure)
+        raise LimoHogError(ended.failure)
     return 0

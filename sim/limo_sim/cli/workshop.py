@@ -23,10 +23,6 @@ if TYPE_CHECKING:
 WIDTH = 80
 
 
-class CheckpointError(LimoHogError):
-    """A checkpoint of the workshop does not hold."""
-
-
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `workshop`."""
     parser = subparsers.add_parser(
@@ -106,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
             _show(verdicts, args.hint)
         missed = [verdict for verdict in verdicts if not verdict.holds]
         if missed:
-            raise CheckpointError(f"{args.file}: {len(missed)} of {len(verdicts)} checkpoints do not hold")
+            raise LimoHogError(f"{args.file}: {len(missed)} of {len(verdicts)} checkpoints do not hold")
         return 0
     text = template(node) if args.action == "new" else solution(node)
     path = args.file or Path(f"{node}.py" if args.action == "new" else f"{node}_solution.py")

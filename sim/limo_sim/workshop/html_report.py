@@ -21,36 +21,7 @@ from limo_sim.workshop.scenes import Look, Take
 _WIDTH = 320
 _MARKS = {True: ("✓", "holds"), False: ("✗", "missed"), None: ("–", "open")}
 
-_STYLE = """
-:root { color-scheme: light dark; --text: #1c2430; --dim: #5b6675; --back: #f6f7f9; --card: #fff; --line: #dde2e8;
-  --good: #00688b; --bad: #b3420e; }
-@media (prefers-color-scheme: dark) { :root { --text: #e7ebf0; --dim: #a3adba; --back: #14181d; --card: #1d232a;
-  --line: #333c47; --good: #6cc4e8; --bad: #ffa06b; } }
-* { box-sizing: border-box; }
-body { margin: 0 auto; padding: 1.25rem; max-width: 62rem; background: var(--back); color: var(--text);
-  font: 1rem/1.5 system-ui, sans-serif; }
-h1 { font-size: 1.5rem; margin: 0; overflow-wrap: anywhere; }
-h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
-header p { color: var(--dim); margin: .1rem 0 1rem; }
-.points { font-size: 2.4rem; font-weight: 650; font-variant-numeric: tabular-nums; }
-.points small { font-size: 1rem; font-weight: 400; color: var(--dim); }
-.tasks { display: grid; gap: .5rem 1rem; grid-template-columns: repeat(auto-fit, minmax(9rem, 1fr)); }
-.tasks div { font-variant-numeric: tabular-nums; }
-progress { display: block; width: 100%; height: .5rem; accent-color: var(--good); }
-ul { list-style: none; margin: 0; padding: 0; background: var(--card); border: 1px solid var(--line);
-  border-radius: .6rem; }
-li { display: grid; grid-template-columns: 1.5rem 1fr auto; gap: .1rem .5rem; padding: .6rem .9rem; }
-li + li { border-top: 1px solid var(--line); }
-li p { grid-column: 2 / -1; margin: 0; color: var(--dim); white-space: pre-wrap; overflow-wrap: anywhere; }
-.holds .mark { color: var(--good); } .missed .mark, .missed .name { color: var(--bad); font-weight: 650; }
-.won { font-variant-numeric: tabular-nums; color: var(--dim); }
-.scenes { display: grid; gap: 1rem; grid-template-columns: repeat(auto-fill, minmax(min(17rem, 100%), 1fr)); }
-figure { margin: 0; background: var(--card); border: 1px solid var(--line); border-radius: .6rem; overflow: hidden; }
-figure img { display: block; width: 100%; height: auto; }
-figure .none { display: grid; place-items: center; aspect-ratio: 4 / 3; color: var(--dim); }
-figcaption { padding: .5rem .75rem .7rem; }
-figcaption span { display: block; color: var(--dim); font-size: .875rem; overflow-wrap: anywhere; }
-"""
+_STYLE = Path(__file__).with_name("report.css").read_text(encoding="utf-8")
 
 
 def to_html(script: Path, node: str, examination: Examination) -> str:

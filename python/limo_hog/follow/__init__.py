@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from limo_hog.detections import Detector
-from limo_hog.follow.control.approach import ApproachController
-from limo_hog.follow.control.distance import ProxemicController
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.control.tracking import TrackingController
+from limo_hog.follow.control.workshop import ApproachController, ProxemicController
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.pipeline import Follower, FrameLog
 from limo_hog.follow.robot import Twist

@@ -6,9 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow.control.approach import ApproachController
-from limo_hog.follow.control.distance import ProxemicController
 from limo_hog.follow.control.tracking import TrackingController
+from limo_hog.follow.control.workshop import ApproachController, ProxemicController
 from limo_hog.follow.decision import Controller
 
 #: The workshop's two controllers, then the one to use.

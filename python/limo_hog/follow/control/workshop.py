@@ -1,4 +1,4 @@
-"""The workshop's first controller: turn towards the box with the highest score and drive."""
+"""The workshop's two controllers: drive to the box with the highest score, or hold a distance to the person."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from limo_hog.follow.decision import Decision, Mode
 from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import Twist
-from limo_hog.follow.sense.measurement import box_centre
+from limo_hog.follow.sense.measurement import box_centre, person_depth, zone_of
 from limo_hog.follow.sense.observation import Observation
 
 
@@ -44,6 +44,51 @@ class ApproachController:
         target, error = best_box(observation)
         angular = 0.0 if abs(error) < self.dead_band_px else self.angular_gain * error
         return Decision(Twist(self.linear_speed, angular), True, Mode.FOLLOW, "driving towards a person", target)
+
+
+@dataclass(frozen=True, slots=True)
+class ProxemicController:
+    """Two proportional controllers: the box to the middle of the image, the person to a distance.
+
+    The state is whether a person was detected before. The numbers are the workshop's.
+
+    Attributes
+    ----------
+    target_distance
+        Distance to hold, by the depth image [m].
+    linear_gain
+        Speed for each metre of error [1/s].
+    angular_gain
+        Turn rate for each pixel of error [rad/s/px].
+    max_linear, max_angular
+        Limits of the command, either way [m/s, rad/s].
+    """
+
+    target_distance: float = bounded(1.5, 0.1, 8)
+    linear_gain: float = bounded(0.5, 0, 5)
+    angular_gain: float = bounded(0.005, 0, 0.05)
+    max_linear: float = bounded(0.3, 0, 1)
+    max_angular: float = bounded(0.8, 0, 3)
+
+    def start(self) -> bool:
+        """Return the state before the first observation: no person detected yet."""
+        return False
+
+    def step(self, observation: Observation, state: bool) -> Decision[bool]:
+        """Turn towards the best box and hold its distance; stop without a box or a distance."""
+        if len(observation.detections) == 0:
+            return no_detection(state)
+        target, error = best_box(observation)
+        box = observation.detections.boxes[target]
+        distance = None if observation.depth is None else person_depth(observation.depth, box)
+        if distance is None:
+            return Decision(Twist(), True, Mode.BLOCKED, "no depth at the person", target)
+        linear = self.linear_gain * (distance - self.target_distance)
+        twist = Twist(
+            min(max(linear, -self.max_linear), self.max_linear),
+            min(max(self.angular_gain * error, -self.max_angular), self.max_angular),
+        )
+        return Decision(twist, True, Mode.FOLLOW, f"person in the {zone_of(distance).value} zone", target)
 
 
 def best_box(observation: Observation) -> tuple[int, int]:

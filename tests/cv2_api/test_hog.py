@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import limo_hog
-from limo_hog import HOGDescriptor, groupRectangles, visualize
+from limo_hog import HOGDescriptor, visualize
 
 GEOMETRY = ((48, 96), (16, 16), (8, 8), (8, 8), 9)
 

@@ -22,7 +22,7 @@ class Contrib(HOGDescriptor):
     """As opencv-contrib 5 has it: gamma correction is on with arguments, too."""
 
     def __init__(self, *sizes: Any) -> None:
-        super().__init__(*sizes, **{"_gammaCorrection": True} if sizes else {})
+        super().__init__(*sizes, 1, -1, 0, 0.2, True)
 
 
 def test_opencv_4_keeps_its_own_names(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,7 +69,7 @@ def people() -> HOGDescriptor:
     "wrong",
     [
         lambda: people().detectMultiScale(None),  # type: ignore[arg-type]
-        lambda: people().detectMultiScale(np.zeros((200, 100), np.float32)),  # type: ignore[arg-type]
+        lambda: people().detectMultiScale(np.zeros((200, 100), np.float32)),
         lambda: people().detect(np.zeros((200, 100), np.uint8), winStride=(0, 8)),
         lambda: people().setSVMDetector(np.ones(7)),
         lambda: HOGDescriptor((60, 128), (16, 16), (8, 8), (8, 8), 9).getDescriptorSize(),

@@ -22,7 +22,8 @@ class Contrib(HOGDescriptor):
     """As opencv-contrib 5 has it: gamma correction is on with arguments, too."""
 
     def __init__(self, *sizes: Any) -> None:
-        super().__init__(*sizes, 1, -1, 0, 0.2, True)
+        given: Any = (*sizes, 1, -1.0, 0, 0.2, True)
+        super().__init__(*given)
 
 
 def test_opencv_4_keeps_its_own_names(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -39,5 +39,13 @@ class ModelFormatError(HogError):
     """A model file is not one of OpenCV's HOG files."""
 
 
+class ModelFileError(OSError, HogError):
+    """A model file cannot be read."""
+
+
+class ModelMissingError(ModelFileError, FileNotFoundError):
+    """There is no model file of that name."""
+
+
 class BackendError(HogError):
     """The instruction set asked for is unknown, or this CPU lacks it."""

@@ -24,7 +24,6 @@ _LIBRARIES = {
     "rosbags": ("rosbags", "record"),
     "scipy": ("SciPy", "train"),
     "shtab": ("shtab", "completion"),
-    "sklearn": ("scikit-learn", "train"),
     "threadpoolctl": ("threadpoolctl", "train"),
     "zstandard": ("Zstandard", "record"),
 }

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import copy
 import pickle
-import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import limo_hog
-from limo_hog import HOGDescriptor, groupRectangles, visualize
+from limo_hog import HOGDescriptor, visualize
 
 GEOMETRY = ((48, 96), (16, 16), (8, 8), (8, 8), 9)
 
@@ -39,13 +39,25 @@ def test_a_copy_holds_and_describes_the_same(hog: HOGDescriptor, again: Any) -> 
     assert repr(twin) != repr(hog)
 
 
-def test_a_subclass_can_be_made_used_and_pickled() -> None:
-    hog = _Named(*GEOMETRY)
-    assert isinstance(pickle.loads(pickle.dumps(hog)), _Named)
+@pytest.mark.parametrize(
+    "again", [copy.copy, copy.deepcopy, lambda hog: pickle.loads(pickle.dumps(hog))], ids=["copy", "deepcopy", "pickle"]
+)
+def test_a_copy_of_a_subclass_keeps_its_attributes_and_its_detector(again: Any) -> None:
+    named = _Named("north door")
+    named.seen = 7
+    twin = again(named)
+    assert isinstance(twin, _Named) and (twin.door, twin.seen, repr(twin)) == ("north door", 7, repr(named))
 
 
 class _Named(HOGDescriptor):
-    pass
+    """A subclass as programs have it: other arguments, attributes, and a slot."""
+
+    __slots__ = ("__dict__", "door")
+
+    def __init__(self, door: str) -> None:
+        super().__init__()
+        self.door, self.seen = door, 0
+        self.setSVMDetector(self.getDefaultPeopleDetector())
 
 
 def test_the_repr_tells_geometry_and_detector() -> None:
@@ -71,6 +83,25 @@ def test_none_stands_for_every_default() -> None:
         strict=True,
     ):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_flag_is_a_truth_value_or_an_integer_as_in_opencv() -> None:
+    for value in (True, np.bool_(True), 1, 2, np.int64(1)):
+        given: Any = value
+        assert HOGDescriptor(*GEOMETRY, _gammaCorrection=given).gammaCorrection
+    zero: Any = 0
+    assert not HOGDescriptor(*GEOMETRY, _gammaCorrection=zero).gammaCorrection
+
+
+def test_a_model_file_that_is_not_there_is_a_hog_error_and_an_os_error(tmp_path: Path) -> None:
+    missing = tmp_path / "none.yml"
+    for load in (HOGDescriptor, HOGDescriptor().load):
+        with pytest.raises(limo_hog.HogError, match=r"none\.yml") as caught:
+            load(missing)
+        assert isinstance(caught.value, FileNotFoundError)
+    with pytest.raises(limo_hog.HogError) as caught:
+        HOGDescriptor(tmp_path)
+    assert isinstance(caught.value, OSError)
 
 
 def test_final_threshold_is_the_old_name_of_group_threshold() -> None:
@@ -134,6 +165,22 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
         TypeError,
         "useMeanshiftGrouping is",
     ),
+    # What OpenCV refuses, too.
+    (lambda: people().detectMultiScale(None), TypeError, "the image is None: did imread find no file"),
+    (lambda: people().detectMultiScale(noise(200, 100), useMeanshiftGrouping="no"), TypeError, "useMeanshiftGrouping"),
+    (lambda: people().detectMultiScale(noise(200, 100), useMeanshiftGrouping=1.0), TypeError, "useMeanshiftGrouping"),
+    (lambda: people().detectMultiScale(noise(200, 100), scale=True), TypeError, "scale is True"),
+    (
+        lambda: people().detectMultiScale(noise(200, 100), scale=np.bool_(True)),
+        TypeError,
+        "scale is np.True_|scale is True",
+    ),
+    (lambda: people().detect(noise(200, 100), winStride=()), TypeError, r"winStride is \(\)"),
+    (lambda: people().detect(noise(200, 100), winStride=(True, 8)), TypeError, r"winStride is \(True, 8\)"),
+    (lambda: untyped.HOGDescriptor(*GEOMETRY, _gammaCorrection="x"), TypeError, "_gammaCorrection is 'x'"),
+    (lambda: untyped.HOGDescriptor(*GEOMETRY, _nlevels=True), TypeError, "_nlevels is True"),
+    (lambda: untyped.groupRectangles([[0, 0, 1, 1]], True), TypeError, "groupThreshold is True"),
+    (lambda: people().setSVMDetector(np.ones(3781, bool)), TypeError, "coefficients are bool"),
     (lambda: untyped.HOGDescriptor(""), ValueError, "filename is empty"),
     (lambda: people().save(""), ValueError, "filename is empty"),
     (lambda: untyped.visualize(untyped.HOGDescriptor(), np.ones(36)), ValueError, "there are 36 values"),
@@ -179,19 +226,3 @@ def test_a_picture_of_a_detector_tells_for_from_against() -> None:
     # None stands for the default, as for every other argument.
     unset: Any = None
     np.testing.assert_array_equal(visualize(hog, np.ones(3780), zoom=unset), visualize(hog, np.ones(3780)))
-
-
-def test_opencv_4_keeps_its_own_names(monkeypatch: pytest.MonkeyPatch) -> None:
-    import cv2
-
-    kept = cv2.HOGDescriptor
-    monkeypatch.delattr(cv2, "groupRectangles")
-    assert limo_hog.install_into_cv2() == ["groupRectangles"]
-    assert cv2.HOGDescriptor is kept and cv2.groupRectangles is groupRectangles
-    monkeypatch.undo()
-
-
-def test_without_opencv_there_is_nothing_to_install_into(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(limo_hog.MissingExtraError, match=r"pip install 'limo-hog\[cv\]'"):
-        limo_hog.install_into_cv2()

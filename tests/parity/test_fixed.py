@@ -98,7 +98,7 @@ def images_of_other_types_are_named() -> None:
     for dtype in (np.float32, np.uint16, np.int8, bool):
         refused(np.dtype(dtype).name, noise(200, 100, dtype=dtype), kind=TypeError)
     refused("list", [[1, 2], [3, 4]], kind=TypeError)
-    refused("NoneType", None, kind=TypeError)
+    refused("the image is None", None, kind=TypeError)
 
 
 def images_of_other_shapes_are_named() -> None:

@@ -35,6 +35,8 @@ def pixels(image: Any) -> NDArray[np.uint8]:
         It is anything else, or empty.
     """
     image = _downloaded(image)
+    if image is None:
+        raise ImageTypeError("the image is None: did imread find no file, or is the video over?")
     if not isinstance(image, np.ndarray):
         raise ImageTypeError(f"an image is a uint8 numpy array; this is a {type(image).__name__}")
     if image.size == 0:
@@ -64,7 +66,7 @@ def coefficients(svm: ArrayLike | None) -> NDArray[np.float32] | None:
         raise ParameterTypeError("the detector's coefficients are ragged; one row of numbers is wanted") from None
     if given.size == 0:
         return None
-    if given.dtype.kind not in "biuf":
+    if given.dtype.kind not in "iuf":
         raise ParameterTypeError(f"the detector's coefficients are {given.dtype}; real numbers are wanted")
     if given.ndim > 2 or (given.ndim == 2 and 1 not in given.shape):
         raise ParameterTypeError(f"the detector's shape is {given.shape}; (n,), (n, 1) or (1, n) is wanted")
@@ -73,12 +75,11 @@ def coefficients(svm: ArrayLike | None) -> NDArray[np.float32] | None:
 
 
 def pair(name: str, value: Pair | None, default: tuple[int, int] = (0, 0)) -> tuple[int, int]:
-    """Return two integers; None or nothing stands for `default`."""
+    """Return two integers; None stands for `default`."""
+    if value is None:
+        return default
     try:
-        # (An array of no dimensions has a `__len__` that raises.)
-        if value is None or (hasattr(value, "__len__") and len(value) == 0):
-            return default
-        x, y = map(operator.index, value)
+        x, y = map(_index, value)
     except (TypeError, ValueError):
         raise ParameterTypeError(f"{name} is {shown(value)}; two integers (x, y) are wanted") from None
     if abs(x) > _INT_MAX or abs(y) > _INT_MAX:
@@ -126,7 +127,7 @@ def real(name: str, value: SupportsFloat | None, default: float) -> float:
     """Return a number; None stands for `default`."""
     if value is None:
         return default
-    if not isinstance(value, (SupportsFloat, SupportsIndex)):
+    if not isinstance(value, (SupportsFloat, SupportsIndex)) or _is_truth(value):
         raise ParameterTypeError(f"{name} is {shown(value)}; a number is wanted")
     try:
         return float(value)
@@ -144,8 +145,8 @@ def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf
     ParameterError, ParameterTypeError
         It is out of its bounds, infinite or NaN, or no number.
     """
-    if value is None or isinstance(value, bool):
-        raise ParameterTypeError(f"{name} is {value}; a number is wanted")
+    if value is None:
+        raise ParameterTypeError(f"{name} is None; a number is wanted")
     found = real(name, value, math.nan)
     if not (math.isfinite(found) and low <= found <= high):
         bounds = f"{low:g} to {high:g}" if high < math.inf else f"{low:g} or more"
@@ -158,7 +159,7 @@ def integer(name: str, value: SupportsIndex | None, default: int) -> int:
     if value is None:
         return default
     try:
-        found = operator.index(value)
+        found = _index(value)
     except TypeError:
         raise ParameterTypeError(f"{name} is {shown(value)}; an integer is wanted") from None
     if abs(found) > _INT_MAX:
@@ -171,8 +172,8 @@ def flag(name: str, value: Any, default: bool) -> bool:
     if value is None:
         return default
     try:
-        return bool(value)
-    except (TypeError, ValueError):  # an array of more than one
+        return bool(value) if _is_truth(value) else operator.index(value) != 0
+    except (TypeError, ValueError):  # no number; an array of more than one
         raise ParameterTypeError(f"{name} is {shown(value)}; True or False is wanted") from None
 
 
@@ -183,6 +184,17 @@ def shown(value: object) -> str:
     except ValueError:  # an integer of more digits than Python prints
         text = f"{type(value).__name__} of thousands of digits"
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+
+
+def _is_truth(value: Any) -> bool:
+    return isinstance(value, bool) or getattr(value, "dtype", None) == np.bool_
+
+
+def _index(value: Any) -> int:
+    """Return an integer; `TypeError` for anything else, a truth value too, as in OpenCV."""
+    if _is_truth(value):
+        raise TypeError
+    return operator.index(value)
 
 
 def _downloaded(value: Any) -> Any:

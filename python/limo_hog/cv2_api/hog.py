@@ -178,7 +178,7 @@ class HOGDescriptor:
         Parameters
         ----------
         svmdetector
-            Numbers of shape (n,), (n, 1) or (1, n); None or nothing clears the detector.
+            Numbers of shape (n,), (n, 1) or (1, n); None or an empty sequence clears the detector.
 
         Raises
         ------
@@ -326,8 +326,8 @@ class HOGDescriptor:
 
         Raises
         ------
-        OSError
-            The file cannot be read.
+        ModelFileError
+            The file cannot be read; `ModelMissingError` where there is none.
         ModelFormatError
             It holds no HOG detector.
         DetectorSizeError

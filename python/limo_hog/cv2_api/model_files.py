@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from limo_hog.atomic import whole_file
 from limo_hog.cv2_api.arguments import shown
 from limo_hog.cv2_api.geometry import Geometry
-from limo_hog.exceptions import ModelFormatError, ParameterError
+from limo_hog.exceptions import ModelFileError, ModelFormatError, ModelMissingError, ParameterError
 
 #: Each key's values, word by word as they stand in the file.
 Entries = dict[str, list[str]]
@@ -51,8 +51,8 @@ def load(filename: str | os.PathLike[str], name: str = "") -> tuple[Geometry, li
     ------
     ParameterError
         The file's name is empty.
-    OSError
-        The file cannot be read.
+    ModelFileError
+        The file cannot be read; `ModelMissingError` where there is none.
     ModelFormatError
         It is not one of OpenCV's files, or has no such object, or that is no HOG detector, or its block is far larger
         than its coefficients justify.
@@ -64,6 +64,9 @@ def load(filename: str | os.PathLike[str], name: str = "") -> tuple[Geometry, li
         _assert_in_proportion(geometry, svm)
     except (ValueError, RecursionError, EOFError, gzip.BadGzipFile, zlib.error, ElementTree.ParseError) as error:
         raise ModelFormatError(f"{path} holds no HOG detector: {error}") from error
+    except OSError as error:
+        kind = ModelMissingError if isinstance(error, FileNotFoundError) else ModelFileError
+        raise kind(error.errno, error.strerror, str(path)) from error
     return geometry, svm
 
 

@@ -37,7 +37,7 @@ class FrameLog:
     Attributes
     ----------
     time
-        When the command was decided, on the clock of the sensors' stamps [s].
+        When the command was decided, on the robot's own clock [s].
     decision
         The command and the reason for it; its `target` is an index into `detections`.
     sensors
@@ -77,7 +77,7 @@ class Periods:
         Parameters
         ----------
         now
-            Time on the clock of the sensors' stamps [s]; a clock that was set back begins a period.
+            Time on the robot's own clock [s]; one that was set back begins a period.
         frame
             The newest camera image: new if it is another object than the last. None without one.
         """
@@ -121,7 +121,7 @@ class Follower(Generic[S]):
         Parameters
         ----------
         now
-            Time on the clock of the sensors' stamps [s].
+            Time on the robot's own clock [s], which only goes on: ages are counted on it, whatever the stamps say.
         frame
             The newest camera image: a new one is searched for people, without one the last command is checked against
             the newest scan. None without any.
@@ -141,7 +141,7 @@ class Follower(Generic[S]):
         except Exception as error:  # whatever a detector raises, the robot must stop and the loop must go on
             detections, failure = Detections.none(), f"the detector failed: {error}"
         detect_ms = 1e3 * (time.perf_counter() - began)
-        observation = observed(frame, sensors, detections, region, failure, self._between)
+        observation = observed(frame, sensors, detections, region, failure, self._between, now)
         self._between = ()
         decision = self._guard.step(observation, self._state)
         self._state, self._region = decision.state, decision.region

@@ -120,6 +120,8 @@ class Observation:
     remembered
         float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
         not look. `Guard` fills it in; None without it.
+    clock
+        When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
     now
         The newest stamp of all sensors [s]: a camera frame may arrive late.
     """
@@ -137,12 +139,18 @@ class Observation:
     clothes: Clothes | None = None
     between: tuple[tuple[Scan, Odometry], ...] = ()
     remembered: NDArray[np.float64] | None = None
+    clock: float | None = None
     now: float = field(init=False)
 
     def __post_init__(self) -> None:
         newest = self.stamp if self.scan is None else max(self.stamp, self.scan.stamp)
         newest = newest if self.odometry is None else max(newest, self.odometry.stamp)
         object.__setattr__(self, "now", newest)
+
+    @property
+    def at(self) -> float:
+        """When the readings were at hand, on the robot's own clock [s]."""
+        return self.now if self.clock is None else self.clock
 
 
 def observed(
@@ -152,6 +160,7 @@ def observed(
     region: Region | None = None,
     fault: str = "",
     between: tuple[tuple[Scan, Odometry], ...] = (),
+    clock: float | None = None,
 ) -> Observation:
     """Return the observation of a frame and what was found in it: its size and people's clothes are filled in."""
     height, width = frame.image.shape[:2]
@@ -169,6 +178,7 @@ def observed(
         fault,
         clothes,
         between,
+        clock=clock,
     )
 
 

@@ -151,6 +151,7 @@ class Guard(Generic[S]):
         if fault := state.arrivals.disagreement(self.max_age_s, self.max_late_s):
             # Neither the controller nor the memory can do anything with times of several clocks.
             after = replace(state, stamp=observation.stamp, proposed=None)
+            fault = "; ".join(filter(None, (self._missing(observation.at, after), fault)))
             return Decision(Twist(), after, Mode.BLOCKED, fault)
         state = self._remember(state, observation.scan, observation.odometry)
         if observation.scan is not None and observation.odometry is not None:

@@ -25,6 +25,7 @@ _LIBRARIES = {
     "scipy": ("SciPy", "train"),
     "shtab": ("shtab", "completion"),
     "sklearn": ("scikit-learn", "train"),
+    "tomli": ("tomli", "ros2"),
     "threadpoolctl": ("threadpoolctl", "train"),
     "zstandard": ("Zstandard", "record"),
 }

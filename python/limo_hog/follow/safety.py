@@ -80,8 +80,6 @@ class Guard(Generic[S]):
         Whose commands are limited.
     margin
         Ground kept free ahead of the robot's outline, and behind it.
-    braking
-        Deceleration counted on [m/s²]. Chosen: half of what the wheels can do, 1.0.
     reaction_s
         Time from an obstacle's appearance to braking [s]: a scan's period of .125, a command's of .1, and computing.
     depth_reach
@@ -113,12 +111,11 @@ class Guard(Generic[S]):
     depth_grid
         Which depth pixels are looked at.
     robot
-        The robot's outline and mounts.
+        The robot's outline, mounts and limits.
     """
 
     controller: Controller[S]
     margin: Margin = field(default_factory=Margin)
-    braking: float = 0.5
     reaction_s: float = 0.25
     depth_reach: float = 1.0
     memory_s: float = 60.0
@@ -132,6 +129,11 @@ class Guard(Generic[S]):
     without_lidar: bool = False
     depth_grid: DepthGrid = field(default_factory=DepthGrid)
     robot: RobotGeometry = LIMO
+
+    @property
+    def braking(self) -> float:
+        """Deceleration counted on [m/s²]: half of what the wheels can do."""
+        return self.robot.acceleration / 2
 
     def start(self) -> GuardState[S]:
         """Return the state before the first observation."""
@@ -228,17 +230,18 @@ class Guard(Generic[S]):
         room = room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot)
         ahead = speed_within(room, self.braking, self.reaction_s)
         behind = speed_within(room_behind(around, self.margin, self.robot), self.braking, self.reaction_s)
-        fastest, backward = math.inf, self.max_backward
+        fastest, backward = self.robot.max_speed, self.max_backward if self.robot.may_back else 0.0
         if scan is None or odometry is None:
-            fastest, backward = self.max_blind, 0.0
+            fastest, backward = min(fastest, self.max_blind), 0.0
         elif proposed.twist.linear < 0:
             seen = speed_within(room_seen_behind(state.looks, pose, self.robot), self.braking, self.reaction_s)
             behind = min(behind, max(seen, self.unseen_speed))
-        wanted = min(max(proposed.twist.linear, -backward), fastest)
+        wanted = min(max(proposed.twist.linear, -min(backward, fastest)), fastest)
         linear = min(max(wanted, -behind), ahead)
-        twist = Twist(linear, proposed.twist.angular)
+        twist = Twist(linear, min(max(proposed.twist.angular, -self.robot.max_turn), self.robot.max_turn))
         if backward == 0 > proposed.twist.linear:
-            return decision(twist, Mode.BLOCKED, "the robot does not back without sight")
+            why = "without sight" if self.robot.may_back else "at all"
+            return decision(twist, Mode.BLOCKED, f"the robot does not back {why}")
         if linear == wanted:
             return decision(twist, proposed.mode, proposed.reason)
         where = "ahead" if wanted > 0 else "behind"
@@ -259,7 +262,8 @@ class Guard(Generic[S]):
         new = to_odometry(new[np.hypot(new[:, 0], new[:, 1]) < self.memory_radius], pose)
         old = from_odometry(state.scan_points, pose)
         angle = np.arctan2(old[:, 1], old[:, 0] - self.robot.lidar_x)
-        out_of_view = (angle < scan.angle_min) | (angle > scan.angle_max)
+        off = angle - (scan.angle_min + scan.angle_max) / 2
+        out_of_view = np.abs(off - math.tau * np.rint(off / math.tau)) > (scan.angle_max - scan.angle_min) / 2
         age = scan.stamp - state.scan_points_at
         kept = out_of_view & (age >= 0) & (age < self.memory_s)
         return replace(

@@ -38,8 +38,7 @@ def test_a_person_near_ahead_stops_the_robot_but_not_its_turn() -> None:
 
 def test_the_robot_slows_down_before_it_stops() -> None:
     speeds = [
-        ahead().step(whole(scan=scan_of([(x, 0.0)])), ahead().start()).twist.linear
-        for x in (2.0, 1.0, 0.9, 0.8, 0.7)
+        ahead().step(whole(scan=scan_of([(x, 0.0)])), ahead().start()).twist.linear for x in (2.0, 1.0, 0.9, 0.8, 0.7)
     ]
     assert speeds[0] == 0.5
     assert speeds == sorted(speeds, reverse=True)
@@ -233,7 +232,7 @@ def test_depth_beyond_its_reach_is_left_to_the_lidar() -> None:
     # The robot's length, the margin and a metre: 1.89 m from the camera.
     for depth, free in ((1.85, False), (1.93, True)):
         view = whole(scan=scan(), depth=flat(depth))
-        assert (ahead(2.0).step(view, ahead().start()).twist.linear == 2.0) is free
+        assert (ahead(2.0).step(view, ahead().start()).twist.linear == LIMO.max_speed) is free
 
 
 def test_a_fault_of_the_same_instant_forgets_nothing() -> None:
@@ -261,7 +260,8 @@ BAD = {
     "scan is empty": whole(scan=scan(np.empty(0, np.float32))),
     "no valid range": whole(scan=scan(np.full(292, np.nan, np.float32))),
     **{
-        f"no valid range from {least} to {most} m": whole(scan=replace(scan(np.full(292, value, np.float32)), range_min=least, range_max=most)
+        f"no valid range from {least} to {most} m": whole(
+            scan=replace(scan(np.full(292, value, np.float32)), range_min=least, range_max=most)
         )
         for value, least, most in (
             *((0.0, 0.12, 8.0), (-1.0, 0.12, 7.0), (-np.inf, 0.12, 6.0)),

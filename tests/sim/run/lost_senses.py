@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import math
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -133,4 +134,4 @@ def _wrong(run: tuple[Case, int]) -> list[str]:
 
 if __name__ == "__main__":
     for line in main():
-        print(line)
+        sys.stdout.write(f"{line}\n")

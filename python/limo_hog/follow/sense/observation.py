@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from operator import attrgetter
 
 import numpy as np
@@ -40,6 +40,25 @@ class Scan:
     angle_max: float
     range_min: float
     range_max: float
+
+    def turned(self, yaw: float) -> Scan:
+        """Return the scan of a lidar whose angle 0 looks `yaw` [rad] from straight ahead, by the robot's angles."""
+        return replace(self, angle_min=self.angle_min + yaw, angle_max=self.angle_max + yaw) if yaw else self
+
+
+def beams_at(
+    angles: NDArray[np.float64],
+    angle_min: float | NDArray[np.float64],
+    angle_max: float | NDArray[np.float64],
+    count: int | NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return which of a scan's `count` beams looks nearest to each angle [rad]; none where that is no index.
+
+    The limits may be those of several scans, and lie beyond half a turn.
+    """
+    step = (angle_max - angle_min) / np.maximum(count - 1, 1)
+    middle = (angle_min + angle_max) / 2
+    return np.asarray(np.rint((angles - math.tau * np.rint((angles - middle) / math.tau) - angle_min) / step))
 
 
 @dataclass(frozen=True, slots=True)

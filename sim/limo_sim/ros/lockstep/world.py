@@ -36,7 +36,6 @@ from limo_sim.run.episode import Episode
 from limo_sim.run.log import Step, Watch
 from limo_sim.run.score import Scorer
 from limo_sim.sensing.camera import TrueFrame
-from limo_sim.world.robot import is_finite
 from limo_sim.world.scenario import Scenario
 
 #: A subscription is warned of when nobody publishes its topic for this time [s]. Chosen: publishers start within it.
@@ -315,7 +314,7 @@ class World:
             return
         found = self._in_frame_pixels(frame) if new else Detections.none()
         target = int(np.argmax(found.scores)) if len(found) else None
-        twist = self.commands[-1].twist if self.commands and is_finite(self.commands[-1].twist) else Twist()
+        twist = self.commands[-1].twist if self.commands else Twist()
         if self.detector_inputs:
             mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
         else:

@@ -37,6 +37,8 @@ class Arrivals:
         """
         reasons = [f"no {name} has come" for name in needed if name not in self.newest]
         ages = {name: now - came for name, (_, came) in self.newest.items()}
+        if abs(ages.get(CAMERA, 0.0)) > max_age:
+            ages.pop(DEPTH, None)  # it comes with its frame
         reasons += [f"no {name} for {abs(age):.1f} s" for name, age in ages.items() if abs(age) > max_age]
         return "; ".join(reasons)
 

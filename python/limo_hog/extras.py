@@ -24,6 +24,7 @@ _LIBRARIES = {
     "rosbags": ("rosbags", "record"),
     "scipy": ("SciPy", "train"),
     "shtab": ("shtab", "completion"),
+    "tomli": ("tomli", "ros2"),
     "threadpoolctl": ("threadpoolctl", "train"),
     "zstandard": ("Zstandard", "record"),
 }

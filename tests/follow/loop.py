@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from tests.follow.views import boxes, scan
+from tests.follow.views import boxes, flat, scan
 
 from limo_hog.detections import Detections
 from limo_hog.follow import (
@@ -24,7 +24,8 @@ from limo_hog.follow import (
 )
 
 IMAGE = np.full((480, 640, 3), 90, np.uint8)
-SENSORS = Sensors(scan())
+SENSORS = Sensors(scan(), Odometry())
+DEPTH = flat(8.0)
 FOCAL_PX = 448.6
 REGION = Region(96, 32, 208, 192, 150.0)
 
@@ -60,7 +61,7 @@ class Loop:
     def tick(self, now: float, frame: Frame | None, sensors: Sensors = SENSORS) -> FrameLog | None:
         return self._follower.tick(now, frame, sensors)
 
-    def frame(self, now: float, sensors: Sensors = SENSORS, depth: NDArray[np.float32] | None = None) -> FrameLog:
+    def frame(self, now: float, sensors: Sensors = SENSORS, depth: NDArray[np.float32] | None = DEPTH) -> FrameLog:
         """What comes of an image."""
         log = self.tick(now, Frame(now, IMAGE, FOCAL_PX, depth), sensors)
         assert log is not None
@@ -68,6 +69,6 @@ class Loop:
 
     def between(self, now: float, turn: Scan | None = None, odometry: Odometry | None = None) -> Decision[None]:
         """The command of a control period without an image; the lidar hits nothing unless `turn` says otherwise."""
-        log = self.tick(now, None, Sensors(scan(stamp=now) if turn is None else turn, odometry))
+        log = self.tick(now, None, Sensors(turn or scan(stamp=now), odometry or Odometry(now)))
         assert log is not None
         return log.decision

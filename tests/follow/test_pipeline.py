@@ -55,7 +55,7 @@ def test_a_detector_that_raises_stops_the_robot_and_the_next_image_is_searched_w
 
 
 def test_every_command_passes_the_safety_layer() -> None:
-    blocked = Loop().frame(0.0, Sensors(scan_of([(0.6, 0.0)]))).decision
+    blocked = Loop().frame(0.0, Sensors(scan_of([(0.6, 0.0)]), Odometry())).decision
     assert (blocked.twist, blocked.mode) == (Twist(0.0, 0.1), Mode.BLOCKED)
     # Before the first image the robot stands.
     early = Loop().between(0.0)

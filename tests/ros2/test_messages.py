@@ -204,7 +204,27 @@ def test_defaults_are_ros_defaults() -> None:
         messages.serialize(messages.default_message(name))
 
 
-@pytest.mark.parametrize("data", [b"", b"no picture", b"\xff\xd8\xff"])
+PNG = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"
+
+
+@pytest.mark.parametrize("size", [(65536, 65536), (30000, 30000)])
+def test_a_compressed_image_too_big_for_a_camera_is_not_decoded(size: tuple[int, int]) -> None:
+    pytest.importorskip("cv2")
+    message = messages.default_message("sensor_msgs/msg/CompressedImage")
+    for data in (
+        PNG + struct.pack(">II5B", *size, 8, 2, 0, 0, 0),
+        b"\xff\xd8\xff\xe0\0\4ab\xff" + struct.pack(">HHBHH", 0xFFC0, 17, 8, *(min(side, 65535) for side in size)),
+    ):
+        message.data = np.frombuffer(data + bytes(100), np.uint8)
+        with pytest.raises(messages.MessageError, match="want 67108864 pixels at most"):
+            messages.decompressed(message)
+
+
+#: What else OpenCV would read, and refuses by raising: OpenEXR's magic number.
+EXR = b"\x76\x2f\x31\x01\2\0\0\0"
+
+
+@pytest.mark.parametrize("data", [b"", b"no picture", b"\xff\xd8\xff", EXR, PNG + struct.pack(">II", 9, 9)])
 def test_compressed_data_that_are_no_picture_are_refused(data: bytes) -> None:
     pytest.importorskip("cv2")
     message = messages.default_message("sensor_msgs/msg/CompressedImage")

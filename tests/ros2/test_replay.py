@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.follow.views import scan
 
 from limo_hog.cli import replay as command
 from limo_hog.cli.main import main
 from limo_hog.detections import Detections
-from limo_hog.follow import Decision, Mode, Observation, Twist
+from limo_hog.follow import Decision, Mode, Observation, Odometry, Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.bag import Record, bag_writer
 from limo_hog.ros2.findings import stamped_twist
@@ -120,6 +121,9 @@ def test_what_is_no_depth_image_and_no_picture_is_named() -> None:
 def frames(count: int) -> Iterator[Record]:
     yield Record(names.CAMERA_INFO, 0.0, messages.camera_info(0.0, 64, 48, 50.0))
     for k in range(count):
+        yield Record(names.DEPTH, 0.1 * k, messages.image(0.1 * k, depth(8.0)))
+        yield Record(names.SCAN, 0.1 * k, messages.laser_scan(scan(stamp=0.1 * k)))
+        yield Record(names.ODOMETRY, 0.1 * k, messages.odometry(Odometry(0.1 * k)))
         yield Record(names.IMAGE, 0.1 * k, messages.image(0.1 * k, PICTURE))
 
 
@@ -156,3 +160,15 @@ def test_the_command_line_counts_the_failures_and_says_the_first(
     card = json.loads(out)
     assert (card["frames"], card["detector_failures"]) == (3, 1)
     assert "1 of 3 frames: the detector failed: out of memory" in err
+
+
+def test_one_line_says_which_senses_are_there_and_which_are_not() -> None:
+    senses = Senses()
+    assert senses.present() == "camera yes · camera_info no, 71° wide is assumed · depth no · scan NO · odom no"
+    assert "scan no" in senses.present(without_lidar=True)
+    senses.take(messages.camera_info(0.0, 64, 48, 50.0))
+    senses.take(messages.odometry(Odometry()))
+    assert senses.present() == "camera yes · camera_info yes · depth no · scan NO · odom yes"
+    senses.take(messages.laser_scan(scan()))
+    senses.take(messages.image(0.0, depth(1.0)))
+    assert senses.present() == "camera yes · camera_info yes · depth yes · scan yes · odom yes"

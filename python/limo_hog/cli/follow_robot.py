@@ -14,6 +14,7 @@ from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.pipeline import FrameLog
+from limo_hog.follow.robot import LIMO, load_robot
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.ros2.dds import Bus
 from limo_hog.ros2.follower import drive
@@ -35,6 +36,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--no-drive", action="store_true", help="publish what is found and no commands: a planner, such as Nav2, drives"
     )
+    parser.add_argument("--robot", metavar="FILE.toml", help="what differs from a Limo (see `RobotGeometry`)")
+    parser.add_argument(
+        "--without-lidar", action="store_true", help="drive by depth alone where no scan comes: slowly, never backwards"
+    )
     parser.add_argument("--ros2", action="store_true", help="follow on a ROS 2 robot instead of in the arena")
 
 
@@ -53,7 +58,17 @@ def run(args: argparse.Namespace) -> int:
                 task, completed=time.monotonic() - began, description=f"{decision.mode.value}: {decision.reason}"
             )
 
-        report = drive(bus, controller, detector, args.seconds, watch, moves=not args.no_drive)
+        report = drive(
+            bus,
+            controller,
+            detector,
+            args.seconds,
+            watch,
+            moves=not args.no_drive,
+            robot=load_robot(args.robot) if args.robot else LIMO,
+            without_lidar=args.without_lidar,
+            say=lambda line: print(line, file=sys.stderr),
+        )
     answer = statistics.median(report.answer_ms) if report.answer_ms else None
     card = {
         "controller": args.controller,

@@ -8,7 +8,7 @@ from limo_hog.follow.control.tracking import TrackingController
 from limo_hog.follow.control.workshop import ApproachController, ProxemicController
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.pipeline import Follower, FrameLog
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, RobotError, RobotGeometry, Twist, load_robot
 from limo_hog.follow.safety import Guard
 from limo_hog.follow.sense.detectors import Region, detector_named
 from limo_hog.follow.sense.measurement import Zone, person_depth, zone_of
@@ -16,6 +16,7 @@ from limo_hog.follow.sense.observation import Frame, Observation, Odometry, Scan
 
 __all__ = [
     "CONTROLLERS",
+    "LIMO",
     "ApproachController",
     "Controller",
     "Decision",
@@ -29,6 +30,8 @@ __all__ = [
     "Odometry",
     "ProxemicController",
     "Region",
+    "RobotError",
+    "RobotGeometry",
     "Scan",
     "Sensors",
     "TrackingController",
@@ -36,6 +39,7 @@ __all__ = [
     "Zone",
     "controller_named",
     "detector_named",
+    "load_robot",
     "person_depth",
     "zone_of",
 ]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, RobotError, RobotGeometry, Twist
 from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Observation
 
@@ -126,3 +126,18 @@ class Controller(Protocol[S]):
     def step(self, observation: Observation, state: S) -> Decision[S]:
         """Decide what to do about one observation."""
         ...
+
+
+def made_for(controller: Controller[S], robot: RobotGeometry) -> Controller[S]:
+    """Return a controller that drives `robot`: one that knows its robot is given this one.
+
+    Raises
+    ------
+    RobotError
+        It was made for another robot than the Limo and this one.
+    """
+    known = getattr(controller, "robot", robot)
+    if known not in (robot, LIMO):
+        raise RobotError("the controller was made for another robot: give the follower the same")
+    changed: Any = controller if known == robot else replace(controller, robot=robot)  # type: ignore[type-var]
+    return changed  # type: ignore[no-any-return]

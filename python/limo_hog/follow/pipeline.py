@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections, Detector
-from limo_hog.follow.decision import Controller, Decision
+from limo_hog.follow.decision import Controller, Decision, made_for
+from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.safety import Guard
 from limo_hog.follow.sense.detectors import Region, detect_in
 from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors, observed
@@ -37,7 +38,7 @@ class FrameLog:
     Attributes
     ----------
     time
-        When the command was decided, on the clock of the sensors' stamps [s].
+        When the command was decided, on the robot's own clock [s].
     decision
         The command and the reason for it; its `target` is an index into `detections`.
     sensors
@@ -77,7 +78,7 @@ class Periods:
         Parameters
         ----------
         now
-            Time on the clock of the sensors' stamps [s]; a clock that was set back begins a period.
+            Time on the robot's own clock [s]; one that was set back begins a period.
         frame
             The newest camera image: new if it is another object than the last. None without one.
         """
@@ -103,12 +104,30 @@ class Follower(Generic[S]):
         Steers by what the detector finds; `Guard` limits its commands.
     detector
         Finds people in uint8 (H, W, 3) BGR images. If it raises, the robot stops and the decision says so.
+    robot
+        Its outline, limits, camera and lidar, for the guard and for a controller that has a `robot`.
     search
         Applies the detector to a region of an image.
+    without_lidar
+        The robot has none; see `Guard`.
+
+    Raises
+    ------
+    RobotError
+        The controller was made for another robot.
     """
 
-    def __init__(self, controller: Controller[S], detector: Detector, search: Search = detect_in) -> None:
-        self._guard = Guard(controller)
+    def __init__(
+        self,
+        controller: Controller[S],
+        detector: Detector,
+        robot: RobotGeometry = LIMO,
+        *,
+        search: Search = detect_in,
+        without_lidar: bool = False,
+    ) -> None:
+        self._guard = Guard(made_for(controller, robot), robot=robot, without_lidar=without_lidar)
+        self._lidar_yaw = robot.lidar_yaw
         self._detector, self._search = detector, search
         self._state = self._guard.start()
         self._region: Region | None = None
@@ -121,7 +140,7 @@ class Follower(Generic[S]):
         Parameters
         ----------
         now
-            Time on the clock of the sensors' stamps [s].
+            Time on the robot's own clock [s], which only goes on: ages are counted on it, whatever the stamps say.
         frame
             The newest camera image: a new one is searched for people, without one the last command is checked against
             the newest scan. None without any.
@@ -141,7 +160,7 @@ class Follower(Generic[S]):
         except Exception as error:  # whatever a detector raises, the robot must stop and the loop must go on
             detections, failure = Detections.none(), f"the detector failed: {error}"
         detect_ms = 1e3 * (time.perf_counter() - began)
-        observation = observed(frame, sensors, detections, region, failure, self._between)
+        observation = observed(frame, self._turned(sensors), detections, region, failure, self._between, now)
         self._between = ()
         decision = self._guard.step(observation, self._state)
         self._state, self._region = decision.state, decision.region
@@ -149,9 +168,16 @@ class Follower(Generic[S]):
         return FrameLog(now, told, sensors, frame, detections, region, failure, detect_ms)
 
     def _recheck(self, now: float, sensors: Sensors) -> FrameLog:
-        if sensors.scan is not None and sensors.odometry is not None:
-            self._between = (*self._between[1 - _SCANS_BETWEEN :], (sensors.scan, sensors.odometry))
-        decision = self._guard.recheck(now, sensors.scan, sensors.odometry, self._state)
+        turned = self._turned(sensors)
+        if turned.scan is not None and turned.odometry is not None:
+            self._between = (*self._between[1 - _SCANS_BETWEEN :], (turned.scan, turned.odometry))
+        decision = self._guard.recheck(now, turned.scan, turned.odometry, self._state)
         self._state = decision.state
         told: Decision[None] = replace(decision, state=None)  # type: ignore[arg-type, assignment]
         return FrameLog(now, told, sensors)
+
+    def _turned(self, sensors: Sensors) -> Sensors:
+        """Return the readings with the scan's angles as the robot's."""
+        if sensors.scan is None:
+            return sensors
+        return replace(sensors, scan=sensors.scan.turned(self._lidar_yaw))

@@ -1,4 +1,4 @@
-"""The Limo: its outline, where its sensors and wheels sit, what its camera sees, and the command it is given.
+"""A robot as data: its outline, where its sensors and wheels sit, what it can do; and the command it is given.
 
 Lengths are in the base frame: x forward, y left, z up, origin on the floor below the middle of the body.
 """
@@ -6,35 +6,78 @@ Lengths are in the base frame: x forward, y left, z up, origin on the floor belo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from limo_hog.exceptions import LimoHogError
+from limo_hog.extras import needed
+
+
+class RobotError(LimoHogError, ValueError):
+    """A robot that cannot be driven; the message names the file, the key and what is allowed."""
+
+
+def _within(default: float, low: float, high: float) -> Any:
+    return field(default=default, metadata={"limits": (low, high)})
 
 
 @dataclass(frozen=True, slots=True)
 class RobotGeometry:
-    """Lengths of a robot [m], from LCAS/limo_ros2's `limo_four_diff.xacro`.
+    """A robot with two driven sides; by default the Limo, its lengths from LCAS/limo_ros2's `limo_four_diff.xacro`.
 
     Attributes
     ----------
     half_length, half_width
-        Half of the body's outline.
+        Half of the body's outline [m].
     camera_x, camera_z
-        Where the camera sits, ahead of the centre and above the floor; it looks level and straight ahead.
+        Where the camera sits, ahead of the centre and above the floor [m]; it looks level and straight ahead.
     field_of_view
         Horizontal field of view of the camera [rad].
     lidar_x, lidar_z
-        Where the lidar sits, ahead of the centre and above the floor; its plane is level.
+        Where the lidar sits, ahead of the centre and above the floor [m]; its plane is level.
+    lidar_yaw
+        Which way the lidar's angle 0 looks [rad], counter-clockwise from straight ahead.
     wheel_separation
-        Between the left and the right wheels, as the differential drive counts it.
+        Between the left and the right wheels, as the differential drive counts it [m].
+    max_speed, max_turn
+        The most that it is told to drive and to turn [m/s, rad/s].
+    acceleration
+        How fast it speeds up and brakes [m/s²].
+    may_back
+        Whether it may drive backwards.
+
+    Raises
+    ------
+    RobotError
+        A value is of another type, or out of its range.
     """
 
-    half_length: float = 0.145
-    half_width: float = 0.11
-    camera_x: float = 0.084
-    camera_z: float = 0.175
-    field_of_view: float = 1.23918
-    lidar_x: float = 0.103
-    lidar_z: float = 0.111
-    wheel_separation: float = 0.172
+    half_length: float = _within(0.145, 0.02, 2.0)
+    half_width: float = _within(0.11, 0.02, 2.0)
+    camera_x: float = _within(0.084, -2.0, 2.0)
+    camera_z: float = _within(0.175, 0.02, 2.0)
+    field_of_view: float = _within(1.23918, 0.2, 3.0)
+    lidar_x: float = _within(0.103, -2.0, 2.0)
+    lidar_z: float = _within(0.111, 0.01, 2.0)
+    lidar_yaw: float = _within(0.0, -math.pi, math.pi)
+    wheel_separation: float = _within(0.172, 0.02, 4.0)
+    max_speed: float = _within(1.0, 0.01, 10.0)
+    max_turn: float = _within(11.6, 0.01, 100.0)
+    acceleration: float = _within(1.0, 0.05, 20.0)
+    may_back: bool = True
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if "limits" not in one.metadata:
+                if not isinstance(value, bool):
+                    raise RobotError(f"{one.name}: got {value!r}, want true or false")
+                continue
+            low, high = one.metadata["limits"]
+            if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+                raise RobotError(f"{one.name}: got {value!r}, want a number in {low:g} … {high:g}")
 
     def focal_px(self, width: int) -> float:
         """Return the camera's focal length for images of `width` [px]: 448.6 for 640."""
@@ -42,6 +85,33 @@ class RobotGeometry:
 
 
 LIMO = RobotGeometry()
+
+
+def load_robot(path: str | Path) -> RobotGeometry:
+    """Read a robot from a TOML file with `RobotGeometry`'s names; what is left out is the Limo's.
+
+    Raises
+    ------
+    RobotError
+        With the file, the key and what is allowed there.
+    """
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        with needed(by="a robot's file"):
+            import tomli as tomllib  # type: ignore[import-not-found]
+    try:
+        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise RobotError(f"{path}: cannot be read as TOML: {getattr(error, 'strerror', None) or error}") from error
+    known = [one.name for one in fields(RobotGeometry)]
+    for key in table:
+        if key not in known:
+            raise RobotError(f"{path}: {key}: unknown key, want one of {', '.join(known)}")
+    try:
+        return RobotGeometry(**table)
+    except RobotError as error:
+        raise RobotError(f"{path}: {error}") from None
 
 
 @dataclass(frozen=True, slots=True)

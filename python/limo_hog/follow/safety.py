@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
+from limo_hog.follow.sense.arrivals import CAMERA, DEPTH, ODOMETRY, SCAN, Arrivals
 from limo_hog.follow.sense.clearance import (
     NO_POINTS,
     DepthGrid,
@@ -44,10 +45,12 @@ class GuardState(Generic[S]):
         The guarded controller's state.
     proposed
         The controller's last decision, before limits; None before the first and after a fault.
-    stamp, newest_stamp
-        Stamp of the last frame, and the newest of any sensor when it was decided on [s].
+    stamp
+        Stamp of the last frame [s].
+    arrivals
+        The newest reading of each sense, by its stamp and by the robot's own clock.
     depth_points
-        float64 (N, 2) [m], base frame: obstacles in the depth image of that frame.
+        float64 (N, 2) [m], base frame: obstacles in the last depth image.
     scan_stamp
         Stamp of the last scan [s].
     scan_points, scan_points_at
@@ -59,7 +62,7 @@ class GuardState(Generic[S]):
     inner: S
     proposed: Decision[S] | None = None
     stamp: float | None = None
-    newest_stamp: float = -math.inf
+    arrivals: Arrivals = field(default_factory=Arrivals)
     depth_points: Points = field(default_factory=lambda: NO_POINTS)
     scan_stamp: float = -math.inf
     scan_points: Points = field(default_factory=lambda: NO_POINTS)
@@ -77,8 +80,6 @@ class Guard(Generic[S]):
         Whose commands are limited.
     margin
         Ground kept free ahead of the robot's outline, and behind it.
-    braking
-        Deceleration counted on [m/s²]. Chosen: half of what the wheels can do, 1.0.
     reaction_s
         Time from an obstacle's appearance to braking [s]: a scan's period of .125, a command's of .1, and computing.
     depth_reach
@@ -99,19 +100,22 @@ class Guard(Generic[S]):
         .6 m/s the robot stops within .51 m, less than the ground looked at. Measured in 64 development runs of a person
         who walks at the robot at .8 m/s: with .4 m/s three end with a contact, with .6 m/s clearance is .32 m and more.
     max_blind
-        The same without a lidar or odometry [m/s]. Chosen: from .4 m/s the robot stops within .26 m.
+        Highest speed without a lidar [m/s], and none backwards. Chosen: from .2 m/s the robot stops within .09 m.
     max_age_s
-        The robot stops without a camera frame, or with a scan, this old [s]. Chosen: four lidar periods, the time of
-        the robot's own watchdog.
+        The robot stops when no new camera frame, depth image, scan or odometry has come for so long on its own clock,
+        or one is so late by its stamp [s]. Chosen: four lidar periods, the time of the robot's own watchdog.
+    max_late_s
+        The same for a camera frame's stamp [s]. Chosen: twice the latency that the controllers were tried with.
+    without_lidar
+        The robot has none: it drives by the depth image alone, slowly. Without depth or odometry no robot drives.
     depth_grid
         Which depth pixels are looked at.
     robot
-        The robot's outline and mounts.
+        The robot's outline, mounts and limits.
     """
 
     controller: Controller[S]
     margin: Margin = field(default_factory=Margin)
-    braking: float = 0.5
     reaction_s: float = 0.25
     depth_reach: float = 1.0
     memory_s: float = 60.0
@@ -119,10 +123,17 @@ class Guard(Generic[S]):
     look_every_s: float = 0.5
     unseen_speed: float = 0.2
     max_backward: float = 0.6
-    max_blind: float = 0.4
+    max_blind: float = 0.2
     max_age_s: float = 0.5
+    max_late_s: float = 1.0
+    without_lidar: bool = False
     depth_grid: DepthGrid = field(default_factory=DepthGrid)
     robot: RobotGeometry = LIMO
+
+    @property
+    def braking(self) -> float:
+        """Deceleration counted on [m/s²]: half of what the wheels can do."""
+        return self.robot.acceleration / 2
 
     def start(self) -> GuardState[S]:
         """Return the state before the first observation."""
@@ -136,13 +147,20 @@ class Guard(Generic[S]):
             set_back = state.stamp is not None and observation.stamp < state.stamp
             stamp = observation.stamp if math.isfinite(observation.stamp) else state.stamp
             after = replace(self.start() if set_back else state, stamp=stamp, proposed=None)
+            after = self._heard(observation.at, observation.scan, observation.odometry, after, observation)
+            return Decision(Twist(), after, Mode.BLOCKED, fault)
+        state = self._heard(observation.at, observation.scan, observation.odometry, state, observation)
+        if fault := state.arrivals.disagreement(self.max_age_s, self.max_late_s):
+            # Neither the controller nor the memory can do anything with times of several clocks.
+            after = replace(state, stamp=observation.stamp, proposed=None)
+            fault = "; ".join(filter(None, (self._missing(observation.at, after), fault)))
             return Decision(Twist(), after, Mode.BLOCKED, fault)
         state = self._remember(state, observation.scan, observation.odometry)
         if observation.scan is not None and observation.odometry is not None:
             old = state.scan_points[state.scan_points_at < state.scan_stamp]
             observation = replace(observation, remembered=from_odometry(old, observation.odometry))
         proposed = self.controller.step(observation, state.inner)
-        depth_points = NO_POINTS
+        depth_points = state.depth_points
         if observation.depth is not None:
             reach = 2 * self.robot.half_length + self.margin.ahead + self.depth_reach
             depth_points = self.depth_grid.points(observation.depth, observation.focal_px, reach, self.robot)
@@ -151,27 +169,45 @@ class Guard(Generic[S]):
             inner=proposed.state,
             proposed=proposed,
             stamp=observation.stamp,
-            newest_stamp=observation.now,
             depth_points=depth_points,
         )
-        return self._limited(proposed, state, observation.scan, observation.odometry, observation.now)
+        return self._limited(proposed, state, observation.scan, observation.odometry, observation.at)
 
     def recheck(
         self, now: float, scan: Scan | None, odometry: Odometry | None, state: GuardState[S]
     ) -> Decision[GuardState[S]]:
         """Check the controller's last decision against a newer scan, for a control period without a camera frame.
 
-        The decision has no target and no region: these belong to a frame.
+        The decision has no target and no region: these belong to a frame. `now` is on the robot's own clock [s].
         """
-        if state.proposed is None:
-            return Decision(Twist(), state, Mode.BLOCKED, "no usable camera frame")
-        age = now - state.newest_stamp
-        if age > self.max_age_s:
-            return Decision(Twist(), state, Mode.BLOCKED, f"no camera frame for {age:.1f} s")
-        if fault := scan_fault(scan):
+        if fault := scan_fault(scan) or _odometry(odometry):
+            return Decision(Twist(), state, Mode.BLOCKED, fault)
+        state = self._heard(now, scan, odometry, state)
+        fault = self._missing(now, state) or state.arrivals.disagreement(self.max_age_s, self.max_late_s)
+        if not fault and state.proposed is None:
+            fault = "no usable camera frame"
+        if fault or state.proposed is None:
             return Decision(Twist(), state, Mode.BLOCKED, fault)
         proposed = replace(state.proposed, target=None, region=None)
         return self._limited(proposed, self._remember(state, scan, odometry), scan, odometry, now)
+
+    def _heard(
+        self,
+        now: float,
+        scan: Scan | None,
+        odometry: Odometry | None,
+        state: GuardState[S],
+        seen: Observation | None = None,
+    ) -> GuardState[S]:
+        """Note which readings are new at `now` on the robot's own clock [s]."""
+        stamps = {SCAN: scan.stamp if scan else math.nan, ODOMETRY: odometry.stamp if odometry else math.nan}
+        if seen is not None:
+            stamps |= {CAMERA: seen.stamp, DEPTH: math.nan if seen.depth is None else seen.stamp}
+        return replace(state, arrivals=state.arrivals.after(now, stamps))
+
+    def _missing(self, now: float, state: GuardState[S]) -> str:
+        needed = (CAMERA, DEPTH, ODOMETRY) if self.without_lidar else (CAMERA, DEPTH, SCAN, ODOMETRY)
+        return state.arrivals.missing(now, needed, self.max_age_s)
 
     def _limited(
         self,
@@ -188,19 +224,24 @@ class Guard(Generic[S]):
 
         if not (math.isfinite(proposed.twist.linear) and math.isfinite(proposed.twist.angular)):
             return decision(Twist(), Mode.BLOCKED, "the controller's command is not a number")
-        if scan is not None and now - scan.stamp > self.max_age_s:
-            return decision(Twist(), Mode.BLOCKED, f"the scan is {now - scan.stamp:.1f} s old")
+        if fault := self._missing(now, state):
+            return decision(Twist(), Mode.BLOCKED, fault)
         around = from_odometry(state.scan_points, pose)
         room = room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot)
         ahead = speed_within(room, self.braking, self.reaction_s)
         behind = speed_within(room_behind(around, self.margin, self.robot), self.braking, self.reaction_s)
-        fastest = self.max_blind
-        if scan is not None and odometry is not None and proposed.twist.linear < 0:
+        fastest, backward = self.robot.max_speed, self.max_backward if self.robot.may_back else 0.0
+        if scan is None or odometry is None:
+            fastest, backward = min(fastest, self.max_blind), 0.0
+        elif proposed.twist.linear < 0:
             seen = speed_within(room_seen_behind(state.looks, pose, self.robot), self.braking, self.reaction_s)
-            behind, fastest = min(behind, max(seen, self.unseen_speed)), self.max_backward
-        wanted = max(proposed.twist.linear, -fastest)
+            behind = min(behind, max(seen, self.unseen_speed))
+        wanted = min(max(proposed.twist.linear, -min(backward, fastest)), fastest)
         linear = min(max(wanted, -behind), ahead)
-        twist = Twist(linear, proposed.twist.angular)
+        twist = Twist(linear, min(max(proposed.twist.angular, -self.robot.max_turn), self.robot.max_turn))
+        if backward == 0 > proposed.twist.linear:
+            why = "without sight" if self.robot.may_back else "at all"
+            return decision(twist, Mode.BLOCKED, f"the robot does not back {why}")
         if linear == wanted:
             return decision(twist, proposed.mode, proposed.reason)
         where = "ahead" if wanted > 0 else "behind"
@@ -221,7 +262,8 @@ class Guard(Generic[S]):
         new = to_odometry(new[np.hypot(new[:, 0], new[:, 1]) < self.memory_radius], pose)
         old = from_odometry(state.scan_points, pose)
         angle = np.arctan2(old[:, 1], old[:, 0] - self.robot.lidar_x)
-        out_of_view = (angle < scan.angle_min) | (angle > scan.angle_max)
+        off = angle - (scan.angle_min + scan.angle_max) / 2
+        out_of_view = np.abs(off - math.tau * np.rint(off / math.tau)) > (scan.angle_max - scan.angle_min) / 2
         age = scan.stamp - state.scan_points_at
         kept = out_of_view & (age >= 0) & (age < self.memory_s)
         return replace(
@@ -314,5 +356,7 @@ def scan_fault(scan: Scan | None) -> str:
 def _odometry(odometry: Odometry | None) -> str:
     if odometry is None:
         return ""
+    if not math.isfinite(odometry.stamp):
+        return f"the odometry's stamp is {odometry.stamp}, not a time"
     values = (odometry.x, odometry.y, odometry.yaw, odometry.linear, odometry.angular)
     return "" if all(map(math.isfinite, values)) else "the odometry is not a number"

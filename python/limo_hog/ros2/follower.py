@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,7 +11,7 @@ from typing import Any, TypeVar
 from limo_hog.detections import Detector
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, FrameLog
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.dds import Bus, BusError, Endpoints
@@ -22,6 +23,9 @@ S = TypeVar("S")
 
 #: The drive ends after so long without a camera image [s]: discovery takes up to 3 s, a driver as long to start.
 SILENT_AFTER = 10.0
+
+#: Other senses than the camera are said to be missing so long after the first image [s]: discovery takes up to 3 s.
+SETTLED = 3.0
 
 
 @dataclass
@@ -90,8 +94,8 @@ class Inputs:
         The other sensors' newest readings.
     """
 
-    def __init__(self, bus: Bus, camera: str) -> None:
-        self.senses = Senses()
+    def __init__(self, bus: Bus, camera: str, robot: RobotGeometry = LIMO) -> None:
+        self.senses = Senses(robot)
         self._unreadable = 0
         self._camera = bus.subscription(camera, names.TYPES[camera], depth=5)
         self._others = [
@@ -133,10 +137,14 @@ def drive(
     watch: Callable[[FrameLog], None] | None = None,
     *,
     moves: bool = True,
+    robot: RobotGeometry = LIMO,
+    without_lidar: bool = False,
+    say: Callable[[str], None] = lambda _: None,
 ) -> Report:
     """Follow the person the camera sees until the time is up; the last command is always to stand.
 
-    With `moves` False no command is sent: a planner drives to what is found.
+    With `moves` False no command is sent: a planner drives to what is found. `say` is told which senses are there, when
+    all are, or some time after the first image, and whenever one more has come.
 
     Raises
     ------
@@ -144,10 +152,11 @@ def drive(
         If there is no camera, or no image comes for 10 s.
     """
     camera = camera_topic(bus)
-    inputs = Inputs(bus, camera)
+    inputs = Inputs(bus, camera, robot)
     commands, findings = Commands(bus) if moves else None, Findings(bus)
-    follower = Follower(controller, detector)
+    follower = Follower(controller, detector, robot, without_lidar=without_lidar)
     report = Report()
+    first, said = math.inf, ""
     began = heard = time.monotonic()
     stamp = 0.0
     try:
@@ -156,18 +165,21 @@ def drive(
             came = time.monotonic()
             frame = inputs.newest()
             if frame is not None:
-                heard, stamp = came, frame.stamp
+                heard, stamp, first = came, frame.stamp, min(first, came)
             elif came - heard > SILENT_AFTER:
                 raise BusError(f"no image on {camera} in ROS domain {bus.domain} for {SILENT_AFTER:g} s")
             elif not report.frames:
                 continue
-            # The robot's clock, by the last image's stamp and the time since on this machine's clock.
-            now = stamp + came - heard
-            log = follower.tick(now, frame, inputs.senses.sensors)
+            line = inputs.senses.present(without_lidar=without_lidar)
+            if line != said and (came - first > SETTLED or "no" not in line.lower()):
+                said = line
+                say(line)
+            log = follower.tick(came, frame, inputs.senses.sensors)
             if log is None:
                 continue
             if commands is not None:
-                commands.publish(now, log.decision.twist)
+                # The camera's clock: the last image's stamp and the time since.
+                commands.publish(stamp + came - heard, log.decision.twist)
             report.add(log, 1e3 * (time.monotonic() - came))
             report.dropped = inputs.dropped
             findings.publish(log, inputs.senses.newest(stamp))

@@ -39,9 +39,12 @@ from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.imaging.headers import picture_size
 from limo_hog.ros2.definitions import add_to
 
 CAMERA_FRAME = "depth_link"
+#: Compressed images of more are not decoded: 8 bytes for each are taken meanwhile. Chosen: twice a camera of 8K.
+MOST_PIXELS = 2**26
 LIDAR_FRAME = "laser_link"
 IMU_FRAME = "imu_link"
 ODOMETRY_FRAME = "odom"
@@ -242,14 +245,20 @@ def decompressed(message: Any) -> NDArray[np.uint8]:
     Raises
     ------
     MessageError
-        The data are no picture.
+        The data are no JPEG or PNG, or one of more than `MOST_PIXELS`.
     """
     with needed(by="a compressed image"):
         import cv2
     data = np.frombuffer(message.data, np.uint8)
-    pixels = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR) if data.size else None
+    width, height = picture_size(data.tobytes()) or (0, 0)
+    if width * height > MOST_PIXELS:
+        raise MessageError(f"a compressed image of {width}x{height}: want {MOST_PIXELS} pixels at most")
+    try:
+        pixels = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR) if width * height else None
+    except cv2.error:  # OpenCV refuses some by raising, most by None
+        pixels = None
     if pixels is None:
-        raise MessageError(f"{data.size} bytes of {message.format!r} are no picture")
+        raise MessageError(f"{data.size} bytes of {message.format!r} are no picture: want a JPEG or PNG")
     return pixels.astype(np.uint8, copy=False)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors
 from limo_hog.ros2 import messages
 from limo_hog.ros2.messages import MessageError
@@ -35,7 +35,8 @@ class Senses:
         The newest; None before the first.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, robot: RobotGeometry = LIMO) -> None:
+        self._robot = robot
         self.focal_px: float | None = None
         self.scan: Scan | None = None
         self.odometry: Odometry | None = None
@@ -72,6 +73,24 @@ class Senses:
         """The newest scan and odometry."""
         return Sensors(self.scan, self.odometry)
 
+    def present(self, *, without_lidar: bool = False) -> str:
+        """Return which senses have come beside a camera's first image, in one line.
+
+        NO is a lidar without which the robot does not drive.
+        """
+        there = {
+            "camera_info": self.focal_px is not None,
+            "depth": bool(self._depths),
+            "scan": self.scan is not None,
+            "odom": self.odometry is not None,
+        }
+        told = {name: "yes" if came else "no" for name, came in there.items()}
+        if not (there["scan"] or without_lidar):
+            told["scan"] = "NO"
+        if self.focal_px is None:
+            told["camera_info"] += f", {math.degrees(self._robot.field_of_view):.0f}° wide is assumed"
+        return " · ".join(["camera yes", *(f"{name} {answer}" for name, answer in told.items())])
+
     def frame(self, stamp: float, image: NDArray[np.uint8]) -> Frame:
         """Return the frame of a camera image, uint8 (H, W, 3) or (H, W), taken at `stamp` [s].
 
@@ -79,7 +98,7 @@ class Senses:
         """
         fitting = [(abs(at - stamp), depth) for at, depth in self._depths if depth.shape == image.shape[:2]]
         gap, depth = min(fitting, key=lambda pair: pair[0], default=(math.inf, None))
-        focal_px = LIMO.focal_px(image.shape[1]) if self.focal_px is None else self.focal_px
+        focal_px = self._robot.focal_px(image.shape[1]) if self.focal_px is None else self.focal_px
         return Frame(stamp, image, focal_px, depth if gap <= SLOP else None)
 
 

@@ -13,6 +13,7 @@ from limo_hog.ros2 import names
 from limo_sim.ros.lockstep.calls import PUBLISHED
 from limo_sim.run.arena import Arena
 from limo_sim.run.log import Step, Watch
+from limo_sim.world.robot import is_finite
 from limo_sim.world.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def run_live(
 
 def _step(arena: Arena, twist: Twist) -> Step:
     frame = arena.frame()
+    twist = twist if is_finite(twist) else Twist()
     mode = Mode.STAND if twist == Twist() else Mode.DRIVE
     decision = Decision(twist, None, mode, "driven by /cmd_vel")
     log = FrameLog(arena.time, decision, Sensors(arena.scan(), arena.odometry()), frame)

@@ -98,7 +98,7 @@ def run_episode(
     search: Search = detect_in
     if scenario.detector != DetectorFaults():
         search = FaultySearch(arena.scenario, seed, lambda: arena.frame().truth)
-    follower = Follower(controller, detector, search)
+    follower = Follower(controller, detector, search=search)
     while arena.time < seconds:
         drawing = time.perf_counter()
         frame = arena.frame()

@@ -36,10 +36,8 @@ class Drive:
 
     def command(self, twist: Twist, time: float) -> None:
         """Take a command at `time` [s]; one that is not finite stops the robot and is counted."""
-        if not (math.isfinite(twist.linear) and math.isfinite(twist.angular)):
-            self.rejected += 1
-            twist = Twist()
-        self._wanted = twist
+        self.rejected += not is_finite(twist)
+        self._wanted = twist if is_finite(twist) else Twist()
         self._commanded_at = time
 
     def advance(self, time: float, dt: float) -> None:
@@ -62,6 +60,11 @@ class Drive:
     def twist(self) -> Twist:
         """The robot's speeds while the wheels do not slip."""
         return twist_of(self.left, self.right)
+
+
+def is_finite(twist: Twist) -> bool:
+    """Whether both speeds of a command are numbers: by any other the robot stands."""
+    return math.isfinite(twist.linear) and math.isfinite(twist.angular)
 
 
 def twist_of(left: float, right: float) -> Twist:

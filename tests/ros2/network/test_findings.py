@@ -17,13 +17,15 @@ from cyclonedds.idl import make_idl_struct, types
 
 from limo_hog.detections import Detections
 from limo_hog.follow.control.naming import controller_named
-from limo_hog.follow.decision import Believed
+from limo_hog.follow.decision import Believed, Mode
+from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.ros2 import dds, findings, follower, frames, messages, names
 from limo_hog.ros2.bag import to_detections
 from limo_hog.ros2.outputs import Commands
 from limo_sim.ros.live import run_live
+from limo_sim.run.log import Step
 from limo_sim.world.scenario import Person, Scenario
 
 PERSON = Believed(2.0, 2.0, 0.875, 7, 0.5, -0.25, 1)
@@ -127,3 +129,42 @@ def test_a_drive_publishes_where_the_person_is(monkeypatch: pytest.MonkeyPatch) 
     children = {one.child_frame_id for message in found[names.TF] for one in message.transforms}
     assert {"base_link", "person_1", "followed_person"} <= children
     assert [one.child_frame_id for one in kept.take()[0].transforms][:1] == ["depth_link"]
+
+
+def test_a_robot_that_publishes_images_alone_is_told_what_is_missing_and_stands() -> None:
+    bus, heard = dds.Bus(), dds.Bus()
+    commands = heard.subscription(names.COMMAND, names.TYPES[names.COMMAND], depth=1000)
+    images = bus.publisher(names.IMAGE, names.TYPES[names.IMAGE])
+    done = threading.Event()
+
+    def shine() -> None:
+        while not done.wait(0.1):
+            images.publish(messages.image(time.time(), np.full((480, 640, 3), 90, np.uint8)))
+
+    camera = threading.Thread(target=shine)
+    camera.start()
+    said: list[str] = []
+    logs: list[FrameLog] = []
+    controller, detector = controller_named("tracking", 1.5), detector_named("hog")
+    try:
+        follower.drive(dds.Bus(), controller, detector, 6.0, logs.append, say=said.append)
+    finally:
+        done.set()
+        camera.join()
+    assert said == ["camera yes · camera_info no, 71° wide is assumed · depth no · scan NO · odom no"]
+    assert {log.decision.reason for log in logs} == {"no depth image has come; no scan has come; no odometry has come"}
+    sent = [messages.to_twist(message) for message in commands.take()]
+    assert len(sent) > 20
+    assert set(sent) == {Twist()}
+
+
+def test_a_command_that_is_no_number_is_shown_and_recorded_as_standing() -> None:
+    steps: list[Step] = []
+    arena = threading.Thread(target=run_live, args=(Scenario(name="empty"), 0, 4.0, dds.Bus(), steps.append))
+    arena.start()
+    commands = dds.Bus().publisher(names.COMMAND, names.TYPES[names.COMMAND])
+    while arena.is_alive():
+        commands.publish(messages.twist(Twist(math.nan, 0.5)))
+        time.sleep(0.05)
+    arena.join()
+    assert {(step.log.decision.twist, step.log.decision.mode) for step in steps} == {(Twist(), Mode.STAND)}

@@ -90,6 +90,12 @@ class TrackingController:
     depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))
     robot: RobotGeometry = LIMO
 
+    def __post_init__(self) -> None:
+        tracker = self.tracker
+        if tracker.robot != self.robot:
+            tracker = replace(tracker, robot=self.robot, movers=replace(tracker.movers, robot=self.robot))
+            object.__setattr__(self, "tracker", tracker)
+
     def start(self) -> TrackingState:
         """Return the state before the first observation: no people."""
         return TrackingState(acceleration=self.wheels.acceleration)
@@ -233,7 +239,7 @@ class TrackingController:
         scan, tracks = observation.scan, state.tracks
         if scan is None or observation.odometry is None:
             return state
-        half_view = min(-scan.angle_min, scan.angle_max)
+        half_view = min(self.robot.lidar_yaw - scan.angle_min, scan.angle_max - self.robot.lidar_yaw)
         tracks = self.tracker.follow_movers(tracks, half_view, self.lookout.half_view, self.grid, state.ground)
         if state.ground is not None and scan.stamp < state.ground.stamp + self.grid.period_s:
             return replace(state, tracks=tracks)

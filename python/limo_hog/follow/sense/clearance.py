@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
 
 Points = NDArray[np.float64]
 
@@ -229,7 +229,7 @@ def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> N
     covered = (np.abs(ahead) < robot.half_length + grace) & (np.abs(aside) < robot.half_width + grace)
     distance = np.hypot(ahead - robot.lidar_x, aside)
     angle = np.arctan2(aside, ahead - robot.lidar_x)
-    beam = np.rint((angle - angle_min) / ((angle_max - angle_min) / np.maximum(count - 1, 1)))
+    beam = beams_at(angle, angle_min, angle_max, count)
     inside = (beam >= 0) & (beam < count)
     # The scans one after the other, and where each begins.
     begins = np.cumsum(count, axis=0) - count

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from operator import attrgetter
 
 import numpy as np
@@ -40,6 +40,25 @@ class Scan:
     angle_max: float
     range_min: float
     range_max: float
+
+    def turned(self, yaw: float) -> Scan:
+        """Return the scan of a lidar whose angle 0 looks `yaw` [rad] from straight ahead, by the robot's angles."""
+        return replace(self, angle_min=self.angle_min + yaw, angle_max=self.angle_max + yaw) if yaw else self
+
+
+def beams_at(
+    angles: NDArray[np.float64],
+    angle_min: float | NDArray[np.float64],
+    angle_max: float | NDArray[np.float64],
+    count: int | NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return which of a scan's `count` beams looks nearest to each angle [rad]; none where that is no index.
+
+    The limits may be those of several scans, and lie beyond half a turn.
+    """
+    step = (angle_max - angle_min) / np.maximum(count - 1, 1)
+    middle = (angle_min + angle_max) / 2
+    return np.asarray(np.rint((angles - math.tau * np.rint((angles - middle) / math.tau) - angle_min) / step))
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +139,8 @@ class Observation:
     remembered
         float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
         not look. `Guard` fills it in; None without it.
+    clock
+        When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
     now
         The newest stamp of all sensors [s]: a camera frame may arrive late.
     """
@@ -137,12 +158,18 @@ class Observation:
     clothes: Clothes | None = None
     between: tuple[tuple[Scan, Odometry], ...] = ()
     remembered: NDArray[np.float64] | None = None
+    clock: float | None = None
     now: float = field(init=False)
 
     def __post_init__(self) -> None:
         newest = self.stamp if self.scan is None else max(self.stamp, self.scan.stamp)
         newest = newest if self.odometry is None else max(newest, self.odometry.stamp)
         object.__setattr__(self, "now", newest)
+
+    @property
+    def at(self) -> float:
+        """When the readings were at hand, on the robot's own clock [s]."""
+        return self.now if self.clock is None else self.clock
 
 
 def observed(
@@ -152,6 +179,7 @@ def observed(
     region: Region | None = None,
     fault: str = "",
     between: tuple[tuple[Scan, Odometry], ...] = (),
+    clock: float | None = None,
 ) -> Observation:
     """Return the observation of a frame and what was found in it: its size and people's clothes are filled in."""
     height, width = frame.image.shape[:2]
@@ -169,6 +197,7 @@ def observed(
         fault,
         clothes,
         between,
+        clock=clock,
     )
 
 

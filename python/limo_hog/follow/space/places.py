@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
-from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
 from limo_hog.follow.space.grid import Grid, Ground
 
 
@@ -145,7 +145,7 @@ class Wandering:
         distance = np.maximum(np.hypot(dx, dy), 0.05)
         angle = np.remainder(np.arctan2(dy, dx) - pose.yaw + math.pi, math.tau) - math.pi
         step = (scan.angle_max - scan.angle_min) / max(len(scan.ranges) - 1, 1)
-        beam = np.rint((angle - scan.angle_min) / step).astype(np.int64)
+        beam = beams_at(angle, scan.angle_min, scan.angle_max, len(scan.ranges)).astype(np.int64)
         half = np.minimum(np.ceil(np.arctan(self.width / 2 / distance) / step), 20).astype(np.int64)
         passes = (beam - half >= 0) & (beam + half < len(scan.ranges)) & (distance < self.far)
         ranges = np.where(np.isnan(scan.ranges), 0.0, scan.ranges).astype(np.float64)

@@ -237,7 +237,8 @@ class Movers:
         return np.where(gaps.min(axis=0) < self.legs.radius, numbers.take(gaps.argmin(axis=0)), 0)
 
     def _patience(self, expected: Track, returns: Returns, half_view: float) -> float:
-        return self.forget_s if is_in_view(expected, returns, half_view, self.robot) else self.unseen_s
+        seen = is_in_view(expected, returns, half_view, self.robot, self.robot.lidar_yaw)
+        return self.forget_s if seen else self.unseen_s
 
     def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
         """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
@@ -292,9 +293,9 @@ def named(mover: Mover, number: int, stamp: float) -> Mover:
     return replace(mover, number=number, shown=0, named=mover.named if mover.number == number else stamp)
 
 
-def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry) -> bool:
-    """Whether the lidar looked at a track's place, `half_view` [rad] to either side of straight ahead."""
+def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry, towards: float = 0.0) -> bool:
+    """Whether a track's place, from the lidar, was at most `half_view` [rad] to either side of `towards`."""
     pose = returns.pose
     x, y = lidar_at(pose, robot)
     off = math.atan2(track.mean[1] - y, track.mean[0] - x) - pose.yaw
-    return abs(math.remainder(off, math.tau)) < half_view
+    return abs(math.remainder(off - towards, math.tau)) < half_view

@@ -1,0 +1,61 @@
+"""When each sense's newest reading came: which never did, which stopped, and whose clock is wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+CAMERA, DEPTH, SCAN, ODOMETRY = "camera frame", "depth image", "scan", "odometry"
+
+
+@dataclass(frozen=True, slots=True)
+class Arrivals:
+    """The newest reading of each sense.
+
+    Attributes
+    ----------
+    newest
+        By the sense's name: the reading's stamp on the sensor's clock, and when it came on the robot's own [s].
+    """
+
+    newest: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def after(self, now: float, stamps: Mapping[str, float]) -> Arrivals:
+        """Add the readings at hand at `now` [s]: a new one has another stamp than the last, NaN is none."""
+        new = {
+            name: (stamp, now)
+            for name, stamp in stamps.items()
+            if math.isfinite(stamp) and (name not in self.newest or self.newest[name][0] != stamp)
+        }
+        return Arrivals({**self.newest, **new}) if new else self
+
+    def missing(self, now: float, needed: tuple[str, ...], max_age: float) -> str:
+        """Return which senses never came, though needed, or came longer than `max_age` [s] ago; "" if none.
+
+        A reading from the future came before the robot's clock was set back: nobody knows how old it is.
+        """
+        reasons = [f"no {name} has come" for name in needed if name not in self.newest]
+        ages = {name: now - came for name, (_, came) in self.newest.items()}
+        if abs(ages.get(CAMERA, 0.0)) > max_age:
+            ages.pop(DEPTH, None)  # it comes with its frame
+        reasons += [f"no {name} for {abs(age):.1f} s" for name, age in ages.items() if abs(age) > max_age]
+        return "; ".join(reasons)
+
+    def disagreement(self, max_age: float, max_late: float) -> str:
+        """Return which sense's stamps do not fit the others'; "" if all do.
+
+        Parameters
+        ----------
+        max_age, max_late
+            How late a reading may be when it comes [s], and an image.
+        """
+        # A depth image has its camera frame's stamp. What the others' clocks showed when the last reading came:
+        now = max((came for _, came in self.newest.values()), default=0.0)
+        clocks = {name: stamp + now - came for name, (stamp, came) in self.newest.items() if name != DEPTH}
+        ahead = max(clocks, key=clocks.__getitem__, default="")
+        late = {name: clocks[ahead] - clock for name, clock in clocks.items() if name != ahead}
+        old = [name for name in late if late[name] > (max_late if name == CAMERA else max_age)]
+        if old and len(old) == len(late):
+            return f"the {ahead}'s clock is {min(late.values()):.1f} s ahead of the {' and the '.join(late)}'s"
+        return "; ".join(f"the {name} is {late[name]:.1f} s old" for name in old)

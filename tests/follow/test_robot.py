@@ -1,0 +1,106 @@
+"""A robot is data: read from a file, and taken by the follower for guard and controller alike."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.follow.loop import DEPTH, FOCAL_PX, IMAGE, Loop
+from tests.follow.safety.headstrong import Headstrong
+from tests.follow.views import scan, scan_of
+
+from limo_hog.follow import (
+    LIMO,
+    Follower,
+    Frame,
+    Odometry,
+    RobotError,
+    RobotGeometry,
+    Sensors,
+    TrackingController,
+    Twist,
+    load_robot,
+)
+from limo_hog.follow.decision import made_for
+
+TALL = RobotGeometry(half_length=0.25, half_width=0.2, camera_z=0.25, field_of_view=math.pi / 3, lidar_yaw=math.pi)
+
+
+def driven(robot: RobotGeometry, wanted: Twist, sensors: Sensors) -> tuple[Twist, str]:
+    """What a robot is told that is wanted to do something."""
+    log = Follower(Headstrong(wanted), Loop(), robot).tick(0.0, Frame(0.0, IMAGE, FOCAL_PX, DEPTH), sensors)
+    assert log is not None
+    return log.decision.twist, log.decision.reason
+
+
+def test_a_file_names_what_differs_from_the_limo(tmp_path: Path) -> None:
+    path = tmp_path / "tall.toml"
+    path.write_text("half_length = 0.25\ncamera_z = 0.25\nmay_back = false\nmax_speed = 1\n")
+    assert load_robot(path) == replace(LIMO, half_length=0.25, camera_z=0.25, may_back=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("half_lenght = 0.2", "half_lenght: unknown key, want one of half_length, half_width"),
+        ("camera_z = 'high'", "camera_z: got 'high', want a number in 0.02 … 2"),
+        ("max_speed = -1.0", "max_speed: got -1.0, want a number in 0.01 … 10"),
+        ("max_speed = nan", "max_speed: got nan"),
+        ("may_back = 1", "may_back: got 1, want true or false"),
+        ("half_length = ", "cannot be read as TOML"),
+    ],
+)
+def test_a_wrong_file_is_refused_by_file_key_and_what_is_allowed(tmp_path: Path, text: str, why: str) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text(text)
+    with pytest.raises(RobotError, match=r"robot\.toml") as refused:
+        load_robot(path)
+    assert why in str(refused.value)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="No such file"):
+        load_robot(tmp_path / "nowhere.toml")
+
+
+def test_a_longer_robot_stops_earlier() -> None:
+    post = Sensors(scan_of([(0.80, 0.0)]), Odometry())
+    assert driven(LIMO, Twist(0.5, 0.0), post)[0].linear > 0
+    assert driven(replace(LIMO, half_length=0.25), Twist(0.5, 0.0), post)[0].linear == 0
+
+
+def test_no_command_is_faster_than_the_robot_or_backs_one_that_may_not() -> None:
+    free = Sensors(scan(), Odometry())
+    slow = replace(LIMO, max_speed=0.3, max_turn=0.5, may_back=False)
+    assert driven(slow, Twist(0.7, 2.0), free)[0] == Twist(0.3, 0.5)
+    assert driven(slow, Twist(0.1, -2.0), free)[0] == Twist(0.1, -0.5)
+    assert driven(slow, Twist(-0.2, 0.0), free) == (Twist(), "the robot does not back at all")
+    assert driven(replace(LIMO, max_speed=0.1), Twist(-0.2, 0.0), free)[0] == Twist(-0.1, 0.0)
+
+
+def test_a_robot_of_weak_brakes_keeps_more_room() -> None:
+    post = Sensors(scan_of([(1.2, 0.0)]), Odometry())
+    speeds = [driven(replace(LIMO, acceleration=a), Twist(0.9, 0.0), post)[0].linear for a in (0.3, 1.0)]
+    assert 0 < speeds[0] < speeds[1] < 0.9
+
+
+def test_a_lidar_that_looks_backwards_guards_the_way_back_and_what_is_ahead_is_for_the_depth_image() -> None:
+    # The same beam, straight ahead of the lidar: 0.5 m off, ahead of a Limo and behind the other.
+    turned = replace(LIMO, lidar_x=0.0, lidar_yaw=math.pi)
+    ranges = np.full(292, np.inf, np.float32)
+    ranges[140:152] = 0.5
+    post = Sensors(scan(ranges), Odometry())
+    assert driven(replace(turned, lidar_yaw=0.0), Twist(0.3, 0.0), post)[0].linear == 0
+    assert driven(turned, Twist(0.3, 0.0), post)[0].linear == 0.3
+    assert driven(turned, Twist(-0.3, 0.0), post) == (Twist(), "an obstacle is too close behind")
+
+
+def test_a_controller_that_knows_its_robot_is_given_the_followers() -> None:
+    tracking = made_for(TrackingController(), TALL)
+    assert isinstance(tracking, TrackingController)
+    assert tracking.robot == tracking.tracker.robot == tracking.tracker.movers.robot == TALL
+    with pytest.raises(RobotError, match="another robot"):
+        Follower(TrackingController(robot=TALL), Loop(), replace(TALL, camera_z=0.3))

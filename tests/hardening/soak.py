@@ -17,7 +17,6 @@ import argparse
 import asyncio
 import ctypes
 import gc
-import multiprocessing
 import subprocess
 import sys
 import tempfile
@@ -30,8 +29,8 @@ import numpy as np
 import limo_hog
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
-from limo_sim.ros.apart import run_apart
-from limo_sim.ros.script import score_of
+from limo_sim.ros.runner import run_node
+from limo_sim.ros.stage import Stage, score_of
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.log import Step
 from limo_sim.view.pace import Pace
@@ -43,10 +42,12 @@ READERS, STALLED = 15, 5
 STEPS = 100_000
 #: A node that drives in a circle, ten commands a second.
 NODE = """
+import os
 import rclpy
 from geometry_msgs.msg import Twist
 from rclpy.node import Node
 
+print(os.getpid())
 rclpy.init()
 node = Node("circle")
 commands = node.create_publisher(Twist, "cmd_vel", 10)
@@ -169,18 +170,18 @@ def run_a_node(seconds: float, seed: int) -> None:
     """Run a node in a process of its own, and score it as it goes."""
     scenario = Scenario.load("followable")
     rows: list[tuple[float, float, float]] = []
+    pid: list[str] = []
 
     def watch(step: Step) -> None:
         if not rows or step.log.time - rows[-1][0] >= 10.0:
-            (node,) = multiprocessing.active_children()
-            rows.append((step.log.time, held_mb()[0], memory_mb(node.pid or 0)[0]))
+            rows.append((step.log.time, held_mb()[0], memory_mb(int("".join(pid)))[0]))
             if len(rows) % 30 == 0:
                 print("{:.0f} s: {:.1f} MB, the node's process {:.1f} MB".format(*rows[-1]), flush=True)
 
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "node.py"
         script.write_text(NODE, encoding="utf-8")
-        ended = run_apart(script, scenario, seconds, seed, watch=watch, pictures=False)
+        ended = run_node(Stage(script, scenario, seconds, seed, watch=watch), said=lambda _, text: pid.append(text))
     print(f"{score_of(ended).frames} frames {ended.failure}")
     warm = [row for row in rows if row[0] > min(WARM_S, seconds / 4)]
     hours = [row[0] / 3600 for row in warm]

@@ -18,6 +18,9 @@ from limo_sim.cli.watching import add_watching, observing
 if TYPE_CHECKING:
     from limo_sim.run.log import Step
 
+#: Address space of a node [MB], where the system limits it. Chosen: neural networks reserve more than they use.
+MEMORY_MB = 32_000
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `run`."""
@@ -46,8 +49,8 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.world.variants import of_run
 
     with needed(by="limo-hog run"):
-        from limo_sim.ros.apart import run_apart
-        from limo_sim.ros.script import score_of
+        from limo_sim.ros.runner import Limits, run_node
+        from limo_sim.ros.stage import Stage, score_of
     scenario = of_run(Scenario.load(args.scenario), args.seed)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
@@ -65,16 +68,12 @@ def run(args: argparse.Namespace) -> int:
             line = f"[{level}] [{time:.9f}] [{name}]: {message}"
             bar.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
-        ended = run_apart(
-            args.node,
-            scenario,
-            args.seconds,
-            args.seed,
-            arguments=["--ros-args", *args.ros_args],
-            log=log,
-            watch=watch,
-            pictures=bool(observers),
-        )
+        def said(name: str, text: str) -> None:
+            (sys.stdout if name == "stdout" else sys.stderr).write(text)
+
+        stage = Stage(args.node, scenario, args.seconds, args.seed, log=log, watch=watch)
+        limits = Limits(memory_mb=MEMORY_MB)
+        ended = run_node(stage, ["--ros-args", *args.ros_args], limits=limits, said=said)
         card = score_of(ended)
         bar.stop()
         observers.end(ended.episode, card)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,7 +91,8 @@ def run(args: argparse.Namespace) -> int:
             from limo_sim.workshop.check import examine
             from limo_sim.workshop.html_report import to_html
             from limo_sim.workshop.report import to_gradescope, to_json
-        examination = examine(args.file, node)
+        # What the node prints must not mix with the report or the JSON.
+        examination = examine(args.file, node, said=lambda _, text: print(text, end="", file=sys.stderr))
         verdicts = examination.verdicts
         if args.html:
             write_text(Path(args.html), to_html(args.file, node, examination))
@@ -118,20 +120,33 @@ def run(args: argparse.Namespace) -> int:
 
 def _grade(args: argparse.Namespace, node: str) -> int:
     with needed(by="limo-hog workshop"):
-        from limo_sim.workshop.grade import Limits, grade, nodes_in, write_csv
+        from limo_sim.ros.runner import Limits
+        from limo_sim.workshop.grade import Grade, Table, grade, nodes_in
     if not args.folder.is_dir():
         raise UsageError(f"{args.folder}: no such folder; wanted is one with the nodes' .py files")
     files = nodes_in(args.folder)
     if not files:
         raise UsageError(f"{args.folder}: no Python file in it, nor in the folders in it")
-    with progress("files") as bar:
+    limits = Limits(seconds=args.seconds, memory_mb=args.memory)
+    grades: list[Grade] = []
+    with ExitStack() as stack:
+        target = sys.stdout
+        if args.csv != STDOUT:
+            # Rows as they come: what was graded before a signal is not lost.
+            target = stack.enter_context(Path(args.csv).open("w", encoding="utf-8", newline=""))
+        table = Table(node, args.folder, target)
+        bar = stack.enter_context(progress("files"))
         task = bar.add_task("graded", total=len(files))
-        grades = grade(files, cores(), node, Limits(args.seconds, args.memory), lambda _: bar.advance(task))
-    if args.csv == STDOUT:
-        write_csv(grades, args.folder, sys.stdout)
-    else:
+        for graded in stack.enter_context(closing(grade(files, args.folder, cores(), node, limits))):
+            table.add(graded)
+            grades.append(graded)
+            bar.advance(task)
+    if args.csv != STDOUT:
+        # All are there: now in the order of their names.
         with whole_file(Path(args.csv)) as part, part.open("w", encoding="utf-8", newline="") as target:
-            write_csv(grades, args.folder, target)
+            table = Table(node, args.folder, target)
+            for graded in sorted(grades, key=lambda graded: graded.file):
+                table.add(graded)
     failed = sum(graded.result is None for graded in grades)
     print(f"{len(files)} files graded, {failed} of them without a result", file=sys.stderr)
     return 0

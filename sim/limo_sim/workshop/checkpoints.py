@@ -284,10 +284,10 @@ def speaks(takes: Sequence[Take]) -> Finding:
     if not _answers(takes):
         return NEVER_MOVES
     for take in takes:
-        world = take.outcome.world if take.outcome else None
-        if world is None or not any(len(look.found) for look in take.looks):
+        stage = take.outcome.stage if take.outcome else None
+        if stage is None or not any(len(look.found) for look in take.looks):
             continue
-        times = [0.0, *(command.time for command in world.commands), take.scene.seconds]
+        times = [0.0, *(command.time for command in stage.commands), take.scene.seconds]
         gap, at = max((b - a, a) for a, b in itertools.pairwise(times))
         if gap > SILENCE + 1e-6 and not blocked(take):
             said = f"{take.scene.words}: no command for {gap:.1f} s after {at:.1f} s; the watchdog stops the robot"
@@ -305,7 +305,7 @@ def returns(takes: Sequence[Take]) -> Finding:
 
 def blocked(take: Take) -> str:
     """Return which callback took longer than the watchdog's time, "" if none did."""
-    call = take.outcome.world.longest if take.outcome else None
+    call = take.outcome.stage.longest if take.outcome else None
     if call is None or call.slept <= SILENCE - 1e-6:
         return ""
     return f"the callback at {call.time:.1f} s slept for {call.slept:.1f} s"

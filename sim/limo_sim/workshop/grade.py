@@ -1,46 +1,28 @@
-"""Grades a folder of nodes: each in a process of its own, with limits of time and memory.
-
-`python -m limo_sim.workshop.grade FILE NODE RESULT MEMORY_MB` is that process: it writes the points as JSON.
-"""
+"""Grades a folder of nodes: each runs in processes of its own, among its own files, with limits of time and memory."""
 
 from __future__ import annotations
 
-import contextlib
 import csv
-import json
 import os
-import signal
+import shutil
+import stat
 import subprocess
-import sys
 import tempfile
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
-import cv2
-
-import limo_hog
-from limo_hog.atomic import write_text
-from limo_sim.workshop.check import check
+from limo_sim.ros.runner import Limits
+from limo_sim.ros.worker import stop_nodes
+from limo_sim.workshop.check import examine
+from limo_sim.workshop.exercises import EXERCISES
 from limo_sim.workshop.report import to_json
 
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What one node may use.
-
-    Attributes
-    ----------
-    seconds
-        Wall time [s]. A correct node takes 5 s on one core of 2024; chosen: room for twenty times that.
-    memory_mb
-        Address space [MB], where the system limits it (not on Windows). Python with OpenCV reserves 1.5 GB; chosen.
-    """
-
-    seconds: float = 100.0
-    memory_mb: int = 4000
+#: What is taken of a student's folder: so many files, in so many folders in each other, of so many bytes together.
+_MOST_FILES, _DEEPEST, _MOST_BYTES = 1000, 8, 200 * 10**6
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,95 +40,101 @@ def nodes_in(folder: Path) -> list[Path]:
 
 
 def grade(
-    files: Sequence[Path],
-    workers: int,
-    node: str = "follower",
-    limits: Limits | None = None,
-    done: Callable[[Grade], None] = lambda _: None,
-) -> list[Grade]:
-    """Check each file in a process of its own, `workers` of them at once; `done` hears of each."""
-    limits = limits or Limits()
+    files: Sequence[Path], folder: Path, workers: int, node: str = "follower", limits: Limits | None = None
+) -> Generator[Grade, None, None]:
+    """Check each file of `nodes_in(folder)`, `workers` of them at once; yield the grades as they come.
 
-    def one(file: Path) -> Grade:
-        graded = _grade(file, node, limits)
-        done(graded)
-        return graded
-
+    The limits of time are those of all scenes together. A caller who leaves early ends the nodes that run.
+    """
+    allowed = limits or Limits(seconds=100.0)
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(one, files))
-
-
-def write_csv(grades: Sequence[Grade], folder: Path, target: TextIO) -> None:
-    """Write a line for each file: points, points of each task, and the first mistake with its line."""
-    tasks = sorted({task["task"] for graded in grades if graded.result for task in graded.result["tasks"]})
-    writer = csv.writer(target, lineterminator="\n")
-    writer.writerow(["file", "points", "max_points", *(f"task_{task}" for task in tasks), "line", "first_mistake"])
-    for graded in grades:
-        name = graded.file.relative_to(folder)
-        if graded.result is None:
-            writer.writerow([name, 0, "", *("" for _ in tasks), "", graded.reason])
-            continue
-        won = {task["task"]: task["points"] for task in graded.result["tasks"]}
-        missed = [entry for entry in graded.result["checkpoints"] if not entry["holds"]]
-        line, said = "", ""
-        if missed:
-            line = "" if missed[0]["line"] is None else missed[0]["line"]
-            said = f"{missed[0]['checkpoint']}: " + " ".join(missed[0]["evidence"].split())
-        points, worth = graded.result["points"], graded.result["max_points"]
-        writer.writerow([name, points, worth, *(won.get(task, "") for task in tasks), line, said])
-
-
-def _grade(file: Path, node: str, limits: Limits) -> Grade:
-    with tempfile.TemporaryDirectory() as scratch:
-        result = Path(scratch) / "result.json"
-        command = [sys.executable, "-m", "limo_sim.workshop.grade", str(file.resolve()), node, str(result)]
-        child = subprocess.Popen(  # noqa: S603 — the students' nodes are run: that is the purpose
-            [*command, str(limits.memory_mb)],
-            cwd=scratch,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        waiting = [pool.submit(_grade, file, folder, node, allowed) for file in files]
         try:
-            code = child.wait(limits.seconds)
-        except subprocess.TimeoutExpired:
-            return Grade(file, None, f"ran for more than {limits.seconds:g} s and was stopped")
-        finally:
-            _end(child)
-        try:
-            return Grade(file, json.loads(result.read_text(encoding="utf-8")))
-        except (OSError, ValueError):
-            return Grade(file, None, f"ended without a result, exit code {code}: out of memory, or os._exit was called")
+            for done in as_completed(waiting):
+                yield done.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            stop_nodes()
+            raise
 
 
-def _end(child: subprocess.Popen[bytes]) -> None:
-    """End a process and those it started."""
-    if hasattr(os, "killpg"):
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(child.pid, signal.SIGKILL)
-    else:
-        child.kill()
-    child.wait()
-
-
-def _limit_memory(megabytes: int) -> None:
+def _grade(file: Path, folder: Path, node: str, limits: Limits) -> Grade:
     try:
-        import resource
-    except ImportError:
-        # Windows has no such limit.
-        return
-    resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
+        with _scratch() as scratch:
+            script = _alone(file, folder, scratch)
+            examination = examine(script, node, replace(limits, folder=script.parent))
+            return Grade(file, to_json(script, node, examination.verdicts))
+    except (OSError, ValueError, RecursionError, MemoryError) as error:
+        # One file costs no other its grade.
+        return Grade(file, None, f"it cannot be graded: {error}")
 
 
-def _main(file: str, node: str, result: str, memory_mb: str) -> None:
-    _limit_memory(int(memory_mb))
-    # The same boxes as OpenCV's, many times faster; this process ends with the check.
-    vars(cv2)["HOGDescriptor"] = limo_hog.HOGDescriptor
-    script = Path(file)
-    found = json.dumps(to_json(script, node, check(script, node)))
-    write_text(Path(result), found)
+@contextmanager
+def _scratch() -> Iterator[Path]:
+    """Make a folder that is removed whatever a node has left in it."""
+    folder = Path(tempfile.mkdtemp(prefix="limo-hog-"))
+    try:
+        yield folder
+    finally:
+        if os.name == "posix":
+            # (Folders in each other a thousand times are too deep for Python's own removal.)
+            subprocess.run(["rm", "-rf", str(folder)], check=False, stderr=subprocess.DEVNULL)  # noqa: S603, S607
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
-if __name__ == "__main__":
-    _main(*sys.argv[1:])
+def _alone(file: Path, folder: Path, scratch: Path) -> Path:
+    """Copy a file, and of a student's own folder the files beside it; return the copy.
+
+    Raises
+    ------
+    ValueError
+        If the file is none, or the folder holds too much.
+    """
+    if not stat.S_ISREG(file.stat().st_mode):
+        raise ValueError("it is no regular file")
+    if file.parent == folder:
+        return Path(shutil.copyfile(file, scratch / file.name))
+    files, size = 0, 0
+    waiting = [(file.parent, scratch, 0)]
+    while waiting:
+        source, target, depth = waiting.pop()
+        for entry in os.scandir(source):
+            if entry.is_dir(follow_symlinks=False) and depth < _DEEPEST:
+                (target / entry.name).mkdir()
+                waiting.append((Path(entry.path), target / entry.name, depth + 1))
+            elif entry.is_file(follow_symlinks=False) or Path(entry.path) == file:
+                files, size = files + 1, size + entry.stat().st_size
+                if files > _MOST_FILES or size > _MOST_BYTES:
+                    raise ValueError(f"its folder holds more than {_MOST_FILES} files or {_MOST_BYTES // 10**6} MB")
+                shutil.copyfile(entry.path, target / entry.name)
+    return scratch / file.name
+
+
+class Table:
+    """A line for each file: points, points of each task, and the first mistake with its line."""
+
+    def __init__(self, node: str, folder: Path, target: TextIO) -> None:
+        exercise = EXERCISES[node]
+        self._tasks = sorted({point.task for point in exercise.checkpoints if point not in exercise.given})
+        self._folder, self._target = folder, target
+        self._writer = csv.writer(target, lineterminator="\n")
+        tasks = (f"task_{task}" for task in self._tasks)
+        self._writer.writerow(["file", "points", "max_points", *tasks, "line", "first_mistake"])
+
+    def add(self, graded: Grade) -> None:
+        """Write a line, to the disk."""
+        # (Names from old archives are not UTF-8.)
+        name = os.fsencode(graded.file.relative_to(self._folder)).decode("utf-8", "backslashreplace")
+        if graded.result is None:
+            self._writer.writerow([name, 0, "", *("" for _ in self._tasks), "", graded.reason])
+        else:
+            won = {task["task"]: task["points"] for task in graded.result["tasks"]}
+            missed = next((entry for entry in graded.result["checkpoints"] if not entry["holds"]), None)
+            line, said = "", ""
+            if missed is not None:
+                line = "" if missed["line"] is None else missed["line"]
+                said = f"{missed['checkpoint']}: " + " ".join(missed["evidence"].split())
+            points, worth = graded.result["points"], graded.result["max_points"]
+            self._writer.writerow([name, points, worth, *(won.get(task, "") for task in self._tasks), line, said])
+        self._target.flush()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,18 +24,42 @@ class Finding(NamedTuple):
     line: int | None = None
 
 
+class Source:
+    """A script's text, as it was before the script ran."""
+
+    def __init__(self, script: Path) -> None:
+        self._tree = ast.Module([], [])
+        # (A file that Python refuses has no calls; the run says why.)
+        with suppress(SyntaxError, ValueError, RecursionError, MemoryError, OSError):
+            self._tree = ast.parse(script.read_bytes())
+
+    def uncalled(self, function: str) -> int | None:
+        """Return the line of a function of the module that nothing calls; None where it is called or absent."""
+        defined = [node for node in self._tree.body if isinstance(node, ast.FunctionDef) and node.name == function]
+        return defined[0].lineno if defined and self.first_call(function) is None else None
+
+    def first_call(self, function: str) -> int | None:
+        """Return the first line that calls a function or a method of this name; None where there is none."""
+        lines = [
+            node.lineno
+            for node in ast.walk(self._tree)
+            if isinstance(node, ast.Call) and function in (getattr(node.func, "attr", ""), getattr(node.func, "id", ""))
+        ]
+        return min(lines, default=None)
+
+
 def camera_read(calls: Calls) -> bool:
     """Whether a subscription asks for the camera's colour image."""
     return any(topic in calls.readers for topic in _IMAGES)
 
 
-def no_picture(script: Path, takes: Sequence[Take]) -> Finding | None:
+def no_picture(source: Source, takes: Sequence[Take]) -> Finding | None:
     """Return why no camera image reaches a callback; None where one does."""
     calls = takes[0].calls
     if calls.images:
         return None
     if not calls.nodes:
-        main = _uncalled(script, "main")
+        main = source.uncalled("main")
         if main is not None:
             return Finding(False, "main() is never called; end the file with: if __name__ == '__main__': main()", main)
         return Finding(False, "the script makes no node: call rclpy.init(), make the node, and rclpy.spin(node)")
@@ -49,10 +74,10 @@ def no_picture(script: Path, takes: Sequence[Take]) -> Finding | None:
     return Finding(False, "the callback never ran; is rclpy.spin given the node that has the subscription?", line)
 
 
-def no_detection(script: Path, takes: Sequence[Take]) -> Finding | None:
+def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
     """Return why the detector cannot find anybody; None where it looks at pictures with an SVM."""
     if not any(look.raw is not None for take in takes for look in take.looks):
-        line = _first_call(script, "detectMultiScale")
+        line = source.first_call("detectMultiScale")
         if line is None:
             return Finding(False, "self.hog.detectMultiScale was never called")
         return Finding(False, "detectMultiScale was never called: this line never runs", line)
@@ -66,7 +91,7 @@ def no_detection(script: Path, takes: Sequence[Take]) -> Finding | None:
 
 def no_command(takes: Sequence[Take]) -> Finding | None:
     """Return why no command reaches the robot; None where one does."""
-    if any(take.outcome and take.outcome.world.commands for take in takes):
+    if any(take.outcome and take.outcome.stage.commands for take in takes):
         return None
     calls = takes[0].calls
     other = {topic: line for topic, line in calls.writers.items() if topic not in names.TYPES}
@@ -88,22 +113,3 @@ def _no_subscription(calls: Calls) -> tuple[str, int | None]:
         topic, line = next(iter(calls.readers.items()))
         return f"subscribes to {topic!r}; the camera's image is {names.IMAGE!r}", line
     return f"the node has no subscription: call create_subscription(Image, {names.IMAGE!r}, …)", None
-
-
-def _uncalled(script: Path, function: str) -> int | None:
-    """Return the line of a function of the module that nothing calls; None where it is called or absent."""
-    defined = [node for node in _tree(script).body if isinstance(node, ast.FunctionDef) and node.name == function]
-    return defined[0].lineno if defined and _first_call(script, function) is None else None
-
-
-def _first_call(script: Path, function: str) -> int | None:
-    lines = [
-        node.lineno
-        for node in ast.walk(_tree(script))
-        if isinstance(node, ast.Call) and function in (getattr(node.func, "attr", ""), getattr(node.func, "id", ""))
-    ]
-    return min(lines, default=None)
-
-
-def _tree(script: Path) -> ast.Module:
-    return ast.parse(script.read_bytes())

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
-from limo_sim.ros.lockstep.calls import Calls
+from limo_sim.ros.lockstep.calls import LOGGER, Calls
 from limo_sim.ros.lockstep.records import Command, Found, Shown
-from limo_sim.ros.lockstep.world import LOGGER, World
-from limo_sim.ros.script import Outcome, run_script
+from limo_sim.ros.runner import Limits, Said, run_node
+from limo_sim.ros.stage import Ended, Stage
 from limo_sim.run.log import Step
 from limo_sim.world.scenario import Person, Scenario
 from limo_sim.world.truth import Truth
@@ -103,51 +103,47 @@ class Take:
     scene: Scene
     looks: list[Look] = field(default_factory=list)
     path: list[tuple[float, float, float]] = field(default_factory=list)
-    outcome: Outcome | None = None
+    outcome: Ended | None = None
 
     @property
     def calls(self) -> Calls:
         """What the node called."""
-        return self.outcome.world.calls if self.outcome is not None else Calls()
+        return self.outcome.stage.calls if self.outcome is not None else Calls()
 
 
-def play(script: Path, scene: Scene) -> Take:
-    """Run a node in a scene and note its outputs for each frame."""
+def play(script: Path, scene: Scene, limits: Limits | None = None, said: Said = lambda *_: None) -> Take:
+    """Run a node in a scene and note its outputs for each frame; `said` is given what it prints."""
     take = Take(scene)
-    worlds: list[World] = []
-    said: list[str] = []
+    lines: list[str] = []
     commanded = 0
 
     def watch(step: Step) -> None:
         nonlocal commanded
         take.path.append(step.truth.robot)
-        world, log = worlds[0], step.log
-        commands = tuple(world.commands[commanded:])
+        log = step.log
         if log.frame is None or step.seen is None:
             return
-        commanded = len(world.commands)
-        raw = world.found[-1] if world.found else None
         take.looks.append(
             Look(
                 log.time,
                 log.frame.image,
                 log.detections,
-                raw,
-                commands,
-                dict(world.shown),
-                tuple(said),
+                stage.found[-1] if stage.found else None,
+                tuple(stage.commands[commanded:]),
+                dict(stage.shown),
+                tuple(lines),
                 step.seen,
             )
         )
-        said.clear()
+        commanded = len(stage.commands)
+        lines.clear()
 
-    take.outcome = run_script(
+    stage = Stage(
         script,
         scene.scenario,
         scene.seconds,
-        arguments=("--ros-args", *scene.arguments),
-        log=lambda _time, _level, name, message: None if name == LOGGER else said.append(message),
+        log=lambda _time, _level, name, message: None if name == LOGGER else lines.append(message),
         watch=watch,
-        made=worlds.append,
     )
+    take.outcome = run_node(stage, ("--ros-args", *scene.arguments), limits=limits, said=said, fast=True)
     return take

@@ -199,7 +199,7 @@ DETECTOR_SCENES = (LEFT, RIGHT, NOBODY)
 
 def no_hog(takes: Sequence[Take]) -> Finding:
     """Whether people are found without OpenCV's HOG detector: a red box is on the person."""
-    if any(take.outcome is not None and take.outcome.world.detector_inputs for take in takes):
+    if any(take.outcome is not None and take.outcome.stage.detector_inputs for take in takes):
         return Finding(False, "cv2's HOGDescriptor is still asked: detectMultiScale runs")
     return red_on_person(takes)
 
@@ -310,14 +310,12 @@ LASER_SCENES = (CHAIR, FAR)
 def stops(takes: Sequence[Take]) -> Finding:
     """Whether a robot that drives to people stops before the chair."""
     take = next(take for take in takes if take.scene.name == "chair")
-    world = take.outcome.world if take.outcome is not None else None
-    if world is None or not any(speed > 0 for speed in speeds(takes, "far")):
+    if take.outcome is None or not any(speed > 0 for speed in speeds(takes, "far")):
         return Finding(None, "not tried: the robot does not drive to a person in a free room")
-    episode = world.episode()
     way = max(x for x, _, _ in take.path)
     if way < 0.1:
         return Finding(None, "not tried: the robot does not drive towards the chair")
-    if episode.contacts.wall:
+    if take.outcome.episode.contacts.wall:
         return Finding(False, f"the robot drives {way:.2f} m and into the chair")
     room = min(_room(pose) for pose in take.path)
     said = f"the robot drives {way:.2f} m and stops {room:.2f} m before the chair"

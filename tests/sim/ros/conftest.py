@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.sim.ros.scripts import HEAD, NOBODY, Run
+from tests.sim.ros.scripts import HEAD, NOBODY, Run, run_script
 
-from limo_sim.ros.script import Outcome, run_script
+from limo_sim.ros.stage import Ended
 from limo_sim.world.scenario import Scenario
 
 
@@ -17,7 +17,7 @@ from limo_sim.world.scenario import Scenario
 def run(tmp_path: Path) -> Run:
     """Run a script's text against the arena; returns how it ended."""
 
-    def run_text(text: str, scenario: Scenario = NOBODY, seconds: float = 2.0, **options: Any) -> Outcome:
+    def run_text(text: str, scenario: Scenario = NOBODY, seconds: float = 2.0, **options: Any) -> Ended:
         script = tmp_path / "node.py"
         script.write_text(HEAD + textwrap.dedent(text), encoding="utf-8")
         return run_script(script, scenario, seconds, **options)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
-from limo_sim.ros.script import Outcome
+from limo_sim.ros.runner import Limits, run_node
+from limo_sim.ros.stage import Ended, Stage
 from limo_sim.world.scenario import Person, Scenario
 
 #: Somebody stands 2.5 m ahead, to the left.
@@ -41,7 +44,26 @@ cv2.imshow('camera', image)
 cv2.waitKey(1)
 """
 
-Run = Callable[..., Outcome]
+Run = Callable[..., Ended]
+
+
+def run_script(
+    script: Path,
+    scenario: Scenario,
+    seconds: float,
+    seed: int = 0,
+    *,
+    arguments: Sequence[str] = (),
+    patience: float = 20.0,
+    **watching: Any,
+) -> Ended:
+    """Run a script against the arena as `limo-hog run` does; what it prints is printed."""
+
+    def said(name: str, text: str) -> None:
+        (sys.stdout if name == "stdout" else sys.stderr).write(text)
+
+    stage = Stage(script, scenario, seconds, seed, **watching)
+    return run_node(stage, arguments, limits=Limits(patience), said=said)
 
 
 def said(run: Run, text: str, **options: Any) -> list[str]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from tests.sim.ros.scripts import NOBODY, STANDING
+from tests.sim.ros.scripts import NOBODY, STANDING, run_script
 
-from limo_sim.ros.script import Outcome, run_script
+from limo_sim.ros.stage import Ended
 from limo_sim.world.scenario import Scenario
 
 NODES = Path(__file__).parent / "nodes"
@@ -18,19 +18,19 @@ NODES = Path(__file__).parent / "nodes"
 class Ran:
     """A run, and what was logged."""
 
-    outcome: Outcome
+    outcome: Ended
     said: list[str]
 
     @property
     def bearing(self) -> float:
         """Where the first person is in the end, seen from the robot [rad]."""
-        person = self.outcome.world.arena.truth().people[0]
+        person = self.outcome.stage.arena.truth().people[0]
         assert person is not None
         return person.bearing
 
     @property
     def commands(self) -> list[tuple[float, float, float]]:
-        return [(round(c.time, 2), c.twist.linear, c.twist.angular) for c in self.outcome.world.commands]
+        return [(round(c.time, 2), c.twist.linear, c.twist.angular) for c in self.outcome.stage.commands]
 
 
 def ran(name: str, scenario: Scenario = NOBODY, seconds: float = 4.0) -> Ran:
@@ -43,7 +43,7 @@ def ran(name: str, scenario: Scenario = NOBODY, seconds: float = 4.0) -> Ran:
 def test_a_class_with_timers_drives_by_stamped_commands() -> None:
     run = ran("timers", seconds=2.2)
     assert run.said == [f'Publishing: "Hello World: {number}"' for number in range(4)]
-    assert run.outcome.world.arena.truth().robot[0] == pytest.approx(0.2 * 2.0, abs=0.06)
+    assert run.outcome.stage.arena.truth().robot[0] == pytest.approx(0.2 * 2.0, abs=0.06)
 
 
 def test_a_callback_may_wait_for_a_service_in_a_multi_threaded_executor() -> None:
@@ -69,7 +69,7 @@ def test_a_client_of_a_service_gets_its_answer() -> None:
 def test_a_listener_of_frames_drives_to_a_frame() -> None:
     run = ran("tf_listener", seconds=15.0)
     assert run.said[-1].startswith("arrived; 1 m before the lidar is 1.")
-    x, y, _ = run.outcome.world.arena.truth().robot[:3]
+    x, y, _ = run.outcome.stage.arena.truth().robot[:3]
     assert (x, y) == pytest.approx((1.0, 0.5), abs=0.12)
 
 

@@ -13,12 +13,12 @@ import cv2
 import numpy as np
 import pytest
 from tests.sim.logs import kept_in
-from tests.sim.ros.scripts import DRIVE, FOLLOW, NOBODY, STANDING, Run, node, said
+from tests.sim.ros.scripts import DRIVE, FOLLOW, NOBODY, STANDING, Run, node, run_script, said
 
 from limo_hog.cli.main import main
 from limo_hog.ros2 import names
 from limo_sim.ros.lockstep.records import StubError
-from limo_sim.ros.script import run_script, score_of
+from limo_sim.ros.stage import score_of
 from limo_sim.run.log import Step
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Person
@@ -27,8 +27,8 @@ from limo_sim.world.scenario import Person
 def test_a_node_that_drives_moves_the_robot(run: Run) -> None:
     outcome = run(node(DRIVE))
     assert outcome.failure == ""
-    assert outcome.world.arena.truth().robot[0] == pytest.approx(0.2 * 2.0, abs=0.05)
-    assert [round(command.time, 2) for command in outcome.world.commands[:3]] == [0.0, 0.1, 0.2]
+    assert outcome.stage.arena.truth().robot[0] == pytest.approx(0.2 * 2.0, abs=0.05)
+    assert [round(command.time, 2) for command in outcome.stage.commands[:3]] == [0.0, 0.1, 0.2]
 
 
 def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
@@ -133,12 +133,11 @@ def test_a_bad_callback_ends_in_its_own_traceback_and_a_robot_that_stands(
     assert "rclpy_stub" not in outcome.traceback.replace("limo_sim.ros.lockstep.world.StubError", "").replace(
         "limo_sim.ros.lockstep.patience.HungError", ""
     )
-    assert outcome.world.arena.odometry().linear == 0.0
+    assert outcome.stage.arena.odometry().linear == 0.0
 
 
-def test_ctrl_c_in_a_callback_ends_the_run_even_if_the_script_catches_it(run: Run) -> None:
-    with pytest.raises(KeyboardInterrupt):
-        run(node("raise KeyboardInterrupt"))
+def test_a_keyboard_interrupt_that_the_node_raises_itself_is_a_fault(run: Run) -> None:
+    assert "failed with KeyboardInterrupt" in run(node("raise KeyboardInterrupt")).failure
 
 
 def test_a_fault_that_the_script_hides_is_found_all_the_same(run: Run) -> None:
@@ -161,15 +160,15 @@ def test_the_watchdog_stops_a_robot_whose_node_falls_silent(run: Run) -> None:
     steps: list[Step] = []
     outcome = run(node(body), watch=kept_in(steps))
     speeds = {step.log.time: step.truth.robot[0] for step in steps}
-    assert outcome.world.arena.watchdog_stops == 1
+    assert outcome.stage.arena.watchdog_stops == 1
     assert speeds[1.9] - speeds[1.5] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_sleep_in_a_callback_lets_the_arenas_time_pass_not_the_walls(run: Run) -> None:
     began = time.perf_counter()
     outcome = run(node("import time; time.sleep(5.0); " + DRIVE), seconds=20.0)
-    assert [round(c.time, 2) for c in outcome.world.commands] == [5.0, 10.0, 15.0, 20.0]
-    assert outcome.world.arena.watchdog_stops >= 3
+    assert [round(c.time, 2) for c in outcome.stage.commands] == [5.0, 10.0, 15.0, 20.0]
+    assert outcome.stage.arena.watchdog_stops >= 3
     assert time.perf_counter() - began < 15.0
 
 
@@ -270,7 +269,7 @@ def test_polling_and_spinning_with_a_timeout_let_time_pass(run: Run) -> None:
         rclpy.spin_once(n, timeout_sec=0)
         pub.publish(Twist())
     """
-    assert len(run(text).world.commands) == 101
+    assert len(run(text).stage.commands) == 101
 
 
 def test_a_run_leaves_python_as_it_was(run: Run) -> None:
@@ -292,7 +291,7 @@ def test_a_callback_may_draw_on_its_picture_without_touching_anybody_elses(run: 
     """
     outcome = run(node(body + DRIVE), STANDING, 0.3)
     assert outcome.failure == ""
-    assert outcome.world.arena.frame().image.mean() > 50
+    assert outcome.stage.arena.frame().image.mean() > 50
 
 
 def test_a_script_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 from tests.sim.ros.scripts import STANDING, Run, node, said
 
 from limo_sim.cli.card import picture
-from limo_sim.ros.script import score_of
+from limo_sim.ros.stage import score_of
 
 SAY = "self.get_logger().info(str(%s))"
 ZERO = "self.pub.publish(Twist())"

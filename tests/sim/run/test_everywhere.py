@@ -12,7 +12,8 @@ from limo_hog.follow import ApproachController
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.env import LimoFollowV1
 from limo_sim.ros.live import run_live
-from limo_sim.ros.script import run_script
+from limo_sim.ros.runner import run_node
+from limo_sim.ros.stage import Stage
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import run_episode
 from limo_sim.run.sweep import Run, play
@@ -50,7 +51,7 @@ def test_the_closed_loop_and_a_sweep_run_with_the_people_of_the_seed(tmp_path: P
 
 
 def test_a_node_meets_the_people_of_the_seed(node: Path) -> None:
-    assert run_script(node, DRAWN, 0.5, 3).episode.scenario == of_run(DRAWN, 3)
+    assert run_node(Stage(node, DRAWN, 0.5, 3)).episode.scenario == of_run(DRAWN, 3)
 
 
 def test_an_arena_on_the_network_has_the_people_of_the_seed() -> None:
@@ -69,7 +70,7 @@ def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
 @pytest.mark.parametrize(
     "start",
     [
-        lambda node: run_script(node, UNKIND, 0.5),
+        lambda node: Stage(node, UNKIND, 0.5),
         lambda _: run_live(UNKIND, 0, 0.04, None),
         lambda _: LimoFollowV1(UNKIND, "camera"),
     ],

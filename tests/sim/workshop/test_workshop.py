@@ -8,10 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import cv2
 import pytest
 
-import limo_hog
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution, template
 from limo_sim.workshop.check import Verdict, check
@@ -66,12 +64,6 @@ MISTAKES = {
         "slept for 0.8 s",
     ),
 }
-
-
-@pytest.fixture(autouse=True)
-def fast_detector(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same boxes, many times faster."""
-    monkeypatch.setattr(cv2, "HOGDescriptor", limo_hog.HOGDescriptor, raising=False)
 
 
 def checked(tmp_path: Path, text: str, node: str = "follower") -> list[Verdict]:

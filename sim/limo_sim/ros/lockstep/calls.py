@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import difflib
+from array import array
 from dataclasses import dataclass, field
 
 from limo_hog.ros2 import names
 
 #: Topics that the arena publishes.
 PUBLISHED = tuple(topic for topic in names.TYPES if topic not in (names.COMMAND, names.ANNOTATED))
+#: A subscription is warned of when nobody publishes its topic for this time [s]. Chosen: publishers start within it.
+UNHEARD_AFTER = 2.0
+#: The name under which the run itself logs.
+LOGGER = "limo-hog"
 
 
 @dataclass
@@ -17,12 +22,12 @@ class Calls:
 
     Attributes
     ----------
-    nodes, readers, writers, clients, windows
+    nodes, readers, writers, services, clients, windows
         Lines by the node's name, by topic, by the service's name, and by the window's name.
     spun
         Whether `spin` or `spin_once` ran, of rclpy or of an executor.
     images
-        How many camera images the script's callbacks were given.
+        Stamps of the camera images that the script's callbacks were given [s].
     searched_without_svm
         Line of a `detectMultiScale` before `setSVMDetector`; 0 where there was none.
     """
@@ -30,10 +35,11 @@ class Calls:
     nodes: dict[str, int | None] = field(default_factory=dict)
     readers: dict[str, int | None] = field(default_factory=dict)
     writers: dict[str, int | None] = field(default_factory=dict)
+    services: dict[str, int | None] = field(default_factory=dict)
     clients: dict[str, int | None] = field(default_factory=dict)
     windows: dict[str, int | None] = field(default_factory=dict)
     spun: bool = False
-    images: int = 0
+    images: array[float] = field(default_factory=lambda: array("d"))
     searched_without_svm: int | None = 0
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -16,25 +16,15 @@ class HungError(BaseException):
     """The script hangs; not an Exception, so that `except Exception` in a script does not hide it."""
 
 
-class DiedError(BaseException):
-    """The script's process has ended before the run was over."""
-
-
 class Patience:
     """A timer that starts again whenever simulated time passes.
 
     It needs the main thread and a system with interval timers; elsewhere (Windows), and where the script takes no
-    interrupt, `limo_sim.ros.apart` stops its process.
-
-    Attributes
-    ----------
-    passing
-        Called whenever simulated time passes.
+    interrupt, `limo_sim.ros.runner` stops its process.
     """
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
-        self.passing: Callable[[], None] = lambda: None
         self._running = False
 
     @contextmanager
@@ -55,15 +45,10 @@ class Patience:
 
     @contextmanager
     def suspended(self) -> Iterator[None]:
-        """Stop the timer, for example while the live view is paused."""
+        """Stop the timer while the arena works or the live view is paused, and start it again."""
         if self._running:
             signal.setitimer(signal.ITIMER_REAL, 0)
         yield
-        self.progress()
-
-    def progress(self) -> None:
-        """Start the timer again: simulated time has passed."""
-        self.passing()
         if self._running:
             self._start()
 

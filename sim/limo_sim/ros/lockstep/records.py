@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -12,11 +11,8 @@ from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
-from limo_hog.follow.pipeline import Periods
 from limo_hog.follow.robot import Twist
 from limo_sim.ros.interfaces import Message
-from limo_sim.run.log import Step
-from limo_sim.run.score import Scorer
 
 #: Takes what a script logs: time [s], level, logger, message.
 Log = Callable[[float, str, str, str], None]
@@ -71,33 +67,23 @@ class Callback:
     slept: float
 
 
-@dataclass
-class Past:
-    """What is known of a run that another process began: enough to go on with it.
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Why a script ended before its time.
 
     Attributes
     ----------
-    scorer
-        Has measured every control period.
-    commands
-        Time [s], linear [m/s] and angular speed [rad/s] of every command, one after another.
-    periods
-        When the last control period began.
-    found
-        Whether a control period had a target.
-    detector_inputs, target_distance
-        As `World` has them.
+    how
+        Such as "failed with ValueError", "hung" or "died".
+    message
+        In one line.
+    traceback
+        The script's part of it; "" without an exception.
+    line
+        Line of the script; None where it is not known.
     """
 
-    scorer: Scorer
-    commands: array[float] = field(default_factory=lambda: array("d"))
-    periods: Periods = field(default_factory=Periods)
-    found: bool = False
-    detector_inputs: list[str] = field(default_factory=list)
-    target_distance: float | None = None
-
-    def add(self, step: Step) -> None:
-        """Take the next control period."""
-        self.scorer.add(step)
-        self.periods.begins(step.log.time, None)
-        self.found |= step.log.decision.target is not None
+    how: str
+    message: str
+    traceback: str = ""
+    line: int | None = None

@@ -1,7 +1,4 @@
-"""Replacements in `cv2` for one run: windows without a display, and a HOG detector whose results are logged.
-
-The last picture of each window is kept for the live view.
-"""
+"""Replacements in `cv2` for one run: windows without a display, and a HOG detector whose results are logged."""
 
 from __future__ import annotations
 
@@ -14,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.cv2_api.install import install_into_cv2
-from limo_hog.detections import Detections
 from limo_hog.extras import needed
-from limo_sim.ros.lockstep.records import Found
 from limo_sim.ros.lockstep.world import World
 
 with needed(by="limo-hog run"):
@@ -50,16 +45,20 @@ def _windows(world: World) -> dict[str, Callable[..., Any]]:
     def imshow(winname: str, mat: Any) -> None:
         if not isinstance(mat, np.ndarray) or mat.size == 0:
             raise cv2.error(f"imshow: want a picture that is not empty, came {type(mat).__name__}")
-        world.show(str(winname), _as_shown(mat))
+        if mat.ndim not in (2, 3) or (mat.ndim == 3 and mat.shape[2] not in (1, 3, 4)):
+            raise cv2.error(f"imshow: want (H, W) or 1, 3 or 4 channels, came {mat.shape}")
+        picture = _as_shown(mat)
+        world.called("windows", str(winname))
+        world.link.tell("shown", str(winname), picture.shape, data=picture.tobytes())
 
     def wait_key(delay: int = 0) -> int:  # noqa: ARG001 — OpenCV's signature
         return -1
 
     def destroy_window(winname: str) -> None:
-        world.shown.pop(winname, None)
+        world.link.tell("closed", str(winname))
 
     def destroy_all() -> None:
-        world.shown.clear()
+        world.link.tell("closed", None)
 
     def nothing(*_: Any, **__: Any) -> None:
         return None
@@ -118,16 +117,12 @@ def _watched(base: Any, world: World) -> Any:
 
         def detectMultiScale(self, img: Any, *args: Any, **kwargs: Any) -> Any:  # noqa: N802 — OpenCV's name
             looked_at = f"{getattr(img, 'dtype', type(img).__name__)} {np.shape(img)}"
-            if looked_at not in world.detector_inputs:
-                world.detector_inputs.append(looked_at)
-            if not self._has_svm:
-                world.calls.searched_without_svm = world.line()
+            world.link.tell("looked", looked_at, world.line(), self._has_svm)
             began = time.perf_counter()
             rects, weights = self._descriptor.detectMultiScale(img, *args, **kwargs)
             ms = 1e3 * (time.perf_counter() - began)
-            boxes = np.array(rects, np.int32).reshape(-1, 4)
-            scores = np.array(weights, np.float64).reshape(-1)
-            world.note(Found(np.shape(img), Detections(boxes, scores), ms))
+            boxes, scores = np.reshape(rects, (-1, 4)), np.reshape(weights, -1)
+            world.link.tell("found", np.shape(img), boxes.tolist(), scores.tolist(), ms)
             return rects, weights
 
     return HOGDescriptor

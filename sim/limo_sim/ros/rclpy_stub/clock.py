@@ -7,8 +7,8 @@ from enum import IntEnum
 from typing import Any
 
 from limo_sim.ros.interfaces import message_class
+from limo_sim.ros.lockstep.calls import UNHEARD_AFTER
 from limo_sim.ros.lockstep.records import StubError
-from limo_sim.ros.lockstep.world import UNHEARD_AFTER
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.partial import PartialApi

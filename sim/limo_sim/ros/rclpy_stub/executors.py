@@ -93,7 +93,7 @@ class Executor(PartialApi, missing=_MISSING):
     def _once(self, timeout: float, enough: Callable[[], bool] = lambda: False) -> None:
         """Wait for something that is due, and run it."""
         world = self.context.world
-        world.calls.spun = True
+        world.spun()
         if self._spins:
             raise RuntimeError(
                 "Executor is already spinning: a callback of it, or another thread, spins it again; in a callback, "

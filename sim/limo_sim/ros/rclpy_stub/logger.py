@@ -88,7 +88,7 @@ class Logger(PartialApi, missing=("log", "is_enabled_for", "get_logger_name")):
             self._said[place] = world.time
             if skip_first and last is None:
                 return False
-        world.log(world.time, level.name, self.name, str(message))
+        world.link.tell("log", level.name, self.name, str(message))
         return True
 
 

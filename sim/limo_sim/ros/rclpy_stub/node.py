@@ -72,7 +72,7 @@ class Node(PartialApi, missing=_MISSING):
         self._namespace = "/" + self._remaps.get("__ns", namespace or "").strip("/")
         overrides = arguments.parameters_of(self._name, self._namespace) if use_global_arguments else {}
         overrides = {p.name: p.value for p in parameter_overrides or ()} | overrides
-        context.world.calls.nodes.setdefault(self._name, context.world.line())
+        context.world.called("nodes", self._name)
         self._parameters = Parameters(
             overrides,
             context.world.parameters,
@@ -218,6 +218,7 @@ class Node(PartialApi, missing=_MISSING):
         service = Service(srv_type, name, callback, self._group(callback_group), qos_profile)
         self._services.append(service)
         current().world.services[name] = service
+        current().world.called("services", name)
         return service
 
     def create_client(
@@ -232,7 +233,7 @@ class Node(PartialApi, missing=_MISSING):
         _check_service(srv_type)
         client = Client(srv_type, self.resolve_service_name(srv_name), qos_profile, self._group(callback_group))
         self._clients.append(client)
-        current().world.expect_service(client.srv_name)
+        current().world.called("clients", client.srv_name)
         return client
 
     def _group(self, given: CallbackGroup | None) -> CallbackGroup:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from limo_hog.ros2 import names
+from limo_hog.ros2.messages import to_seconds
 from limo_sim.ros.interfaces import Message
 from limo_sim.ros.lockstep.calls import PUBLISHED
 from limo_sim.ros.lockstep.records import StubError
@@ -31,7 +32,7 @@ class Publisher(
         if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
             self._kept = deque(maxlen=max(qos.depth, 1))
             world.kept.append((topic, self._kept))
-        world.calls.writers.setdefault(topic, world.line())
+        world.called("writers", topic)
         world.writers.append(topic)
 
     def publish(self, msg: Message) -> None:
@@ -98,9 +99,9 @@ class Subscription(PartialApi, missing=("handle", "event_handlers", "raw", "logg
 
     def take(self) -> Callable[[], Any]:
         """Return the work of giving the oldest message to the callback."""
+        message: Any = self._queue.popleft()
         if self.topic in (names.IMAGE, names.IMAGE_COMPRESSED):
-            current().world.calls.images += 1
-        message = self._queue.popleft()
+            current().world.link.tell("given", to_seconds(message.header.stamp))
         return lambda: self.callback(message)
 
     def get_publisher_count(self) -> int:

@@ -14,13 +14,12 @@ from pathlib import Path
 
 import pytest
 from tests.sim.logs import kept_in
-from tests.sim.ros.scripts import DRIVE, FOLLOW, HEAD, STANDING, node
+from tests.sim.ros.scripts import DRIVE, FOLLOW, HEAD, STANDING, node, run_script
 
 from limo_hog.cli.main import main
-from limo_sim.ros import apart
-from limo_sim.ros.apart import run_apart
+from limo_sim.ros import runner
 from limo_sim.ros.lockstep.records import StubError
-from limo_sim.ros.script import Ended, run_script, score_of
+from limo_sim.ros.stage import Ended, score_of
 from limo_sim.run.log import Step
 from limo_sim.world.scenario import Scenario
 
@@ -50,33 +49,16 @@ def figures(ended: Ended) -> dict[str, object]:
     return {name: value for name, value in score_of(ended).to_json().items() if name not in clock}
 
 
-def test_a_run_apart_is_the_run_in_this_process(script: Callable[[str], Path]) -> None:
+def test_the_same_node_scenario_and_seed_give_the_same_run(script: Callable[[str], Path]) -> None:
     path = script(node(FOLLOW, "self.declare_parameter('target_distance', 1.8)"))
-    here_steps: list[Step] = []
-    there_steps: list[Step] = []
-    here = run_script(path, STANDING, 1.5, 3, watch=kept_in(here_steps))
-    there = run_apart(path, STANDING, 1.5, 3, watch=kept_in(there_steps))
-    assert log(here_steps) == log(there_steps)
-    assert len(there_steps) > 10
-    assert figures(here) == figures(there)
-    assert (here.failure, here.used_hog) == (there.failure, there.used_hog) == ("", True)
-    for name in ("scenario", "controller", "detector", "seed", "seconds", "contacts", "target_distance"):
-        assert getattr(here.episode, name) == getattr(there.episode, name), name
-
-
-def test_a_person_who_watches_is_given_the_same_pictures(script: Callable[[str], Path]) -> None:
-    path = script(node(FOLLOW))
-    here: list[Step] = []
-    there: list[Step] = []
-    run_script(path, STANDING, 0.3, watch=here.append)
-    run_apart(path, STANDING, 0.3, watch=there.append)
-    assert len(here) == len(there)
-    for ours, theirs in zip(here, there, strict=True):
-        assert (ours.log.frame is None) == (theirs.log.frame is None)
-        assert ours.log.sensors.odometry == theirs.log.sensors.odometry
-        assert ours.windows.keys() == theirs.windows.keys()
-        if ours.log.frame is not None and theirs.log.frame is not None:
-            assert (ours.log.frame.image == theirs.log.frame.image).all()
+    first: list[Step] = []
+    second: list[Step] = []
+    ended = run_script(path, STANDING, 1.5, 3, watch=kept_in(first))
+    again = run_script(path, STANDING, 1.5, 3, watch=kept_in(second))
+    assert log(first) == log(second)
+    assert len(first) > 10
+    assert figures(ended) == figures(again)
+    assert (ended.failure, ended.used_hog, ended.episode.target_distance) == ("", True, 1.8)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +81,7 @@ def test_a_node_that_dies_leaves_its_log_and_a_robot_that_stands(
 ) -> None:
     steps: list[Step] = []
     after_raising: list[Step] = []
-    ended = run_apart(script(node(THEN + body)), STANDING, 20.0, watch=kept_in(steps))
+    ended = run_script(script(node(THEN + body)), STANDING, 20.0, watch=kept_in(steps))
     assert ended.failure.startswith("node.py ")
     assert said in ended.failure
     assert ended.failure.endswith("; the watchdog stopped the robot")
@@ -132,7 +114,7 @@ if self.n in (50, 150):
 
     tracemalloc.start()
     try:
-        run_apart(script(node(said)), STANDING, 15.5, watch=watch, pictures=False)
+        run_script(script(node(said)), STANDING, 15.5, watch=watch)
     finally:
         tracemalloc.stop()
     there = [int(line) for line in capsys.readouterr().out.split()]
@@ -153,16 +135,16 @@ if self.n in (50, 150):
 def test_a_node_that_takes_no_interrupt_is_stopped(
     script: Callable[[str], Path], body: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(apart, "GRACE_S", 1.0)
+    monkeypatch.setattr(runner, "GRACE_S", 1.0)
     began = time.monotonic()
     # (Patience is wall time: a busy machine may keep the node from its loop for a second.)
-    ended = run_apart(script(node(THEN + body)), STANDING, 20.0, patience=4.0)
+    ended = run_script(script(node(THEN + body)), STANDING, 20.0, patience=4.0)
     assert "hung at 0.90 s: no simulated time has passed for 4 s, and it took no interrupt" in ended.failure
     assert time.monotonic() - began < 60
 
 
 def test_a_node_that_prints_for_ever_is_interrupted(script: Callable[[str], Path]) -> None:
-    ended = run_apart(script(node("while True: print(end='')")), STANDING, 2.0, patience=2.0)
+    ended = run_script(script(node("while True: print(end='')")), STANDING, 2.0, patience=2.0)
     assert "hung at 0.00 s" in ended.failure
     assert "print(end='')" in ended.traceback
 
@@ -171,7 +153,7 @@ def test_what_a_node_prints_comes_out_here_even_right_before_its_death(
     script: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     body = "import os, sys\nprint('hello'); print('wrong', file=sys.stderr); os._exit(1)"
-    run_apart(script(node(body)), STANDING, 2.0)
+    run_script(script(node(body)), STANDING, 2.0)
     said = capsys.readouterr()
     assert (said.out, said.err) == ("hello\n", "wrong\n")
 
@@ -181,12 +163,12 @@ def test_a_watcher_that_fails_ends_the_node(script: Callable[[str], Path]) -> No
         raise OSError("no space left on device")
 
     with pytest.raises(OSError, match="no space left"):
-        run_apart(script(node(DRIVE)), STANDING, 2.0, watch=full)
+        run_script(script(node(DRIVE)), STANDING, 2.0, watch=full)
 
 
 def test_a_script_that_is_not_there_and_a_scenario_that_cannot_be_are_named(tmp_path: Path) -> None:
     with pytest.raises(StubError, match="no such file"):
-        run_apart(tmp_path / "none.py", Scenario(name="nobody"), 1.0)
+        run_script(tmp_path / "none.py", Scenario(name="nobody"), 1.0)
 
 
 def test_the_command_line_writes_a_card_and_ends_with_one_line(

@@ -1,0 +1,357 @@
+"""The arena on its side of the link: it drives by the node's commands, notes what the node does, and logs the run.
+
+What a node tells is checked here: nothing that it sends can be more than a command, a picture or a text.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from array import array
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from limo_hog.detections import Detections
+from limo_hog.follow.decision import Decision, Mode
+from limo_hog.follow.pipeline import FrameLog, Periods
+from limo_hog.follow.robot import Twist
+from limo_hog.follow.sense.observation import Sensors
+from limo_hog.ros2 import names
+from limo_hog.ros2.messages import serialize
+from limo_sim.ros.lockstep.calls import LOGGER, PUBLISHED, UNHEARD_AFTER, Calls, nearest_topic
+from limo_sim.ros.lockstep.records import Callback, Command, Fault, Found, Log, Shown
+from limo_sim.ros.outlet import Outlet
+from limo_sim.run.arena import Arena
+from limo_sim.run.episode import Episode, score
+from limo_sim.run.log import Step, Watch
+from limo_sim.run.score import ScoreCard, Scorer
+from limo_sim.sensing.camera import TrueFrame
+from limo_sim.world.scenario import Scenario
+
+#: Simulated time after a script's failure, in which the watchdog stops the robot [s]: 0.5 s and 1 m/s over 1 m/s².
+_AFTERMATH = 2.0
+#: What a node may tell in one step of the arena; a loop that publishes tells so much in seconds. Chosen.
+_MOST_TOLD = 10_000
+
+
+class Stage:
+    """One run: the arena, and the log that is scored.
+
+    Attributes
+    ----------
+    found
+        What the script's detector found since the last camera frame.
+    detector_inputs
+        Types and shapes of the images given to the detector, as "uint8 (480, 640, 3)", each once.
+    longest
+        The callback that slept longest; None while none has slept.
+    calls
+        What the script called, and where.
+    shown
+        The newest picture of each window with its time; closing a window removes it.
+    published
+        The topics on which the script has published.
+    target_distance
+        The node's parameter of that name [m]; None where no node has one.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario asks for faults of the detector, which is the node's own here.
+    """
+
+    def __init__(
+        self,
+        script: Path,
+        scenario: Scenario,
+        seconds: float,
+        seed: int = 0,
+        *,
+        log: Log = lambda *_: None,
+        watch: Watch = lambda _: None,
+    ) -> None:
+        scenario.check_detector_is_plain("a node brings its own detector")
+        self._began = time.perf_counter()
+        self.script = script
+        self.arena = Arena(scenario, seed)
+        self.seconds = seconds
+        self.log = log
+        self.watch = watch
+        # (An hour's: 28 bytes each.)
+        self._driven, self._lines = array("d"), array("i")
+        self.found: list[Found] = []
+        self.shown: dict[str, Shown] = {}
+        self.calls = Calls()
+        self.longest: Callback | None = None
+        self.detector_inputs: list[str] = []
+        self.published: set[str] = set()
+        self.target_distance: float | None = None
+        self._due: dict[tuple[str, str], float] = {}
+        self._outlet = Outlet(self.arena)
+        self.scorer = Scorer(self.arena.scenario)
+        self._frame: TrueFrame | None = None
+        self._render_ms = 0.0
+        self._periods = Periods()
+        self._seen_before = False
+        self._collected = False
+        self._told = 0
+        self._handlers: dict[str, Callable[..., None]] = {
+            "called": self._called,
+            "closed": self._closed,
+            "command": self._command,
+            "found": self._find,
+            "given": lambda stamp: self.calls.images.append(float(stamp)),
+            "log": lambda *line: self.log(self.time, *(str(part) for part in line)),
+            "looked": self._looked,
+            "published": lambda topic: self.published.add(str(topic)),
+            "shown": self._show,
+            "slept": self._slept,
+            "spun": lambda: setattr(self.calls, "spun", True),
+        }
+
+    @property
+    def commands(self) -> list[Command]:
+        """Every Twist on /cmd_vel."""
+        numbers = zip(*[iter(self._driven)] * 3, self._lines, strict=True)
+        return [Command(at, Twist(linear, angular), line or None) for at, linear, angular, line in numbers]
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start of the run."""
+        return self.arena.time
+
+    @property
+    def over(self) -> bool:
+        """Whether the run's time is up."""
+        return self.arena.time >= self.seconds - 1e-9
+
+    def tell(self, told: str, *content: Any, data: bytes = b"") -> None:
+        """Take what the script does.
+
+        Raises
+        ------
+        ValueError, TypeError, KeyError
+            If it is nothing that a script can do.
+        """
+        self._told += 1
+        if self._told > _MOST_TOLD:
+            raise ValueError(f"{_MOST_TOLD} messages without a step of the arena: the loop that sends them never waits")
+        self._handlers[told](*content, **({"data": data} if data else {}))
+
+    def advance(
+        self, wanted: Collection[str] = (), target: float | None = None
+    ) -> tuple[float, list[tuple[str, bytes]]]:
+        """Advance by one step; return the time [s], and the new messages of the topics that are wanted, as CDR.
+
+        Raises
+        ------
+        ValueError
+            When the time is up.
+        """
+        if self.over:
+            raise ValueError("a step after the end of the run")
+        self.target_distance, self._told = target, 0
+        if self._collected:
+            self._log()
+            self.arena.step()
+        self._collected = True
+        news = self._collect(wanted)
+        self._warn()
+        return self.time, news
+
+    def _called(self, kind: str, name: str, line: int | None) -> None:
+        lines: dict[str, int | None] = getattr(self.calls, kind)
+        lines.setdefault(str(name), line)
+        if kind in ("readers", "clients"):
+            self._due.setdefault((kind, str(name)), self.time + UNHEARD_AFTER)
+
+    def _command(self, linear: float, angular: float, line: int | None) -> None:
+        if not (math.isfinite(linear) and math.isfinite(angular)):
+            raise ValueError(f"a command of {linear} m/s and {angular} rad/s")
+        self._driven.extend((self.time, linear, angular))
+        self._lines.append(line or 0)
+        self.arena.command(Twist(float(linear), float(angular)))
+
+    def _looked(self, at: str, line: int | None, has_svm: bool) -> None:
+        if at not in self.detector_inputs:
+            self.detector_inputs.append(str(at))
+        if not has_svm:
+            self.calls.searched_without_svm = line
+
+    def _find(self, shape: list[int], boxes: list[list[int]], scores: list[float], ms: float) -> None:
+        if len(shape) not in (2, 3) or min(shape) < 1:
+            raise ValueError(f"a picture of {shape}")
+        found = Detections(np.array(boxes, np.int32).reshape(-1, 4), np.array(scores, np.float64))
+        self.found.append(Found(tuple(shape), found, float(ms)))
+
+    def _show(self, window: str, shape: list[int], *, data: bytes) -> None:
+        self.shown[str(window)] = Shown(self.time, np.frombuffer(data, np.uint8).reshape(shape))
+
+    def _closed(self, window: str | None) -> None:
+        for name in list(self.shown) if window is None else [window]:
+            self.shown.pop(name, None)
+
+    def _slept(self, since: float, seconds: float) -> None:
+        if seconds > (0.0 if self.longest is None else self.longest.slept):
+            self.longest = Callback(float(since), float(seconds))
+
+    def _warn(self) -> None:
+        """Name each subscription to a topic that nobody publishes, and each unanswered client, once."""
+        for kind, name in [key for key, at in self._due.items() if self.time >= at - 1e-9]:
+            del self._due[kind, name]
+            line = getattr(self.calls, kind)[name]
+            if kind == "readers" and name not in PUBLISHED and name not in self.calls.writers:
+                where = "" if line is None else f", subscribed to at line {line}"
+                said = f"nobody publishes {name!r}{where}; did you mean {nearest_topic(name)!r}?"
+                self.log(self.time, "WARN", LOGGER, said)
+            if kind == "clients" and name not in self.calls.services:
+                where = "" if line is None else f", asked for at line {line}"
+                there = ", ".join(sorted(self.calls.services)) or "none"
+                self.log(self.time, "WARN", LOGGER, f"no node offers the service {name!r}{where}; offered: {there}")
+
+    def _collect(self, wanted: Collection[str]) -> list[tuple[str, bytes]]:
+        drawing = time.perf_counter()
+        frame = self.arena.frame()
+        if self._frame is None or frame.stamp > self._frame.stamp:
+            self._render_ms = 1e3 * (time.perf_counter() - drawing)
+            self._frame, self.found = frame, []
+        return [
+            (topic, serialize(make()))
+            for topic, make in self._outlet.new()
+            if topic in wanted or topic == names.TF_STATIC
+        ]
+
+    def _log(self) -> None:
+        """Log the control period that ends now."""
+        frame = self._frame
+        begins, new = self._periods.begins(self.time, frame)
+        if frame is None or not begins:
+            return
+        found = self._in_frame_pixels(frame) if new else Detections.none()
+        target = int(np.argmax(found.scores)) if len(found) else None
+        twist = Twist(*self._driven[-2:]) if self._driven else Twist()
+        if self.detector_inputs:
+            mode = Mode.FOLLOW if target is not None else Mode.LOST if self._seen_before else Mode.SEARCH
+        else:
+            # Whether a node with a detector of its own searches or follows is not known.
+            mode = Mode.STAND if twist == Twist() else Mode.DRIVE
+        self._seen_before |= target is not None
+        log = FrameLog(
+            self.time,
+            Decision(twist, None, mode, f"as {self.script.name} says", target),
+            Sensors(self.arena.scan(), self.arena.odometry()),
+            frame if new else None,
+            found,
+            detect_ms=sum(found.ms for found in self.found) if new else 0.0,
+        )
+        windows = {name: shown.picture for name, shown in self.shown.items()}
+        step = Step(log, self.arena.truth(), frame.truth if new else None, self._render_ms, windows)
+        self.scorer.add(step)
+        self.watch(step)
+
+    def _in_frame_pixels(self, frame: TrueFrame) -> Detections:
+        """Return the boxes found last since the frame came, in its pixels: a smaller copy is scaled back."""
+        height, width = frame.image.shape[:2]
+        for found in reversed(self.found):
+            scale = height / found.shape[0]
+            if abs(found.shape[1] * scale - width) <= scale:
+                boxes = np.rint(found.detections.boxes * scale).astype(np.int32)
+                return Detections(boxes, found.detections.scores)
+        return Detections.none()
+
+    def finish(self, fault: Fault | None = None) -> Ended:
+        """Let the arena go on without commands until the time is up, or the robot stands; return how the run ended."""
+        failed_at = self.time
+        if fault is not None:
+            self.seconds = failed_at + _AFTERMATH
+        while not self.over:
+            self.advance((), self.target_distance)
+        episode = Episode(
+            scenario=self.arena.scenario,
+            controller=self.script.name,
+            detector="hog" if self.detector_inputs else "the node's own",
+            seed=self.arena.seed,
+            seconds=self.time,
+            scorer=self.scorer,
+            contacts=self.arena.contacts,
+            wall_seconds=time.perf_counter() - self._began,
+            target_distance=self.target_distance,
+        )
+        return Ended(episode, self._failure(fault, failed_at), fault, self)
+
+    def _failure(self, fault: Fault | None, failed_at: float) -> str:
+        if fault is not None:
+            stopped = self.arena.odometry()
+            stands = abs(stopped.linear) < 1e-6 and abs(stopped.angular) < 1e-6
+            ending = "the watchdog stopped the robot" if stands else "the robot still moves"
+            if not self._driven:
+                ending = "the robot never moved"
+            message = " ".join(fault.message.split())
+            return f"{self.script.name} {fault.how} at {failed_at:.2f} s: {message}; {ending}"
+        if not self._driven:
+            other = ", ".join(sorted(self.published)) or "nothing at all"
+            never = f"never published on {names.COMMAND} (it published {other})"
+            return f"{self.script.name} {never}: the robot never moved"
+        return ""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a run ended.
+
+    Attributes
+    ----------
+    episode
+        The log that is scored.
+    failure
+        One line that names the fault; "" without one.
+    fault
+        Why the script ended before its time; None where it did not.
+    stage
+        The run, with what the node did.
+    """
+
+    episode: Episode
+    failure: str
+    fault: Fault | None
+    stage: Stage
+
+    @property
+    def traceback(self) -> str:
+        """The script's part of the traceback; "" without an exception."""
+        return "" if self.fault is None else self.fault.traceback
+
+    @property
+    def used_hog(self) -> bool:
+        """Whether the script used cv2's HOG detector."""
+        return bool(self.stage.detector_inputs)
+
+
+def score_of(outcome: Ended) -> ScoreCard:
+    """Measure a run; where the script does not use cv2's HOG detector, figures of detections are None.
+
+    Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
+    """
+    card, driving = score(outcome.episode), outcome.episode.scorer.driving
+    if outcome.used_hog:
+        return card
+    return replace(
+        card,
+        modes={"drive": driving, "stand": 1.0 - driving},
+        first_detection_s=None,
+        detected=None,
+        best_box_wrong=None,
+        longest_gap_s=None,
+        lost=0,
+        found_again=None,
+        time_to_find_again_s=None,
+        follows_first=None,
+        identity_switches=None,
+        detect_ms_p50=None,
+        detect_ms_p95=None,
+        detect_ms_mean=None,
+    )

@@ -1,0 +1,19 @@
+"""The messages between a node's process and the arena's: plain data."""
+
+from __future__ import annotations
+
+import json
+import struct
+import sys
+from typing import Any
+
+#: Of a message: how long its JSON and its bytes are.
+HEAD = struct.Struct("<II")
+#: Whether a node's process is a copy of one that has imported everything.
+FORKS = sys.platform == "linux"
+
+
+def packed(content: Any, data: bytes = b"") -> bytes:
+    """Return a message: JSON, and bytes that are none."""
+    said = json.dumps(content).encode()
+    return HEAD.pack(len(said), len(data)) + said + data

@@ -1,0 +1,135 @@
+"""Processes that have imported what nodes need, and wait for one."""
+
+from __future__ import annotations
+
+import atexit
+import base64
+import json
+import os
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from limo_hog.extras import needed
+from limo_sim.ros.wire import FORKS
+
+with needed(by="limo-hog run"):
+    import cv2  # noqa: F401 — the node's process needs it, and could not say so as well
+
+
+class Worker:
+    """A process that has imported what nodes need."""
+
+    def __init__(self) -> None:
+        command = [sys.executable, "-m", "limo_sim.ros.child"]
+        # (In the root folder no file has a module's name.)
+        options: dict[str, Any] = {"cwd": Path(os.sep).resolve(), "stdout": subprocess.DEVNULL}
+        self.status: int | None = None
+        self._control, theirs = socket.socketpair()
+        options["stdin"] = subprocess.PIPE if os.name == "nt" else theirs
+        self._process: subprocess.Popen[bytes] = subprocess.Popen(  # noqa: S603 — this program
+            command, start_new_session=True, **options
+        )
+        theirs.close()
+
+    def begin(self, job: dict[str, Any], ends: Sequence[socket.socket]) -> None:
+        """Run a node."""
+        self.status = None
+        if os.name == "nt":
+            shares = [base64.b64encode(end.share(self._process.pid)).decode() for end in ends]  # type: ignore[attr-defined]
+            if pipe := self._process.stdin:
+                pipe.write(json.dumps(job | {"shares": shares}).encode() + b"\n")
+                pipe.close()
+            return
+        socket.send_fds(self._control, [json.dumps(job).encode()], [end.fileno() for end in ends])
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process, which tells of its node's end, is there."""
+        return self._process.poll() is None
+
+    def is_alone(self, seconds: float) -> bool:
+        """Wait until the node has ended by itself, no longer than this [s]; return whether it has."""
+        if FORKS:
+            return bool(select.select([self._control], [], [], seconds)[0])
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+        return not self.alive
+
+    def end(self, how: bytes = b"k") -> int | None:
+        """End the node, with all that it started; return its status, None where that is not known.
+
+        Parameters
+        ----------
+        how
+            b"w": its fault handler tells where it was; b"k": it is killed.
+        """
+        if self.status is not None:
+            return self.status
+        if not FORKS:
+            self._kill()
+            self.status = self._process.returncode
+            return self.status
+        with suppress(OSError):
+            self._control.sendall(how)
+            told = self._control.recv(4)
+            if len(told) == 4:
+                (self.status,) = struct.unpack("i", told)
+                return self.status
+        self._kill()
+        return None
+
+    def _kill(self) -> None:
+        self._control.close()
+        if hasattr(os, "killpg"):
+            # Of a group there may be others when its first is gone.
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+        else:
+            self._process.kill()
+        self._process.wait()
+
+    def leave(self) -> None:
+        """Let the process end, and its node with it."""
+        if FORKS:
+            with suppress(OSError):
+                self._control.shutdown(socket.SHUT_WR)
+        else:
+            self._kill()
+
+
+#: Processes that wait for a node, and those that have one.
+idle: list[Worker] = []
+busy: list[Worker] = []
+
+
+@contextmanager
+def ready() -> Iterator[Worker]:
+    """Give a process that has imported what nodes need; it is kept for the next node unless it has ended."""
+    worker = idle.pop() if idle else Worker()
+    busy.append(worker)
+    try:
+        yield worker
+    finally:
+        busy.remove(worker)
+        if worker.status is not None and FORKS:
+            idle.append(worker)
+
+
+def stop_nodes() -> None:
+    """End the nodes of all threads: their runs return soon."""
+    for worker in tuple(busy):
+        worker.leave()
+
+
+@atexit.register
+def _close_workers() -> None:
+    for worker in idle:
+        worker.leave()

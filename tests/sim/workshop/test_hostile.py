@@ -1,0 +1,177 @@
+"""Forty hostile nodes: each costs its own run alone, with a true sentence, and leaves nothing running."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.sim.ros.scripts import DRIVE, HEAD, node
+
+from limo_hog.cli.main import main
+from limo_sim.ros import runner, worker
+from limo_sim.ros.runner import Limits
+from limo_sim.workshop.check import examine
+from limo_sim.workshop.report import total
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what a node leaves is found by Linux's /proc")
+
+LIMITS = Limits(patience=4.0, seconds=40.0, memory_mb=3000, printed_mb=5)
+FOREVER = "while True:\n    try:\n        n = range(99)\n        while True: sum(n)\n    except BaseException: pass"
+SLEEP = "import subprocess; subprocess.Popen(['sleep', '98765'], start_new_session=True)"
+
+#: What the third image makes each node do, and words of the sentence that says so.
+IN_A_CALLBACK = {
+    "exit 0": ("import os; os._exit(0)", "died at 0.20 s: its process ended with status 0 before the run was over"),
+    "exit 3": ("import os; os._exit(3)", "its process ended with status 3"),
+    "exit in C": ("import ctypes; ctypes.CDLL(None)._exit(4)", "its process ended with status 4"),
+    "segfault": ("import ctypes; ctypes.string_at(0)", "its process was ended by SIGSEGV"),
+    "abort": ("import os; os.abort()", "its process was ended by SIGABRT"),
+    "kill": ("import os; os.kill(os.getpid(), 9)", "its process was ended by SIGKILL"),
+    "terminate": ("import os; os.kill(os.getpid(), 15)", "its process was ended by SIGTERM"),
+    "stop": ("import os, signal; os.kill(os.getpid(), signal.SIGSTOP)", "no simulated time has passed"),
+    "parent": ("import os; os.kill(os.getppid(), 9); import time\nwhile True: pass", "ended the process that watches"),
+    "group": ("import os; os.killpg(0, 9)", "ended the process that watches"),
+    "sys.exit": ("import sys; sys.exit(5)", "sys.exit(5)"),
+    "loop": ("while True: pass", "hung at 0.20 s: no simulated time has passed for 4 s"),
+    "loop that catches all": (FOREVER, "it took no interrupt"),
+    "loop in C": ("sum(range(10**12))", "hung at 0.20 s"),
+    "ignored alarm": ("import signal; signal.signal(signal.SIGALRM, signal.SIG_IGN)\nwhile True: pass", "no interrupt"),
+    "all signals blocked": (
+        "import signal; signal.pthread_sigmask(signal.SIG_BLOCK, range(1, 64))\nwhile True: pass",
+        "it took no interrupt",
+    ),
+    "pause": ("import signal; signal.pause()", "hung at 0.20 s"),
+    "standard input": ("input()", "EOFError"),
+    "lock": ("import _thread\na = _thread.allocate_lock(); a.acquire(); a.acquire()", "hung at 0.20 s"),
+    "printing": ("import os\nwhile True: os.write(1, b'x' * 10**6)", "more than 5 MB"),
+    "printing errors": ("import sys\nwhile True: sys.stderr.write('x' * 10**5)", "more than 5 MB"),
+    "logging": ("while True: self.get_logger().info('x' * 10**6)", "more than 5 MB"),
+    "commands": ("while True: self.pub.publish(Twist())", "without a step of the arena"),
+    "memory": ("keep = bytearray(10 * 10**9)", "MemoryError"),
+    "memory bit by bit": ("import numpy\nkeep = []\nwhile True: keep.append(numpy.zeros(10**7))", "MemoryError"),
+    "recursion": ("f = lambda: f()\nf()", "RecursionError"),
+    "closed descriptors": ("import os; os.closerange(0, 1000)", "ied at 0.20 s"),
+    "closed and hangs": ("import os; os.closerange(3, 1000)\nwhile True: pass", "closed its connection"),
+    "text of an error": (
+        "class Odd(Exception):\n    def __str__(self): raise ValueError\nraise Odd",
+        "its text cannot be read: __str__ raises ValueError",
+    ),
+    "own base exception": ("class Odd(BaseException): pass\nraise Odd('oh')", "failed with Odd at 0.20 s: oh"),
+    "interrupt": ("raise KeyboardInterrupt", "failed with KeyboardInterrupt"),
+    "not finite": ("t = Twist(); t.linear.x = float('nan'); self.pub.publish(t)", "finite numbers alone"),
+    "own file deleted": ("import os; os.unlink(__file__); 1 / 0", "ZeroDivisionError"),
+    "folder deleted": (
+        "import os, shutil\nfrom pathlib import Path\nhere = Path(__file__).resolve().parent\n"
+        "assert here.name == 'there' and list(here.iterdir()) == [here / 'node.py']\n"
+        "shutil.rmtree(here); 1 / 0",
+        "ZeroDivisionError",
+    ),
+    "fork": ("import os\nif os.fork() == 0:\n    import time\n    while True: pass\nos._exit(1)", "status 1"),
+    "fork that goes on": ("import os\nos.fork(); 1 / 0", "ZeroDivisionError"),
+    "daemon": (SLEEP + "; 1 / 0", "ZeroDivisionError"),
+    "daemon of a fork": (
+        f"import os\nif os.fork() == 0:\n    os.setsid(); {SLEEP}; os._exit(0)\n1 / 0",
+        "ZeroDivision",
+    ),
+    "thread that spins": (
+        "import threading, time\ndef spin():\n    while True: pass\n"
+        "threading.Thread(target=spin).start()\ntime.sleep(0.1)",
+        "hung at 0.20 s",
+    ),
+    "forged messages": (
+        "import gc\nlink = next(o for o in gc.get_objects() if type(o).__name__ == 'SocketLink')\n"
+        "link.tell('points', 100)",
+        "it sent what is no message of a node",
+    ),
+}
+#: The same as a file.
+FILES = {
+    "not Python": ("this is no Python", "SyntaxError"),
+    "NUL": ("\0", "SyntaxError"),
+    "deep": ("(" * 10_000, "SyntaxError"),
+    "exit before all": ("import os; os._exit(0)", "died at 0.00 s: its process ended with status 0"),
+    "catches all": (FOREVER, "it took no interrupt"),
+    "patched judge": (
+        "import limo_sim.workshop.check as c\nc.check = c.examine = lambda *a, **k: []\nimport os; os._exit(0)",
+        "its process ended with status 0",
+    ),
+}
+THEN = f"self.n = getattr(self, 'n', 0) + 1\nif self.n < 3:\n    {DRIVE}\n    return\n"
+
+
+def left_running() -> list[str]:
+    """Return the commands of the processes that a node has left; those that wait for the next node are none."""
+    waiting = {waits._process.pid for waits in worker.idle}
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdecimal() and int(entry.name) not in waiting:
+            try:
+                command = (entry / "cmdline").read_text(errors="replace").replace("\0", " ")
+                parent = int((entry / "stat").read_text(errors="replace").rpartition(")")[2].split()[1])
+            except OSError:
+                continue
+            if "98765" in command or parent in waiting:
+                found.append(command)
+    return found
+
+
+def tried(tmp_path: Path, text: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "GRACE_S", 1.0)
+    folder = tmp_path / "there"
+    folder.mkdir()
+    script = folder / "node.py"
+    script.write_text(text)
+    began = time.monotonic()
+    # (It runs in that folder, and in no other.)
+    verdicts = examine(script, limits=replace(LIMITS, folder=folder)).verdicts
+    assert verdicts[0].holds is False
+    assert said in verdicts[0].evidence
+    assert total(verdicts) == (0, 100)
+    assert time.monotonic() - began < 60
+    assert left_running() == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", IN_A_CALLBACK)
+def test_a_hostile_callback_is_reported_and_leaves_nothing(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body, said = IN_A_CALLBACK[name]
+    tried(tmp_path, HEAD + node(THEN + body), said, monkeypatch)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FILES)
+def test_a_hostile_file_is_reported_and_leaves_nothing(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, said = FILES[name]
+    tried(tmp_path, text, said, monkeypatch)
+
+
+@pytest.mark.parametrize("name", ["exit 0", "segfault", "daemon", "forged messages"])
+def test_some_hostile_nodes(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    body, said = IN_A_CALLBACK[name]
+    tried(tmp_path, HEAD + node(THEN + body), said, monkeypatch)
+
+
+def test_check_of_a_node_that_exits_writes_a_report_and_returns_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "node.py").write_text("import os; os._exit(0)")
+    assert main(["workshop", "check", str(tmp_path / "node.py"), "--json", str(tmp_path / "points.json")]) == 1
+    said = capsys.readouterr()
+    assert "0 of 100 points" in said.out
+    assert "its process ended with status 0" in " ".join(said.out.split())
+    assert (tmp_path / "points.json").is_file()
+
+
+def test_the_line_of_a_crash_is_told(tmp_path: Path) -> None:
+    script = tmp_path / "node.py"
+    script.write_text("import os\n\nimport ctypes\nctypes.string_at(0)\n")
+    assert examine(script, limits=LIMITS).verdicts[0].line == 4
+    script.write_text("import os\n\nos._exit(2)\n")
+    assert examine(script, limits=LIMITS).verdicts[0].line == 3

@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -136,6 +137,48 @@ def test_a_file_that_is_no_recording_is_one_line(
 def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(kept / "run.mcap"), "--image", "/other"]) == 1
     assert "no images on /other; the recording holds /cmd_vel, " in capsys.readouterr().err
+
+
+@pytest.fixture
+def opened(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """The pages that a browser beside this terminal has opened."""
+    pages: list[bytes] = []
+
+    def look(url: str) -> bool:
+        with urllib.request.urlopen(url, timeout=10) as page:
+            pages.append(page.read())
+        return True
+
+    monkeypatch.setattr("webbrowser.open", look)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.delenv("SSH_CONNECTION", raising=False)
+    return pages
+
+
+def test_follow_opens_its_page_unasked_where_a_display_is(
+    opened: list[bytes], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["follow", "--seconds", "1"]) == 0
+    assert len(opened) == 1
+    assert b"<canvas" in opened[0]
+    assert "--view" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("options", [["--view", "off"], ["--json", "-"]])
+def test_follow_opens_no_page_where_something_else_is_asked_for(options: list[str], opened: list[bytes]) -> None:
+    assert main(["follow", "--seconds", "1", *options]) == 0
+    assert opened == []
+
+
+def test_follow_says_how_to_look_where_no_display_is(
+    monkeypatch: pytest.MonkeyPatch, opened: list[bytes], capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("DISPLAY")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert main(["follow", "--seconds", "1"]) == 0
+    assert opened == []
+    assert capsys.readouterr().out.splitlines()[-1].startswith("To see the robot follow: limo-hog follow --view")
 
 
 def test_a_port_in_use_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:

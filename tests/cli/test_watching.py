@@ -139,9 +139,8 @@ def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, capsys: p
     assert "no images on /other; the recording holds /cmd_vel, " in capsys.readouterr().err
 
 
-@pytest.fixture
-def opened(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
-    """The pages that a browser beside this terminal has opened."""
+def at_a_display(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """Have a terminal, and beside it a browser: the pages that it opens."""
     pages: list[bytes] = []
 
     def look(url: str) -> bool:
@@ -157,8 +156,9 @@ def opened(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_follow_opens_its_page_unasked_where_a_display_is(
-    opened: list[bytes], capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    opened = at_a_display(monkeypatch)
     assert main(["follow", "--seconds", "1"]) == 0
     assert len(opened) == 1
     assert b"<canvas" in opened[0]
@@ -166,14 +166,16 @@ def test_follow_opens_its_page_unasked_where_a_display_is(
 
 
 @pytest.mark.parametrize("options", [["--view", "off"], ["--json", "-"]])
-def test_follow_opens_no_page_where_something_else_is_asked_for(options: list[str], opened: list[bytes]) -> None:
+def test_follow_opens_no_page_where_it_is_told_otherwise(options: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = at_a_display(monkeypatch)
     assert main(["follow", "--seconds", "1", *options]) == 0
     assert opened == []
 
 
 def test_follow_says_how_to_look_where_no_display_is(
-    monkeypatch: pytest.MonkeyPatch, opened: list[bytes], capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    opened = at_a_display(monkeypatch)
     monkeypatch.delenv("DISPLAY")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     assert main(["follow", "--seconds", "1"]) == 0

@@ -17,6 +17,11 @@ from limo_hog.exceptions import HogError, LimoHogError
 from limo_hog.models import PERSON_BOX, Calibration, PersonBox
 
 
+def people(count: int) -> str:
+    """Return "1 person", "2 people"."""
+    return f"{count} {'person' if count == 1 else 'people'}"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections:
     """People found in one image, best first.
@@ -53,8 +58,7 @@ class Detections:
         return len(self.scores)
 
     def __str__(self) -> str:
-        count = f"{len(self)} {'person' if len(self) == 1 else 'people'}"
-        return f"{count}, best {self.scores[0]:.2f}" if len(self) else count
+        return people(len(self)) + (f", best {self.scores[0]:.2f}" if len(self) else "")
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.column_stack([self.boxes, self.scores]).astype(dtype or np.float64, copy=False)
@@ -175,7 +179,7 @@ class Detections:
         from limo_hog.imaging.notebook import shown
 
         name = self._searched if isinstance(self._searched, str) else ""
-        caption = f"{len(self)} {'person' if len(self) == 1 else 'people'}{name and f' in {name}'}"
+        caption = f"{people(len(self))}{name and f' in {name}'}"
         rows = [
             [str(i), *map(str, box), f"{score:.2f}"]
             for i, (box, score) in enumerate(zip(self.person_boxes.tolist(), self.scores, strict=True))

@@ -6,12 +6,12 @@ import argparse
 from typing import TYPE_CHECKING
 
 from limo_hog.cli.support.arguments import add_follower
-from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.cli.options import add_json, add_scenario
-from limo_sim.cli.watching import HERE, PORT, add_watching, observing, shown_unasked
+from limo_sim.cli.watching import HERE, PORT, add_watching, finish, observing, shown_unasked
 
 if TYPE_CHECKING:
     from limo_sim.run.log import Step
@@ -66,12 +66,7 @@ def run(args: argparse.Namespace) -> int:
             )
         card = score(episode)
         observers.end(episode, card)
-    if args.json:
-        write_json(args.json, card.to_json())
-    if args.json != STDOUT:
-        from limo_sim.cli.card import show
-
-        show(card)
-        if not args.view and args.video is None:
-            print(f"To see the robot follow: limo-hog follow --view, and http://{HERE}:{PORT}/ in a browser")
+    finish(args, card)
+    if args.json != STDOUT and not args.view and args.video is None:
+        print(f"To see the robot follow: limo-hog follow --view, and http://{HERE}:{PORT}/ in a browser")
     return 0

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import file_ending
+from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.signals import held
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 HERE, PORT = "127.0.0.1", 8488
 
 
-def add_watching(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+def add_watching(parser: argparse.ArgumentParser, *, plot: bool = True) -> None:
+    """Add the options; --plot is not shown where a run has no end at which to draw."""
     group = parser.add_argument_group("to show and to record the run")
     group.add_argument(
         "--view",
@@ -51,8 +52,20 @@ def add_watching(parser: argparse.ArgumentParser) -> None:
         "--plot",
         type=file_ending(".png", ".svg", ".pdf"),
         metavar="FILE.png",
-        help="draw path, pixel error, distance and speed in one figure (not with arena)",
+        help="draw path, pixel error, distance and speed in one figure" if plot else argparse.SUPPRESS,
     )
+
+
+def finish(args: argparse.Namespace, card: ScoreCard) -> None:
+    """Write the score card as JSON, or show it, and say what else was written."""
+    if args.json:
+        write_json(args.json, card.to_json())
+    if args.json != STDOUT:
+        from limo_sim.cli.card import show
+
+        show(card)
+        if written := [str(one) for one in (args.json, args.video, args.record, args.plot) if one is not None]:
+            print(f"written: {', '.join(written)}")
 
 
 def _address(text: str) -> tuple[str, int] | tuple[()]:

@@ -24,6 +24,9 @@ from limo_hog.learn.evaluation.curve import (
 )
 from limo_hog.learn.labels import LabelError, Picture, inside, sizes_of
 
+#: With 50 objects the interval of a miss rate of .3 is about ± .13 wide.
+_FEW = 50
+
 
 @dataclass(frozen=True)
 class EvaluationParameters:
@@ -215,6 +218,11 @@ def compare(first: Evaluation, other: Evaluation, parameters: EvaluationParamete
         Difference(other.name, figure, a - b, (low, high))
         for figure, a, b, (low, high) in zip(Figures._fields, first.figures, other.figures, ends, strict=True)
     ]
+
+
+def few(objects: int) -> str:
+    """Return a warning where figures come from too few objects to mean much, else nothing."""
+    return f"only {objects} objects: below {_FEW} these figures are mostly chance" if objects < _FEW else ""
 
 
 def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation], how: EvaluationParameters) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import random
+import re
 import signal
 import socket
 import subprocess
@@ -93,6 +94,20 @@ def test_a_recording_says_how_the_scenarios_lens_bends(tmp_path: Path) -> None:
         messages: list[Any] = [reader.deserialize(data, one.msgtype) for one, _, data in reader.messages(infos)]
         told = {tuple(message.d) for message in messages}
     assert told == {(-0.1, 0.02, 0.0, 0.0, 0.0)}
+
+
+def test_follow_says_what_it_has_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    card, plot = tmp_path / "card.json", tmp_path / "run.png"
+    assert main(["follow", "--seconds", "1", "--json", str(card), "--plot", str(plot)]) == 0
+    assert f"written: {card}, {plot}\n" in capsys.readouterr().out
+
+
+def test_a_replay_says_what_its_differences_are_of(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(kept / "run.mcap"), "--controller", "approach"]) == 0
+    told = capsys.readouterr().out
+    assert re.search(rf"^same detections +\d+ of the {10 * SECONDS} frames recorded with some *$", told, re.MULTILINE)
+    assert re.search(r"^largest difference of forward speed +[\d.]+ m/s *$", told, re.MULTILINE)
+    assert "differ where another detector, controller or version made the recording" in told
 
 
 def test_a_recording_replayed_gives_the_same_detections(

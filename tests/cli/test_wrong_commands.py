@@ -35,9 +35,8 @@ def test_help_breaks_no_address(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     assert main([command, "--help"]) == 0
-    assert re.search(
-        r"https://github\.com/limo-hog/limo-hog/blob/main/docs/\S+\.md$", capsys.readouterr().out, re.MULTILINE
-    )
+    address = r"https://github\.com/limo-hog/limo-hog/blob/main/docs/\S+\.md$"
+    assert re.search(address, capsys.readouterr().out, re.MULTILINE)
 
 
 def test_the_arena_lists_no_option_that_it_refuses(capsys: pytest.CaptureFixture[str]) -> None:

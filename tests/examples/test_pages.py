@@ -85,6 +85,13 @@ def test_a_distribution_with_a_relative_link_is_refused(text: str, code: int, tm
     assert subprocess.run(command, capture_output=True, check=False).returncode == code
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if not is_of_the_site(page)], ids=str)
+def test_a_page_opens_with_a_sentence_that_says_what_it_is_for(page: Page) -> None:
+    title, opening, *_ = page.text.split("\n\n")
+    assert re.fullmatch(r"# .+", title)
+    assert re.match(r"[*`]*\w", opening) and re.search(r"[.:][*]*$", opening)
+
+
 def sentences(page: Page) -> set[str]:
     """The sentences of a page's prose, of six words or more, in small letters without punctuation."""
     prose = re.sub(r"^(```.*?^```|[|#].*?)$", "\n\n", page.text, flags=re.MULTILINE | re.DOTALL)

@@ -202,7 +202,7 @@ def test_copies_of_pictures_above_the_current_folder_lie_below_out(
     [
         (["--min-height", "300", "--max-height", "100"], "max_height is 100; at least 300"),
         (["--min-height", "none", "--max-height", "50"], "max_height is 50; at least 99.84"),
-        (["--model", "bogus"], "model is 'bogus'; opencv, default, daimler"),
+        (["--model", "bogus"], "model is 'bogus': no such file, and none of the names opencv, default, daimler"),
         (["--nms", "group", "--overlap", "0.5"], "overlap has no meaning"),
     ],
 )

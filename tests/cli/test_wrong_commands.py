@@ -77,7 +77,7 @@ WRONG_ARGUMENTS = [
     ("folow", "no command 'folow'; did you mean follow?"),
     ("detect a.jpg --json there.txt", "there.txt would be overwritten: --overwrite replaces it"),
     ("detect a.jpg --outt found", "did you mean --out?"),
-    ("detect a.jpg --model nobody.yml", "no such model file: 'nobody.yml'; or name one of opencv,"),
+    ("detect a.jpg --model nobody.yml", "model is 'nobody.yml': no such file, and none of the names opencv,"),
     ("bench --size 640", "'640' is no size; wanted is WIDTHxHEIGHT such as 640x480"),
     ("bench --size 0x480", "'0x480' is no size"),
     ("bench --size 200x60", "a picture of 200x60 is smaller than the detector's window; 64x128 or more is wanted"),

@@ -108,6 +108,11 @@ async def _steer_it(tab: Tab, view: View, controller: Tunable[Any]) -> None:
         await tab.look(width, height, dark)
         await tab.screenshot(PICTURES / f"{'phone' if width < 600 else 'desk'}-{'dark' if dark else 'light'}.png")
         assert await tab.value("document.documentElement.scrollWidth") <= width
+        # The controls are in one row, and each says what it is.
+        tops = "[...document.querySelectorAll('.controls > *')].map((c) => c.getBoundingClientRect().height)"
+        assert max(await tab.value(tops)) < 48
+        assert await tab.value("document.querySelector('.controls').getBoundingClientRect().height") < 60
+        assert await tab.value("document.querySelector('.controls label span').offsetWidth") > 20
     # On the phone: the caption is text, not part of the picture, and every parameter tells what it is.
     assert await tab.value("parseFloat(getComputedStyle(document.querySelector('#seen')).fontSize)") >= 14
     fields = await tab.value(

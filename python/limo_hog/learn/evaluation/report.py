@@ -63,8 +63,8 @@ def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:
     axes: Axes = figure.add_subplot()
     for one in evaluations:
         miss = np.maximum(1 - one.curve.recall, _LEAST_MISS_RATE / 2)
-        axes.step(one.curve.fppi, miss, where="post", label=f"{one.figures.lamr:.3f}  {one.name}")
-    if all(one.curve.recall.min(initial=1.0) == 1.0 for one in evaluations):
+        axes.step(np.maximum(one.curve.fppi, _FPPI[0]), miss, where="post", label=f"{one.figures.lamr:.3f}  {one.name}")
+    if all(one.curve.recall[one.curve.fppi <= _FPPI[0]].max(initial=0.0) == 1.0 for one in evaluations):
         axes.text(0.5, 0.5, "no misses", transform=axes.transAxes, ha="center", fontsize=16, color="#66727f")
     axes.set(xscale="log", yscale="log", xlim=_FPPI, ylim=(_LEAST_MISS_RATE, 1.02))
     axes.set(xlabel="false positives per image", ylabel="miss rate")

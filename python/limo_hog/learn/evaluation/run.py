@@ -222,7 +222,7 @@ def compare(first: Evaluation, other: Evaluation, parameters: EvaluationParamete
 
 def few(objects: int) -> str:
     """Return a warning where figures come from too few objects to mean much, else nothing."""
-    return f"only {objects} objects: below {_FEW} these figures are mostly chance" if objects < _FEW else ""
+    return f"only {objects} object{'' if objects == 1 else 's'}: below {_FEW} these figures are mostly chance" if objects < _FEW else ""
 
 
 def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation], how: EvaluationParameters) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def test_a_distribution_with_a_relative_link_is_refused(text: str, code: int, tm
     wheel = tmp_path / "a-1-py3-none-any.whl"
     with zipfile.ZipFile(wheel, "w") as archive:
         archive.writestr("a-1.dist-info/METADATA", f"Name: a\n\n{text}\n")
-    command = [sys.executable, ROOT / ".ci" / "package_page", wheel]
+    command = [sys.executable, str(ROOT / ".ci" / "package_page"), str(wheel)]
     assert subprocess.run(command, capture_output=True, check=False).returncode == code
 
 

@@ -24,7 +24,7 @@ from limo_hog.learn.evaluation.curve import (
 )
 from limo_hog.learn.labels import LabelError, Picture, inside, sizes_of
 
-#: With 50 objects the interval of a miss rate of .3 is about ± .13 wide.
+#: With 50 objects the 95 % interval of a miss rate of .3 is ± .13.
 _FEW = 50
 
 
@@ -222,7 +222,9 @@ def compare(first: Evaluation, other: Evaluation, parameters: EvaluationParamete
 
 def few(objects: int) -> str:
     """Return a warning where figures come from too few objects to mean much, else nothing."""
-    return f"only {objects} object{'' if objects == 1 else 's'}: below {_FEW} these figures are mostly chance" if objects < _FEW else ""
+    if objects >= _FEW:
+        return ""
+    return f"only {objects} object{'' if objects == 1 else 's'}: below {_FEW} these figures are mostly chance"
 
 
 def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation], how: EvaluationParameters) -> dict[str, Any]:

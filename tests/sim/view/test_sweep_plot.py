@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -31,7 +32,7 @@ def figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Figure:
 
 
 def test_no_title_is_cut_off(figure: Figure) -> None:
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     titles = [axes._left_title.get_window_extent(canvas.get_renderer()) for axes in figure.axes]  # type: ignore[attr-defined]
     assert all(left.x1 < right.x0 for left, right in pairwise(titles))

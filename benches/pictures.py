@@ -1,14 +1,15 @@
-"""Draw the photographs of the documentation, docs/images/*.jpg: `uv run python -m benches.pictures`.
+"""Draw the documentation's pictures, docs/images/*.jpg and follow.webp: `uv run python -m benches.pictures [NAME ...]`.
 
-Five scenarios of rooms and people are seen by the robot's camera at chosen instants, side by side. The live page needs
-Chromium and is left as it is where there is none. `benches/benchmark.py` and `benches/fit_detector.py` draw the
-plots.
+Five scenarios of rooms and people are seen by the robot's camera at chosen instants, side by side; `follow.webp` moves.
+The live page needs Chromium and is left as it is where there is none. `benches/benchmark.py` and
+`benches/fit_detector.py` draw the plots.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 import tempfile
 import threading
 from collections.abc import Callable
@@ -24,7 +25,7 @@ from limo_hog.follow.control.naming import controller_named
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
-from limo_sim.sensing.camera import CameraPose
+from limo_sim.sensing.camera import FIELD, CameraPose
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.view.pace import Pace
 from limo_sim.view.reading import annotated, depth_picture
@@ -47,6 +48,9 @@ SEEN = 400  # rows of a frame; below them there is only floor [px]
 WIDTH = 480  # of each view in a picture [px]
 QUALITY = 82  # of the JPEG files
 PAGE_SHOWN = 880  # rows of the live page; below them are the controller's parameters [px]
+FILM_S, SHOWN, FILM_QUALITY = 32.0, 360, 55  # of follow.webp: the run [s], rows of a picture [px], of the file
+ROBOT, PERSON = (178, 114, 0), (0, 94, 213)  # blue and orange of Okabe and Ito, blue first
+FOLLOWERS = PeopleDetector(min_height=None, nms="group")
 
 
 def view(scenario: Scenario, seconds: float, place: tuple[float, float, float] | None) -> NDArray[np.uint8]:
@@ -101,21 +105,53 @@ def gait() -> NDArray[np.uint8]:
     )
 
 
-def followed() -> NDArray[np.uint8]:
-    """Return a frame of a run as `limo-hog follow --video` shows it."""
-    seen: list[Step] = []
-    controller = controller_named("tracking", None)
-    detector = PeopleDetector(min_height=None, nms="group")
-    run_episode(Scenario.load("workshop"), controller, detector, 14.0, 0, watch=seen.append)
-    logs = [step.log for step in seen if step.log.frame is not None and step.log.decision.target is not None]
-    return annotated(logs[-1])
+def map_of(steps: list[Step], scenario: Scenario) -> NDArray[np.uint8]:
+    """Return the room from above at the last of the steps: the ways so far, the robot with its view, and the people."""
+    scale = SHOWN / (2 * scenario.room.half)
+    picture = np.full((SHOWN, SHOWN, 3), (246, 244, 242), np.uint8)
+
+    def at(x: float, y: float) -> tuple[int, int]:
+        return round(SHOWN / 2 + x * scale), round(SHOWN / 2 - y * scale)
+
+    def way(places: list[tuple[float, float]], colour: tuple[int, int, int]) -> None:
+        cv2.polylines(picture, [np.array([at(*place) for place in places])], False, colour, 2, cv2.LINE_AA)
+
+    x, y, yaw = steps[-1].truth.robot
+    view = [at(x + 3 * math.cos(yaw + turn), y + 3 * math.sin(yaw + turn)) for turn in (FIELD / 2, -FIELD / 2)]
+    cv2.fillPoly(picture, [np.array([at(x, y), *view])], (222, 214, 206), cv2.LINE_AA)
+    way([step.truth.robot[:2] for step in steps], ROBOT)
+    for i, person in enumerate(steps[-1].truth.people):
+        if person is not None:
+            way([(one.x, one.y) for step in steps if (one := step.truth.people[i]) is not None], PERSON)
+            cv2.circle(picture, at(person.x, person.y), round(0.25 * scale), PERSON, -1, cv2.LINE_AA)
+    body = [(0.26, 0.0), (-0.18, 0.17), (-0.18, -0.17)]
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    corners = [at(x + a * cos - b * sin, y + a * sin + b * cos) for a, b in body]
+    cv2.fillPoly(picture, [np.array(corners)], ROBOT, cv2.LINE_AA)
+    return picture
+
+
+def film() -> cv2.Animation:
+    """Return a run at twice its speed: what the robot sees with the boxes found, and the room from above."""
+    scenario, steps, frames = Scenario.load("workshop"), [], list[NDArray[np.uint8]]()
+
+    def watch(step: Step) -> None:
+        steps.append(step.bare())
+        if step.log.frame is not None and len(steps) % 2 == 0:
+            camera = cv2.resize(annotated(step.log), (SHOWN * 4 // 3, SHOWN), interpolation=cv2.INTER_AREA)
+            frames.append(np.hstack([camera, map_of(steps, scenario)]).astype(np.uint8))
+
+    run_episode(scenario, controller_named("tracking", None), FOLLOWERS, FILM_S, 0, watch=watch)
+    moving = cv2.Animation()
+    moving.frames, moving.durations = frames, [100] * len(frames)
+    return moving
 
 
 def of_the_workshop() -> NDArray[np.uint8]:
     """Return a frame of two people with their boxes, in the colours that the workshop's nodes draw them in."""
     people = (Person(route=((3.0, -0.35, 0),), facing=0.0), Person(route=((4.1, -1.3, 0),), facing=0.3))
     image = Arena(Scenario(people=people), 0).frame().image.copy()
-    found = PeopleDetector(min_height=None, nms="group").detect(image)
+    found = FOLLOWERS.detect(image)
     best = int(np.argmax(found.scores))
     for number, (x, y, w, h) in enumerate(found.boxes.tolist()):
         red = number == best
@@ -128,7 +164,6 @@ def of_the_workshop() -> NDArray[np.uint8]:
 def live_page() -> NDArray[np.uint8]:
     """Return what a browser shows of a run of 40 s."""
     controller, scenario, shown = Tunable(controller_named("tracking", None)), Scenario.load("workshop"), 40.0
-    detector = PeopleDetector(min_height=None, nms="group")
     with View(scenario, controller, pace=Pace(2)) as page, tempfile.TemporaryDirectory() as folder:
         there, picture = threading.Event(), Path(folder) / "page.png"
 
@@ -139,7 +174,7 @@ def live_page() -> NDArray[np.uint8]:
                 page.pace.pause()
 
         run = threading.Thread(
-            target=run_episode, args=(scenario, controller, detector, shown + 1.0, 0), kwargs={"watch": watch}
+            target=run_episode, args=(scenario, controller, FOLLOWERS, shown + 1.0, 0), kwargs={"watch": watch}
         )
 
         with chromium() as browser:
@@ -156,16 +191,21 @@ def live_page() -> NDArray[np.uint8]:
 
 
 def main() -> None:
-    """Write the pictures."""
+    """Write the pictures that are named, or all."""
     drawn: dict[str, Callable[[], NDArray[np.uint8]]] = {name: lambda name=name: room(name) for name in VIEWS}
-    drawn |= {"arena": among_furniture, "gait": gait, "follow": followed, "workshop": of_the_workshop}
+    drawn |= {"arena": among_furniture, "gait": gait, "workshop": of_the_workshop}
     if CHROMIUM is None:
         print("no Chromium: view.jpg stays as it is")
     else:
         drawn["view"] = live_page
-    for name, draw in drawn.items():
-        path = IMAGES / f"{name}.jpg"
-        cv2.imwrite(str(path), draw(), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    wanted = sys.argv[1:] or [*drawn, "follow"]
+    for name in wanted:
+        if name == "follow":
+            path = IMAGES / "follow.webp"
+            cv2.imwriteanimation(str(path), film(), [cv2.IMWRITE_WEBP_QUALITY, FILM_QUALITY])
+        else:
+            path = IMAGES / f"{name}.jpg"
+            cv2.imwrite(str(path), drawn[name](), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size // 1024} KiB")
 
 

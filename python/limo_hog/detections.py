@@ -17,12 +17,18 @@ from limo_hog.exceptions import HogError, LimoHogError
 from limo_hog.models import PERSON_BOX, Calibration, PersonBox
 
 
-@dataclass(frozen=True, slots=True)
+def people(count: int) -> str:
+    """Return "1 person", "2 people"."""
+    return f"{count} {'person' if count == 1 else 'people'}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Detections:
     """People found in one image, best first.
 
     `len(d)` counts them, iterating and `d[i]` give (box, score), a slice, mask or array of indices gives `Detections`.
-    Jupyter shows a table, and the picture as long as the program holds it, or its file is there.
+    Two are equal where all that they hold is. `np.asarray(d)` is float64 (N, 5): x, y, w, h, score. Jupyter shows a
+    table, and the picture as long as the program holds it, or its file is there.
 
     Attributes
     ----------
@@ -51,6 +57,23 @@ class Detections:
     def __len__(self) -> int:
         return len(self.scores)
 
+    def __str__(self) -> str:
+        return people(len(self)) + (f", best {self.scores[0]:.2f}" if len(self) else "")
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.column_stack([self.boxes, self.scores]).astype(dtype or np.float64, copy=False)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Detections):
+            return NotImplemented
+        return self._held() == other._held()
+
+    def __hash__(self) -> int:
+        return hash(self._held())
+
+    def _held(self) -> tuple[Any, ...]:
+        return self.boxes.tobytes(), self.scores.tobytes(), self.person_box, self.calibration
+
     def __iter__(self) -> Iterator[tuple[NDArray[np.int32], float]]:
         for box, score in zip(self.boxes, self.scores, strict=True):
             yield box, float(score)
@@ -71,6 +94,11 @@ class Detections:
     def person_boxes(self) -> NDArray[np.int32]:
         """int32 (N, 4): the boxes without the window's margin, tight around the person [px]."""
         return np.rint(self.person_box.inside(self.boxes)).astype(np.int32)
+
+    @property
+    def xyxy(self) -> NDArray[np.int32]:
+        """int32 (N, 4): left, top, right and bottom of the boxes [px]; right and bottom lie just outside."""
+        return np.hstack([self.boxes[:, :2], self.boxes[:, :2] + self.boxes[:, 2:]])
 
     @property
     def probabilities(self) -> NDArray[np.float64]:
@@ -106,12 +134,52 @@ class Detections:
 
         return annotate(pixels(image), self.person_boxes, [f"{score:.1f}" for score in self.scores])
 
+    def to_dict(self) -> dict[str, list[Any]]:
+        """Return lists of plain numbers, for JSON: boxes, scores, and probabilities where the model has them."""
+        held = {"boxes": self.boxes.tolist(), "scores": self.scores.tolist()}
+        return held if self.calibration is None else {**held, "probabilities": self.probabilities.tolist()}
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the picture that was searched, with the people's boxes; the path's ending says its format.
+
+        Raises
+        ------
+        HogError
+            The picture is gone: the program does not hold it any more, and it has no file.
+        MissingExtraError
+            OpenCV, which draws, is not installed.
+        OSError
+            The file cannot be written; no part of it is left behind.
+        """
+        from pathlib import Path
+
+        from limo_hog.imaging.inputs import as_array
+        from limo_hog.imaging.writing import write_image
+
+        searched = self._searched_now()
+        if searched is None:
+            raise HogError("the picture that was searched is gone: keep it in a variable, or use draw(image)")
+        write_image(Path(path), self.draw(as_array(searched)))
+
+    def show(self) -> None:
+        """Open what `save` writes with the system's viewer of pictures or its browser."""
+        import tempfile
+        import webbrowser
+        from pathlib import Path
+
+        path = Path(tempfile.mkdtemp(prefix="limo-hog-")) / "people.png"
+        self.save(path)
+        webbrowser.open(path.as_uri())
+
+    def _searched_now(self) -> Any:
+        return self._searched() if isinstance(self._searched, weakref.ref) else self._searched
+
     def _repr_html_(self) -> str:
         # Imported here: only notebooks need it.
         from limo_hog.imaging.notebook import shown
 
         name = self._searched if isinstance(self._searched, str) else ""
-        caption = f"{len(self)} {'person' if len(self) == 1 else 'people'}{name and f' in {name}'}"
+        caption = f"{people(len(self))}{name and f' in {name}'}"
         rows = [
             [str(i), *map(str, box), f"{score:.2f}"]
             for i, (box, score) in enumerate(zip(self.person_boxes.tolist(), self.scores, strict=True))
@@ -123,7 +191,7 @@ class Detections:
         from limo_hog.imaging.inputs import as_array
         from limo_hog.imaging.notebook import reduced
 
-        searched = self._searched() if isinstance(self._searched, weakref.ref) else self._searched
+        searched = self._searched_now()
         if searched is None:
             return None
         try:

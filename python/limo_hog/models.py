@@ -144,7 +144,7 @@ def load_model(name: str | os.PathLike[str] | Model) -> Model:
     if name in _NAMED:
         return _NAMED[name]()  # a path equals no name
     if not os.path.isfile(name):  # noqa: PTH113 - pathlib would double the time to import this package
-        raise ParameterError(f"model is {os.fspath(name)!r}; {', '.join(_NAMED)} or the path of a model file is wanted")
+        raise ParameterError(f"model is {os.fspath(name)!r}: no such file, and none of the names {', '.join(_NAMED)}")
     return _from_file(os.fspath(name))
 
 

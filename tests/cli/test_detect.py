@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -74,6 +75,25 @@ def test_a_video_gives_a_line_a_frame_and_an_annotated_copy(tmp_path: Path, caps
         stream = container.streams.video[0]
         assert (stream.codec_context.name, stream.width, stream.height) == ("h264", 192, 256)
         assert len(list(container.decode(stream))) == 4
+
+
+def test_a_films_frames_are_numbered_from_its_first_and_counted_as_frames(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    film_of(tmp_path / "walk.mp4")
+    names = ["walk.mp4:0", "walk.mp4:5", "walk.mp4:10"]
+    assert main(["detect", str(tmp_path / "walk.mp4"), "--every", "5"]) == 0
+    shown = capsys.readouterr()
+    assert [line.split()[0].rpartition("/")[2] for line in shown.out.splitlines()] == names
+    times = r"detection [\d.]+ ms each, with reading and writing [\d.]+ ms"
+    assert re.fullmatch(rf"3 frames, \d+ detections; {times}\n", shown.err)
+
+
+def test_one_picture_is_summed_up_in_one_unit(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["detect", str(pictures / "c.png")]) == 0
+    shown = capsys.readouterr()
+    assert "  0 people " in shown.out
+    assert re.fullmatch(r"1 picture, 0 people; detection [\d.]+ ms\n", shown.err)
 
 
 def test_ctrl_c_is_the_end_of_a_camera(
@@ -182,7 +202,7 @@ def test_copies_of_pictures_above_the_current_folder_lie_below_out(
     [
         (["--min-height", "300", "--max-height", "100"], "max_height is 100; at least 300"),
         (["--min-height", "none", "--max-height", "50"], "max_height is 50; at least 99.84"),
-        (["--model", "bogus"], "model is 'bogus'; opencv, default, daimler"),
+        (["--model", "bogus"], "model is 'bogus': no such file, and none of the names opencv, default, daimler"),
         (["--nms", "group", "--overlap", "0.5"], "overlap has no meaning"),
     ],
 )

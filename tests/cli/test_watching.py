@@ -7,11 +7,13 @@ import errno
 import json
 import os
 import random
+import re
 import signal
 import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -94,6 +96,20 @@ def test_a_recording_says_how_the_scenarios_lens_bends(tmp_path: Path) -> None:
     assert told == {(-0.1, 0.02, 0.0, 0.0, 0.0)}
 
 
+def test_follow_says_what_it_has_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    card, plot = tmp_path / "card.json", tmp_path / "run.png"
+    assert main(["follow", "--seconds", "1", "--json", str(card), "--plot", str(plot)]) == 0
+    assert f"written: {card}, {plot}\n" in capsys.readouterr().out
+
+
+def test_a_replay_says_what_its_differences_are_of(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(kept / "run.mcap"), "--controller", "approach"]) == 0
+    told = capsys.readouterr().out
+    assert re.search(rf"^same detections +\d+ of the {10 * SECONDS} frames recorded with some *$", told, re.MULTILINE)
+    assert re.search(r"^largest difference of forward speed +[\d.]+ m/s *$", told, re.MULTILINE)
+    assert "differ where another detector, controller or version made the recording" in told
+
+
 def test_a_recording_replayed_gives_the_same_detections(
     kept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -136,6 +152,50 @@ def test_a_file_that_is_no_recording_is_one_line(
 def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(kept / "run.mcap"), "--image", "/other"]) == 1
     assert "no images on /other; the recording holds /cmd_vel, " in capsys.readouterr().err
+
+
+def at_a_display(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """Have a terminal, and beside it a browser: the pages that it opens."""
+    pages: list[bytes] = []
+
+    def look(url: str) -> bool:
+        with urllib.request.urlopen(url, timeout=10) as page:
+            pages.append(page.read())
+        return True
+
+    monkeypatch.setattr("webbrowser.open", look)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.delenv("SSH_CONNECTION", raising=False)
+    return pages
+
+
+def test_follow_opens_its_page_unasked_where_a_display_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opened = at_a_display(monkeypatch)
+    assert main(["follow", "--seconds", "1"]) == 0
+    assert len(opened) == 1
+    assert b"<canvas" in opened[0]
+    assert "--view" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("options", [["--view", "off"], ["--json", "-"]])
+def test_follow_opens_no_page_where_it_is_told_otherwise(options: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = at_a_display(monkeypatch)
+    assert main(["follow", "--seconds", "1", *options]) == 0
+    assert opened == []
+
+
+def test_follow_says_how_to_look_where_no_display_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opened = at_a_display(monkeypatch)
+    monkeypatch.delenv("DISPLAY")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert main(["follow", "--seconds", "1"]) == 0
+    assert opened == []
+    assert capsys.readouterr().out.splitlines()[-1].startswith("To see the robot follow: limo-hog follow --view")
 
 
 def test_a_port_in_use_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,37 @@ import numpy as np
 import pytest
 
 from limo_hog.cli.main import main
+
+
+@pytest.mark.parametrize("word", ["--show", "--track", "--quiet"])
+def test_an_option_is_suggested_only_where_it_is_alike(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["detect", "a.jpg", word]) == 2
+    assert "did you mean" not in capsys.readouterr().err
+    assert main(["detect", "a.jpg", "--jsn", "b"]) == 2
+    assert "did you mean --json?" in capsys.readouterr().err
+
+
+def test_a_wrong_option_is_answered_in_two_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["follow", "--bogus"]) == 2
+    usage, error = capsys.readouterr().err.splitlines()
+    assert usage == "usage: limo-hog follow [options], as limo-hog follow --help lists them"
+    assert error == "limo-hog follow: error: unrecognized arguments: --bogus"
+
+
+@pytest.mark.parametrize("command", ["run", "score", "workshop"])
+def test_help_breaks_no_address(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main([command, "--help"]) == 0
+    address = r"https://github\.com/limo-hog/limo-hog/blob/main/docs/\S+\.md$"
+    assert re.search(address, capsys.readouterr().out, re.MULTILINE)
+
+
+def test_the_arena_lists_no_option_that_it_refuses(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["arena", "--help"]) == 0
+    assert "--plot" not in capsys.readouterr().out
+
 
 #: Wrong arguments, which end with 2: what is typed, and a part of the last line of the answer.
 WRONG_ARGUMENTS = [
@@ -45,7 +77,7 @@ WRONG_ARGUMENTS = [
     ("folow", "no command 'folow'; did you mean follow?"),
     ("detect a.jpg --json there.txt", "there.txt would be overwritten: --overwrite replaces it"),
     ("detect a.jpg --outt found", "did you mean --out?"),
-    ("detect a.jpg --model nobody.yml", "the path of a model file is wanted"),
+    ("detect a.jpg --model nobody.yml", "model is 'nobody.yml': no such file, and none of the names opencv,"),
     ("bench --size 640", "'640' is no size; wanted is WIDTHxHEIGHT such as 640x480"),
     ("bench --size 0x480", "'0x480' is no size"),
     ("bench --size 200x60", "a picture of 200x60 is smaller than the detector's window; 64x128 or more is wanted"),

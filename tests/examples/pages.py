@@ -7,10 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-#: Where README.md and sim/README.md link to: they are shown on package pages too, where a relative link leads nowhere.
-REPOSITORY = "https://github.com/limo-hog/limo-hog/blob/main/"
-PICTURES = "https://raw.githubusercontent.com/limo-hog/limo-hog/main/"
-
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"(!?)\[[^\]]*\]\(([^)\s]+)\)")
 
@@ -53,9 +49,6 @@ def pages() -> list[Page]:
 def file_of(page: Page, link: str) -> Path | None:
     """The file in the repository that a link leads to; None for other places on the web."""
     target = link.partition("#")[0]
-    for prefix in (REPOSITORY, PICTURES):
-        if target.startswith(prefix):
-            return ROOT / target.removeprefix(prefix)
     if "://" in target or target.startswith("mailto:"):
         return None
     return (page.path.parent / target).resolve() if target else page.path

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import ast
 import importlib
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections import defaultdict
+from pathlib import Path
 
 import pytest
-from tests.examples.pages import REPOSITORY, ROOT, Page, file_of, pages
+from tests.examples.pages import ROOT, Page, file_of, pages
 
 PAGES = pages()
 #: Shown on package pages as well as in the repository.
-ON_PACKAGE_PAGES = [page for page in PAGES if page.path.name == "README.md" and "docs" not in page.path.parts]
+READMES = [Page(ROOT / "README.md"), Page(ROOT / "sim" / "README.md")]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
@@ -40,14 +47,64 @@ def test_every_page_can_be_reached_from_the_readme() -> None:
     assert [str(page) for page in PAGES if page.path not in reached and not is_of_the_site(page)] == []
 
 
-def test_two_readmes_are_shown_on_package_pages() -> None:
-    assert [str(page) for page in ON_PACKAGE_PAGES] == ["README.md", "sim/README.md"]
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_a_page_needs_no_network_for_the_repositorys_own_files(page: Page) -> None:
+    assert [link for link in page.links if "limo-hog/limo-hog/blob/main" in link or "githubusercontent" in link] == []
 
 
-@pytest.mark.parametrize("page", ON_PACKAGE_PAGES, ids=str)
-def test_a_package_page_has_no_relative_link(page: Page) -> None:
-    relative = [link for link in page.links if not link.startswith(("https://", "#"))]
-    assert relative == [], f"write {REPOSITORY}… for files of the repository"
+@pytest.fixture(scope="module")
+def packaged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of what the pages link to, with the pages as the distributions are built from them."""
+    folder = tmp_path_factory.mktemp("checkout")
+    for page in READMES:
+        for name in [page.path, *(file for link in page.links if (file := file_of(page, link)))]:
+            copy = folder / name.relative_to(ROOT)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.mkdir(exist_ok=True) if name.is_dir() else shutil.copy(name, copy)
+    (folder / ".ci").mkdir()
+    shutil.copy(ROOT / ".ci" / "package_page", folder / ".ci")
+    subprocess.run([sys.executable, folder / ".ci" / "package_page"], check=True)
+    return folder
+
+
+@pytest.mark.parametrize("page", READMES, ids=str)
+def test_a_package_page_has_the_readmes_links_as_whole_addresses(page: Page, packaged: Path) -> None:
+    links = Page(packaged / page.path.relative_to(ROOT)).links
+    assert [link for link in links if not link.startswith("https://")] == []
+    home = re.compile(r"https://(?:github|raw\.githubusercontent)\.com/limo-hog/limo-hog/(?:(?:blob|tree)/)?main/(.*)")
+    led = [ROOT / found[1].partition("#")[0] for link in links if (found := home.fullmatch(link))]
+    assert led == [file for link in page.links if (file := file_of(page, link))]
+
+
+@pytest.mark.parametrize(("text", "code"), [("[a](docs/a.md)", 1), ("[a](https://example.org/a.md)", 0)])
+def test_a_distribution_with_a_relative_link_is_refused(text: str, code: int, tmp_path: Path) -> None:
+    wheel = tmp_path / "a-1-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        archive.writestr("a-1.dist-info/METADATA", f"Name: a\n\n{text}\n")
+    command = [sys.executable, str(ROOT / ".ci" / "package_page"), str(wheel)]
+    assert subprocess.run(command, capture_output=True, check=False).returncode == code
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if not is_of_the_site(page)], ids=str)
+def test_a_page_opens_with_a_sentence_that_says_what_it_is_for(page: Page) -> None:
+    title, opening, *_ = page.text.split("\n\n")
+    assert re.fullmatch(r"# .+", title)
+    assert re.match(r"[*`]*\w", opening) and re.search(r"[.:][*]*$", opening)
+
+
+def sentences(page: Page) -> set[str]:
+    """The sentences of a page's prose, of six words or more, in small letters without punctuation."""
+    prose = re.sub(r"^(```.*?^```|[|#].*?)$", "\n\n", page.text, flags=re.MULTILINE | re.DOTALL)
+    parts = re.split(r"\n\s*\n|^- |^\d\. |(?<=[.:;!?])\s+", prose, flags=re.MULTILINE)
+    return {re.sub(r"\W+", " ", part.lower()).strip() for part in parts if len(part.split()) >= 6}
+
+
+def test_no_two_pages_have_a_sentence_in_common() -> None:
+    homes = defaultdict(list)
+    for page in PAGES:
+        for sentence in sentences(page):
+            homes[sentence].append(str(page))
+    assert {sentence: where for sentence, where in homes.items() if len(where) > 1} == {}
 
 
 BLOCKS = [(page, i, block) for page in PAGES for i, block in enumerate(page.python)]

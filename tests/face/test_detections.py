@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from urllib.parse import urlsplit
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,6 +16,7 @@ from numpy.typing import NDArray
 import limo_hog
 from limo_hog import Detections, PeopleDetector
 from limo_hog.cli.support.scene import street
+from limo_hog.exceptions import HogError
 from limo_hog.models import Calibration, PersonBox
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
@@ -98,3 +102,49 @@ def test_detecting_and_enlarging_need_no_opencv() -> None:
         "limo_hog.PeopleDetector().detect(np.zeros((200, 200, 3), np.uint8))"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_detections_are_an_array_of_boxes_and_scores() -> None:
+    array = np.asarray(some())
+    assert array.dtype == np.float64
+    assert array.tolist() == [[0, 0, 64, 128, 2.0], [100, 50, 128, 256, 0.5], [10, 10, 100, 200, -1.0]]
+    assert np.asarray(Detections.none()).shape == (0, 5)
+    assert some().xyxy.tolist() == [[0, 0, 64, 128], [100, 50, 228, 306], [10, 10, 110, 210]]
+
+
+def test_detections_are_equal_where_all_they_hold_is() -> None:
+    other = replace(some(), scores=np.array([2.0, 0.5, -1.1]))
+    assert some() == some()
+    assert some() != other
+    assert some() != replace(some(), calibration=Calibration(1, 0))
+    assert some() != "people"
+    assert len({some(), some(), other}) == 2
+
+
+def test_detections_say_how_many_people_there_are() -> None:
+    assert str(some()) == "3 people, best 2.00"
+    assert str(some()[:1]) == "1 person, best 2.00"
+    assert str(Detections.none()) == "0 people"
+
+
+def test_detections_become_json() -> None:
+    found = replace(some()[:1], calibration=Calibration(1, 0))
+    assert json.loads(json.dumps(some()[:1].to_dict())) == {"boxes": [[0, 0, 64, 128]], "scores": [2.0]}
+    assert found.to_dict()["probabilities"] == found.probabilities.tolist()
+
+
+def test_the_picture_is_saved_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    image = picture().copy()
+    found = PeopleDetector().detect(image)
+    found.save(tmp_path / "people.png")
+    found.show()
+    written = cv2.imread(str(tmp_path / "people.png"))
+    np.testing.assert_array_equal(written, found.draw(image))
+    (shown,) = [Path(urlsplit(address).path) for address in opened]
+    np.testing.assert_array_equal(cv2.imread(str(shown)), written)
+    del image
+    with pytest.raises(HogError, match=r"is gone: keep it in a variable, or use draw"):
+        found.save(tmp_path / "again.png")

@@ -114,3 +114,9 @@ def test_without_either_the_error_names_what_to_install(file: Path) -> None:
     done = without("cv2 PIL", "limo_hog.PeopleDetector().detect(sys.argv[1])", file)
     assert done.stderr.strip().endswith("reading pictures needs OpenCV or Pillow: pip install 'limo-hog[cv]'")
     assert MissingExtraError.__name__ in done.stderr
+
+
+@pytest.mark.parametrize(("given", "told"), [([], "detect_many takes a list"), (None, "did imread fail")])
+def test_what_is_no_image_is_answered_with_what_was_meant(given: object, told: str) -> None:
+    with pytest.raises(ImageTypeError, match=rf"also a file's name or a PIL image; this is a .*{told}"):
+        PeopleDetector().detect(given)  # type: ignore[arg-type]

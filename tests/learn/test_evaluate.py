@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,23 @@ def test_the_report_is_a_page_with_the_curve_and_the_mistakes(
     assert [m["box"] for m in missed] == [[10, 5, 15, 40]]
     sheet = np.asarray(cv2.imread(str(out / "mistakes.png")))
     assert sheet.std() > 10
+
+
+def test_figures_from_few_objects_come_with_a_warning(
+    streets: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["evaluate", "opencv", str(streets), "--report", str(tmp_path / "report")]) == 0
+    told = re.search(r"only \d+ objects?: below 50 these figures are mostly chance", capsys.readouterr().out)
+    assert told is not None
+    assert told[0] in (tmp_path / "report" / "index.html").read_text("utf-8")
+
+
+def test_the_report_speaks_of_figures_by_their_names_and_of_colours_as_they_are(streets: Path, tmp_path: Path) -> None:
+    command = ["evaluate", "opencv", str(streets), "--against", "daimler", "--report", str(tmp_path / "report")]
+    assert main(command) == 0
+    page = (tmp_path / "report" / "index.html").read_text("utf-8")
+    assert "recall_01" not in page and ">lamr<" not in page
+    assert "False alarms in orange" in page and 'name="viewport"' in page
 
 
 @pytest.mark.parametrize(

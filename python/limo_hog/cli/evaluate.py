@@ -42,7 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=_score,
         default=-1.2,
         metavar="T",
-        help="where the curve ends: no surer hit is left out (%(default)s)",
+        help="lowest score counted (%(default)s)",
     )
     parser.add_argument("--report", type=Path, metavar="DIR", help="write a page with the curve and the worst mistakes")
     parser.add_argument(
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure, print a table and, if asked, write JSON and a page."""
     from limo_hog.cli.support.progress import progress
     from limo_hog.cli.support.warned import warnings_in_one_line
-    from limo_hog.learn.evaluation.run import EvaluationParameters, as_json, evaluate
+    from limo_hog.learn.evaluation.run import EvaluationParameters, as_json, evaluate, few
     from limo_hog.learn.formats import read_labels
     from limo_hog.learn.labels import choose
 
@@ -81,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json != STDOUT:
         objects = sum(not box.ignored for picture in used for box in picture.boxes)
         _print(f"{len(used)} pictures with {objects} objects", evaluations, how)
+        if warning := few(objects):
+            print(warning)
     if args.report:
         page = write_report(args.report, used, evaluations, how)
         if args.json != STDOUT:
@@ -133,7 +135,7 @@ def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters)
     for other in evaluations[1:]:
         lamr = compare(evaluations[0], other, how)[0]
         low, high = lamr.interval
-        sure = "" if low <= 0 <= high else ", more than the choice of pictures"
+        sure = "" if low <= 0 <= high else ", unlikely to be chance"
         names = f"{evaluations[0].name} minus {other.name}"
         console.print(
             f"LAMR of {names}: {lamr.difference:+.3f} ({low:+.3f} to {high:+.3f}){sure}",

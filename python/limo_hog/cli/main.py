@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
 from types import ModuleType, SimpleNamespace
+from typing import Any, NoReturn
 
 from limo_hog.cli.support.output import UsageError, one_line
 from limo_hog.cli.support.signals import stopping
@@ -42,6 +43,29 @@ ARENA = {
     "score": "compare controllers over scenarios and seeds, on all cores",
     "export": "write labelled pictures of the arena, to train and to measure detectors on",
 }
+
+
+class _Help(argparse.HelpFormatter):
+    """Breaks lines between words alone: an address stays one that can be clicked."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        # Imported here: only help needs it.
+        from textwrap import wrap
+
+        return wrap(" ".join(text.split()), width, break_on_hyphens=False, break_long_words=False)
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return "\n".join(indent + line for line in self._split_lines(text, width))
+
+
+class _Parser(argparse.ArgumentParser):
+    """Answers a wrong argument in two lines, without all the options before."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"formatter_class": _Help, **options})
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"usage: {self.prog} [options], as {self.prog} --help lists them\n{self.prog}: error: {message}\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -72,7 +96,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(arguments: list[str]) -> int:
     wanted = next((argument for argument in arguments if not argument.startswith("-")), None)
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="limo-hog",
         description="OpenCV's HOG people detector, many times faster, and a robot arena to try it on.",
     )
@@ -131,8 +155,10 @@ def _likely(word: str, known: Iterable[str]) -> str:
     # Imported here: only a mistyped word needs it.
     from difflib import get_close_matches
 
-    found = get_close_matches(word, list(known), 1)
-    return f"did you mean {found[0]}?" if found else ""
+    # Without dashes, which every option has in common.
+    bare = {name.lstrip("-"): name for name in known}
+    found = get_close_matches(word.lstrip("-"), bare, 1, cutoff=0.7)
+    return f"did you mean {bare[found[0]]}?" if found else ""
 
 
 def _module_of(command: str, arguments: list[str]) -> ModuleType | None:

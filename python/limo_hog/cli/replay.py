@@ -24,6 +24,16 @@ if TYPE_CHECKING:
     from limo_hog.ros2.replay import Replayed
 
 
+#: How the table words a figure, and what stands behind its number.
+_SHOWN = {
+    "same_detections": ("same detections", "of the {frames_recorded_with_detections} frames recorded with some"),
+    "linear_difference_max": ("largest difference of forward speed", "m/s"),
+    "angular_difference_max": ("largest difference of turn rate", "rad/s"),
+    "detect_ms_p50": ("detection, median", "ms a frame"),
+}
+_WHY = "Detections and commands differ where another detector, controller or version made the recording."
+
+
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add `replay`."""
     parser = subparsers.add_parser(
@@ -77,8 +87,12 @@ def run(args: argparse.Namespace) -> int:
         table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
         for name, value in card.items():
             shown = f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)
-            table.add_row(name.replace("_", " "), shown)
-        Console(highlight=False).print(table)
+            label, unit = _SHOWN.get(name, (name.replace("_", " "), ""))
+            table.add_row(label, f"{shown} {unit.format(**card)}".rstrip())
+        console = Console(highlight=False)
+        console.print(table)
+        if card["same_detections"] < card["frames_recorded_with_detections"] or card["linear_difference_max"]:
+            console.print(_WHY, soft_wrap=True)
     failures = [frame["failure"] for frame in frames if frame["failure"]]
     if failures:
         print(f"{len(failures)} of {len(frames)} frames: {failures[0]}", file=sys.stderr)

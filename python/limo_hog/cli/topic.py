@@ -49,7 +49,10 @@ def run(args: argparse.Namespace) -> int:
 
     bus = Bus()
     if args.action == "list":
-        for name, ends in bus.topics().items():
+        topics = bus.topics()
+        if not topics:
+            print(f"no topics in ROS domain {bus.domain}", file=sys.stderr)
+        for name, ends in topics.items():
             print(f"{name} [{ends.type_name}]" if args.show_types else name)
         return 0
     topic = args.topic if args.topic.startswith("/") else f"/{args.topic}"

@@ -38,7 +38,12 @@ def pixels(image: Any) -> NDArray[np.uint8]:
     if image is None:
         raise ImageTypeError("the image is None: did imread find no file, or is the video over?")
     if not isinstance(image, np.ndarray):
-        raise ImageTypeError(f"an image is a uint8 numpy array; this is a {type(image).__name__}")
+        hint = "; detect_many takes a list" if isinstance(image, (list, tuple)) else ""
+        hint = "; did imread fail, or is the video over?" if image is None else hint
+        raise ImageTypeError(
+            f"an image is a uint8 numpy array, for PeopleDetector also a file's name or a PIL image; this is a "
+            f"{type(image).__name__}{hint}"
+        )
     if image.size == 0:
         raise ImageError(f"the image is empty: its shape is {image.shape}")
     if image.dtype != _UINT8:

@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--ros2", action="store_true", help="publish and subscribe to ROS 2 topics over DDS, on this machine alone"
     )
     add_scenario(parser, math.inf, "simulated time after which to stop (never)")
-    add_watching(parser)
+    add_watching(parser, plot=False)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -74,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
             data = {"info": {**about_all, "code_version": code_version()}, "categories": categories}
             text = json.dumps({**data, "images": images, "annotations": annotations}) + "\n"
             write_text(folder / "coco.json", text)
+            print(f"{folder}: pictures: {len(images)}, labelled things: {len(annotations)}, labels: coco.json")
     return 0
 
 

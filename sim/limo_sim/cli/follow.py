@@ -6,12 +6,12 @@ import argparse
 from typing import TYPE_CHECKING
 
 from limo_hog.cli.support.arguments import add_follower
-from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.cli.options import add_json, add_scenario
-from limo_sim.cli.watching import add_watching, observing
+from limo_sim.cli.watching import HERE, PORT, add_watching, finish, observing, shown_unasked
 
 if TYPE_CHECKING:
     from limo_sim.run.log import Step
@@ -42,6 +42,8 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.world.scenario import Scenario
     from limo_sim.world.variants import of_run
 
+    if shown_unasked(args):
+        args.view = HERE, 0
     scenario = of_run(Scenario.load(args.scenario), args.seed)
     controller = Tunable(controller_named(args.controller, args.target))
     detector = detector_named(args.detector)
@@ -64,10 +66,7 @@ def run(args: argparse.Namespace) -> int:
             )
         card = score(episode)
         observers.end(episode, card)
-    if args.json:
-        write_json(args.json, card.to_json())
-    if args.json != STDOUT:
-        from limo_sim.cli.card import show
-
-        show(card)
+    finish(args, card)
+    if args.json != STDOUT and not args.view and args.video is None:
+        print(f"To see the robot follow: limo-hog follow --view, and http://{HERE}:{PORT}/ in a browser")
     return 0

@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
 from limo_sim.cli.options import add_json, add_scenario
-from limo_sim.cli.watching import add_watching, observing
+from limo_sim.cli.watching import add_watching, finish, observing
 
 if TYPE_CHECKING:
     from limo_sim.run.log import Step
@@ -77,12 +77,7 @@ def run(args: argparse.Namespace) -> int:
         card = score_of(ended)
         bar.stop()
         observers.end(ended.episode, card)
-    if args.json:
-        write_json(args.json, card.to_json())
-    if args.json != STDOUT:
-        from limo_sim.cli.card import show
-
-        show(card)
+    finish(args, card)
     if ended.failure:
         # What was printed before comes first, where both go to one terminal or file.
         sys.stdout.flush()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
+import webbrowser
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -11,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import file_ending
+from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.signals import held
 
 if TYPE_CHECKING:
@@ -21,19 +24,20 @@ if TYPE_CHECKING:
     from limo_sim.view.tuning import Tunable
     from limo_sim.world.scenario import Scenario
 
-PORT = 8488
+HERE, PORT = "127.0.0.1", 8488
 
 
-def add_watching(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+def add_watching(parser: argparse.ArgumentParser, *, plot: bool = True) -> None:
+    """Add the options; --plot is not shown where a run has no end at which to draw."""
     group = parser.add_argument_group("to show and to record the run")
     group.add_argument(
         "--view",
         nargs="?",
-        const=("127.0.0.1", PORT),
+        const=(HERE, PORT),
         type=_address,
-        metavar="[HOST:]PORT",
-        help=f"show the run, in real time, on a page of its own ({PORT}); without HOST to this machine alone",
+        metavar="[HOST:]PORT|off",
+        help=f"show the run, in real time, on a page ({PORT}), which opens where there is a display; without HOST to "
+        "this machine alone. `follow` shows it unasked where nothing else is asked for",
     )
     group.add_argument(
         "--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="film what the follower saw (H.264)"
@@ -48,15 +52,41 @@ def add_watching(parser: argparse.ArgumentParser) -> None:
         "--plot",
         type=file_ending(".png", ".svg", ".pdf"),
         metavar="FILE.png",
-        help="draw path, pixel error, distance and speed in one figure (not with arena)",
+        help="draw path, pixel error, distance and speed in one figure" if plot else argparse.SUPPRESS,
     )
 
 
-def _address(text: str) -> tuple[str, int]:
+def finish(args: argparse.Namespace, card: ScoreCard) -> None:
+    """Write the score card as JSON, or show it, and say what else was written."""
+    if args.json:
+        write_json(args.json, card.to_json())
+    if args.json != STDOUT:
+        from limo_sim.cli.card import show
+
+        show(card)
+        if written := [str(one) for one in (args.json, args.video, args.record, args.plot) if one is not None]:
+            print(f"written: {', '.join(written)}")
+
+
+def _address(text: str) -> tuple[str, int] | tuple[()]:
+    if text == "off":
+        return ()
     host, _, port = text.rpartition(":")
     if not port.isdecimal() or int(port) > 65535:
         raise argparse.ArgumentTypeError(f"{text!r} is no [HOST:]PORT such as {PORT} or 0.0.0.0:{PORT}")
-    return host.strip("[]") or "127.0.0.1", int(port)
+    return host.strip("[]") or HERE, int(port)
+
+
+def has_display() -> bool:
+    """Whether somebody sits at a terminal beside whom a browser's window can open."""
+    graphical = sys.platform in ("darwin", "win32") or any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return graphical and sys.stderr.isatty() and "SSH_CONNECTION" not in os.environ
+
+
+def shown_unasked(args: argparse.Namespace) -> bool:
+    """Whether a run is to be shown though nobody said so: where it can be, and nothing else was asked for."""
+    asked = (args.view, args.video, args.record, args.plot, args.json)
+    return has_display() and all(one is None for one in asked)
 
 
 @dataclass
@@ -127,11 +157,13 @@ def observing(
             from limo_sim.view.record import recorded
 
             observers.keepers.append(stack.enter_context(recorded(args.record, scenario.camera)))
-        if args.view is not None:
+        if args.view:
             from limo_sim.view.server import View
 
             observers.view = stack.enter_context(View(scenario, controller, *args.view))
             print(f"watch the run at {observers.view.url}", file=sys.stderr)
+            if has_display():
+                webbrowser.open(observers.view.url)
         try:
             yield observers
         except KeyboardInterrupt as error:

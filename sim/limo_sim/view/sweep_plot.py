@@ -49,10 +49,15 @@ def plot(summaries: Sequence[Summary], path: Path) -> None:
         for place, controller in enumerate(controllers):
             shift = 0.7 / len(controllers) * (place - (len(controllers) - 1) / 2)
             _dots(axes, [one for one in summaries if one.controller == controller], name, scenarios, shift)
-        axes.set_title(title, loc="left", fontsize=10, color=_INK)
+        axes.set_title(title.replace(" [", "\n["), loc="left", fontsize=10, color=_INK)
         axes.set_yticks(range(len(scenarios)), scenarios)
         axes.set_ylim(len(scenarios) - 0.5, -0.5)
-        axes.set_xlim(0, 1.02 if share else None)
+        if share:
+            axes.set_xlim(-0.02, 1.02)
+        else:
+            axes.set_xlim(left=-0.02 * axes.get_xlim()[1])
+        if all(one.measures[name] is None for one in summaries):
+            axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center", color=_FAINT)
         axes.grid(axis="x", color=_FAINT, alpha=0.3, linewidth=0.6)
         axes.tick_params(length=0, labelsize=9, colors=_INK)
         axes.spines[["top", "right", "left"]].set_visible(False)

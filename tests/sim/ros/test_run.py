@@ -48,6 +48,17 @@ def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
         np.testing.assert_array_equal(window, image)
 
 
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [(node("raise ValueError('boom')"), "failed with ValueError"), (node("pass"), "never published on /cmd_vel")],
+    ids=["crashes", "only spins"],
+)
+def test_a_node_that_fails_has_no_success(script: str, said: str, run: Run) -> None:
+    card = score_of(run(script, STANDING, 1.0))
+    assert card.success is False
+    assert said in str(card.to_json()["failure"])
+
+
 def test_a_nodes_windows_are_on_the_live_page_under_their_names(run: Run) -> None:
     steps: list[Step] = []
     run(node(FOLLOW), STANDING, 0.2, watch=steps.append)

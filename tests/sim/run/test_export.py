@@ -99,3 +99,10 @@ def test_a_folder_with_files_is_not_written_into(tmp_path: Path, capsys: pytest.
     assert main(["export", "--out", str(tmp_path)]) == 2
     assert "not empty" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_export_says_what_it_wrote(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "--scenario", "standing", "--frames", "2", "--out", str(tmp_path / "a")]) == 0
+    told = capsys.readouterr().out
+    labels = json.loads((tmp_path / "a" / "coco.json").read_text())["annotations"]
+    assert told == f"{tmp_path / 'a'}: pictures: 2, labelled things: {len(labels)}, labels: coco.json\n"

@@ -121,12 +121,20 @@ def _steer_it(page: Page, view: View) -> None:
     _take_light_and_dark(page, "desk")
 
 
+def _see_the_controls_in_one_row(page: Page) -> None:
+    tops = "[...document.querySelectorAll('.controls > *')].map((c) => c.getBoundingClientRect().height)"
+    assert max(page.evaluate(tops)) < 48
+    assert page.evaluate("document.querySelector('.controls').getBoundingClientRect().height") < 60
+    assert page.evaluate("document.querySelector('.controls label span').offsetWidth") > 20
+
+
 def _see_it_on_a_phone(browser: Browser, view: View, controller: Tunable[Any]) -> None:
     page = browser.new_page(viewport={"width": 390, "height": 844}, device_scale_factor=2, is_mobile=True)
     page.goto(view.url)
     _until(page, "now && now.paused")
     expect(page.locator("#camera")).to_have_js_property("naturalWidth", 640)
     _take_light_and_dark(page, "phone")
+    _see_the_controls_in_one_row(page)
     # The caption is text, not part of the picture, and every parameter tells what it is.
     assert page.evaluate("parseFloat(getComputedStyle(document.querySelector('#seen')).fontSize)") >= 14
     fields = page.evaluate(

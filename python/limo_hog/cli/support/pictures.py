@@ -22,6 +22,7 @@ import limo_hog
 from limo_hog.cli.support.environment import cores
 from limo_hog.cli.support.output import UsageError, one_line, printable
 from limo_hog.cli.support.results import Result, Results, refuse_to_overwrite
+from limo_hog.detections import people
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ImageError
 from limo_hog.imaging.drawing import annotate
@@ -72,6 +73,7 @@ class Run:
         self._task = bar.add_task("looking", total=0) if bar else None
         self.pictures = self.peopled = self.people = self.failed = self.known = 0
         self._ms = 0.0
+        self._films = False
 
     def find(self, stack: ExitStack) -> None:
         """Expand every input, and name each annotated copy.
@@ -87,6 +89,7 @@ class Run:
             for source in self._expand(name, stack):
                 named.setdefault(_identity(source), source)
         self._sources = list(named.values())
+        self._films = any(source.kind is not Kind.IMAGE for source in self._sources)
         if self._args.out is not None:
             self._copies = _copies(self._sources, self._args.out, self._args.format)
             own = {source.path.resolve() for source in self._sources}
@@ -113,10 +116,16 @@ class Run:
 
     def summary(self, seconds: float) -> str:
         """Return counts and times in one line."""
-        pictures = "picture" if self.pictures == 1 else "pictures"
-        words = [f"{self.pictures} {pictures}, {self.people} people in {self.peopled} of them"]
+        # The same person is found in frame after frame of a film.
+        found = f"{self.people} detections" if self._films else f"{people(self.people)} in {self.peopled} of them"
+        if not self._films and self.pictures == 1:
+            found = people(self.people)
+        words = [f"{_of(self.pictures, 'frame' if self._films else 'picture')}, {found}"]
         if self.pictures:
-            words.append(f"{self._ms / self.pictures:.1f} ms each, {self.pictures / seconds:.4g} a second")
+            each = " each" if self.pictures > 1 else ""
+            words.append(f"detection {self._ms / self.pictures:.1f} ms{each}")
+        if self.pictures > 1:
+            words[-1] += f", with reading and writing {1e3 * seconds / self.pictures:.1f} ms"
         if self.known:
             words.append(f"{self.known} done before")
         if self.failed:
@@ -192,7 +201,7 @@ class Run:
                     if write and picture is not None:
                         write(picture)
                     if found.frame not in done:
-                        self._keep(found)
+                        self._keep(found, film=True)
                     self._advance()
             except KeyboardInterrupt:
                 # Ctrl-C is how a camera's or a stream's run ends: its copy is complete.
@@ -229,7 +238,7 @@ class Run:
         if self._bar and self._task is not None:
             self._bar.advance(self._task)
 
-    def _keep(self, found: Row) -> None:
+    def _keep(self, found: Row, film: bool = False) -> None:
         self._write(vars(found))
         if self.results is not None:
             self.results.append(vars(found))
@@ -238,8 +247,8 @@ class Run:
         self.peopled += bool(found.scores)
         self._ms += found.ms
         if self._args.json is None and self._args.out is None:
-            where = f"{found.source}:{found.frame}" if found.frame else found.source
-            print(f"{printable(where)}  {len(found.scores)} people ", *(f"{score:.2f}" for score in found.scores))
+            where = f"{found.source}:{found.frame}" if film else found.source
+            print(f"{printable(where)}  {people(len(found.scores))} ", *(f"{score:.2f}" for score in found.scores))
 
     def _fail(self, line: str) -> None:
         self.failed += 1
@@ -248,6 +257,10 @@ class Run:
             self._bar.console.print(line, highlight=False, markup=False, soft_wrap=True)
         else:
             print(line, file=sys.stderr)
+
+
+def _of(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _identity(source: Source) -> object:

@@ -14,7 +14,7 @@ from limo_hog.atomic import about, whole_file, write_text
 from limo_hog.extras import needed
 from limo_hog.imaging.writing import write_image
 from limo_hog.learn.evaluation.mistakes import draw_sheet, worst_mistakes
-from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, as_json, compare
+from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, as_json, compare, few
 from limo_hog.learn.labels import Picture
 
 with needed(by="--report"):
@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 
 #: Miss rates and FPPI that the plot shows.
 _LEAST_MISS_RATE, _FPPI = 0.02, (10**-2.3, 10**1.2)
+#: What the page calls each figure.
+_FIGURES = {"lamr": "LAMR", "recall_01": "recall at 0.1 FPPI", "recall_1": "recall at 1 FPPI", "ap": "AP"}
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#1d2733}
-table{border-collapse:collapse;margin:1rem 0}
+table{border-collapse:collapse;margin:1rem 0;display:block;overflow-x:auto}
 td,th{padding:.25rem .8rem;border-bottom:1px solid #d7dde4;text-align:right}
 td:first-child,th:first-child{text-align:left}small{color:#66727f}img{max-width:100%}"""
 
@@ -61,7 +63,9 @@ def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:
     axes: Axes = figure.add_subplot()
     for one in evaluations:
         miss = np.maximum(1 - one.curve.recall, _LEAST_MISS_RATE / 2)
-        axes.step(one.curve.fppi, miss, where="post", label=f"{one.figures.lamr:.3f}  {one.name}")
+        axes.step(np.maximum(one.curve.fppi, _FPPI[0]), miss, where="post", label=f"{one.figures.lamr:.3f}  {one.name}")
+    if all(one.curve.recall[one.curve.fppi <= _FPPI[0]].max(initial=0.0) == 1.0 for one in evaluations):
+        axes.text(0.5, 0.5, "no misses", transform=axes.transAxes, ha="center", fontsize=16, color="#66727f")
     axes.set(xscale="log", yscale="log", xlim=_FPPI, ylim=(_LEAST_MISS_RATE, 1.02))
     axes.set(xlabel="false positives per image", ylabel="miss rate")
     ticks = [0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0]
@@ -92,14 +96,15 @@ def _page(
         for row in one.by_height
     ]
     differences = [
-        (f"{evaluations[0].name} − {d.name}", d.figure, f"{d.difference:+.3f}", _interval(d.interval, "+.3f"))
+        (f"{evaluations[0].name} − {d.name}", _FIGURES[d.figure], f"{d.difference:+.3f}", _interval(d.interval, "+.3f"))
         for other in evaluations[1:]
         for d in compare(evaluations[0], other, how)
     ]
     title = f"{evaluations[0].name} on {pictures} pictures with {objects} objects"
     recalls = ("recall at 0.1 FPPI", "at 1")
     parts = [
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>',
+        f'<!doctype html><html lang="en"><meta charset="utf-8">'
+        f'<meta name="viewport" content="width=device-width"><title>{html.escape(title)}</title>',
         f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1>",
         '<img src="det.png" alt="Miss rate over false positives per image">',
         _table(("model", "LAMR", *recalls, "AP", "threshold at 0.1 FPPI", "ms a picture"), rows),
@@ -107,8 +112,10 @@ def _page(
         f"A box is found from an IoU of {how.min_iou:g} on. Intervals: {share} of {how.draws} draws of the pictures."
         "</small></p>",
     ]
+    if warning := few(objects):
+        parts.insert(2, f"<p><b>{warning}</b></p>")
     if differences:
-        note = "An interval without 0: more than the choice of pictures."
+        note = "If the interval excludes 0, the difference is unlikely to be chance."
         parts += [
             "<h2>Differences, paired</h2>",
             _table(("models", "figure", "difference", "interval"), differences),
@@ -116,7 +123,7 @@ def _page(
         ]
     parts += ["<h2>By height</h2>", _table(("objects", "how many", *recalls), heights)]
     if mistakes:
-        alt = "False alarms in red with their score, missed people in green with their height"
+        alt = "False alarms in orange with their score and a blue centre, missed people in green with their height"
         parts += [f"<h2>The worst mistakes of {html.escape(evaluations[0].name)}</h2>", f"<p><small>{alt}</small></p>"]
         parts += [f'<img src="mistakes.png" alt="{alt}">']
     return "\n".join([*parts, "</html>", ""])

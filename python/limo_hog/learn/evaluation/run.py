@@ -24,6 +24,9 @@ from limo_hog.learn.evaluation.curve import (
 )
 from limo_hog.learn.labels import LabelError, Picture, inside, sizes_of
 
+#: With 50 objects the 95 % interval of a miss rate of .3 is ± .13.
+_FEW = 50
+
 
 @dataclass(frozen=True)
 class EvaluationParameters:
@@ -215,6 +218,13 @@ def compare(first: Evaluation, other: Evaluation, parameters: EvaluationParamete
         Difference(other.name, figure, a - b, (low, high))
         for figure, a, b, (low, high) in zip(Figures._fields, first.figures, other.figures, ends, strict=True)
     ]
+
+
+def few(objects: int) -> str:
+    """Return a warning where figures come from too few objects to mean much, else nothing."""
+    if objects >= _FEW:
+        return ""
+    return f"only {objects} object{'' if objects == 1 else 's'}: below {_FEW} these figures are mostly chance"
 
 
 def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation], how: EvaluationParameters) -> dict[str, Any]:

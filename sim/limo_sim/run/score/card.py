@@ -25,7 +25,8 @@ class ScoreCard:
         whole person.
     success
         Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
-        view for more than 10 s after being first in view; None where no person ever was in the arena.
+        view for more than 10 s after being first in view; None where no person ever was in the arena. A node that
+        failed, or never gave a command, has no success.
     frames
         Camera frames worked on.
     first_detection_s
@@ -75,6 +76,8 @@ class ScoreCard:
         Share of control periods in each mode, and for each reason.
     detect_ms_p50, detect_ms_p95, detect_ms_mean, render_ms_p50, real_time_factor
         Wall time; the only figures that differ between two runs of one seed.
+    failure
+        How the node failed, in a line; None where it did not.
     """
 
     scenario: str
@@ -124,6 +127,7 @@ class ScoreCard:
     detect_ms_mean: float | None
     render_ms_p50: float | None
     real_time_factor: float
+    failure: str | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures as JSON's types; all numbers are finite."""

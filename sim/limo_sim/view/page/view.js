@@ -323,9 +323,11 @@ function drawMap() {
     disc(x, y, 0.3);
     pen.strokeStyle = pen.fillStyle = colours.believed;
     pen.stroke();
-    pen.textAlign = "left";
-    const label = same === null ? percent(probability) : `${percent(probability)}, same ${percent(same)}`;
-    pen.fillText(label, at(x + 0.36, y)[0], at(x, y)[1] + 4);
+    // On the side where the room is wider: the map's edge cuts nothing off.
+    pen.textAlign = x > 0 ? "right" : "left";
+    const [edge, line] = at(x + (x > 0 ? -0.36 : 0.36), y);
+    pen.fillText(`person ${percent(probability)}`, edge, line - 2);
+    if (same !== null) pen.fillText(`followed ${percent(same)}`, edge, line + 12);
   }
   pen.setLineDash([]);
   pen.save();

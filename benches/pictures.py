@@ -107,7 +107,7 @@ def followed() -> NDArray[np.uint8]:
     """Return a frame of a run as `limo-hog follow --video` shows it."""
     seen: list[Step] = []
     controller = controller_named("tracking", None)
-    detector = PeopleDetector(min_height=None, nms="group")
+    detector = PeopleDetector(model="opencv", min_height=None, nms="group")
     run_episode(Scenario.load("workshop"), controller, detector, 14.0, 0, watch=seen.append)
     logs = [step.log for step in seen if step.log.frame is not None and step.log.decision.target is not None]
     return annotated(logs[-1])
@@ -117,9 +117,9 @@ def of_the_workshop() -> NDArray[np.uint8]:
     """Return a frame of two people with their boxes, in the colours that the workshop's nodes draw them in."""
     people = (Person(route=((3.0, -0.35, 0),), facing=0.0), Person(route=((4.1, -1.3, 0),), facing=0.3))
     image = Arena(Scenario(people=people), 0).frame().image.copy()
-    found = PeopleDetector(min_height=None, nms="group").detect(image)
+    found = PeopleDetector(model="opencv", min_height=None, nms="group").detect(image)
     best = int(np.argmax(found.scores))
-    for number, (x, y, w, h) in enumerate(found.boxes.tolist()):
+    for number, (x, y, w, h) in enumerate(found.windows.tolist()):
         red = number == best
         cv2.rectangle(image, (x, y), (x + w, y + h), (0, 0, 255) if red else (0, 255, 0), 3 if red else 2)
         if red:
@@ -130,7 +130,7 @@ def of_the_workshop() -> NDArray[np.uint8]:
 def live_page() -> NDArray[np.uint8]:
     """Return what a browser shows of a run of 40 s."""
     controller, scenario, shown = Tunable(controller_named("tracking", None)), Scenario.load("workshop"), 40.0
-    detector = PeopleDetector(min_height=None, nms="group")
+    detector = PeopleDetector(model="opencv", min_height=None, nms="group")
     with View(scenario, controller, pace=Pace(2)) as page, tempfile.TemporaryDirectory() as folder:
         there, picture = threading.Event(), Path(folder) / "page.png"
 

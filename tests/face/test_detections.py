@@ -30,8 +30,8 @@ def some() -> Detections:
 
 
 def test_the_person_is_two_tenths_in_from_the_side_and_one_from_the_top() -> None:
-    assert some().person_boxes.tolist() == [[13, 13, 38, 100], [126, 76, 77, 200], [30, 30, 60, 156]]
-    assert some().person_boxes.dtype == np.int32
+    assert some().boxes.tolist() == [[13, 13, 38, 100], [126, 76, 77, 200], [30, 30, 60, 156]]
+    assert some().boxes.dtype == np.int32
 
 
 def test_detections_are_indexed_as_they_are_iterated() -> None:
@@ -56,7 +56,7 @@ def test_a_slice_or_mask_of_detections_is_detections() -> None:
 def test_no_detections_are_empty_arrays() -> None:
     none = Detections.none()
     assert none.boxes.shape == (0, 4) and none.boxes.dtype == np.int32 and none.scores.shape == (0,)
-    assert len(none) == 0 and list(none) == [] and none.person_boxes.shape == (0, 4)
+    assert len(none) == 0 and list(none) == [] and none.boxes.shape == (0, 4)
 
 
 def test_opencvs_models_have_a_calibration_in_which_surer_is_likelier() -> None:

@@ -66,7 +66,7 @@ def test_the_table_holds_the_people_and_the_picture_their_boxes(file: Path) -> N
         people = PeopleDetector().detect(image)
         html = people._repr_html_()
         told = words(html)
-        for box, score in zip(people.person_boxes.tolist(), people.scores, strict=True):
+        for box, score in zip(people.boxes.tolist(), people.scores, strict=True):
             assert set(map(str, box)) <= set(told) and f"{score:.2f}" in told
         shown = picture(html)
         assert shown is not None

@@ -49,7 +49,7 @@ class ApproachController:
 def best_box(observation: Observation) -> tuple[int, int]:
     """Return the index of the box with the highest score, and how far left of the image's middle it is [px]."""
     target = int(np.argmax(observation.detections.scores))
-    return target, observation.width // 2 - box_centre(observation.detections.boxes[target])[0]
+    return target, observation.width // 2 - box_centre(observation.detections.windows[target])[0]
 
 
 def no_detection(detected_before: bool) -> Decision[bool]:

@@ -45,7 +45,7 @@ class ProxemicController:
         if len(observation.detections) == 0:
             return no_detection(state)
         target, error = best_box(observation)
-        box = observation.detections.boxes[target]
+        box = observation.detections.windows[target]
         distance = None if observation.depth is None else person_depth(observation.depth, box)
         if distance is None:
             return Decision(Twist(), True, Mode.BLOCKED, "no depth at the person", target)

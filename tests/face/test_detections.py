@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,7 @@ import limo_hog
 from limo_hog import Detections, PeopleDetector
 from limo_hog.cli.support.scene import street
 from limo_hog.models import Calibration, PersonBox
+from limo_hog.suppression import intersection_over_union
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
 Image = NDArray[np.uint8]
@@ -103,3 +105,14 @@ def test_detecting_and_enlarging_need_no_opencv() -> None:
         "limo_hog.PeopleDetector().detect(np.zeros((200, 200, 3), np.uint8))"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="photographs lie in ../shared")
+def test_on_a_street_no_box_is_on_what_is_no_person() -> None:
+    labels = {one["file"]: one["boxes_xywh"] for one in json.loads((PHOTOGRAPHS.parent / "manifest.json").read_text())}
+    frames = sorted(PHOTOGRAPHS.glob("TUD_*.jpg"))
+    assert len(frames) == 9
+    for frame in frames:
+        found = PeopleDetector().detect(frame)
+        overlap = intersection_over_union(found.boxes, np.array(labels[f"pedestrians/{frame.name}"])).max(axis=1)
+        assert (overlap > 0.3).all() and (overlap > 0.5).sum() >= 4

@@ -153,7 +153,7 @@ def photographed(data: Path, frames: Path, detector: Detector) -> tuple[list[Sig
         shown = in_view(boxes)
         for size in SIZES:
             sized = image if size == 1 else cv2.resize(image, None, fx=size, fy=size, interpolation=cv2.INTER_AREA)
-            found = detector.detect(sized).boxes
+            found = detector.detect(sized).windows
             people = [person_at(box * size) for box in boxes]
             on = [person_of(box, people) for box in found]
             sightings += [
@@ -173,7 +173,7 @@ def filmed(data: Path, frames: Path, detector: Detector) -> list[Sighting]:
     for frame, (image, boxes, names) in enumerate(tud(data, frames)):
         shown = in_view(boxes)
         people = [person_at(box) for box in boxes]
-        hits = {person_of(box, people) for box in detector.detect(image).boxes}
+        hits = {person_of(box, people) for box in detector.detect(image).windows}
         sightings += [
             Sighting(float(box[3]), index in hits, frame, names[index])
             for index, box in enumerate(boxes)
@@ -289,7 +289,7 @@ def plain(frames: Sequence[tuple[Truth, Detections]]) -> Iterator[Sighting]:
     for truth, found in frames:
         person = truth.people[0]
         if person is not None and person.box is not None and person.visible > WHOLE:
-            yield Sighting(float(person.box[3]), any(person_of(box, truth.people) == 0 for box in found.boxes))
+            yield Sighting(float(person.box[3]), any(person_of(box, truth.people) == 0 for box in found.windows))
 
 
 def with_model(frames: Sequence[tuple[Truth, Detections]], model: str, seed: int) -> Iterator[Sighting]:

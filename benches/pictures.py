@@ -50,7 +50,7 @@ QUALITY = 82  # of the JPEG files
 PAGE_SHOWN = 880  # rows of the live page; below them are the controller's parameters [px]
 FILM_S, SHOWN, FILM_QUALITY = 32.0, 360, 55  # of follow.webp: the run [s], rows of a picture [px], of the file
 ROBOT, PERSON = (178, 114, 0), (0, 94, 213)  # blue and orange of Okabe and Ito, blue first
-FOLLOWERS = PeopleDetector(min_height=None, nms="group")
+FOLLOWERS = PeopleDetector(model="opencv", min_height=None, nms="group")
 
 
 def view(scenario: Scenario, seconds: float, place: tuple[float, float, float] | None) -> NDArray[np.uint8]:
@@ -153,7 +153,7 @@ def of_the_workshop() -> NDArray[np.uint8]:
     image = Arena(Scenario(people=people), 0).frame().image.copy()
     found = FOLLOWERS.detect(image)
     best = int(np.argmax(found.scores))
-    for number, (x, y, w, h) in enumerate(found.boxes.tolist()):
+    for number, (x, y, w, h) in enumerate(found.windows.tolist()):
         red = number == best
         cv2.rectangle(image, (x, y), (x + w, y + h), (0, 0, 255) if red else (0, 255, 0), 3 if red else 2)
         if red:

@@ -145,14 +145,14 @@ def guided() -> Iterator[Line]:
     hog = detector(cv2, "people")
     for (name, frame), colour, kind in itertools.product(frames.items(), ("gray", "BGR"), ("guided", "exact")):
         image = frame if colour == "BGR" else cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
-        people = PeopleDetector(min_height=None, nms="group", group_threshold=2, search=kind)
+        people = PeopleDetector(model="opencv", min_height=None, nms="group", group_threshold=2, search=kind)
         yield Line(f"{kind}, {name}, {colour}", partial(ours, people, image), partial(theirs, hog, image))
 
 
 def ours(people: PeopleDetector, image: Any) -> Any:
     """Return our rectangles and scores, sorted by place: `PeopleDetector` puts the best first, OpenCV does not."""
     found = people.detect(image)
-    return np.array(sorted([*box, score] for box, score in zip(found.boxes, found.scores, strict=True)))
+    return np.array(sorted([*box, score] for box, score in zip(found.windows, found.scores, strict=True)))
 
 
 def theirs(hog: Any, image: Any) -> Any:

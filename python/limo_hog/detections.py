@@ -27,22 +27,24 @@ class Detections:
     """People found in one image, best first.
 
     `len(d)` counts them, iterating and `d[i]` give (box, score), a slice, mask or array of indices gives `Detections`.
-    Two are equal where all that they hold is. `np.asarray(d)` is float64 (N, 5): x, y, w, h, score. Jupyter shows a
-    table, and the picture as long as the program holds it, or its file is there.
+    `boxes` are around the people, `windows` what HOG looked through; both are in pixels of the image. Two are equal if
+    all that they hold is. `np.asarray(d)` is float64 (N, 5): x, y, w, h of the boxes, score. Jupyter shows a table, and
+    the picture as long as the program holds it, or its file is there.
 
     Attributes
     ----------
-    boxes
-        int32 (N, 4): x, y, w, h [px] of the detection windows, top left corner first.
+    windows
+        int32 (N, 4): x, y, w, h [px] of HOG's windows, which hold a margin around the person; `nms="group"` gives
+        OpenCV's rectangles.
     scores
-        float64 (N,): SVM margin of each box, descending; larger is surer, 0 is the model's own threshold.
+        float64 (N,): SVM margin of each window, descending; larger is surer.
     person_box
         Where the person stands in a window, as shares of it.
     calibration
         How the model's margins become probabilities; None where that was never measured.
     """
 
-    boxes: NDArray[np.int32]
+    windows: NDArray[np.int32]
     scores: NDArray[np.float64]
     person_box: PersonBox = PERSON_BOX
     calibration: Calibration | None = None
@@ -72,7 +74,7 @@ class Detections:
         return hash(self._held())
 
     def _held(self) -> tuple[Any, ...]:
-        return self.boxes.tobytes(), self.scores.tobytes(), self.person_box, self.calibration
+        return self.windows.tobytes(), self.scores.tobytes(), self.person_box, self.calibration
 
     def __iter__(self) -> Iterator[tuple[NDArray[np.int32], float]]:
         for box, score in zip(self.boxes, self.scores, strict=True):
@@ -85,15 +87,15 @@ class Detections:
     def __getitem__(self, index: slice | NDArray[Any]) -> Detections: ...
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> tuple[NDArray[np.int32], float] | Detections:
-        boxes, scores = self.boxes[index], self.scores[index]
+        scores = self.scores[index]
         if scores.ndim == 0:
-            return boxes, float(scores)
-        return dataclasses.replace(self, boxes=boxes, scores=scores)
+            return self.boxes[index], float(scores)
+        return dataclasses.replace(self, windows=self.windows[index], scores=scores)
 
     @property
-    def person_boxes(self) -> NDArray[np.int32]:
-        """int32 (N, 4): the boxes without the window's margin, tight around the person [px]."""
-        return np.rint(self.person_box.inside(self.boxes)).astype(np.int32)
+    def boxes(self) -> NDArray[np.int32]:
+        """int32 (N, 4): x, y, w, h [px] of the people, top left corner first: the windows without their margin."""
+        return np.rint(self.person_box.inside(self.windows)).astype(np.int32)
 
     @property
     def xyxy(self) -> NDArray[np.int32]:
@@ -102,7 +104,7 @@ class Detections:
 
     @property
     def probabilities(self) -> NDArray[np.float64]:
-        """float64 (N,): probability that each box holds a person, by the model's calibration.
+        """float64 (N,) in 0..1: probability that each box holds a person, by the model's calibration.
 
         Raises
         ------
@@ -113,8 +115,15 @@ class Detections:
             raise HogError("the model has no calibration, so its margins stand for no probabilities: use scores")
         return self.calibration.probabilities(self.scores)
 
+    @property
+    def labels(self) -> list[str]:
+        """What pictures and tables say of each box: its probability, such as "97 %"; without calibration its margin."""
+        if self.calibration is None:
+            return [f"{score:.2f}" for score in self.scores]
+        return [f"{100 * share:.0f} %" for share in self.probabilities]
+
     def draw(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Draw the people's boxes and scores into a copy of the image.
+        """Draw the people's boxes and labels into a copy of the image.
 
         Parameters
         ----------
@@ -132,11 +141,11 @@ class Detections:
         """
         from limo_hog.imaging.drawing import annotate
 
-        return annotate(pixels(image), self.person_boxes, [f"{score:.1f}" for score in self.scores])
+        return annotate(pixels(image), self.boxes, self.labels)
 
     def to_dict(self) -> dict[str, list[Any]]:
-        """Return lists of plain numbers, for JSON: boxes, scores, and probabilities where the model has them."""
-        held = {"boxes": self.boxes.tolist(), "scores": self.scores.tolist()}
+        """Return lists of plain numbers for JSON: boxes, windows, scores, and probabilities if calibrated."""
+        held = {"boxes": self.boxes.tolist(), "windows": self.windows.tolist(), "scores": self.scores.tolist()}
         return held if self.calibration is None else {**held, "probabilities": self.probabilities.tolist()}
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -181,10 +190,11 @@ class Detections:
         name = self._searched if isinstance(self._searched, str) else ""
         caption = f"{people(len(self))}{name and f' in {name}'}"
         rows = [
-            [str(i), *map(str, box), f"{score:.2f}"]
-            for i, (box, score) in enumerate(zip(self.person_boxes.tolist(), self.scores, strict=True))
+            [str(i), *map(str, box), label]
+            for i, (box, label) in enumerate(zip(self.boxes.tolist(), self.labels, strict=True))
         ]
-        return shown(caption, ("", "x", "y", "width", "height", "margin"), rows, self._jpeg())
+        meaning = "margin" if self.calibration is None else "probability"
+        return shown(caption, ("", "x", "y", "width", "height", meaning), rows, self._jpeg())
 
     def _jpeg(self) -> bytes | None:
         """Return the small picture with the boxes; None where it is gone, or OpenCV is not installed."""
@@ -198,14 +208,14 @@ class Detections:
             from limo_hog.imaging.writing import jpeg
 
             image, divisor = reduced(pixels(as_array(searched)))
-            small = dataclasses.replace(self, boxes=np.asarray(self.boxes // divisor, np.int32))
+            small = dataclasses.replace(self, windows=np.asarray(self.windows // divisor, np.int32))
             return jpeg(small.draw(image))
         except (LimoHogError, OSError):
             return None
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         # A copy in another process does not know the image.
-        return Detections, (self.boxes, self.scores, self.person_box, self.calibration)
+        return Detections, (self.windows, self.scores, self.person_box, self.calibration)
 
 
 class Detector(Protocol):

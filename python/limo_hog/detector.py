@@ -65,26 +65,26 @@ _FINEST_SCALE, _LEAST_HEIGHT_PX, _MOST_PIXELS = 1.005, 8.0, 2**28
 class PeopleDetector:
     """Finds standing and walking people in images; immutable, may be shared between threads.
 
-    All arguments are checked when it is made. `PeopleDetector(min_height=None, nms="group")` gives the rectangles of
-    `cv2.HOGDescriptor`'s `detectMultiScale` (winStride 8, padding 4, scale 1.05).
+    All arguments are checked when it is made. The windows of `PeopleDetector(model="opencv", min_height=None,
+    nms="group")` are the rectangles of `cv2.HOGDescriptor`'s `detectMultiScale` (winStride 8, padding 4, scale 1.05).
 
     Attributes
     ----------
     model
-        "opencv" (INRIA people, window 64 × 128; also "default"), "daimler" (window 48 × 96), "limo" (our weights,
-        window 64 × 128; people below 64 px are sought with a second one of 48 × 96), or the path of a file that OpenCV
-        or limo-hog wrote; or a `Model`; see `limo_hog.models.load_model`.
+        "limo" (our weights, window 64 × 128; people below 64 px are sought with a second one of 48 × 96), "opencv"
+        (OpenCV's default, window 64 × 128; also "default"), "daimler" (OpenCV's, window 48 × 96), or the path of a file
+        that OpenCV or limo-hog wrote; or a `Model`; see `limo_hog.models.load_model`.
     min_height
         Height of the smallest person to find [px], head to foot: the image is enlarged (or reduced) until they fill
         the model's window. Half the height takes four times the time. None searches the image as it is: people from
-        100 px on, for "daimler" and "limo" 75.
+        75 px on, for "opencv" 100.
     max_height
         Height of the tallest person to report [px]; None reports all.
     threshold
         Least SVM margin of a hit; raise it for fewer false alarms, lower it (to -1 and below) for fewer misses. None
         is the model's own: 0 for OpenCV's.
     nms
-        How one box is made of a person's many hits, which are compared by the person boxes inside of the windows.
+        How one window is chosen of a person's many hits, which are compared by the boxes around the person in them.
         "overlap": the best hit stays and removes those that share more than `overlap` of the smaller box's area;
         "group": OpenCV's grouping of the windows.
     overlap
@@ -110,7 +110,7 @@ class PeopleDetector:
         The model's file is damaged or cannot be read.
     """
 
-    model: str | os.PathLike[str] | Model = "opencv"
+    model: str | os.PathLike[str] | Model = "limo"
     min_height: float | None = 64.0
     max_height: float | None = None
     threshold: float | None = None

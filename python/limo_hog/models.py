@@ -1,4 +1,4 @@
-"""Trained people models: OpenCV's two by name, and those in files."""
+"""Trained people models: ours and OpenCV's two by name, and those in files."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,6 +45,8 @@ class Calibration(NamedTuple):
 
 #: The person box of OpenCV's models; at IoU 0.5 the best of a grid on three sets of street photographs.
 PERSON_BOX = PersonBox()
+#: That of detectors whose windows have no margin.
+WHOLE_WINDOW = PersonBox(0.0, 0.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,6 +94,8 @@ def _daimler() -> Model:
     return Model(geometry, _core.daimler_people_detector(), calibration=Calibration(2.38, -3.61))
 
 
+# Kept, as reading the files takes longer than searching a picture.
+@cache
 def _limo() -> Model:
     """Return our own weights, trained as docs/models.md says.
 

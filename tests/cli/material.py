@@ -13,7 +13,7 @@ from limo_hog.imaging.writing import video_writer
 
 PICTURE = street(192, 256, 3)
 #: With these `detect` gives OpenCV's rectangles.
-OPENCVS = ("--min-height", "none", "--nms", "group")
+OPENCVS = ("--model", "opencv", "--min-height", "none", "--nms", "group")
 
 
 def film_of(path: Path, frames: int = 12) -> None:

@@ -143,17 +143,60 @@ def test_a_small_person_is_found_by_enlarging(tmp_path: Path, capsys: pytest.Cap
     x, y, w, h = enlarged["boxes"][0]
     assert 0 <= x < x + w <= 77
     assert 0 <= y < y + h <= 102
-    assert all(0.78 * h <= 37.5 for _, _, _, h in low["boxes"])
+    assert all(h <= 37.5 for _, _, _, h in low["boxes"])
     assert len(low["boxes"]) < len(enlarged["boxes"])
 
 
-def test_person_boxes_lie_within_the_windows(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(pictures / "a.png")
-    assert main(["detect", path, "--json", "-"]) == 0
-    assert main(["detect", path, "--json", "-", "--person-box"]) == 0
-    window, person = (r["boxes"][0] for r in lines_of(capsys.readouterr().out))
-    x, y, w, h = window
-    assert person == [round(x + 0.2 * w), round(y + 0.1 * h), round(0.6 * w), round(0.78 * h)]
+def test_a_box_is_the_person_within_its_window(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["detect", str(pictures / "a.png"), "--json", "-"]) == 0
+    (result,) = lines_of(capsys.readouterr().out)
+    assert len(result["boxes"]) == len(result["windows"]) > 0
+    for box, (x, y, w, h) in zip(result["boxes"], result["windows"], strict=True):
+        assert box == [round(x + 0.2 * w), round(y + 0.1 * h), round(0.6 * w), round(0.78 * h)]
+
+
+def test_json_csv_and_coco_hold_margin_and_probability(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table, coco = tmp_path / "people.csv", tmp_path / "people.json"
+    wanted = [str(pictures / "a.png"), "--json", "-", "--csv", str(table), "--coco", str(coco)]
+    assert main(["detect", *wanted]) == 0
+    (result,) = lines_of(capsys.readouterr().out)
+    expected = PeopleDetector().detect(PICTURE)
+    assert result["probabilities"] == pytest.approx(expected.probabilities.tolist(), abs=1e-4)
+    assert all(0 <= share <= 1 for share in result["probabilities"])
+    told = list(zip(*(result[name] for name in ("boxes", "windows", "scores", "probabilities")), strict=True))
+    with table.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    box, window = ("x", "y", "w", "h"), ("window_x", "window_y", "window_w", "window_h")
+    for row, (person, around, score, share) in zip(rows, told, strict=True):
+        assert [int(row[name]) for name in box] == person and [int(row[name]) for name in window] == around
+        assert (float(row["score"]), float(row["probability"])) == (score, share)
+    annotations = json.loads(coco.read_text("utf-8"))["annotations"]
+    assert [(a["bbox"], a["window"], a["score"], a["probability"]) for a in annotations] == told
+
+
+def test_a_terminal_shows_each_persons_probability(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["detect", str(pictures / "a.png")]) == 0
+    found = PeopleDetector().detect(PICTURE)
+    assert len(found) > 0
+    assert capsys.readouterr().out.split("people")[1].split() == " ".join(found.labels).split()
+
+
+def test_a_model_without_calibration_shows_margins(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "plain.yml"
+    hog = limo_hog.HOGDescriptor()
+    hog.setSVMDetector(hog.getDefaultPeopleDetector())
+    hog.save(model)
+    path, table = str(pictures / "a.png"), tmp_path / "people.csv"
+    assert main(["detect", path, "--model", str(model), "--json", "-", "--csv", str(table)]) == 0
+    (result,) = lines_of(capsys.readouterr().out)
+    assert len(result["scores"]) > 0 and result["probabilities"] == [None] * len(result["scores"])
+    assert all(line.endswith(",") for line in table.read_text("utf-8").splitlines()[1:])
+    assert main(["detect", path, "--model", str(model)]) == 0
+    assert f"{result['scores'][0]:.2f}" in capsys.readouterr().out
 
 
 def test_overlapping_hits_leave_only_the_best(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -164,7 +207,7 @@ def test_overlapping_hits_leave_only_the_best(pictures: Path, capsys: pytest.Cap
     raw = PeopleDetector(nms="group", group_threshold=0).detect(PICTURE)
     assert len(all_["boxes"]) == len(raw)
     assert 0 < len(few["boxes"]) < len(raw)
-    assert few["boxes"][0] == raw.boxes[0].tolist()
+    assert few["windows"][0] == raw.windows[0].tolist()
 
 
 def test_a_picture_is_searched_once_however_its_name_is_spelled(
@@ -201,7 +244,7 @@ def test_copies_of_pictures_above_the_current_folder_lie_below_out(
     ("arguments", "told"),
     [
         (["--min-height", "300", "--max-height", "100"], "max_height is 100; at least 300"),
-        (["--min-height", "none", "--max-height", "50"], "max_height is 50; at least 99.84"),
+        (["--min-height", "none", "--max-height", "50"], "max_height is 50; at least 74.88"),
         (["--model", "bogus"], "model is 'bogus': no such file, and none of the names opencv, default, daimler"),
         (["--nms", "group", "--overlap", "0.5"], "overlap has no meaning"),
     ],
@@ -306,7 +349,7 @@ def test_photographs_give_opencvs_rectangles(tmp_path: Path, capsys: pytest.Capt
     assert len(results) == 12
     for result in results:
         wanted = golden[str(Path(result["source"]).relative_to(REAL))]["ws8_pad4_s1.05_group2"]
-        found = sorted(zip(result["boxes"], result["scores"], strict=True))
+        found = sorted(zip(result["windows"], result["scores"], strict=True))
         expected = sorted(zip(wanted["rects"], wanted["weights"], strict=True))
         assert [box for box, _ in found] == [box for box, _ in expected]
         assert [score for _, score in found] == pytest.approx([score for _, score in expected], abs=1e-5)

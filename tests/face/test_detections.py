@@ -18,6 +18,7 @@ from limo_hog import Detections, PeopleDetector
 from limo_hog.cli.support.scene import street
 from limo_hog.exceptions import HogError
 from limo_hog.models import Calibration, PersonBox
+from limo_hog.suppression import intersection_over_union
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
 Image = NDArray[np.uint8]
@@ -34,8 +35,8 @@ def some() -> Detections:
 
 
 def test_the_person_is_two_tenths_in_from_the_side_and_one_from_the_top() -> None:
-    assert some().person_boxes.tolist() == [[13, 13, 38, 100], [126, 76, 77, 200], [30, 30, 60, 156]]
-    assert some().person_boxes.dtype == np.int32
+    assert some().boxes.tolist() == [[13, 13, 38, 100], [126, 76, 77, 200], [30, 30, 60, 156]]
+    assert some().boxes.dtype == np.int32
 
 
 def test_detections_are_indexed_as_they_are_iterated() -> None:
@@ -60,7 +61,7 @@ def test_a_slice_or_mask_of_detections_is_detections() -> None:
 def test_no_detections_are_empty_arrays() -> None:
     none = Detections.none()
     assert none.boxes.shape == (0, 4) and none.boxes.dtype == np.int32 and none.scores.shape == (0,)
-    assert len(none) == 0 and list(none) == [] and none.person_boxes.shape == (0, 4)
+    assert len(none) == 0 and list(none) == [] and none.boxes.shape == (0, 4)
 
 
 def test_opencvs_models_have_a_calibration_in_which_surer_is_likelier() -> None:
@@ -74,6 +75,11 @@ def test_probabilities_need_a_calibration() -> None:
         _ = some().probabilities
     found = replace(some(), calibration=Calibration(500.0, 0.0))
     assert found.probabilities.tolist() == [1.0, 1.0, 0.0]
+
+
+def test_a_label_is_the_probability_and_without_calibration_the_margin() -> None:
+    assert some().labels == ["2.00", "0.50", "-1.00"]
+    assert replace(some(), calibration=Calibration(1, 0)).labels == ["88 %", "62 %", "27 %"]
 
 
 def test_the_people_are_drawn_into_a_copy() -> None:
@@ -107,9 +113,9 @@ def test_detecting_and_enlarging_need_no_opencv() -> None:
 def test_detections_are_an_array_of_boxes_and_scores() -> None:
     array = np.asarray(some())
     assert array.dtype == np.float64
-    assert array.tolist() == [[0, 0, 64, 128, 2.0], [100, 50, 128, 256, 0.5], [10, 10, 100, 200, -1.0]]
+    assert array.tolist() == [[13, 13, 38, 100, 2.0], [126, 76, 77, 200, 0.5], [30, 30, 60, 156, -1.0]]
     assert np.asarray(Detections.none()).shape == (0, 5)
-    assert some().xyxy.tolist() == [[0, 0, 64, 128], [100, 50, 228, 306], [10, 10, 110, 210]]
+    assert some().xyxy.tolist() == [[13, 13, 51, 113], [126, 76, 203, 276], [30, 30, 90, 186]]
 
 
 def test_detections_are_equal_where_all_they_hold_is() -> None:
@@ -129,7 +135,11 @@ def test_detections_say_how_many_people_there_are() -> None:
 
 def test_detections_become_json() -> None:
     found = replace(some()[:1], calibration=Calibration(1, 0))
-    assert json.loads(json.dumps(some()[:1].to_dict())) == {"boxes": [[0, 0, 64, 128]], "scores": [2.0]}
+    assert json.loads(json.dumps(some()[:1].to_dict())) == {
+        "boxes": [[13, 13, 38, 100]],
+        "windows": [[0, 0, 64, 128]],
+        "scores": [2.0],
+    }
     assert found.to_dict()["probabilities"] == found.probabilities.tolist()
 
 
@@ -148,3 +158,14 @@ def test_the_picture_is_saved_and_shown(tmp_path: Path, monkeypatch: pytest.Monk
     del image
     with pytest.raises(HogError, match=r"is gone: keep it in a variable, or use draw"):
         found.save(tmp_path / "again.png")
+
+
+@pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="photographs lie in ../shared")
+def test_on_a_street_no_box_is_on_what_is_no_person() -> None:
+    labels = {one["file"]: one["boxes_xywh"] for one in json.loads((PHOTOGRAPHS.parent / "manifest.json").read_text())}
+    frames = sorted(PHOTOGRAPHS.glob("TUD_*.jpg"))
+    assert len(frames) == 9
+    for frame in frames:
+        found = PeopleDetector().detect(frame)
+        overlap = intersection_over_union(found.boxes, np.array(labels[f"pedestrians/{frame.name}"])).max(axis=1)
+        assert (overlap > 0.3).all() and (overlap > 0.5).sum() >= 4

@@ -251,9 +251,9 @@ def svms(a: Arguments) -> None:
 def finding(a: Arguments) -> None:
     image = a.image()
     found = a.draw.choice(FINDERS).detect(image)
-    assert isinstance(found, Detections) and found.boxes.dtype == np.int32 and found.boxes.shape == (len(found), 4)
+    assert isinstance(found, Detections) and found.windows.dtype == np.int32 and found.windows.shape == (len(found), 4)
     assert (np.diff(found.scores) <= 0).all(), found.scores
-    assert found.person_boxes.shape == (len(found), 4)
+    assert found.boxes.shape == (len(found), 4)
 
 
 def finders(a: Arguments) -> None:

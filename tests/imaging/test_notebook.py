@@ -66,8 +66,8 @@ def test_the_table_holds_the_people_and_the_picture_their_boxes(file: Path) -> N
         people = PeopleDetector().detect(image)
         html = people._repr_html_()
         told = words(html)
-        for box, score in zip(people.person_boxes.tolist(), people.scores, strict=True):
-            assert set(map(str, box)) <= set(told) and f"{score:.2f}" in told
+        for box, label in zip(people.boxes.tolist(), people.labels, strict=True):
+            assert set(map(str, box)) <= set(told) and label in told
         shown = picture(html)
         assert shown is not None
         # JPEG changes a little; a picture without boxes or with swapped colours is much further away.
@@ -89,7 +89,7 @@ def test_detections_keep_no_image_alive_and_show_their_table_when_it_is_gone() -
     del scene
     gc.collect()
     assert kept() is None
-    assert picture(people._repr_html_()) is None and "margin" in words(people._repr_html_())
+    assert picture(people._repr_html_()) is None and "probability" in words(people._repr_html_())
 
 
 def test_a_file_that_is_gone_and_a_missing_opencv_leave_the_table(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,7 +29,7 @@ def streets(tmp_path: Path) -> Path:
     for i, size in enumerate([(192, 256), (256, 192), (64, 64)]):
         picture = street(*size, 3)
         write_image(tmp_path / "data" / f"{i}.png", picture)
-        boxes[f"{i}.png"] = PeopleDetector().detect(picture).person_boxes.tolist()
+        boxes[f"{i}.png"] = PeopleDetector().detect(picture).boxes.tolist()
     assert sum(map(len, boxes.values())) >= 2
     boxes["2.png"].append([10, 5, 15, 40])
     (tmp_path / "data" / "boxes.json").write_text(json.dumps(boxes))

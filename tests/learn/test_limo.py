@@ -24,7 +24,7 @@ USC = Path(__file__).parents[3] / "shared" / "data" / "eval" / "usc-c"
 def people_of(height: float) -> NDArray[np.uint8]:
     """A drawn street, made so large that its smallest people are about this tall [px]."""
     picture = street(640, 480, 1)
-    least = int(PeopleDetector(model=LARGE).detect(picture).person_boxes[:, 3].min())
+    least = int(PeopleDetector(model=LARGE).detect(picture).boxes[:, 3].min())
     return np.asarray(cv2.resize(picture, None, fx=height / least, fy=height / least), np.uint8)
 
 
@@ -41,8 +41,8 @@ def test_the_small_windows_margins_are_on_the_scale_of_the_large_ones() -> None:
 def test_people_too_small_for_the_large_window_are_found_by_the_small_one() -> None:
     picture = people_of(84)
     limo, large = (PeopleDetector(model=model, min_height=None).detect(picture) for model in ("limo", LARGE))
-    assert limo.person_boxes[:, 3].min() < 95
-    assert len(large) == 0 or large.person_boxes[:, 3].min() >= 99
+    assert limo.boxes[:, 3].min() < 95
+    assert len(large) == 0 or large.boxes[:, 3].min() >= 99
     assert len(limo) > len(large)
 
 
@@ -67,7 +67,7 @@ def test_opencvs_grouping_knows_one_window() -> None:
 def test_people_of_48_px_are_found() -> None:
     picture = people_of(52)
     found = PeopleDetector(model="limo", min_height=48).detect(picture)
-    assert 46 <= found.person_boxes[:, 3].min() < 62
+    assert 46 <= found.boxes[:, 3].min() < 62
     assert (np.diff(found.scores) <= 0).all()
 
 

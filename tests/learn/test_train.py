@@ -76,7 +76,7 @@ def test_the_detector_finds_what_it_was_trained_on(trained: Path, bollards: Path
     image = np.asarray(cv2.imread(str(bollards / "0000.png")), np.uint8)
     found = limo_hog.PeopleDetector(model=trained, min_height=48).detect(image)
     assert len(found) > 0
-    x, y, _, h = found.person_boxes[0].tolist()
+    x, y, _, h = found.boxes[0].tolist()
     assert any(abs(x - bx) < 10 and abs(y + h - by - bh) < 15 for bx, by, bw, bh in boxes["0000.png"])
     assert found.probabilities[0] > 0.5
 

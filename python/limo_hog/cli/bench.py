@@ -148,13 +148,13 @@ def _find(search: str) -> Find:
     """Return the search of an image with the workshop's parameters: by OpenCV's method, or guided."""
     if search == "guided":
         detectors = {
-            group: PeopleDetector(min_height=None, nms="group", group_threshold=group, search="guided")
+            group: PeopleDetector(model="opencv", min_height=None, nms="group", group_threshold=group, search="guided")
             for group in (0, 2)
         }
 
         def guided(image: Image, group: int = 2) -> tuple[Any, Any]:
             found = detectors[group].detect(image)
-            return found.boxes, found.scores
+            return found.windows, found.scores
 
         return guided
     hog = limo_hog.HOGDescriptor()

@@ -17,7 +17,7 @@ from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
 
 #: What the results of a run depend on, and its JSON lines hold.
-PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "person_box", "every")
+PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "every")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -37,26 +37,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--csv", type=output_file, metavar="FILE", help="write a table, a line a person")
     parser.add_argument("--coco", type=output_file, metavar="FILE", help="write COCO's JSON of images and annotations")
-    parser.add_argument(
-        "--model",
-        default="opencv",
-        metavar="NAME|FILE",
-        help=f"{MODEL} (%(default)s)",
-    )
+    parser.add_argument("--model", default=PeopleDetector.model, metavar="NAME|FILE", help=f"{MODEL} (%(default)s)")
     parser.add_argument(
         "--search",
         choices=("exact", "guided"),
         default="exact",
         help="guided: about twice as fast, a raw hit in two hundred is missed (exact)",
     )
-    parser.add_argument("--threshold", type=_score, metavar="T", help="least SVM score of a hit (the model's own: 0)")
+    parser.add_argument("--threshold", type=_score, metavar="T", help="least SVM margin of a hit (the model's own)")
     parser.add_argument(
         "--min-height",
         type=_least_height,
         default=PeopleDetector.min_height,
         metavar="PX",
-        help="find people from this height on; half of it takes four times as long; none: from 100 px on, at a "
-        "picture's own size (%(default)g)",
+        help="find people from this height on; half of it takes four times as long; none: from 75 px on (opencv: "
+        "100), at a picture's own size (%(default)g)",
     )
     parser.add_argument("--max-height", type=_pixels, metavar="PX", help="leave out people taller than this")
     parser.add_argument(
@@ -68,7 +63,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--overlap", type=_overlap, metavar="X", help="how much two people's boxes may overlap, 0..1 (0.65)"
     )
-    parser.add_argument("--person-box", action="store_true", help="boxes tight around the person, without margin")
     parser.add_argument(
         "--threads", type=threads, default=0, metavar="N", help="how many cores to keep busy; 0: all (0)"
     )

@@ -72,8 +72,7 @@ def run(args: argparse.Namespace) -> int:
             from limo_hog.imaging.drawing import annotate
 
             found, target = frame.log.detections, frame.log.decision.target
-            labels = [f"{score:.1f}" for score in found.scores]
-            return annotate(frame.frame.image, found.boxes, labels, target, f"{frame.frame.stamp:.1f} s")
+            return annotate(frame.frame.image, found.boxes, found.labels, target, f"{frame.frame.stamp:.1f} s")
 
         for frame in replay(read_bag(args.file), controller, detector, args.image or IMAGE):
             frames.append(_compared(frame))

@@ -303,7 +303,7 @@ def find_fault(observation: Observation, last_stamp: float | None) -> str:
 
 
 def _boxes(observation: Observation) -> str:
-    boxes, scores = observation.detections.boxes, observation.detections.scores
+    boxes, scores = observation.detections.windows, observation.detections.scores
     if boxes.ndim != 2 or boxes.shape[1] != 4 or len(boxes) != len(scores):
         return f"boxes {boxes.shape} and scores {scores.shape} do not belong together"
     if not all(map(math.isfinite, scores.tolist())):

@@ -19,6 +19,7 @@ from limo_hog.atomic import about, whole_file
 from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.models import WHOLE_WINDOW
 from limo_hog.ros2.messages import serialize, typestore
 from limo_hog.ros2.names import DETECTIONS_TYPE, TYPES
 
@@ -53,7 +54,7 @@ class Record(NamedTuple):
 
 
 def to_detections(message: Any) -> Detections:
-    """Read a Detection2DArray.
+    """Read a Detection2DArray; it holds the boxes around people alone, so these are the windows, too.
 
     Raises
     ------
@@ -72,7 +73,8 @@ def to_detections(message: Any) -> Detections:
         for one in message.detections
     ]
     scores = [one.results[0].hypothesis.score for one in message.detections]
-    return Detections(np.rint(np.array(boxes).reshape(-1, 4)).astype(np.int32), np.array(scores, np.float64))
+    people = np.rint(np.array(boxes).reshape(-1, 4)).astype(np.int32)
+    return Detections(people, np.array(scores, np.float64), WHOLE_WINDOW)
 
 
 @contextmanager

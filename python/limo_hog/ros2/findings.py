@@ -17,14 +17,14 @@ PERSON_FRAME = "followed_person"
 
 
 def detections_message(stamp: float, found: Detections, frame: str, ids: Mapping[int, int] | None = None) -> Any:
-    """Return boxes as vision_msgs/Detection2DArray, best first.
+    """Return the boxes around people as vision_msgs/Detection2DArray, best first.
 
     Parameters
     ----------
     stamp
         Of the image [s].
     found
-        Boxes: their centre and size are given in pixels, the score as the SVM gave it.
+        Its `boxes`: their centre and size are given in pixels, the score as the SVM gave it.
     frame
         The camera's.
     ids

@@ -62,8 +62,7 @@ class Findings:
         if belief.people and self._frames.has_readers:
             self._frames.publish(findings.person_frames(now, belief.people, belief.followed))
         if self._annotated.has_readers:
-            labels = [f"{score:.1f}" for score in found.scores]
-            drawn = annotate(log.frame.image, found.boxes, labels, log.decision.target, log.decision.reason)
+            drawn = annotate(log.frame.image, found.boxes, found.labels, log.decision.target, log.decision.reason)
             self._annotated.publish(messages.image(stamp, drawn))
 
     def _send(self, topic: str, make: Any) -> None:

@@ -259,7 +259,7 @@ class Stage:
         for found in reversed(self.found):
             scale = height / found.shape[0]
             if abs(found.shape[1] * scale - width) <= scale:
-                boxes = np.rint(found.detections.boxes * scale).astype(np.int32)
+                boxes = np.rint(found.detections.windows * scale).astype(np.int32)
                 return Detections(boxes, found.detections.scores)
         return Detections.none()
 

@@ -199,7 +199,7 @@ class FaultySearch:
         found = detect_in(detector, image, region)
         truth = self._truth()
         period = round(truth.stamp * self._rate)
-        kept = self._kept(found.boxes, truth, period)
+        kept = self._kept(found.windows, truth, period)
         boxes, scores = self._false(period)
         if region is not None:
             ends = boxes[:, :2] + boxes[:, 2:]
@@ -210,10 +210,10 @@ class FaultySearch:
                 # Boxes of a half-size search have even sizes, and are an even number of pixels from its corner.
                 corner = np.array([region.x, region.y, 0, 0])
                 boxes = (boxes - corner) // 2 * 2 + corner
-        all_boxes = np.concatenate([found.boxes[kept], boxes.astype(np.int32)])
+        all_windows = np.concatenate([found.windows[kept], boxes.astype(np.int32)])
         all_scores = np.concatenate([found.scores[kept], scores])
         order = np.argsort(-all_scores, kind="stable")
-        return replace(found, boxes=all_boxes[order], scores=all_scores[order])
+        return replace(found, windows=all_windows[order], scores=all_scores[order])
 
     def _kept(self, boxes: NDArray[np.int32], truth: Truth, period: int) -> list[int]:
         """Return the boxes (N, 4) [px of the camera's image] that are on nobody, or on people who are not missed."""

@@ -25,7 +25,7 @@ def figures(step: Step) -> dict[str, float | None]:
     """
     log, error = step.log, None
     if log.decision.target is not None:
-        error = WIDTH / 2 - box_centre(log.detections.boxes[log.decision.target])[0]
+        error = WIDTH / 2 - box_centre(log.detections.windows[log.decision.target])[0]
     distances = [person.distance for person in step.truth.people if person is not None]
     return {
         "time": log.time,
@@ -40,7 +40,7 @@ def measured_m(log: FrameLog) -> float | None:
     """Return how far the followed person is as the follower measures it: from the camera to their front [m]."""
     if log.frame is None or log.frame.depth is None or log.decision.target is None:
         return None
-    return person_depth(log.frame.depth, log.detections.boxes[log.decision.target])
+    return person_depth(log.frame.depth, log.detections.windows[log.decision.target])
 
 
 def followed_person(step: Step) -> int | None:
@@ -48,7 +48,7 @@ def followed_person(step: Step) -> int | None:
     log = step.log
     if log.decision.target is None or step.seen is None:
         return None
-    x, y, w, h = log.detections.boxes[log.decision.target].tolist()
+    x, y, w, h = log.detections.windows[log.decision.target].tolist()
     shared = {}
     for index, person in enumerate(step.seen.people):
         if person is not None and person.box is not None:
@@ -71,9 +71,8 @@ def annotated(log: FrameLog, caption: bool = True) -> NDArray[np.uint8]:
     distance = measured_m(log)
     if distance is not None:
         words += [f"depth {distance:.2f} m", zone_of(distance).value]
-    labels = [f"{score:.1f}" for score in log.detections.scores]
     text = "  ".join(words) if caption else ""
-    return annotate(log.frame.image, log.detections.boxes, labels, log.decision.target, text)
+    return annotate(log.frame.image, log.detections.boxes, log.detections.labels, log.decision.target, text)
 
 
 def depth_picture(depth: NDArray[np.float32], far: float) -> NDArray[np.uint8]:

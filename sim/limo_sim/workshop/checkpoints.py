@@ -161,7 +161,7 @@ def scaled_back(takes: Sequence[Take]) -> Finding:
         if not look.commands:
             continue
         best = int(np.argmax(look.found.scores))
-        there, here = _middle(look.raw.detections.boxes[best]), _middle(look.found.boxes[best])
+        there, here = _middle(look.raw.detections.windows[best]), _middle(look.found.windows[best])
         said = f"{where}: the box at x = {there} of the {look.raw.shape[1]} px wide copy is at {here} in the camera's "
         said += f"{look.image.shape[1]} px; the command is {command_of(look)}"
         return Finding(False, said, look.commands[-1].line)
@@ -217,18 +217,18 @@ def _misdrawn(look: Look, picture: Picture) -> str:
     if np.array_equal(picture, look.image):
         return "the window shows the image with nothing drawn on it; show the picture you drew on"
     surest = int(np.argmax(look.found.scores))
-    reds = [_share(picture, box, RED) for box in look.found.boxes]
+    reds = [_share(picture, box, RED) for box in look.found.windows]
     if reds[surest] < 0.5:
         if max(reds) > 0.5:
             return f"the red box is number {int(np.argmax(reds))} of {boxes_of(look)}; surest is {surest}"
-        if _share(picture, look.found.boxes[surest], BLUE) > 0.5:
+        if _share(picture, look.found.windows[surest], BLUE) > 0.5:
             return "the surest box is blue: colours are blue, green, red, so red is (0, 0, 255)"
         return f"no red box around the surest of {boxes_of(look)}"
-    x, y, w, h = look.found.boxes[surest].tolist()
+    x, y, w, h = look.found.windows[surest].tolist()
     around = picture[max(y + h // 2 - 4, 0) : y + h // 2 + 5, max(x + w // 2 - 4, 0) : x + w // 2 + 5].reshape(-1, 3)
     if not around.size or np.mean((around == BLUE).all(axis=1)) < 0.3:
         return f"no blue dot in the middle of the red box, ({x + w // 2}, {y + h // 2})"
-    if any(_share(picture, box, GREEN) < 0.5 for i, box in enumerate(look.found.boxes) if i != surest):
+    if any(_share(picture, box, GREEN) < 0.5 for i, box in enumerate(look.found.windows) if i != surest):
         return f"not every other box of {boxes_of(look)} is green"
     return ""
 
@@ -345,7 +345,7 @@ def limits(takes: Sequence[Take]) -> Finding:
 
 def _error(look: Look, scaled: bool = True) -> int:
     """Return how far left of the middle the surest box is [px]; not `scaled`: taken as camera pixels as it is."""
-    boxes = look.found.boxes if scaled or look.raw is None else look.raw.detections.boxes
+    boxes = look.found.windows if scaled or look.raw is None else look.raw.detections.windows
     return int(look.image.shape[1]) // 2 - _middle(boxes[int(np.argmax(look.found.scores))])
 
 
@@ -369,7 +369,7 @@ def _share(picture: Picture, box: NDArray[np.int32], colour: tuple[int, int, int
 
 def boxes_of(look: Look) -> str:
     """Return a frame's boxes and scores in words."""
-    pairs = zip(look.found.boxes.tolist(), look.found.scores.tolist(), strict=True)
+    pairs = zip(look.found.windows.tolist(), look.found.scores.tolist(), strict=True)
     return ", ".join(f"{tuple(box)} {score:.2f}" for box, score in pairs)
 
 

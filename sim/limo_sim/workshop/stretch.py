@@ -264,7 +264,7 @@ def stays(takes: Sequence[Take]) -> Finding:
     """Whether the red box stays on the person who was followed first."""
     looks = [look for take in takes if take.scene.name == "joined" for look in take.looks]
     both = [look for look in looks if _people(look) == 2 and len(look.found) > 1]
-    telling = [look for look in both if _overlap(look.found.boxes[int(np.argmax(look.found.scores))], look, 1)]
+    telling = [look for look in both if _overlap(look.found.windows[int(np.argmax(look.found.scores))], look, 1)]
     if not telling:
         return Finding(None, "not tried: the second person was not found, or not surer than the first")
     if not any(_red_is_on(look, 0) for look in looks if look not in both):

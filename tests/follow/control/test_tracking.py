@@ -127,7 +127,7 @@ def test_it_asks_for_the_part_of_the_image_where_the_person_will_be() -> None:
     assert region is not None
     assert region.width * region.height < 0.5 * 640 * 480
     view = world.observe()
-    x, y, w, h = view.detections.boxes[0]
+    x, y, w, h = view.detections.windows[0]
     assert region.x <= x
     assert x + w <= region.x + region.width
     assert region.y <= max(y, 0)
@@ -279,7 +279,7 @@ def test_a_box_on_the_wall_beside_a_missed_person_does_not_take_their_track() ->
     world = World(person=(2.5, 0.0))
     state = run(world, 4.0).state
     seen = world.observe()
-    beside = seen.detections.boxes + np.array([60, 0, 0, 0], np.int32)
+    beside = seen.detections.windows + np.array([60, 0, 0, 0], np.int32)
     for _ in range(5):
         view = world.observe(visible=False)
         # The wall is as far as the person: by its place and size the box would fit.

@@ -24,7 +24,7 @@ def test_it_stays_with_the_person_it_began_with() -> None:
         view, second = world.observe(), other.observe(score=5.0).detections
         assert len(second) == 1
         together = Detections(
-            np.concatenate([second.boxes, view.detections.boxes]),
+            np.concatenate([second.windows, view.detections.windows]),
             np.concatenate([second.scores, view.detections.scores]),
         )
         decision = CONTROLLER.step(replace(view, detections=together), state)
@@ -37,7 +37,7 @@ def test_it_stays_with_the_person_it_began_with() -> None:
 def seen_in(view: Observation, shirt: tuple[int, int, int]) -> Observation:
     """The same view with a colour image, in which whoever is seen wears a shirt."""
     image = np.full((480, 640, 3), shirt, np.uint8)
-    return replace(view, clothes=clothes_in(image, view.detections.boxes))
+    return replace(view, clothes=clothes_in(image, view.detections.windows))
 
 
 def lost(world: World) -> TrackingState:
@@ -94,7 +94,7 @@ def test_between_two_alike_it_stands_and_looks_and_says_that_it_is_not_sure() ->
     for _ in range(8):
         view, second = world.observe(), other.observe()
         together = Detections(
-            np.concatenate([view.detections.boxes, second.detections.boxes]),
+            np.concatenate([view.detections.windows, second.detections.windows]),
             np.concatenate([view.detections.scores, second.detections.scores]),
         )
         assert view.depth is not None

@@ -46,21 +46,21 @@ def frame() -> NDArray[np.uint8]:
 def test_our_hog_and_opencvs_find_the_same_person(frame: NDArray[np.uint8]) -> None:
     ours, theirs = detector_named("hog").detect(frame), Cv2Detector().detect(frame)
     assert len(ours) == 1
-    assert ours.boxes.tolist() == theirs.boxes.tolist()
+    assert ours.windows.tolist() == theirs.windows.tolist()
 
 
 def test_a_region_is_searched_alone_and_its_boxes_are_in_the_whole_image() -> None:
     spy = Spy()
     found = detect_in(spy, np.zeros((480, 640, 3), np.uint8), Region(96, 32, 208, 192, 150.0))
     assert spy.shown == [(192, 208, 3)]
-    assert found.boxes.tolist() == [[106, 52, 64, 128]]
+    assert found.windows.tolist() == [[106, 52, 64, 128]]
 
 
 def test_large_people_are_searched_in_a_smaller_picture() -> None:
     spy = Spy()
     found = detect_in(spy, np.zeros((480, 640, 3), np.uint8), Region(0, 0, 400, 400, 320.0))
     assert spy.shown == [(200, 200, 3)]
-    assert found.boxes.tolist() == [[20, 40, 128, 256]]
+    assert found.windows.tolist() == [[20, 40, 128, 256]]
 
 
 def test_a_part_keeps_the_models_person_box_and_calibration() -> None:
@@ -75,10 +75,10 @@ def test_a_part_keeps_the_models_person_box_and_calibration() -> None:
 
 def test_a_region_around_a_person_finds_what_the_whole_image_does(frame: NDArray[np.uint8]) -> None:
     detector = detector_named("hog")
-    whole = detector.detect(frame).boxes[0]
+    whole = detector.detect(frame).windows[0]
     x, y, w, h = (int(value) for value in whole)
     region = Region(x - 48, max(y - 32, 0), w + 96, h + 64, float(h))
-    part = detect_in(detector, frame, region).boxes[0]
+    part = detect_in(detector, frame, region).windows[0]
     assert np.abs(part - whole).max() <= 16
 
 
@@ -86,7 +86,7 @@ def test_half_size_gives_boxes_of_the_whole_image() -> None:
     spy = Spy()
     found = HalfSize(spy).detect(np.zeros((481, 641, 3), np.uint8))
     assert spy.shown == [(240, 320, 3)]
-    assert found.boxes.tolist() == [[20, 40, 128, 256]]
+    assert found.windows.tolist() == [[20, 40, 128, 256]]
 
 
 def test_half_size_is_the_mean_of_four_pixels() -> None:
@@ -103,7 +103,7 @@ def test_half_size_is_the_mean_of_four_pixels() -> None:
 def test_the_surest_comes_first() -> None:
     found = by_score(np.array([[0, 0, 1, 2], [3, 3, 1, 2]]), np.array([0.1, 0.9]))
     assert found.scores.tolist() == [0.9, 0.1]
-    assert found.boxes[0].tolist() == [3, 3, 1, 2]
+    assert found.windows[0].tolist() == [3, 3, 1, 2]
 
 
 def test_a_network_from_a_file_finds_dark_cells(tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_a_network_from_a_file_finds_dark_cells(tmp_path: Path) -> None:
     image = np.full((480, 640, 3), 255, np.uint8)
     image[160:192, 320:352] = 0
     found = detector_named(f"onnx:{path}").detect(image)
-    assert found.boxes.tolist() == [[320, 144, 32, 64]]
+    assert found.windows.tolist() == [[320, 144, 32, 64]]
     assert found.scores[0] > 0
 
 
@@ -121,7 +121,7 @@ def test_a_network_sees_a_large_image_whole(tmp_path: Path) -> None:
     path.write_bytes(dark_cells())
     image = np.full((960, 1280, 3), 255, np.uint8)
     image[320:384, 640:704] = 0
-    assert OnnxDetector(path).detect(image).boxes.tolist() == [[640, 288, 64, 128]]
+    assert OnnxDetector(path).detect(image).windows.tolist() == [[640, 288, 64, 128]]
 
 
 def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) ->
 
 
 def test_one_person_is_one_box_by_each_way_to_suppress(frame: NDArray[np.uint8]) -> None:
-    every_hit = PeopleDetector(min_height=None, nms="group", group_threshold=0).detect(frame)
+    every_hit = PeopleDetector(model="opencv", min_height=None, nms="group", group_threshold=0).detect(frame)
     assert len(every_hit) > 5
     for name in ("hog", "hog:opencv"):
         found = detector_named(name).detect(frame)

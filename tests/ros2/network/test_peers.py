@@ -119,7 +119,7 @@ def test_a_peer_receives_what_the_follower_finds_and_its_stamped_commands_arrive
         time.sleep(0.1)
     assert json.loads(other.communicate(timeout=60)[0].splitlines()[-1]) == [
         "12.500000000 base_link 2 0 1",
-        "2  person 1.5 42 128 7",
+        "2  person 1.5 42 100 7",
         "1 7 2 -0.25 0.875",
         "2 base_link person_7 2",
     ]

@@ -75,7 +75,7 @@ def test_the_same_node_gives_the_same_run(run: Run) -> None:
     def log() -> list[tuple[object, ...]]:
         steps: list[Step] = []
         run(node(FOLLOW), STANDING, 1.0, watch=kept_in(steps))
-        return [(s.log.time, s.truth.robot, s.log.decision.twist, s.log.detections.boxes.tolist()) for s in steps]
+        return [(s.log.time, s.truth.robot, s.log.decision.twist, s.log.detections.windows.tolist()) for s in steps]
 
     assert log() == log()
 
@@ -365,6 +365,6 @@ def test_numpy_seed_and_detections_of_a_frame_belong_together(run: Run) -> None:
         person = step.seen.people[0] if step.seen else None
         assert person is not None
         assert person.box is not None
-        box = step.log.detections.boxes[0]
+        box = step.log.detections.windows[0]
         assert abs((box[0] + box[2] / 2) - (person.box[0] + person.box[2] / 2)) < 25
         assert np.isfinite(step.log.detections.scores).all()

@@ -39,7 +39,8 @@ def script(tmp_path: Path) -> Callable[[str], Path]:
 
 def log(steps: list[Step]) -> list[tuple[object, ...]]:
     return [
-        (step.log.time, step.truth, step.log.decision, step.seen, step.log.detections.boxes.tolist()) for step in steps
+        (step.log.time, step.truth, step.log.decision, step.seen, step.log.detections.windows.tolist())
+        for step in steps
     ]
 
 

@@ -236,10 +236,10 @@ def test_the_surface_distance_is_the_depth_in_the_middle_of_a_person(facing: flo
         person = frame.truth.people[0]
         found = detector.detect(frame.image)
         if len(found) and person is not None:
-            depth = person_depth(frame.depth, found.boxes[0])
+            depth = person_depth(frame.depth, found.windows[0])
             if depth is not None:
                 # depth is along the optical axis, the distance along the ray
-                aside = (found.boxes[0][0] + found.boxes[0][2] / 2 - CENTRE_X) / FOCAL_PX
+                aside = (found.windows[0][0] + found.windows[0][2] / 2 - CENTRE_X) / FOCAL_PX
                 errors.append(person.surface_distance - depth * math.hypot(1.0, aside))
         for _ in range(5):
             arena.step()

@@ -61,7 +61,7 @@ def seen(faults: DetectorFaults, frames: int, seed: int = 0, rate: float = 10.0)
 
 
 def found_of(frames: list[Detections], person: int) -> NDArray[np.bool_]:
-    return np.array([(found.boxes == WINDOWS[person]).all(axis=1).any() for found in frames])
+    return np.array([(found.windows == WINDOWS[person]).all(axis=1).any() for found in frames])
 
 
 @pytest.mark.parametrize(("recall", "burst_s"), [(0.5, 0.3), (0.7, 0.3), (0.9, 0.5), (0.2, 0.6)])
@@ -93,7 +93,7 @@ def test_false_boxes_come_at_their_rate_within_the_image_and_best_first() -> Non
     # Four standard errors of a Poisson distribution's mean.
     assert abs(np.mean(counts) - 0.4) < 4 * math.sqrt(0.4 / 10_000)
     assert abs(np.var(counts) - 0.4) < 0.05
-    boxes = np.concatenate([found.boxes for found in frames])
+    boxes = np.concatenate([found.windows for found in frames])
     assert (boxes[:, :2] >= 0).all()
     assert (boxes[:, 0] + boxes[:, 2] <= 640).all()
     assert (boxes[:, 1] + boxes[:, 3] <= 480).all()
@@ -107,7 +107,7 @@ def test_a_seed_fixes_every_miss_and_false_box_whichever_frames_are_read() -> No
     sparse = Faulty(SeesBoth(), faults, 4)
     for frame in range(0, 300, 7):
         found = sparse.at(truth(frame))
-        np.testing.assert_array_equal(found.boxes, every[frame].boxes)
+        np.testing.assert_array_equal(found.windows, every[frame].windows)
         np.testing.assert_array_equal(found.scores, every[frame].scores)
     assert (found_of(every, 0) != found_of(seen(faults, 300, seed=5), 0)).any()
 
@@ -127,10 +127,10 @@ def test_a_search_in_part_of_the_image_or_at_half_size_loses_the_same_people(win
     extra = 0
     for frame in range(200):
         found = faulty.at(truth(frame), region)
-        near = np.abs(found.boxes - WINDOWS[0]).max(axis=1, initial=0) <= 1
+        near = np.abs(found.windows - WINDOWS[0]).max(axis=1, initial=0) <= 1
         assert near.any() == found_of(whole[frame : frame + 1], 0)[0]
-        assert (found.boxes[:, :2] >= (48, 96)).all()
-        assert (found.boxes[:, :2] + found.boxes[:, 2:] <= (240, 384)).all()
+        assert (found.windows[:, :2] >= (48, 96)).all()
+        assert (found.windows[:, :2] + found.windows[:, 2:] <= (240, 384)).all()
         extra += np.count_nonzero(~near)
     assert 0 < extra < 400
 
@@ -146,14 +146,14 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
     region = Region(32, 64, 512, 384, 200.0 * half)
     count = from_the_top = 0
     for frame in range(100):
-        x, y, w, h = faulty.at(truth(frame)).boxes.T
+        x, y, w, h = faulty.at(truth(frame)).windows.T
         from_the_top += np.count_nonzero((y == 0) & (h == 480))
         # Windows of HOG are twice as high as wide.
         np.testing.assert_array_equal(w, h // 2)
         within = (x >= 32) & (y >= 64) & (x + w <= 544) & (y + h <= 448)
         # A search at half size gives even pixels from the region's corner.
         expected = np.stack([x - 32, y - 64, w, h], axis=1)[within] // half * half + (32, 64, 0, 0)
-        np.testing.assert_array_equal(faulty.at(truth(frame), region).boxes, expected)
+        np.testing.assert_array_equal(faulty.at(truth(frame), region).windows, expected)
         count += len(expected)
     assert count > 20
     # One window in eighty is drawn as high as the image or higher.
@@ -162,7 +162,7 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
 
 def test_the_half_size_detector_keeps_its_own_boxes() -> None:
     faulty = Faulty(HalfSize(SeesBoth()), DetectorFaults(false_rate=0.001))
-    np.testing.assert_array_equal(faulty.at(truth(0)).boxes[:2], WINDOWS * 2)
+    np.testing.assert_array_equal(faulty.at(truth(0)).windows[:2], WINDOWS * 2)
 
 
 def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np.bool_]:
@@ -177,7 +177,7 @@ def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np
 
     faulty = Faulty(SeesOne(), DetectorFaults(misses_like=model), seed)
     truths = [Truth(frame / 10, (0.0, 0.0, 0.0), (person, None), Contacts()) for frame in range(frames)]
-    return np.array([(faulty.at(now).boxes == window).all(axis=1).any() for now in truths])
+    return np.array([(faulty.at(now).windows == window).all(axis=1).any() for now in truths])
 
 
 @pytest.mark.parametrize("model", ["opencv", "limo"])

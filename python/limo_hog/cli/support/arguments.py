@@ -11,7 +11,7 @@ from limo_hog.cv2_api.arguments import number as bounded
 #: What a picture of `--size` may have: 64 megapixels take 1 GB to draw, and no camera has more.
 _MOST_PIXELS = 64_000_000
 #: What names a model, as help says it.
-MODEL = "opencv, daimler, limo, or the file of a trained model"
+MODEL = "limo, opencv, daimler, or the file of a trained model"
 #: Digits of the largest whole number an option takes.
 _MOST_DIGITS = 9
 

@@ -22,10 +22,9 @@ import limo_hog
 from limo_hog.cli.support.environment import cores
 from limo_hog.cli.support.output import UsageError, one_line, printable
 from limo_hog.cli.support.results import Result, Results, refuse_to_overwrite
-from limo_hog.detections import people
+from limo_hog.detections import Detections, people
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ImageError
-from limo_hog.imaging.drawing import annotate
 from limo_hog.imaging.reading import (
     STDIN,
     Kind,
@@ -53,9 +52,23 @@ class Row:
     frame: int
     width: int
     height: int
-    boxes: list[list[int]]
-    scores: list[float]
+    people: Detections
     ms: float
+
+    def result(self) -> Result:
+        """Return it as plain values; a model without calibration has None for each probability."""
+        people = self.people
+        return {
+            "source": self.source,
+            "frame": self.frame,
+            "width": self.width,
+            "height": self.height,
+            "boxes": people.boxes.tolist(),
+            "windows": people.windows.tolist(),
+            "scores": people.scores.tolist(),
+            "probabilities": people.probabilities.round(4).tolist() if people.calibration else [None] * len(people),
+            "ms": self.ms,
+        }
 
 
 class Run:
@@ -213,12 +226,8 @@ class Run:
         detections = self._detector.detect(image)
         ms = 1e3 * (time.perf_counter() - start)
         height, width = image.shape[:2]
-        boxes = detections.person_boxes if self._args.person_box else detections.boxes
-        scores = detections.scores.tolist()
-        found = Row(source.name, frame, width, height, boxes.tolist(), scores, round(ms, 3))
-        if source not in self._copies:
-            return found, None
-        return found, annotate(image, boxes, [f"{score:.1f}" for score in scores])
+        found = Row(source.name, frame, width, height, detections, round(ms, 3))
+        return found, detections.draw(image) if source in self._copies else None
 
     def _is_done(self, source: Source) -> bool:
         if not self._args.resume:
@@ -239,16 +248,17 @@ class Run:
             self._bar.advance(self._task)
 
     def _keep(self, found: Row, film: bool = False) -> None:
-        self._write(vars(found))
+        result, seen = found.result(), found.people
+        self._write(result)
         if self.results is not None:
-            self.results.append(vars(found))
+            self.results.append(result)
         self.pictures += 1
-        self.people += len(found.scores)
-        self.peopled += bool(found.scores)
+        self.people += len(seen)
+        self.peopled += len(seen) > 0
         self._ms += found.ms
         if self._args.json is None and self._args.out is None:
             where = f"{found.source}:{found.frame}" if film else found.source
-            print(f"{printable(where)}  {people(len(found.scores))} ", *(f"{score:.2f}" for score in found.scores))
+            print(f"{printable(where)}  {people(len(seen))} ", *seen.labels)
 
     def _fail(self, line: str) -> None:
         self.failed += 1

@@ -15,7 +15,7 @@ from limo_hog.atomic import about, is_stream, part_of, write_text
 from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.exceptions import LimoHogError
 
-#: One line: source, frame, width, height, boxes, scores, ms, parameters.
+#: One line: source, frame, width, height, boxes, windows, scores, probabilities, ms, parameters.
 Result = dict[str, Any]
 #: What of a line is read back.
 _KINDS = {
@@ -24,9 +24,13 @@ _KINDS = {
     "width": int,
     "height": int,
     "boxes": list,
+    "windows": list,
     "scores": list,
+    "probabilities": list,
     "parameters": dict,
 }
+#: What of a line has an entry for each person.
+_EACH = ("boxes", "windows", "scores", "probabilities")
 
 
 class Results(NamedTuple):
@@ -138,10 +142,20 @@ def _is_result(line: Any) -> bool:
     return (
         isinstance(line, dict)
         and all(isinstance(line.get(name), kind) for name, kind in _KINDS.items())
-        and len(line["boxes"]) == len(line["scores"])
-        and all(isinstance(box, list) and len(box) == 4 for box in line["boxes"])
-        and all(isinstance(number, (int, float)) for numbers in (*line["boxes"], line["scores"]) for number in numbers)
+        and len({len(line[name]) for name in _EACH}) == 1
+        and all(isinstance(box, list) and len(box) == 4 for box in (*line["boxes"], *line["windows"]))
+        and all(
+            isinstance(number, (int, float))
+            for numbers in (*line["boxes"], *line["windows"], line["scores"])
+            for number in numbers
+        )
+        and all(share is None or isinstance(share, (int, float)) for share in line["probabilities"])
     )
+
+
+def _people(result: Result) -> Iterator[tuple[list[int], list[int], float, float | None]]:
+    """Yield box, window, margin and probability of each person."""
+    return zip(*(result[name] for name in _EACH), strict=True)
 
 
 def _difference(was: dict[str, Any], now: dict[str, Any]) -> str:
@@ -150,26 +164,31 @@ def _difference(was: dict[str, Any], now: dict[str, Any]) -> str:
 
 
 def write_csv(path: Path, results: Iterable[Result]) -> None:
-    """Write a line a person: source, frame, width, height of the picture; x, y, w, h of the box [px]; score."""
+    """Write a line a person: source, frame, width, height of the picture; box and window [px]; score, probability."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(("source", "frame", "width", "height", "x", "y", "w", "h", "score"))
+    heads = ("window_x", "window_y", "window_w", "window_h")
+    table.writerow(("source", "frame", "width", "height", "x", "y", "w", "h", *heads, "score", "probability"))
     for result in results:
         about_picture = [result[name] for name in ("source", "frame", "width", "height")]
-        for box, score in zip(result["boxes"], result["scores"], strict=True):
-            table.writerow((*about_picture, *box, score))
+        for box, window, score, probability in _people(result):
+            table.writerow((*about_picture, *box, *window, score, probability))
     write_text(path, text.getvalue())
 
 
 def write_coco(path: Path, results: Iterable[Result]) -> None:
-    """Write one JSON object of images, annotations with scores and the category person, as COCO has them."""
+    """Write one JSON object of images, annotations and the category person, as COCO has them.
+
+    Each annotation has its `score`, the SVM's margin, and, beyond COCO, its `probability` and HOG's `window`.
+    """
     images: list[Result] = []
     annotations: list[Result] = []
     for number, result in enumerate(results, 1):
         size = {"width": result["width"], "height": result["height"]}
         images.append({"id": number, "file_name": result["source"], "frame": result["frame"], **size})
-        for box, score in zip(result["boxes"], result["scores"], strict=True):
+        for box, window, score, probability in _people(result):
             annotation = {"id": len(annotations) + 1, "image_id": number, "category_id": 1, "bbox": box}
-            annotations.append({**annotation, "area": box[2] * box[3], "iscrowd": 0, "score": score})
+            annotation |= {"area": box[2] * box[3], "iscrowd": 0, "score": score}
+            annotations.append(annotation | {"probability": probability, "window": window})
     categories = [{"id": 1, "name": "person"}]
     write_text(path, json.dumps({"images": images, "annotations": annotations, "categories": categories}) + "\n")

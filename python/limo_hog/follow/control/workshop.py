@@ -79,7 +79,7 @@ class ProxemicController:
         if len(observation.detections) == 0:
             return no_detection(state)
         target, error = best_box(observation)
-        box = observation.detections.boxes[target]
+        box = observation.detections.windows[target]
         distance = None if observation.depth is None else person_depth(observation.depth, box)
         if distance is None:
             return Decision(Twist(), True, Mode.BLOCKED, "no depth at the person", target)
@@ -94,7 +94,7 @@ class ProxemicController:
 def best_box(observation: Observation) -> tuple[int, int]:
     """Return the index of the box with the highest score, and how far left of the image's middle it is [px]."""
     target = int(np.argmax(observation.detections.scores))
-    return target, observation.width // 2 - box_centre(observation.detections.boxes[target])[0]
+    return target, observation.width // 2 - box_centre(observation.detections.windows[target])[0]
 
 
 def no_detection(detected_before: bool) -> Decision[bool]:

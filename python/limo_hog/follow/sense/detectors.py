@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.models import PERSON_BOX, WHOLE_WINDOW, PersonBox
 from limo_hog.suppression import nms
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def detector_named(name: str) -> Detector:
 
     if kind == "hog" and colon:
         return PeopleDetector(model=file, min_height=None)
-    hog = PeopleDetector(min_height=None, nms="group")
+    hog = PeopleDetector(model="opencv", min_height=None, nms="group")
     if name == "hog":
         return hog
     if name == "hog-half":
@@ -70,20 +71,20 @@ def is_halved(region: Region) -> bool:
 
 
 def detect_in(detector: Detector, image: Image, region: Region | None) -> Detections:
-    """Search a region of an image, or all of it where `region` is None; boxes are in the whole image."""
+    """Search a region of an image, or all of it where `region` is None; windows are in the whole image."""
     if region is None:
         return detector.detect(image)
     rows, columns = slice(region.y, region.y + region.height), slice(region.x, region.x + region.width)
     if is_halved(region):
         detector = HalfSize(detector)
     found = detector.detect(np.ascontiguousarray(image[rows, columns]))
-    return replace(found, boxes=found.boxes + np.array([region.x, region.y, 0, 0], np.int32))
+    return replace(found, windows=found.windows + np.array([region.x, region.y, 0, 0], np.int32))
 
 
-def by_score(boxes: NDArray[Any], scores: NDArray[Any]) -> Detections:
-    """Return boxes (N, 4) and scores (N,) of any type as `Detections`, the highest score first."""
+def by_score(boxes: NDArray[Any], scores: NDArray[Any], person_box: PersonBox = PERSON_BOX) -> Detections:
+    """Return windows (N, 4) and scores (N,) of any type as `Detections`, the highest score first."""
     order = np.argsort(-scores, kind="stable")
-    return Detections(boxes[order].astype(np.int32), scores[order].astype(np.float64))
+    return Detections(boxes[order].astype(np.int32), scores[order].astype(np.float64), person_box)
 
 
 @dataclass(frozen=True)
@@ -93,12 +94,12 @@ class HalfSize:
     detector: Detector
 
     def detect(self, image: Image) -> Detections:
-        """Find people in every second pixel, each the mean of four; boxes are in the whole image."""
+        """Find people in every second pixel, each the mean of four; windows are in the whole image."""
         height, width = image.shape[0] // 2 * 2, image.shape[1] // 2 * 2
         rows = image[0:height:2].astype(np.uint16) + image[1:height:2]
         half = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
         found = self.detector.detect(half)
-        return replace(found, boxes=found.boxes * 2)
+        return replace(found, windows=found.windows * 2)
 
 
 @dataclass(frozen=True)
@@ -183,7 +184,7 @@ class OnnxDetector:
         # Like an SVM's margin: 0 at the threshold, and without an upper limit.
         sure = np.clip(score[likely][kept], 1e-6, 1 - 1e-6).astype(np.float64)
         margin = np.log(sure / (1 - sure)) - math.log(self.threshold / (1 - self.threshold))
-        return by_score(np.rint(boxes[kept]), margin)
+        return by_score(np.rint(boxes[kept]), margin, WHOLE_WINDOW)
 
     @cached_property
     def _network(self) -> cv2.dnn.Net:

@@ -66,7 +66,7 @@ def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]
     """Return every box as a measurement, in the boxes' order; the range is from the depth image."""
     measurements = []
     depths, found = observation.depth, observation.detections
-    for index, (box, score) in enumerate(zip(found.boxes, found.scores.tolist(), strict=True)):
+    for index, (box, score) in enumerate(zip(found.windows, found.scores.tolist(), strict=True)):
         clothes = None if observation.clothes is None else observation.clothes[index]
         if clothes is not None and not np.isfinite(clothes).all():
             clothes = None

@@ -183,7 +183,7 @@ def observed(
 ) -> Observation:
     """Return the observation of a frame and what was found in it: its size and people's clothes are filled in."""
     height, width = frame.image.shape[:2]
-    clothes = clothes_in(frame.image, detections.boxes)
+    clothes = clothes_in(frame.image, detections.windows)
     return Observation(
         frame.stamp,
         width,

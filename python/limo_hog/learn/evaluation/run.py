@@ -156,7 +156,7 @@ def evaluate(
             if rival.timed is not None:
                 _, ms = _timed(rival.timed, image)
             times[i].append(ms)
-            found[i].append((detections.person_boxes.astype(np.float64), detections.scores))
+            found[i].append((detections.boxes.astype(np.float64), detections.scores))
         done()
     if not len(sizes_of(used)):
         raise LabelError(f"no labelled box lies inside of its picture, in {len(used)} pictures; at least one is wanted")

@@ -61,7 +61,7 @@ class Scorer:
         hits = (
             []
             if step.seen is None
-            else [person_of(box, step.seen.people, self._criteria) for box in step.log.detections.boxes]
+            else [person_of(box, step.seen.people, self._criteria) for box in step.log.detections.windows]
         )
         target = None if step.log.decision.target is None else hits[step.log.decision.target]
         for subject in self._subjects:

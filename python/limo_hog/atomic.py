@@ -18,6 +18,15 @@ def is_stream(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
+def is_utf8(name: str) -> bool:
+    """Say whether a file's name can be written as UTF-8; OpenCV crashes on those that cannot."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def part_of(path: Path) -> Path:
     """Return the name a file has while it is written: hidden, beside it, with the same suffix.
 

@@ -17,7 +17,7 @@ from contextlib import suppress
 from functools import partial
 from types import ModuleType, SimpleNamespace
 
-from limo_hog.cli.support.output import UsageError, one_line
+from limo_hog.cli.support.output import UsageError, lasting_streams, one_line, printable
 from limo_hog.cli.support.signals import stopping
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import missing_extra
@@ -43,29 +43,38 @@ ARENA = {
     "export": "write labelled pictures of the arena, to train and to measure detectors on",
 }
 
+#: Pixels of the largest picture that a command reads: of the largest that `PeopleDetector` searches [px].
+_MOST_PIXELS = 2**28
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return 0 done, 1 a named error, 2 wrong arguments, 128 + n stopped by signal n."""
     arguments = list(sys.argv[1:] if argv is None else argv)
+    # OpenCV refuses a larger picture by its header, before it decodes; it reads the limit when it is loaded.
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(_MOST_PIXELS))
+    with lasting_streams():
+        return _answered(arguments)
+
+
+def _answered(arguments: list[str]) -> int:
+    """Run the command; answer named errors by a line and their code."""
     try:
         with stopping():
             code = _run(arguments)
-        # What is still buffered is written here, where a closed pipe or a full disk can be answered.
+        # What is still buffered is written here, where a full disk can be answered.
         sys.stdout.flush()
     except KeyboardInterrupt as error:
-        with suppress(OSError):  # the terminal may be gone
-            print("limo-hog: stopped", file=sys.stderr)
+        print("limo-hog: stopped", file=sys.stderr)
         return 128 + getattr(error, "signal", signal.SIGINT)
     except BrokenPipeError:
-        # The reader has closed the pipe; Python must not complain again when it closes standard output.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader of what was asked for has left.
         return 1
     except (LimoHogError, OSError, MemoryError, ImportError) as error:
         if isinstance(error, ImportError) and not isinstance(error, LimoHogError):
             error = missing_extra(f"limo-hog {arguments[0]}", error)
         if "--debug" in arguments:
             raise
-        print(f"limo-hog: {one_line(error)}", file=sys.stderr)
+        print(f"limo-hog: {printable(one_line(error))}", file=sys.stderr)
         return 2 if isinstance(error, UsageError) else 1
     return code
 

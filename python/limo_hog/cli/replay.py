@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from limo_hog.cli.support.arguments import add_detector, file_ending, output_file
+from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
@@ -77,8 +78,8 @@ def run(args: argparse.Namespace) -> int:
         table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
         for name, value in card.items():
             shown = f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)
-            table.add_row(name.replace("_", " "), shown)
-        Console(highlight=False).print(table)
+            table.add_row(name.replace("_", " "), Text(shown))
+        console().print(table)
     failures = [frame["failure"] for frame in frames if frame["failure"]]
     if failures:
         print(f"{len(failures)} of {len(frames)} frames: {failures[0]}", file=sys.stderr)

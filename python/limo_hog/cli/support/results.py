@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from limo_hog.atomic import about, is_stream, part_of, write_text
-from limo_hog.cli.support.output import STDOUT, UsageError
+from limo_hog.cli.support.output import STDOUT, UsageError, emit
 from limo_hog.exceptions import LimoHogError
 
 #: One line: source, frame, width, height, boxes, scores, ms, parameters.
@@ -73,7 +73,9 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
     """
     if target is None or target == STDOUT:
         # Flushed line by line for a reader at the other end of a pipe.
-        show = (lambda result: print(json.dumps(result | {"parameters": parameters}), flush=True)) if target else _drop
+        show = (
+            (lambda result: emit(json.dumps(result | {"parameters": parameters}, allow_nan=False))) if target else _drop
+        )
         yield Results(show, None)
         return
     path = Path(target)
@@ -90,7 +92,7 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
 
         def write(result: Result) -> None:
             nonlocal whole
-            line = json.dumps(result | {"parameters": parameters}).encode() + b"\n"
+            line = json.dumps(result | {"parameters": parameters}, allow_nan=False).encode() + b"\n"
             written = 0
             with about(path):
                 while written < len(line):
@@ -172,4 +174,5 @@ def write_coco(path: Path, results: Iterable[Result]) -> None:
             annotation = {"id": len(annotations) + 1, "image_id": number, "category_id": 1, "bbox": box}
             annotations.append({**annotation, "area": box[2] * box[3], "iscrowd": 0, "score": score})
     categories = [{"id": 1, "name": "person"}]
-    write_text(path, json.dumps({"images": images, "annotations": annotations, "categories": categories}) + "\n")
+    table = {"images": images, "annotations": annotations, "categories": categories}
+    write_text(path, json.dumps(table, allow_nan=False) + "\n")

@@ -18,9 +18,9 @@ from functools import partial
 from types import ModuleType, SimpleNamespace
 
 from limo_hog.cli.support.output import UsageError, lasting_streams, one_line, printable
-from limo_hog.cli.support.signals import stopping
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import missing_extra
+from limo_hog.signals import stopping
 
 #: Commands of this package and their line in `limo-hog --help`.
 BUILT_IN = {

@@ -94,7 +94,7 @@ def _controller(text: str) -> str:
 def run(args: argparse.Namespace) -> int:
     """Play all runs, show the table, and write what was asked for."""
     from limo_sim.run.suite import Suite
-    from limo_sim.run.sweep import compare, play_all, summarise
+    from limo_sim.run.sweep import WorkerError, compare, play_all, summarise
 
     if args.plot:
         # A missing library is named before the work, not after.
@@ -102,12 +102,18 @@ def run(args: argparse.Namespace) -> int:
     suite = Suite.load(args.suite) if args.suite else None
     runs = _runs(args, suite)
     card_of = {}
+    failure: WorkerError | None = None
     with progress("runs") as bar:
         task = bar.add_task("playing", total=len(runs))
-        for played, card in play_all(runs, args.workers or cores()):
-            card_of[played] = card
-            bar.advance(task)
-    cards = [card_of[run] for run in runs]
+        try:
+            for played, card in play_all(runs, args.workers or cores()):
+                card_of[played] = card
+                bar.advance(task)
+        except WorkerError as error:
+            if not card_of:
+                raise
+            failure = error
+    cards = [card_of[run] for run in runs if run in card_of]
     groups = None if suite is None else suite.groups
     summaries = summarise(cards)
     of_groups = [] if groups is None else [*summarise(cards, groups), *summarise(cards, dict.fromkeys(groups, "all"))]
@@ -129,6 +135,8 @@ def run(args: argparse.Namespace) -> int:
         plot(of_groups or summaries, args.plot)
     if args.json != STDOUT:
         _show(of_groups or summaries, comparisons, f"{args.seeds} seeds of {runs[0].seconds:g} s")
+    if failure is not None:
+        raise failure
     return 0
 
 

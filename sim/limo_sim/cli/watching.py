@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import file_ending
-from limo_hog.cli.support.signals import held
+from limo_hog.signals import held
 
 if TYPE_CHECKING:
     from limo_sim.run.episode import Episode

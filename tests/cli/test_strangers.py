@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from tests.cli.material import PICTURE, film_of, lines_of
 
+from limo_hog.atomic import alone, whole_file
 from limo_hog.cli.main import main
 from limo_hog.cli.support import output
 from limo_hog.cli.support.console import console
@@ -89,7 +90,10 @@ def test_stopping_does_not_wait_for_a_reader_that_never_returns(pictures: Path, 
         time.sleep(1.5)
         began = time.monotonic()
         child.send_signal(signal.SIGINT)
-        assert child.wait(20) == 128 + signal.SIGINT
+        try:
+            assert child.wait(5) == 128 + signal.SIGINT
+        finally:
+            child.kill()
         assert time.monotonic() - began < 2.5
 
 
@@ -222,3 +226,54 @@ def test_a_terminal_that_is_gone_is_survived_and_a_full_disk_is_told() -> None:
     output._Lasting(Full(), every_error=True).write("x")
     with pytest.raises(OSError, match="standard output"):
         output._Lasting(Full(), every_error=False).write("x")
+
+
+def test_two_runs_do_not_write_one_file(pictures: Path, tmp_path: Path) -> None:
+    found = tmp_path / "found.json"
+    assert main(["detect", str(pictures), "--json", str(found)]) == 0
+    before = found.read_bytes()
+    for how in ("--resume", "--overwrite"):
+        with alone(found):
+            done = ended("detect", pictures, "--json", found, how)
+        assert (done.returncode, found.read_bytes()) == (1, before)
+        assert done.stderr == f"limo-hog: {found}: another run is writing it, and holds .found.lock.json\n"
+    assert ended("detect", pictures, "--json", found, "--resume").returncode == 0
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_two_writers_of_one_file_do_not_share_a_temporary_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    with whole_file(path) as first:
+        first.write_text("first")
+        with whole_file(path) as second:
+            second.write_text("second")
+        assert path.read_text() == "second"
+    assert path.read_text() == "first"
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        "evaluate opencv labels.json --json labels.json",
+        "train labels.json --out labels.json",
+        "detect a.png --model m.yml --csv m.yml --overwrite",
+        "follow --scenario s.toml --json s.toml",
+    ],
+)
+def test_an_input_is_never_written_over(
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("labels.json", "m.yml", "s.toml", "a.png"):
+        Path(name).write_text("mine")
+    assert main(typed.split()) == 2
+    assert "is itself an input: give another name" in capsys.readouterr().err
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
+
+
+def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    for option in ("--json", "--csv"):
+        target = tmp_path / "file" / "a.csv"
+        assert main(["score", option, str(target)]) == 1
+        assert capsys.readouterr().err == f"limo-hog: {target}: Not a directory\n"

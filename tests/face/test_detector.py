@@ -370,8 +370,38 @@ def test_a_model_need_not_be_in_a_file() -> None:
     np.testing.assert_array_equal(
         detector.detect(picture()).boxes, PeopleDetector(model="daimler").detect(picture()).boxes
     )
-    assert replace(detector) == detector != PeopleDetector(model=load_model("daimler"))
+    assert replace(detector) == detector == PeopleDetector(model=load_model("daimler"))
+    assert detector != PeopleDetector(model=load_model("opencv"))
     assert len(pickle.loads(pickle.dumps(detector)).detect(picture())) > 0
+
+
+def test_a_detector_of_a_file_keeps_its_model_in_copies_and_pickles(tmp_path: Path) -> None:
+    path = saved(tmp_path / "m.yml")
+    detector = PeopleDetector(model=path)
+    before = detector.detect(picture())
+    path.unlink()
+    for copied in (
+        copy.copy(detector),
+        copy.deepcopy(detector),
+        pickle.loads(pickle.dumps(detector)),
+        replace(detector),
+    ):
+        assert copied == detector and hash(copied) == hash(detector)
+        np.testing.assert_array_equal(copied.detect(picture()).scores, before.scores)
+
+
+@pytest.mark.parametrize("word", [".Inf", "-.Inf", ".Nan", "1e39"])
+def test_a_model_with_a_coefficient_that_is_no_finite_number_is_refused(tmp_path: Path, word: str) -> None:
+    path = saved(tmp_path / "m.yml")
+    text = path.read_text()
+    start = text.index("SVMDetector: [") + len("SVMDetector: [")
+    path.write_text(text[:start] + f" {word}," + text[text.index(",", start) + 1 :])
+    with pytest.raises(limo_hog.ModelFormatError, match=r"m\.yml: a coefficient is infinite or NaN"):
+        PeopleDetector(model=path)
+    weights = load_model("opencv").coefficients.copy()
+    weights[0] = np.inf
+    with pytest.raises(limo_hog.ModelFormatError, match="a coefficient is infinite or NaN"):
+        replace(load_model("opencv"), coefficients=weights)
 
 
 def test_a_file_without_an_svm_is_refused(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ imported; where the arena is not installed, the error names the line that instal
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import os
 import signal
@@ -15,9 +16,11 @@ import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import Any
 
-from limo_hog.cli.support.output import UsageError, lasting_streams, one_line, printable
+from limo_hog.cli.support.output import STDOUT, UsageError, lasting_streams, one_line, printable
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import missing_extra
 from limo_hog.signals import stopping
@@ -119,7 +122,45 @@ def _run(arguments: list[str]) -> int:
     if module is None:
         parser.print_help(sys.stderr)
         return 2
+    _assert_writable(args)
     return int(module.run(args))
+
+
+#: Arguments that name files to write, and those that name what is read.
+_WRITTEN = ("json", "csv", "coco", "out", "video", "record", "plot", "html", "gradescope")
+_READ = ("inputs", "model", "against", "data", "negatives", "validate", "scenario", "file", "node", "image")
+
+
+def _assert_writable(args: argparse.Namespace) -> None:
+    """Refuse, before the work, files that cannot be written, and those that are an input.
+
+    Raises
+    ------
+    UsageError
+        A file to write is one that is read.
+    OSError
+        It cannot be written.
+    """
+    given = [value for name in _READ for value in _listed(getattr(args, name, None))]
+    read = {os.path.realpath(value) for value in given if os.path.isfile(value)}  # noqa: PTH113
+    for target in (value for name in _WRITTEN for value in _listed(getattr(args, name, None)) if value != STDOUT):
+        if os.path.realpath(target) in read:
+            raise UsageError(f"{target} is itself an input: give another name")
+        folder = Path(target).absolute().parent
+        while not folder.exists() and folder != folder.parent:
+            folder = folder.parent
+        if not os.access(folder, os.W_OK) or not folder.is_dir():
+            raise OSError(*_why(folder), target)
+
+
+def _listed(value: Any) -> list[str]:
+    values = value if isinstance(value, (list, tuple)) else [value]
+    return [os.fspath(one) for one in values if isinstance(one, (str, Path)) and str(one)]
+
+
+def _why(folder: Path) -> tuple[int, str]:
+    number = errno.EACCES if folder.is_dir() else errno.ENOTDIR
+    return number, os.strerror(number)
 
 
 def whole_parser() -> argparse.ArgumentParser:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from limo_hog.atomic import about, is_stream, part_of, write_text
+from limo_hog.atomic import about, alone, is_stream, part_of, write_text
 from limo_hog.cli.support.output import STDOUT, UsageError, emit
 from limo_hog.exceptions import LimoHogError
 
@@ -79,6 +79,11 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
         yield Results(show, None)
         return
     path = Path(target)
+    with alone(path):
+        yield from _written(path, parameters, resume, overwrite)
+
+
+def _written(path: Path, parameters: dict[str, Any], resume: bool, overwrite: bool) -> Iterator[Results]:
     part = part_of(path)
     kept = part != path
     if not resume and not overwrite:

@@ -7,6 +7,7 @@ import json
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import FrozenInstanceError, replace
+from decimal import Decimal
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -250,6 +251,9 @@ untyped: Any = limo_hog
 WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"model": "bogus"}, ValueError, "model is 'bogus'; opencv, default, daimler, limo or the path"),
     ({"model": 7}, TypeError, "model is 7"),
+    ({"threshold": Decimal("sNaN")}, TypeError, "threshold is Decimal"),
+    ({"threshold": np.complex128(1 + 2j)}, TypeError, "a real number is wanted"),
+    ({"threshold": np.str_("x")}, TypeError, "threshold is"),
     ({"model": None}, TypeError, "model is None"),
     ({"min_height": 0}, ValueError, "min_height is 0; 8 or more is wanted"),
     ({"min_height": float("nan")}, ValueError, "min_height is nan"),

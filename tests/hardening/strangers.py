@@ -39,7 +39,9 @@ def _bad_name(draw: random.Random) -> bytes:
 def _inputs(kind: str, folder: Path) -> tuple[list[bytes], str, Callable[[Path], list[str]]]:
     """Whole files of a kind, their suffix, and the command that reads one."""
     if kind == "models":
-        HOGDescriptor().save(folder / "m.yml")
+        hog = HOGDescriptor()
+        hog.setSVMDetector(hog.getDefaultPeopleDetector())
+        hog.save(folder / "m.yml")
         return [(folder / "m.yml").read_bytes()], ".yml", lambda path: ["detect", "a.png", "--model", str(path)]
     if kind == "scenarios":
         import limo_sim
@@ -110,9 +112,12 @@ def single(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]
     whole, suffix, command = _inputs(kind, folder)
     ends: Counter[str] = Counter()
     findings = []
+    path = folder / f"bad{suffix}"
+    path.write_bytes(whole[0])
+    if (answer := _answer(command(path), folder))[0]:
+        raise RuntimeError(f"a whole file is refused, so that nothing is tried: {answer}")
     for number in range(count):
         draw = random.Random(number)
-        path = folder / f"bad{suffix}"
         path.write_bytes(damaged(draw.choice(whole), draw))
         try:
             code, told = _answer(command(path), folder)

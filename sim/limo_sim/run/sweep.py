@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
-import signal
-import threading
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from statistics import NormalDist, fmean, stdev
 
 import limo_hog
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.signals import end_with
 from limo_sim.run.baselines import controller_of
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.score import ScoreCard
@@ -143,7 +140,7 @@ def play_all(runs: Sequence[Run], workers: int) -> Iterator[tuple[Run, ScoreCard
     alive, kept_open = context.Pipe(duplex=False)
     missing = 0
     with alive, kept_open:
-        pool = ProcessPoolExecutor(workers, context, _begin_worker, (alive,))
+        pool = ProcessPoolExecutor(workers, context, end_with, (alive,))
         try:
             runs_of = {pool.submit(play, run): run for run in runs}
             for done in as_completed(runs_of):
@@ -161,18 +158,6 @@ def play_all(runs: Sequence[Run], workers: int) -> Iterator[tuple[Run, ScoreCard
             f"a worker process was killed, perhaps for want of memory: {missing} of {len(runs)} runs are missing; "
             "fewer --workers need less"
         )
-
-
-def _begin_worker(alive: Connection) -> None:
-    """End this process as soon as the other end of a pipe is closed, by its parent or with it."""
-
-    def wait() -> None:
-        alive.poll(None)
-        os._exit(1)
-
-    # Ctrl-C in a terminal reaches every process; the parent decides.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=wait, daemon=True).start()
 
 
 def summarise(cards: Sequence[ScoreCard], groups: Mapping[str, str] | None = None) -> list[Summary]:

@@ -94,7 +94,7 @@ def many(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
                 file.write(whole[0] if kind == "names" else damaged(whole[0], draw))
         code, told = _answer(["detect", str(place), "--json", "found", "--overwrite"], folder)
         lines = [json.loads(line) for line in (folder / "found").read_text().splitlines()]
-        named = sum(line.startswith("limo-hog: ") for line in told.splitlines())
+        named = told.count("limo-hog: ")  # libpng writes into our lines
         sources = {line["source"] for line in lines}
         files = len(list(place.iterdir()))
         if problem := _finding(code, told):

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from limo_hog.atomic import whole_file
-from limo_hog.cli.support.environment import cores
 from limo_hog.cli.support.progress import progress
+from limo_hog.parallel import cores
 from limo_sim.run.provenance import code_version
 from limo_sim.run.score import ScoreCard
 from limo_sim.run.suite import Suite

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,8 +19,17 @@ def is_stream(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
+def is_utf8(name: str) -> bool:
+    """Say whether a file's name can be written as UTF-8; OpenCV crashes on those that cannot."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def part_of(path: Path) -> Path:
-    """Return the name a file has while it is written: hidden, beside it, with the same suffix.
+    """Return the name that an unfinished file keeps, for a later run to go on from: hidden, beside it, same suffix.
 
     A pipe or a device is written to under its own name.
 
@@ -32,10 +42,14 @@ def part_of(path: Path) -> Path:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if is_stream(path):
         return path
-    name = f".{path.stem}.part{path.suffix}"
+    return _hidden(path, "part")
+
+
+def _hidden(path: Path, word: str) -> Path:
+    name = f".{path.stem}.{word}{path.suffix}"
     if len(os.fsencode(name)) > _LONGEST_NAME:
         digest = hashlib.sha256(os.fsencode(path.name)).hexdigest()[:32]
-        name = f".{digest}.part{path.suffix[:16]}"
+        name = f".{digest}.{word}{path.suffix[:16]}"
     return path.with_name(name)
 
 
@@ -45,7 +59,7 @@ def about(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.filename is not None and str(error.filename) != str(part_of(path)):
+        if error.filename is not None and not _is_part(Path(str(error.filename)), path):
             raise
         raise _named(error, path) from error
 
@@ -65,6 +79,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     if part == path:
         yield path
         return
+    # Two runs that write one file do not meet: the last one's stays.
+    part = _hidden(path, f"part-{secrets.token_hex(4)}")
     with about(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -73,9 +89,45 @@ def whole_file(path: Path) -> Iterator[Path]:
     except BaseException as error:
         with suppress(OSError):
             part.unlink()
-        if isinstance(error, OSError) and str(error.filename) == str(part):
+        if isinstance(error, OSError) and error.filename is not None and _is_part(Path(str(error.filename)), path):
             raise _named(error, path) from error
         raise
+
+
+@contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """Keep other runs from writing `path` in this block, by a lock beside it that ends with this process.
+
+    Where the system or the file system has no locks, runs are not kept apart.
+
+    Raises
+    ------
+    BlockingIOError
+        Another run writes it.
+    """
+    if os.name != "posix" or is_stream(path):
+        yield
+        return
+    import fcntl
+
+    lock = _hidden(path, "lock")
+    with about(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = lock.open("ab")
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # A run that has just ended may have removed the file between opening and locking.
+            free = os.fstat(file.fileno()).st_ino == lock.stat().st_ino
+        except OSError as error:
+            free = error.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.ENOENT)
+        if not free:
+            raise BlockingIOError(errno.EWOULDBLOCK, f"another run is writing it, and holds {lock.name}", str(path))
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                lock.unlink()
 
 
 def write_text(path: Path, text: str) -> None:
@@ -88,6 +140,11 @@ def write_text(path: Path, text: str) -> None:
     """
     with whole_file(path) as part, about(path):
         part.write_text(text, "utf-8", "surrogateescape")
+
+
+def _is_part(name: Path, path: Path) -> bool:
+    """Say whether a name is a temporary one of `path`."""
+    return name.parent == path.parent and name.name.startswith(".") and (".part" in name.name or ".lock" in name.name)
 
 
 def _named(error: OSError, path: Path) -> OSError:

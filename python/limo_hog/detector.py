@@ -17,8 +17,8 @@ from limo_hog import _core
 from limo_hog.cv2_api.arguments import integer, number, pair, pixels, shown
 from limo_hog.detections import Detections, remembered
 from limo_hog.exceptions import ImageError, ParameterError, ParameterTypeError
-from limo_hog.models import Model, load_model
-from limo_hog.parallel import in_order
+from limo_hog.models import Model, is_named, load_model
+from limo_hog.parallel import cores, in_order
 from limo_hog.suppression import intersection_over_smaller, nms
 
 if TYPE_CHECKING:
@@ -128,6 +128,9 @@ class PeopleDetector:
 
     def __post_init__(self) -> None:
         model = load_model(self.model)
+        if not is_named(self.model):
+            # Kept, since a file may change: copies and pickles are the same detector.
+            self._set(model=model)
         self._check_nms()
         _word("search", self.search, _GUIDES)
         self._set(
@@ -214,7 +217,7 @@ class PeopleDetector:
         ImageError, MissingExtraError, OSError
             As `detect`, at the image's turn.
         """
-        yield from in_order(lambda image: self._detect(image, 1), images, _core.get_num_threads())
+        yield from in_order(lambda image: self._detect(image, 1), images, min(_core.get_num_threads(), cores()))
 
     def _detect(self, image: NDArray[np.uint8] | str | os.PathLike[str] | PilImage, threads: int | None) -> Detections:
         """Return the people in `image`, found by so many threads (None: by as many as `set_num_threads` allows)."""

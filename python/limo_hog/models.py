@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -51,14 +51,14 @@ WHOLE_WINDOW = PersonBox(0.0, 0.0, 1.0, 1.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """A linear SVM over HOG descriptors, and how its windows and margins are to be read; equal to itself alone.
+    """A linear SVM over HOG descriptors, and how its windows and margins are to be read: a value, that never changes.
 
     Attributes
     ----------
     geometry
         Window, blocks, cells and the rest of the descriptor.
     coefficients
-        float32 (n,): a weight per element of a descriptor, and perhaps a bias after them.
+        float32 (n,), finite: a weight per element of a descriptor, and perhaps a bias after them.
     person_box
         The person inside a window.
     threshold
@@ -70,11 +70,30 @@ class Model:
     """
 
     geometry: Geometry
-    coefficients: NDArray[np.float32]
+    coefficients: NDArray[np.float32] = field(repr=False)
     person_box: PersonBox = PERSON_BOX
     threshold: float = 0.0
     calibration: Calibration | None = None
     smaller: Model | None = None
+
+    def __post_init__(self) -> None:
+        weights = np.array(self.coefficients, np.float32)
+        if not np.isfinite(weights).all():
+            raise ModelFormatError("a coefficient is infinite or NaN; finite numbers are wanted")
+        weights.flags.writeable = False
+        object.__setattr__(self, "coefficients", weights)
+
+    def _values(self) -> tuple[object, ...]:
+        reading = (self.person_box, self.threshold, self.calibration, self.smaller)
+        return (self.geometry, self.coefficients.tobytes(), *reading)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another model finds the same."""
+        return self._values() == other._values() if isinstance(other, Model) else NotImplemented
+
+    def __hash__(self) -> int:
+        """Return the same number for equal models."""
+        return hash(self._values())
 
     @property
     def person_height(self) -> float:
@@ -120,6 +139,11 @@ _NAMED: dict[str, Callable[[], Model]] = {
 }
 
 
+def is_named(model: object) -> bool:
+    """Say whether this is the name of a model that comes along, and so always the same; a path equals no name."""
+    return isinstance(model, str) and model in _NAMED
+
+
 def load_model(name: str | os.PathLike[str] | Model) -> Model:
     """Return a model by its name, or from a file that OpenCV or limo-hog wrote; a `Model` as it is.
 
@@ -162,7 +186,11 @@ def _from_file(path: str) -> Model:
         raise ModelFormatError(f"{path} holds a geometry without an SVM; a trained detector is wanted")
     card = f"{path}.json"
     facts = _card(card) if os.path.isfile(card) else {}  # noqa: PTH113
-    return Model(geometry, np.array(coefficients, np.float32), **facts)
+    with np.errstate(over="ignore"):
+        weights = np.array(coefficients, np.float32)
+    if not np.isfinite(weights).all():
+        raise ModelFormatError(f"{path}: a coefficient is infinite or NaN; finite numbers are wanted")
+    return Model(geometry, weights, **facts)
 
 
 def _card(path: str) -> dict[str, Any]:

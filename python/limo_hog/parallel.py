@@ -2,34 +2,93 @@
 
 from __future__ import annotations
 
+import os
+import queue
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, TypeVar
-
-if TYPE_CHECKING:
-    from concurrent.futures import Future
+from contextlib import suppress
+from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+#: How long a caller who stops waits for work that is under way [s]; a reader may wait for a drive that never answers.
+_PATIENCE_S = 0.5
+
+
+def cores() -> int:
+    """Count the processor cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class _Job(Generic[Item, Result]):
+    """One item's work; `done` is set when it has a result or an error."""
+
+    def __init__(self, work: Callable[[Item], Result], item: Item) -> None:
+        self._work, self._item = work, item
+        self._result: Result
+        self._error: BaseException | None = None
+        self.done = threading.Event()
+
+    def run(self) -> None:
+        try:
+            self._result = self._work(self._item)
+        except BaseException as error:
+            self._error = error
+        self.done.set()
+
+    def result(self) -> Result:
+        self.done.wait()
+        if self._error is not None:
+            raise self._error
+        return self._result
 
 
 def in_order(work: Callable[[Item], Result], items: Iterable[Item], threads: int) -> Iterator[Result]:
     """Yield `work(item)` for each item, in the items' order, computed by `threads` threads.
 
     Items are taken as results are, twice as many ahead as there are threads: neither many items nor many results are
-    held. What `work` raises is raised at its item's turn. Where the caller takes no more, nothing more is begun.
+    held. What `work` raises is raised at its item's turn. Where the caller takes no more, nothing more is begun, and
+    what is under way is left after `_PATIENCE_S`. Threads that cannot be had are done without; the caller's works
+    where there is none.
     """
-    from concurrent.futures import ThreadPoolExecutor  # imported here: it takes longer than this package
+    jobs: queue.SimpleQueue[_Job[Item, Result] | None] = queue.SimpleQueue()
+    waiting: deque[_Job[Item, Result]] = deque()
+    helpers: list[threading.Thread] = []
 
-    waiting: deque[Future[Result]] = deque()
-    with ThreadPoolExecutor(threads, thread_name_prefix="limo-hog") as pool:
-        try:
-            for item in items:
-                waiting.append(pool.submit(work, item))
-                if len(waiting) > 2 * threads:
-                    yield waiting.popleft().result()
-            while waiting:
+    def help_() -> None:
+        while (job := jobs.get()) is not None:
+            job.run()
+
+    try:
+        for item in items:
+            job = _Job(work, item)
+            waiting.append(job)
+            if len(helpers) < threads:
+                helper = threading.Thread(target=help_, name="limo-hog", daemon=True)
+                try:
+                    helper.start()
+                    helpers.append(helper)
+                except RuntimeError:
+                    threads = len(helpers)
+            if helpers:
+                jobs.put(job)
+            else:
+                job.run()
+            if len(waiting) > 2 * threads:
                 yield waiting.popleft().result()
-        finally:
-            for job in waiting:
-                job.cancel()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        with suppress(queue.Empty):
+            while True:
+                jobs.get_nowait()
+        for _ in helpers:
+            jobs.put(None)
+        patient_until = time.monotonic() + _PATIENCE_S
+        for helper in helpers:
+            helper.join(max(0.0, patient_until - time.monotonic()))

@@ -8,8 +8,8 @@ import threading
 
 import pytest
 
-from limo_hog.cli.support import signals
-from limo_hog.cli.support.signals import Stopped, held, stopping
+from limo_hog import signals
+from limo_hog.signals import Stopped, held, stopping
 
 
 def _send(number: int) -> None:

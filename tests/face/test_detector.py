@@ -7,6 +7,7 @@ import json
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import FrozenInstanceError, replace
+from decimal import Decimal
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -250,6 +251,9 @@ untyped: Any = limo_hog
 WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"model": "bogus"}, ValueError, "model is 'bogus'; opencv, default, daimler, limo or the path"),
     ({"model": 7}, TypeError, "model is 7"),
+    ({"threshold": Decimal("sNaN")}, TypeError, "threshold is Decimal"),
+    ({"threshold": np.complex128(1 + 2j)}, TypeError, "a real number is wanted"),
+    ({"threshold": np.str_("x")}, TypeError, "threshold is"),
     ({"model": None}, TypeError, "model is None"),
     ({"min_height": 0}, ValueError, "min_height is 0; 8 or more is wanted"),
     ({"min_height": float("nan")}, ValueError, "min_height is nan"),
@@ -370,8 +374,38 @@ def test_a_model_need_not_be_in_a_file() -> None:
     np.testing.assert_array_equal(
         detector.detect(picture()).windows, PeopleDetector(model="daimler").detect(picture()).windows
     )
-    assert replace(detector) == detector != PeopleDetector(model=load_model("daimler"))
+    assert replace(detector) == detector == PeopleDetector(model=load_model("daimler"))
+    assert detector != PeopleDetector(model=load_model("opencv"))
     assert len(pickle.loads(pickle.dumps(detector)).detect(picture())) > 0
+
+
+def test_a_detector_of_a_file_keeps_its_model_in_copies_and_pickles(tmp_path: Path) -> None:
+    path = saved(tmp_path / "m.yml")
+    detector = PeopleDetector(model=path)
+    before = detector.detect(picture())
+    path.unlink()
+    for copied in (
+        copy.copy(detector),
+        copy.deepcopy(detector),
+        pickle.loads(pickle.dumps(detector)),
+        replace(detector),
+    ):
+        assert copied == detector and hash(copied) == hash(detector)
+        np.testing.assert_array_equal(copied.detect(picture()).scores, before.scores)
+
+
+@pytest.mark.parametrize("word", [".Inf", "-.Inf", ".Nan", "1e39"])
+def test_a_model_with_a_coefficient_that_is_no_finite_number_is_refused(tmp_path: Path, word: str) -> None:
+    path = saved(tmp_path / "m.yml")
+    text = path.read_text()
+    start = text.index("SVMDetector: [") + len("SVMDetector: [")
+    path.write_text(text[:start] + f" {word}," + text[text.index(",", start) + 1 :])
+    with pytest.raises(limo_hog.ModelFormatError, match=r"m\.yml: a coefficient is infinite or NaN"):
+        PeopleDetector(model=path)
+    weights = load_model("opencv").coefficients.copy()
+    weights[0] = np.inf
+    with pytest.raises(limo_hog.ModelFormatError, match="a coefficient is infinite or NaN"):
+        replace(load_model("opencv"), coefficients=weights)
 
 
 def test_a_file_without_an_svm_is_refused(tmp_path: Path) -> None:

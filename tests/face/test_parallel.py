@@ -7,9 +7,12 @@ import threading
 import time
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
-from limo_hog.parallel import in_order
+import limo_hog
+from limo_hog import PeopleDetector
+from limo_hog.parallel import cores, in_order
 
 
 def test_results_come_in_the_order_of_their_items_whatever_each_takes() -> None:
@@ -66,3 +69,32 @@ def test_a_caller_who_stops_begins_nothing_more_and_leaves_no_thread() -> None:
     results.close()  # type: ignore[attr-defined]
     assert len(begun) <= 6
     assert not [thread for thread in threading.enumerate() if thread not in before and "limo-hog" in thread.name]
+
+
+def test_threads_that_cannot_be_had_are_done_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    start = threading.Thread.start
+    started: list[threading.Thread] = []
+    most = 0
+
+    def refuse(thread: threading.Thread) -> None:
+        if len(started) == most:
+            raise RuntimeError("can't start new thread")
+        started.append(thread)
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    assert list(in_order(abs, range(50), 8)) == list(range(50)) and not started
+    most = 2
+    assert list(in_order(abs, range(50), 8)) == list(range(50)) and len(started) == 2
+
+
+def test_a_detector_uses_no_more_threads_than_there_are_cores() -> None:
+    before = limo_hog.get_num_threads()
+    limo_hog.set_num_threads(10**6)
+    try:
+        most = 0
+        for _ in PeopleDetector(min_height=None).detect_many([np.zeros((140, 80), np.uint8)] * 300):
+            most = max(most, sum(thread.name == "limo-hog" for thread in threading.enumerate()))
+        assert most <= cores()
+    finally:
+        limo_hog.set_num_threads(before)

@@ -121,6 +121,15 @@ def test_pictures_may_lie_elsewhere(folder: Path, tmp_path_factory: pytest.TempP
         ("x.json", '{"images": [], "annotations": [1]}', "neither COCO labels nor"),
         ("x.json", f'{{"a.png": [[1, 2, 3, {10**400}]]}}', "neither COCO labels nor"),
         ("x.json", "{}", "names no picture"),
+        ("x.json", '{"a.png": ["1234"]}', "a box is '1234'; four finite numbers"),
+        ("x.json", '{"a.png": [[1, 2, 3, 1e300]]}', "of at most 1e"),
+        ("x.json", '{"a.png": [], "a.png": []}', "'a.png' is there twice"),
+        ("x.json", '{"images": [{"id": 1}, {"id": 1}], "annotations": []}', "two of its images have one id"),
+        (
+            "x.json",
+            '{"images": [], "annotations": [{"image_id": 1, "bbox": [1, 2, 3, 4], "iscrowd": "no"}]}',
+            "iscrowd or ignore is",
+        ),
         ("x.xml", "<html/>", r"its outermost tag is <html>; wanted is VOC's"),
         ("x.xml", "<annotation", "wanted is VOC's"),
         ("x.xml", "<annotation><filename>a.png</filename><object/></annotation>", "has no <bndbox/xmin>"),
@@ -187,3 +196,8 @@ def test_boxes_without_area_or_outside_are_left_out_with_a_warning() -> None:
     with pytest.warns(LabelWarning, match=r"a\.png: 1 boxes outside of its 100 x 50 pixels are left out"):
         kept = inside(Picture(Path("a.png"), (good, partly, Box("", 100, 10, 5, 5))), (100, 50))
     assert kept.boxes == (good, partly)
+
+
+def test_blanks_around_a_pictures_name_are_no_part_of_it(folder: Path) -> None:
+    (folder / "x.xml").write_text("<annotation><filename>\n a.png </filename></annotation>")
+    assert [picture.path.name for picture in read_labels(folder / "x.xml")] == ["a.png"]

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rich import box
-from rich.console import Console
 from rich.table import Table
 
 import limo_hog
 from limo_hog.cli.support.arguments import output_file, size, threads
-from limo_hog.cli.support.environment import cores, environment
+from limo_hog.cli.support.console import console
+from limo_hog.cli.support.environment import environment
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.cli.support.race import Rounds, Timing, race
@@ -25,6 +25,7 @@ from limo_hog.cli.support.scene import street
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import LimoHogError
+from limo_hog.parallel import cores
 
 #: The workshop's parameters.
 PARAMETERS: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
@@ -205,14 +206,14 @@ def _found(result: tuple[Any, Any]) -> list[tuple[tuple[int, ...], float]]:
 
 
 def _print(facts: dict[str, Any], rows: list[Row]) -> None:
-    console = Console(highlight=False)
+    screen = console()
     opponent = f"OpenCV {facts['opencv']}" if facts["opencv_has_hog"] else "nothing"
-    console.print(f"[bold]limo-hog {facts['limo_hog']} ({facts['backend']}) against {opponent}[/]")
-    console.print(f"{facts['cpu']}, {facts['cores']} cores, Python {facts['python']}")
+    screen.print(f"[bold]limo-hog {facts['limo_hog']} ({facts['backend']}) against {opponent}[/]")
+    screen.print(f"{facts['cpu']}, {facts['cores']} cores, Python {facts['python']}")
     if (facts["load"] or 0) > 0.5 * facts["cores"]:
-        console.print(f"[yellow]The machine is busy (load {facts['load']}): do not trust these times.[/]")
+        screen.print(f"[yellow]The machine is busy (load {facts['load']}): do not trust these times.[/]")
     if not facts["opencv_has_hog"]:
-        console.print(
+        screen.print(
             "No OpenCV with HOGDescriptor here: pip install 'opencv-python-headless<5' to compare.", soft_wrap=True
         )
     table = Table(
@@ -232,7 +233,7 @@ def _print(facts: dict[str, Any], rows: list[Row]) -> None:
             "" if row.ratio is None else f"[bold]{row.ratio:.1f}×[/]",
             _agreement(row),
         )
-    console.print(table)
+    screen.print(table)
 
 
 def _ms(timing: Timing | None) -> str:

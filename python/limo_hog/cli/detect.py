@@ -17,7 +17,7 @@ from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
 
 #: What the results of a run depend on, and its JSON lines hold.
-PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "every")
+PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "every", "search")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

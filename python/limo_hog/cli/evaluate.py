@@ -111,9 +111,10 @@ def _rivals(args: argparse.Namespace) -> list[Rival]:
 
 def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters) -> None:
     from rich import box
-    from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
+    from limo_hog.cli.support.console import console
     from limo_hog.learn.evaluation.run import compare
 
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
@@ -123,22 +124,22 @@ def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters)
         low, high = one.intervals["lamr"]
         figures = (f"{value:.3f}" for value in one.figures[1:])
         table.add_row(
-            one.name,
+            Text(one.name),
             f"{one.figures.lamr:.3f}",
             f"{low:.2f}..{high:.2f}",
             *figures,
             f"{one.threshold_01:.2f}",
             f"{one.ms:.1f}",
         )
-    console = Console()
-    console.print(table)
+    screen = console()
+    screen.print(table)
     for other in evaluations[1:]:
         lamr = compare(evaluations[0], other, how)[0]
         low, high = lamr.interval
         sure = "" if low <= 0 <= high else ", unlikely to be chance"
         names = f"{evaluations[0].name} minus {other.name}"
-        console.print(
+        screen.print(
             f"LAMR of {names}: {lamr.difference:+.3f} ({low:+.3f} to {high:+.3f}){sure}",
             soft_wrap=True,
-            highlight=False,
+            markup=False,
         )

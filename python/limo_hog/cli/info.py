@@ -6,10 +6,10 @@ import argparse
 import os
 from collections.abc import Mapping
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from limo_hog.cli.support.console import console
 from limo_hog.cli.support.environment import Extra, environment, extras
 
 
@@ -36,10 +36,10 @@ def run(args: argparse.Namespace) -> int:  # noqa: ARG001
         "numpy": facts["numpy"],
         "Python": f"{facts['python']} on {facts['platform']} ({facts['machine']})",
     }
-    console = Console(highlight=False)
-    console.print(_table(rows))
-    console.print("\n[bold]extras[/]")
-    console.print(_table({extra.name: _told(extra) for extra in extras()}))
+    screen = console()
+    screen.print(_table(rows))
+    screen.print("\n[bold]extras[/]")
+    screen.print(_table({extra.name: _told(extra) for extra in extras()}))
     return 0
 
 

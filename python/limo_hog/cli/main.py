@@ -8,6 +8,7 @@ imported; where the arena is not installed, the error names the line that instal
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import os
 import signal
@@ -15,13 +16,14 @@ import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, NoReturn
 
-from limo_hog.cli.support.output import UsageError, one_line
-from limo_hog.cli.support.signals import stopping
+from limo_hog.cli.support.output import STDOUT, UsageError, lasting_streams, one_line, printable
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import missing_extra
+from limo_hog.signals import stopping
 
 #: Commands of this package and their line in `limo-hog --help`.
 BUILT_IN = {
@@ -43,6 +45,9 @@ ARENA = {
     "score": "compare controllers over scenarios and seeds, on all cores",
     "export": "write labelled pictures of the arena, to train and to measure detectors on",
 }
+
+#: Pixels of the largest picture that a command reads: of the largest that `PeopleDetector` searches [px].
+_MOST_PIXELS = 2**28
 
 
 class _Help(argparse.HelpFormatter):
@@ -71,25 +76,31 @@ class _Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return 0 done, 1 a named error, 2 wrong arguments, 128 + n stopped by signal n."""
     arguments = list(sys.argv[1:] if argv is None else argv)
+    # OpenCV refuses a larger picture by its header, before it decodes; it reads the limit when it is loaded.
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(_MOST_PIXELS))
+    with lasting_streams():
+        return _answered(arguments)
+
+
+def _answered(arguments: list[str]) -> int:
+    """Run the command; answer named errors by a line and their code."""
     try:
         with stopping():
             code = _run(arguments)
-        # What is still buffered is written here, where a closed pipe or a full disk can be answered.
+        # What is still buffered is written here, where a full disk can be answered.
         sys.stdout.flush()
     except KeyboardInterrupt as error:
-        with suppress(OSError):  # the terminal may be gone
-            print("limo-hog: stopped", file=sys.stderr)
+        print("limo-hog: stopped", file=sys.stderr)
         return 128 + getattr(error, "signal", signal.SIGINT)
     except BrokenPipeError:
-        # The reader has closed the pipe; Python must not complain again when it closes standard output.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader of what was asked for has left.
         return 1
     except (LimoHogError, OSError, MemoryError, ImportError) as error:
         if isinstance(error, ImportError) and not isinstance(error, LimoHogError):
             error = missing_extra(f"limo-hog {arguments[0]}", error)
         if "--debug" in arguments:
             raise
-        print(f"limo-hog: {one_line(error)}", file=sys.stderr)
+        print(f"limo-hog: {printable(one_line(error))}", file=sys.stderr)
         return 2 if isinstance(error, UsageError) else 1
     return code
 
@@ -134,7 +145,45 @@ def _run(arguments: list[str]) -> int:
     if module is None:
         parser.print_help(sys.stderr)
         return 2
+    _assert_writable(args)
     return int(module.run(args))
+
+
+#: Arguments that name files to write, and those that name what is read.
+_WRITTEN = ("json", "csv", "coco", "out", "video", "record", "plot", "html", "gradescope")
+_READ = ("inputs", "model", "against", "data", "negatives", "validate", "scenario", "file", "node", "image")
+
+
+def _assert_writable(args: argparse.Namespace) -> None:
+    """Refuse, before the work, files that cannot be written, and those that are an input.
+
+    Raises
+    ------
+    UsageError
+        A file to write is one that is read.
+    OSError
+        It cannot be written.
+    """
+    given = [value for name in _READ for value in _listed(getattr(args, name, None))]
+    read = {os.path.realpath(value) for value in given if os.path.isfile(value)}  # noqa: PTH113
+    for target in (value for name in _WRITTEN for value in _listed(getattr(args, name, None)) if value != STDOUT):
+        if os.path.realpath(target) in read:
+            raise UsageError(f"{target} is itself an input: give another name")
+        folder = Path(target).absolute().parent
+        while not folder.exists() and folder != folder.parent:
+            folder = folder.parent
+        if not os.access(folder, os.W_OK) or not folder.is_dir():
+            raise OSError(*_why(folder), target)
+
+
+def _listed(value: Any) -> list[str]:
+    values = value if isinstance(value, (list, tuple)) else [value]
+    return [os.fspath(one) for one in values if isinstance(one, (str, Path)) and str(one)]
+
+
+def _why(folder: Path) -> tuple[int, str]:
+    number = errno.EACCES if folder.is_dir() else errno.ENOTDIR
+    return number, os.strerror(number)
 
 
 def whole_parser() -> argparse.ArgumentParser:

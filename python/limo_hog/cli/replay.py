@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from limo_hog.cli.support.arguments import add_detector, file_ending, output_file
+from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
@@ -87,11 +88,11 @@ def run(args: argparse.Namespace) -> int:
         for name, value in card.items():
             shown = f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)
             label, unit = _SHOWN.get(name, (name.replace("_", " "), ""))
-            table.add_row(label, f"{shown} {unit.format(**card)}".rstrip())
-        console = Console(highlight=False)
-        console.print(table)
+            table.add_row(label, Text(f"{shown} {unit.format(**card)}".rstrip()))
+        out = console()
+        out.print(table)
         if card["same_detections"] < card["frames_recorded_with_detections"] or card["linear_difference_max"]:
-            console.print(_WHY, soft_wrap=True)
+            out.print(_WHY, soft_wrap=True)
     failures = [frame["failure"] for frame in frames if frame["failure"]]
     if failures:
         print(f"{len(failures)} of {len(frames)} frames: {failures[0]}", file=sys.stderr)

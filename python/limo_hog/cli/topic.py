@@ -13,6 +13,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import seconds
+from limo_hog.cli.support.output import emit, printable
 from limo_hog.exceptions import LimoHogError
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
         if not topics:
             print(f"no topics in ROS domain {bus.domain}", file=sys.stderr)
         for name, ends in topics.items():
-            print(f"{name} [{ends.type_name}]" if args.show_types else name)
+            print(printable(f"{name} [{ends.type_name}]" if args.show_types else name))
         return 0
     topic = args.topic if args.topic.startswith("/") else f"/{args.topic}"
     found = bus.topics(2.0, enough=lambda topics: topic in topics and args.action != "info")
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         raise LimoHogError(f"topic {topic} is not there in ROS domain {bus.domain}; there are: {known}")
     if args.action == "info":
         ends = found[topic]
-        print(f"Type: {ends.type_name}")
+        print(printable(f"Type: {ends.type_name}"))
         print(f"Publisher count: {ends.publishers}")
         print(f"Subscription count: {ends.subscriptions}")
         return 0
@@ -95,7 +96,7 @@ def _hz(bus: Bus, subscription: Subscription, topic: str, args: argparse.Namespa
 def _say_rate(gaps: deque[float]) -> None:
     print(f"average rate: {len(gaps) / sum(gaps):.3f}")
     spread = f"min: {min(gaps):.3f}s max: {max(gaps):.3f}s std dev: {statistics.pstdev(gaps):.5f}s"
-    print(f"\t{spread} window: {len(gaps) + 1}", flush=True)
+    emit(f"\t{spread} window: {len(gaps) + 1}")
 
 
 def _echo(bus: Bus, subscription: Subscription, topic: str, args: argparse.Namespace) -> None:
@@ -105,8 +106,7 @@ def _echo(bus: Bus, subscription: Subscription, topic: str, args: argparse.Names
         bus.wait(0.2)
         for message in subscription.take():
             heard = True
-            sys.stdout.write(as_yaml(message) + "---\n")
-            sys.stdout.flush()
+            emit(as_yaml(message) + "---")
             if args.once:
                 return
     if not heard:

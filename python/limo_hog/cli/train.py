@@ -61,11 +61,11 @@ def _share(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """Train, and write the detector and its card after every round."""
-    from limo_hog.cli.support.environment import cores
     from limo_hog.cli.support.progress import progress
     from limo_hog.cli.support.warned import warnings_in_one_line
     from limo_hog.learn.sources import Wanted, gather
     from limo_hog.learn.training import TrainingParameters, train
+    from limo_hog.parallel import cores
 
     if args.window and (args.window[0] % 8 or args.window[1] % 8 or min(args.window) < 16):
         raise UsageError(f"--window {args.window[0]}x{args.window[1]}: multiples of 8 from 16 on are wanted")

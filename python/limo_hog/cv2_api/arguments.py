@@ -134,8 +134,12 @@ def real(name: str, value: SupportsFloat | None, default: float) -> float:
         return default
     if not isinstance(value, (SupportsFloat, SupportsIndex)) or _is_truth(value):
         raise ParameterTypeError(f"{name} is {shown(value)}; a number is wanted")
+    if isinstance(value, np.complexfloating):
+        raise ParameterTypeError(f"{name} is {shown(value)}; a real number is wanted")
     try:
         return float(value)
+    except ValueError:  # text in an array, a signalling NaN
+        raise ParameterTypeError(f"{name} is {shown(value)}; a number is wanted") from None
     except TypeError:  # an array of more than one number
         raise ParameterTypeError(f"{name} is {shown(value)}; one number is wanted") from None
     except OverflowError:

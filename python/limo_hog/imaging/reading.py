@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import glob
+import os
 import shutil
+import stat
 import sys
 import tempfile
 from collections.abc import Container, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -16,6 +18,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.atomic import is_utf8
 from limo_hog.exceptions import ImageError
 from limo_hog.extras import needed
 
@@ -27,6 +30,8 @@ VIDEO_SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".ts"
 
 #: The input that stands for standard input.
 STDIN = "-"
+#: Bytes of the largest file of a picture: 2²⁸ pixels of three bytes, and a header.
+_MOST_BYTES = 3 * 2**28 + 2**20
 #: How long a stream may take to open, or to send its next frame [s]; cameras on a network take one or two.
 STREAM_TIMEOUT_S = 10
 
@@ -103,9 +108,11 @@ def standard_input() -> Iterator[Source]:
     """Keep standard input (one image or one video) in a temporary file."""
     with tempfile.TemporaryDirectory(prefix="limo-hog-") as folder:
         path = Path(folder) / "stdin"
+        if sys.stdin is None:
+            raise ReadError(f"{STDIN}: standard input is closed")
         with path.open("wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
-        kind = Kind.IMAGE if cv2.haveImageReader(str(path)) else Kind.VIDEO
+        kind = Kind.IMAGE if is_utf8(folder) and cv2.haveImageReader(str(path)) else Kind.VIDEO
         yield Source(STDIN, path, kind)
 
 
@@ -115,18 +122,54 @@ def read_image(source: Source) -> NDArray[np.uint8]:
     Raises
     ------
     ReadError
-        If the file is empty or no image; OSError if it cannot be opened.
+        If the file is no regular one, empty, too large or no image; OSError if it cannot be opened.
     """
-    data = np.frombuffer(source.path.read_bytes(), np.uint8)
-    if data.size == 0:
+    # Opened without waiting: a pipe would wait for its writer.
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with os.fdopen(os.open(source.path, flags), "rb") as file:
+        _assert_regular(source, os.fstat(file.fileno()))
+        # Some files are longer than they say, such as those of /proc.
+        content = file.read(_MOST_BYTES + 1)
+    if len(content) > _MOST_BYTES:
+        raise ReadError(f"{source.name}: more than {_MOST_BYTES >> 20} MiB; no picture is so large")
+    if not content:
         raise ReadError(f"{source.name}: the file is empty")
+    data = np.frombuffer(content, np.uint8)
     try:
         image = cv2.imdecode(data, cv2.IMREAD_COLOR)
     except cv2.error as error:
+        if "MAX_IMAGE" in (error.err or ""):
+            limit = os.environ.get("OPENCV_IO_MAX_IMAGE_PIXELS", "fewer")
+            raise ReadError(f"{source.name}: too many pixels; at most {limit} are read") from error
         raise ReadError(f"{source.name}: OpenCV cannot decode this image: {error.err}") from error
     if image is None:
         raise ReadError(f"{source.name}: not an image that OpenCV can read ({data.size} bytes)")
     return image.astype(np.uint8, copy=False)
+
+
+def _assert_regular(source: Source, status: os.stat_result) -> None:
+    if not stat.S_ISREG(status.st_mode):
+        raise ReadError(
+            f"{source.name}: a pipe, a device or a folder; a regular file is wanted, or - for standard input"
+        )
+
+
+@contextmanager
+def _name_for_opencv(source: Source) -> Iterator[str]:
+    """Give a name of a file that OpenCV can take: it crashes on those that are no UTF-8.
+
+    Such a file is read through a link of another name.
+    """
+    if is_utf8(str(source.path)):
+        yield str(source.path)
+        return
+    with tempfile.TemporaryDirectory(prefix="limo-hog-") as folder:
+        suffix = source.path.suffix.lower()
+        link = Path(folder) / f"film{suffix if suffix in VIDEO_SUFFIXES else ''}"
+        if not is_utf8(str(link)):
+            raise ReadError(f"{source.name}: OpenCV takes no name that is not UTF-8; give the file another")
+        link.symlink_to(source.path.absolute())
+        yield str(link)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,28 +219,32 @@ def open_video(source: Source) -> Iterator[Video]:
     ReadError
         OpenCV cannot read it.
     """
-    if source.kind is Kind.CAMERA:
-        wanted = "no camera with this index"
-        try:
-            capture = cv2.VideoCapture(int(source.name))
-        except (cv2.error, ValueError) as error:  # the index is no integer of 32 bits, or one of thousands of digits
-            raise ReadError(f"{source.name}: {wanted}") from error
-    elif source.kind is Kind.STREAM:
-        limits = (cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, cv2.CAP_PROP_READ_TIMEOUT_MSEC)
-        timeouts = [word for limit in limits for word in (limit, 1000 * STREAM_TIMEOUT_S)]
-        capture = cv2.VideoCapture(source.name, cv2.CAP_ANY, timeouts)
-        wanted = (
-            f"OpenCV found no video there within {STREAM_TIMEOUT_S} s; wanted is the address of a stream or a video, "
-            "such as rtsp://HOST/PATH"
-        )
-    elif source.path.stat().st_size == 0:
-        raise ReadError(f"{source.name}: the file is empty")
-    else:
-        capture, wanted = cv2.VideoCapture(str(source.path)), "not a video that OpenCV can read"
-    try:
+    with ExitStack() as stack:
+        if source.kind is Kind.CAMERA:
+            wanted = "no camera with this index"
+            try:
+                capture = cv2.VideoCapture(int(source.name))
+            except (cv2.error, ValueError) as error:  # the index is no integer of 32 bits, or of thousands of digits
+                raise ReadError(f"{source.name}: {wanted}") from error
+        elif source.kind is Kind.STREAM:
+            if not is_utf8(source.name):
+                raise ReadError(f"{source.name}: no address: it is not UTF-8; write other bytes as %XX")
+            limits = (cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, cv2.CAP_PROP_READ_TIMEOUT_MSEC)
+            timeouts = [word for limit in limits for word in (limit, 1000 * STREAM_TIMEOUT_S)]
+            capture = cv2.VideoCapture(source.name, cv2.CAP_ANY, timeouts)
+            wanted = (
+                f"OpenCV found no video there within {STREAM_TIMEOUT_S} s; wanted is the address of a stream or a "
+                "video, such as rtsp://HOST/PATH"
+            )
+        else:
+            status = source.path.stat()
+            _assert_regular(source, status)
+            if status.st_size == 0:
+                raise ReadError(f"{source.name}: the file is empty")
+            wanted = "not a video that OpenCV can read"
+            capture = cv2.VideoCapture(stack.enter_context(_name_for_opencv(source)))
+        stack.callback(capture.release)
         if not capture.isOpened():
             raise ReadError(f"{source.name}: {wanted}")
         frames = 0 if source.kind is Kind.CAMERA else max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
         yield Video(source, capture.get(cv2.CAP_PROP_FPS) or 25.0, frames, capture)
-    finally:
-        capture.release()

@@ -44,7 +44,7 @@ def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShap
         A file cannot be written; no part of it is left behind.
     """
     model_files.save(path, Geometry(winSize=shape.size), coefficients.astype(np.float32))
-    write_text(card_path(path), json.dumps(card, indent=2) + "\n")
+    write_text(card_path(path), json.dumps(card, indent=2, allow_nan=False) + "\n")
 
 
 def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
-
+from limo_hog.cv2_api.arguments import shown
 from limo_hog.imaging.reading import IMAGE_SUFFIXES
 from limo_hog.learn.labels import Box, LabelError, Picture
 
@@ -27,6 +26,9 @@ _PLACES = ("", "images", "JPEGImages", "..", "../images", "../JPEGImages")
 
 #: A picture's name as the labels have it, and its boxes.
 _Named = tuple[str, tuple[Box, ...]]
+
+#: No picture is so wide: boxes beyond it are errors [px].
+_FARTHEST_PX = 1e6
 
 
 def read_labels(source: Path, pictures: Path | None = None) -> list[Picture]:
@@ -121,7 +123,7 @@ def _found(source: Path, named: list[_Named], pictures: Path | None) -> list[Pic
 
 def _json(source: Path) -> Iterator[_Named]:
     try:
-        data = json.loads(source.read_text("utf-8"))
+        data = json.loads(source.read_text("utf-8"), object_pairs_hook=_once)
         if isinstance(data, dict) and {"images", "annotations"} <= data.keys():
             yield from _coco(data)
         elif isinstance(data, dict):
@@ -133,18 +135,34 @@ def _json(source: Path) -> Iterator[_Named]:
         raise LabelError(f"{source} holds neither COCO labels nor {{picture: [[x, y, w, h]]}}: {error!r}") from error
 
 
-def _box(label: str, numbers: Iterable[Any], ignored: bool = False) -> Box:
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        twice = next(key for key in table if sum(key == other for other, _ in pairs) > 1)
+        raise ValueError(f"the key {twice!r} is there twice")
+    return table
+
+
+def _box(label: str, numbers: Any, ignored: bool = False) -> Box:
+    are_numbers = isinstance(numbers, (list, tuple)) and all(type(one) in (int, float) for one in numbers)
+    if not are_numbers or len(numbers) != 4 or not all(abs(one) <= _FARTHEST_PX for one in numbers):
+        raise ValueError(f"a box is {shown(numbers)}; four finite numbers are wanted, of at most {_FARTHEST_PX:g} px")
     x, y, width, height = map(float, numbers)
-    if not np.isfinite([x, y, width, height]).all():
-        raise ValueError(f"a box is {x}, {y}, {width}, {height}; finite numbers are wanted")
     return Box(label, x, y, width, height, ignored)
 
 
 def _coco(data: dict[str, Any]) -> Iterator[_Named]:
+    for kind in ("images", "categories"):
+        ids = [one["id"] for one in data.get(kind, [])]
+        if len(set(ids)) < len(ids):
+            raise ValueError(f"two of its {kind} have one id")
     labels = {category["id"]: str(category["name"]) for category in data.get("categories", [])}
     boxes = defaultdict(list)
     for note in data["annotations"]:
-        ignored = bool(note.get("iscrowd", 0) or note.get("ignore", 0))
+        marks = [note.get("iscrowd", 0), note.get("ignore", 0)]
+        if any(mark not in (0, 1) for mark in marks):
+            raise ValueError(f"iscrowd or ignore is {shown(marks)}; 0 or 1 is wanted")
+        ignored = any(marks)
         label = labels.get(note.get("category_id"), "")
         boxes[note["image_id"]].append(_box(label, note["bbox"], ignored))
     for image in data["images"]:
@@ -172,7 +190,7 @@ def _voc(root: ElementTree.Element) -> Iterator[_Named]:
         ignored = _text(thing, "difficult", "0").strip() == "1"
         numbers = left - 1, top - 1, right - left + 1, bottom - top + 1
         boxes.append(_box(_text(thing, "name", ""), numbers, ignored))
-    yield _text(root, "filename"), tuple(boxes)
+    yield _text(root, "filename").strip(), tuple(boxes)
 
 
 def _cvat(root: ElementTree.Element) -> Iterator[_Named]:

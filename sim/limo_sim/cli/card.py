@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rich import box
-from rich.console import Console, Group
+from rich.console import Group
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
+
+from limo_hog.cli.support.console import console
 
 if TYPE_CHECKING:
     from limo_sim.run.score import ScoreCard
@@ -21,7 +23,7 @@ _ZONE_STYLES = {"intimate": "red", "personal": "yellow", "social": "green", "pub
 
 def show(card: ScoreCard) -> None:
     """Print a score card on standard output."""
-    Console(highlight=False).print(picture(card))
+    console().print(picture(card))
 
 
 def picture(card: ScoreCard) -> Panel:
@@ -70,11 +72,12 @@ def picture(card: ScoreCard) -> Panel:
     reasons.add_column(justify="right", style="dim", no_wrap=True)
     reasons.add_column(overflow="fold")
     for reason, share in list(card.reasons.items())[:5]:
-        reasons.add_row(_percent(share), reason)
+        reasons.add_row(_percent(share), Text(reason))
     detection = f"{card.detect_ms_p50:.1f} ms a frame" if card.detect_ms_p50 is not None else "no frame"
+    names = (Text(card.scenario, style="bold"), card.controller, card.detector, f"seed {card.seed}")
     return Panel(
         Group(figures, "", bars, "", Text("most frequent reasons", style="bold"), reasons),
-        title=f"[bold]{card.scenario}[/] · {card.controller} · {card.detector} · seed {card.seed}",
+        title=Text(" · ").join(Text.assemble(name) for name in names),
         subtitle=f"{card.seconds:g} s, {card.real_time_factor:.1f}× real time · detection {detection}",
         box=box.ROUNDED,
         padding=(1, 2),

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
             about_all = {"scenario": scenario.name, "scenario_hash": scenario_hash(scenario), "seed": args.seed}
             categories = [{"id": i, "name": label} for i, label in enumerate(labels, 1)]
             data = {"info": {**about_all, "code_version": code_version()}, "categories": categories}
-            text = json.dumps({**data, "images": images, "annotations": annotations}) + "\n"
+            text = json.dumps({**data, "images": images, "annotations": annotations}, allow_nan=False) + "\n"
             write_text(folder / "coco.json", text)
             print(f"{folder}: pictures: {len(images)}, labelled things: {len(annotations)}, labels: coco.json")
     return 0

@@ -10,16 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich import box
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from limo_hog.atomic import about, whole_file
 from limo_hog.cli.support.arguments import add_target_and_detector, count, file_ending, seconds, seed
-from limo_hog.cli.support.environment import cores
+from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS
 from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.parallel import cores
 from limo_sim.cli.options import add_json
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def _controller(text: str) -> str:
 def run(args: argparse.Namespace) -> int:
     """Play all runs, show the table, and write what was asked for."""
     from limo_sim.run.suite import Suite
-    from limo_sim.run.sweep import compare, play_all, summarise
+    from limo_sim.run.sweep import WorkerError, compare, play_all, summarise
 
     if args.plot:
         # A missing library is named before the work, not after.
@@ -101,12 +102,18 @@ def run(args: argparse.Namespace) -> int:
     suite = Suite.load(args.suite) if args.suite else None
     runs = _runs(args, suite)
     card_of = {}
+    failure: WorkerError | None = None
     with progress("runs") as bar:
         task = bar.add_task("playing", total=len(runs))
-        for played, card in play_all(runs, args.workers or cores()):
-            card_of[played] = card
-            bar.advance(task)
-    cards = [card_of[run] for run in runs]
+        try:
+            for played, card in play_all(runs, args.workers or cores()):
+                card_of[played] = card
+                bar.advance(task)
+        except WorkerError as error:
+            if not card_of:
+                raise
+            failure = error
+    cards = [card_of[run] for run in runs if run in card_of]
     groups = None if suite is None else suite.groups
     summaries = summarise(cards)
     of_groups = [] if groups is None else [*summarise(cards, groups), *summarise(cards, dict.fromkeys(groups, "all"))]
@@ -128,6 +135,8 @@ def run(args: argparse.Namespace) -> int:
         plot(of_groups or summaries, args.plot)
     if args.json != STDOUT:
         _show(of_groups or summaries, comparisons, f"{args.seeds} seeds of {runs[0].seconds:g} s")
+    if failure is not None:
+        raise failure
     return 0
 
 
@@ -179,13 +188,13 @@ def _write_csv(path: Path, cards: Sequence[ScoreCard]) -> None:
 
 def _show(summaries: Sequence[Summary], comparisons: Sequence[Comparison], runs: str) -> None:
     """Print both tables on standard output; `runs` says how many there were of each."""
-    console = Console(highlight=False)
+    screen = console()
     rows = [(one.scenario, one.controller, one.measures) for one in summaries]
-    console.print(_table(rows, f"mean and, below, half the 95 % interval over {runs}", _cell))
+    screen.print(_table(rows, f"mean and, below, half the 95 % interval over {runs}", _cell))
     if comparisons:
         rows = [(one.scenario, one.controller, one.differences) for one in comparisons]
         words = f"minus {comparisons[0].against}, run by run; bold: the interval leaves out 0"
-        console.print(_table(rows, words, _difference))
+        screen.print(_table(rows, words, _difference))
 
 
 def _table(
@@ -201,9 +210,9 @@ def _table(
     for scenario, controller, measures in rows:
         if scenario != before:
             table.add_section()
-            table.add_row(f"[bold]{scenario}[/]")
+            table.add_row(Text(scenario, style="bold"))
         table.add_row(
-            f"  {controller}", *(cell(measures[name], name, unit, style) for name, _, unit, style in _COLUMNS)
+            Text(f"  {controller}"), *(cell(measures[name], name, unit, style) for name, _, unit, style in _COLUMNS)
         )
         before = scenario
     return table

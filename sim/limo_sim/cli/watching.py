@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import file_ending
 from limo_hog.cli.support.output import STDOUT, write_json
-from limo_hog.cli.support.signals import held
+from limo_hog.signals import held
 
 if TYPE_CHECKING:
     from limo_sim.run.episode import Episode

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from limo_hog.atomic import whole_file, write_text
 from limo_hog.cli.support.arguments import count, output_file, seconds
-from limo_hog.cli.support.environment import cores
+from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.parallel import cores
 
 if TYPE_CHECKING:
     from limo_sim.workshop.check import Verdict
@@ -154,7 +155,6 @@ def _grade(args: argparse.Namespace, node: str) -> int:
 
 def _show(verdicts: list[Verdict], hints: int) -> None:
     """Print each checkpoint on one line, its evidence below, and the points; no line is wider than 80 columns."""
-    from rich.console import Console
     from rich.padding import Padding
     from rich.text import Text
 
@@ -162,24 +162,22 @@ def _show(verdicts: list[Verdict], hints: int) -> None:
     from limo_sim.workshop.report import by_task, evidence, total
 
     marks = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "dim")}
-    console = Console(highlight=False)
-    width = min(console.width, WIDTH)
+    screen = console()
+    width = min(screen.width, WIDTH)
     for verdict in verdicts:
         won = f"{verdict.points:3d}/{verdict.worth:<3d}" if verdict.worth else " " * 7
-        console.print(
-            Text.assemble(marks[verdict.holds], f" task {task_name(verdict.task)} {won} {verdict.checkpoint}")
-        )
+        screen.print(Text.assemble(marks[verdict.holds], f" task {task_name(verdict.task)} {won} {verdict.checkpoint}"))
         style = "" if verdict.holds is False else "dim"
-        console.print(
+        screen.print(
             Padding(Text(evidence(verdict), style=style, overflow="fold"), (0, 0, 0, 4), expand=False), width=width
         )
     points, worth = total(verdicts)
     tasks = ", ".join(f"task {task_name(task)}: {won} of {of}" for task, (won, of) in by_task(verdicts).items())
-    console.print(f"{points} of {worth} points ({tasks})", width=width)
+    screen.print(f"{points} of {worth} points ({tasks})", width=width)
     missed = next((verdict for verdict in verdicts if not verdict.holds and verdict.hints), None)
     if hints and missed is not None:
-        console.print(f"Hints for task {task_name(missed.task)}, {missed.checkpoint}:", width=width)
+        screen.print(f"Hints for task {task_name(missed.task)}, {missed.checkpoint}:", width=width)
         for hint in missed.hints[:hints]:
-            console.print(Padding(Text(hint), (0, 0, 0, 4), expand=False), width=width)
+            screen.print(Padding(Text(hint), (0, 0, 0, 4), expand=False), width=width)
         if hints < len(missed.hints):
-            console.print(f"One more: --hint {hints + 1}")
+            screen.print(f"One more: --hint {hints + 1}")

@@ -16,6 +16,7 @@ import pymunk
 
 from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.signals import held
 from limo_sim.sensing import imu, lidar
 from limo_sim.sensing.camera import FOCAL_PX, CameraPose, TrueFrame
 from limo_sim.sensing.delivery import Channel, Exposure
@@ -168,7 +169,8 @@ class Arena:
         for body, piece in zip(self._moving, self._movers.at(step / STEPS_PER_SECOND), strict=True):
             body.velocity = (piece.x - body.position.x) / STEP_S, (piece.y - body.position.y) / STEP_S
             body.angular_velocity = math.remainder(piece.yaw - body.angle, math.tau) / STEP_S
-        self._space.step(STEP_S)
+        with held():  # an exception in one of pymunk's callbacks would be printed and lost
+            self._space.step(STEP_S)
         robot = self._robot
         twist, wheels = self._drive.twist, before.odometry
         left, right = STEP_S * (1.0 + self.scenario.odometry.slip * self._slip.standard_normal(2))

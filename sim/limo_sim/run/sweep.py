@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
 from statistics import NormalDist, fmean, stdev
 
 import limo_hog
+from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.signals import end_with
 from limo_sim.run.baselines import controller_of
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.score import ScoreCard
@@ -118,17 +121,43 @@ def play(run: Run) -> ScoreCard:
     return score(run_episode(scenario, controller, detector, run.seconds, run.seed, names=names))
 
 
+class WorkerError(LimoHogError):
+    """A worker process ended before its run did."""
+
+
 def play_all(runs: Sequence[Run], workers: int) -> Iterator[tuple[Run, ScoreCard]]:
-    """Play runs on `workers` processes; yields each run with its card, in the order in which they end."""
+    """Play runs on `workers` processes; yields each run with its card, in the order in which they end.
+
+    The processes end with this one, whatever ends it, and at once where the caller takes no more.
+
+    Raises
+    ------
+    WorkerError
+        A process was killed, after the cards of all runs that have ended.
+    """
     # Fresh processes: threads of the detector do not survive a fork.
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+    context = get_context("spawn")
+    alive, kept_open = context.Pipe(duplex=False)
+    missing = 0
+    with alive, kept_open:
+        pool = ProcessPoolExecutor(workers, context, end_with, (alive,))
         try:
             runs_of = {pool.submit(play, run): run for run in runs}
             for done in as_completed(runs_of):
-                yield runs_of[done], done.result()
+                if isinstance(done.exception(), BrokenProcessPool):
+                    missing += 1
+                else:
+                    yield runs_of[done], done.result()
         except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
+            kept_open.close()
             raise
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+    if missing:
+        raise WorkerError(
+            f"a worker process was killed, perhaps for want of memory: {missing} of {len(runs)} runs are missing; "
+            "fewer --workers need less"
+        )
 
 
 def summarise(cards: Sequence[ScoreCard], groups: Mapping[str, str] | None = None) -> list[Summary]:

@@ -54,6 +54,10 @@ _SHORTEST_WALL = 0.05
 _FOLDER = Path(__file__).parents[1] / "scenarios"
 
 
+#: How many of each a scenario may have: 64 people take some seconds for one of the arena.
+_MOST = {"people": 64, "movers": 64, "furniture": 256, "walls": 256}
+
+
 @dataclass(frozen=True, slots=True)
 class WallsTexture:
     """What is on the walls.
@@ -313,6 +317,9 @@ class Scenario:
     def check(self, where: str = "") -> None:
         """Raise `ScenarioError`, its message beginning with `where`, unless this scenario can be run."""
         check_fields(self, where)
+        for kind, most in _MOST.items():
+            if len(getattr(self, kind)) > most:
+                raise ScenarioError(f"{where}{kind}: {len(getattr(self, kind))} of them, want at most {most}")
         if math.hypot(*self.light.sun) < 0.1:
             raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
         self.detector.check(self.camera.rate_hz, f"{where}detector.")
@@ -344,6 +351,9 @@ class Scenario:
     def _with_groups(self, groups: tuple[Group, ...], where: str) -> Scenario:
         """Return this scenario with the members of groups among its people; refuse groups that do not fit."""
         around = self.surroundings
+        grown = len(self.people) + sum(group.size for group in groups)
+        if grown > _MOST["people"]:
+            raise ScenarioError(f"{where}people: {grown} with those of groups, want at most {_MOST['people']}")
         for index, group in enumerate(groups):
             check_fields(group, f"{where}groups[{index}].")
             for member in group.members():

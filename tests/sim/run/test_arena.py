@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
+import os
 import resource
+import signal
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ import pytest
 from limo_hog.follow import detector_named
 from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.measurement import person_depth
+from limo_hog.signals import Stopped, stopping
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.sensing.camera import CENTRE_X, FOCAL_PX, CameraPose
 from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Person, Robot, Room, Scenario, Vary, Wall, Wheels
@@ -333,3 +337,17 @@ def test_a_wall_touched_again_after_half_a_second_is_another_contact() -> None:
             apart += arena.contacts.wall > 0 and arena.plan().robot[0] < furthest - 0.005
     assert 0.6 < apart / STEPS_PER_SECOND < 1.8
     assert arena.contacts.wall == 2
+
+
+def test_a_signal_within_a_step_is_raised_after_it(capfd: pytest.CaptureFixture[str]) -> None:
+    arena = Arena(Scenario.load("empty"), 0)
+    roll = arena._robot.velocity_func
+
+    def interrupted(*state: Any) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        roll(*state)
+
+    arena._robot.velocity_func = interrupted
+    with pytest.raises(Stopped), stopping():
+        arena.step()
+    assert capfd.readouterr().err == ""

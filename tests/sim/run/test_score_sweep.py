@@ -1,8 +1,18 @@
-"""Many runs: every card belongs to its run."""
+"""Many runs: every card belongs to its run; worker processes end with their parent."""
 
 from __future__ import annotations
 
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+import pytest
 
 from limo_sim.run.sweep import Run, play_all
 
@@ -20,3 +30,70 @@ def test_every_card_belongs_to_its_run_whatever_the_scenario_calls_itself(tmp_pa
     assert [cards[run].scenario for run in runs] == ["another name", "workshop", "empty"]
     assert [cards[run].target_m for run in runs] == [1.8, None, 1.5]
     assert [cards[run].seed for run in runs] == [0, 1, 2]
+
+
+def _processes_of(parent: int) -> set[int]:
+    """The children of a process, and theirs."""
+    found: set[int] = set()
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            words = status.read_text().rpartition(")")[2].split()
+            if int(words[1]) == parent and words[0] != "Z":
+                number = int(status.parent.name)
+                found |= {number} | _processes_of(number)
+    return found
+
+
+def _is_running(number: int) -> bool:
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@contextmanager
+def _scoring(*more: str) -> Iterator[tuple[subprocess.Popen[str], set[int]]]:
+    """`limo-hog score` at work with two workers that play, and its processes."""
+    command = [sys.executable, "-m", "limo_hog", "score", "--scenario", "empty", "--controller", "approach", *more]
+    with subprocess.Popen([*command, "--workers", "2"], stderr=subprocess.PIPE, text=True) as child:
+        until = time.monotonic() + 60
+        while len(busy := {one for one in _processes_of(child.pid) if _seconds_of(one) > 2.5}) < 2:
+            assert time.monotonic() < until and child.poll() is None
+            time.sleep(0.1)
+        yield child, busy
+        child.kill()
+
+
+def _seconds_of(number: int) -> float:
+    """Processor time of a process [s]; importing all it needs takes about two."""
+    try:
+        words = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_workers_end_with_their_parent_whatever_ends_it(number: signal.Signals) -> None:
+    with _scoring("--seeds", "20", "--seconds", "3000") as (child, workers):
+        began = time.monotonic()
+        child.send_signal(number)
+        assert child.wait(20) == (-number if number == signal.SIGKILL else 128 + number)
+        while any(map(_is_running, workers)):
+            assert time.monotonic() - began < 3.0
+            time.sleep(0.05)
+        assert child.stderr is not None
+        # After SIGKILL Python's own tracker of semaphores says that it cleaned up.
+        assert number == signal.SIGKILL or child.stderr.read().splitlines() == ["limo-hog: stopped"]
+
+
+def test_finished_runs_are_kept_when_a_worker_is_killed(tmp_path: Path) -> None:
+    with _scoring("--seeds", "300", "--seconds", "2", "--json", str(tmp_path / "s.json")) as (child, workers):
+        time.sleep(2.0)
+        os.kill(min(workers), signal.SIGKILL)
+        assert child.wait(60) == 1
+        assert child.stderr is not None
+        (line,) = child.stderr.read().splitlines()
+    runs = json.loads((tmp_path / "s.json").read_text())["runs"]
+    assert 0 < len(runs) < 300
+    assert line.startswith("limo-hog: a worker process was killed") and f" {300 - len(runs)} of 300 runs" in line

@@ -194,3 +194,15 @@ def test_the_page_about_the_arena_tells_the_truth(tmp_path: Path) -> None:
             assert {name for owner, name in told if owner == table} == {
                 field.name for field in dataclasses.fields(kind)
             }
+
+
+@pytest.mark.parametrize(("table", "most"), [("people", 64), ("furniture", 256), ("groups", 64)])
+def test_no_scenario_has_more_of_a_kind_than_a_run_can_bear(table: str, most: int, tmp_path: Path) -> None:
+    one = {
+        "people": "route = [[1.0, 1.0, 0.0]]\n",
+        "furniture": 'kind = "cone"\nx = 2.0\ny = 2.0\n',
+        "groups": "x = 2.0\ny = 2.0\n",
+    }[table]
+    (tmp_path / "full.toml").write_text(f"[[{table}]]\n{one}" * (most + 1))
+    with pytest.raises(ScenarioError, match=rf"full\.toml: (people|furniture): .*want at most {most}"):
+        Scenario.load(str(tmp_path / "full.toml"))

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import limo_hog
 from limo_hog import _core
+from limo_hog.parallel import cores
 
 
 def environment() -> dict[str, str | int | float | bool | list[str] | None]:
@@ -86,10 +87,3 @@ def _cpu() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()
-
-
-def cores() -> int:
-    """Count the processor cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -1,10 +1,16 @@
-"""JSON to a file or to standard output, and errors in one line."""
+"""All that a command prints: streams that outlast their readers, text without control characters, JSON, errors."""
 
 from __future__ import annotations
 
+import errno
+import io
 import json
+import os
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
+from typing import Any
 
 from limo_hog.atomic import write_text
 from limo_hog.exceptions import LimoHogError
@@ -33,9 +39,78 @@ def write_json(target: str, value: object) -> None:
 
 
 def printable(text: str) -> str:
-    """Return text that standard output can show: characters that its encoding lacks are escaped."""
-    encoding = sys.stdout.encoding or "utf-8"
-    return text.encode(encoding, "backslashreplace").decode(encoding)
+    """Return text in one line that a terminal shows and does not obey: other characters are escaped."""
+    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
+
+
+def emit(line: str) -> None:
+    """Print a line that is all a command is for, at once.
+
+    Raises
+    ------
+    BrokenPipeError
+        Nobody reads standard output any more.
+    """
+    print(line, flush=True)
+    if getattr(sys.stdout, "lost", False):
+        raise BrokenPipeError
+
+
+class _Lasting:
+    """A text stream that drops what is written once its reader or its terminal is gone.
+
+    Attributes
+    ----------
+    lost
+        Whether it is gone.
+    """
+
+    def __init__(self, stream: Any, *, every_error: bool) -> None:
+        self._stream, self._every_error = stream, every_error
+        self.lost = False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        with self._lasting():
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with self._lasting():
+            self._stream.flush()
+
+    @contextmanager
+    def _lasting(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            # A full disk is told, but not on the full disk itself.
+            if not (self._every_error or error.errno in (errno.EPIPE, errno.EBADF, errno.EIO)):
+                raise OSError(error.errno, error.strerror, "standard output") from error
+            self.lost = True
+            with suppress(OSError):  # what is buffered goes nowhere, or Python complains at its end
+                os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+
+
+@contextmanager
+def lasting_streams() -> Iterator[None]:
+    """Let standard output and standard error survive a closed one, a lost reader and any encoding in this block."""
+    # Descriptors 0, 1 and 2 that are closed would become those of the next files, which a library then writes into.
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
+    with ExitStack() as stack:
+        for stream, redirect in ((sys.stdout, redirect_stdout), (sys.stderr, redirect_stderr)):
+            if stream is None:
+                stream = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123
+            elif isinstance(stream, io.TextIOWrapper):
+                stack.callback(stream.reconfigure, errors=stream.errors)
+                stream.reconfigure(errors="backslashreplace")
+            lasting = _Lasting(stream, every_error=redirect is redirect_stderr)
+            stack.enter_context(redirect(lasting))
+        yield
 
 
 def one_line(error: Exception) -> str:

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import limo_hog
-from limo_hog.cli.support.environment import cores
-from limo_hog.cli.support.output import UsageError, one_line, printable
+from limo_hog.cli.support.output import UsageError, emit, one_line, printable
 from limo_hog.cli.support.results import Result, Results, refuse_to_overwrite
 from limo_hog.detections import Detections, people
 from limo_hog.detector import PeopleDetector
@@ -35,8 +34,8 @@ from limo_hog.imaging.reading import (
     read_image,
     standard_input,
 )
-from limo_hog.imaging.writing import video_writer, write_image
-from limo_hog.parallel import in_order
+from limo_hog.imaging.writing import WriteError, video_writer, write_image
+from limo_hog.parallel import cores, in_order
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -105,9 +104,9 @@ class Run:
         self._films = any(source.kind is not Kind.IMAGE for source in self._sources)
         if self._args.out is not None:
             self._copies = _copies(self._sources, self._args.out, self._args.format)
-            own = {source.path.resolve() for source in self._sources}
+            own = {_real(source.path) for source in self._sources}
             for copy in self._copies.values():
-                if copy.resolve() in own:
+                if _real(copy) in own:
                     raise UsageError(f"{copy} is itself an input: choose another folder for --out")
             if not self._args.resume and not self._args.overwrite:
                 refuse_to_overwrite(self._copies.values(), ", --resume makes only what is missing")
@@ -147,10 +146,15 @@ class Run:
 
     def _expand(self, name: str, stack: ExitStack) -> list[Source]:
         try:
-            return [stack.enter_context(standard_input())] if name == STDIN else find_sources(name)
-        except ReadError as error:
-            self._fail(str(error))
+            found = [stack.enter_context(standard_input())] if name == STDIN else find_sources(name)
+        except (ReadError, OSError) as error:
+            self._fail(one_line(error))
             return []
+        out = self._args.out and _real(self._args.out)
+        if out and _real(Path(name)) in out.parents:
+            # Copies of an earlier run, in a folder below the pictures', are no inputs.
+            found = [source for source in found if out not in _real(source.path).parents]
+        return found
 
     def _share_cores(self, sources: list[Source]) -> None:
         """Use a core for each of many pictures, and all cores for a single one."""
@@ -164,8 +168,8 @@ class Run:
         def work(source: Source) -> Row | str:
             try:
                 found, picture = self._find(source, 0, read_image(source))
-            except (ImageError, OSError) as error:
-                return one_line(error)
+            except (ImageError, OSError, MemoryError) as error:
+                return _named(source, error)
             if picture is not None:
                 write_image(self._copies[source], picture)
             return found
@@ -180,6 +184,12 @@ class Run:
             self._advance()
 
     def _look_at_video(self, source: Source) -> None:
+        try:
+            self._look_at_frames(source)
+        except (ReadError, WriteError) as error:
+            self._fail(_named(source, error))
+
+    def _look_at_frames(self, source: Source) -> None:
         copy = self._copies.get(source)
         if self._args.resume and copy is not None and copy.exists():
             if self._done is None:
@@ -190,8 +200,8 @@ class Run:
         with ExitStack() as stack:
             try:
                 video = stack.enter_context(open_video(source))
-            except (ReadError, OSError) as error:
-                self._fail(one_line(error))
+            except OSError as error:
+                self._fail(_named(source, error))
                 return
             every, done = self._args.every, self._done_of(source.name)
             write = copy and stack.enter_context(video_writer(copy, video.fps / every))
@@ -206,11 +216,18 @@ class Run:
                 except ReadError as error:
                     self._fail(str(error))
 
-            def work(job: tuple[int, Image]) -> tuple[Row, Image | None]:
-                return self._find(source, *job)
+            def work(job: tuple[int, Image]) -> tuple[Row, Image | None] | str:
+                try:
+                    return self._find(source, *job)
+                except (ImageError, MemoryError) as error:
+                    return _named(source, error)
 
             try:
-                for found, picture in in_order(work, frames(), self._workers):
+                for result in in_order(work, frames(), self._workers):
+                    if isinstance(result, str):
+                        self._fail(result)
+                        break  # the other frames are as large
+                    found, picture = result
                     if write and picture is not None:
                         write(picture)
                     if found.frame not in done:
@@ -258,11 +275,13 @@ class Run:
         self._ms += found.ms
         if self._args.json is None and self._args.out is None:
             where = f"{found.source}:{found.frame}" if film else found.source
-            print(f"{printable(where)}  {people(len(seen))} ", *seen.labels)
+            # Where nothing is kept, a reader who has left ends the run.
+            line = " ".join((f"{printable(where)}  {people(len(seen))} ", *seen.labels))
+            (emit if self.results is None else print)(line)
 
     def _fail(self, line: str) -> None:
         self.failed += 1
-        line = f"limo-hog: {line}"
+        line = f"limo-hog: {printable(line)}"
         if self._bar:
             self._bar.console.print(line, highlight=False, markup=False, soft_wrap=True)
         else:
@@ -273,10 +292,21 @@ def _of(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
+def _real(path: Path) -> Path:
+    """Return a path without links; one that leads to itself stays, where `Path.resolve` raises."""
+    return Path(os.path.realpath(path))
+
+
+def _named(source: Source, error: Exception) -> str:
+    """Return an error in one line that names its picture."""
+    line = one_line(error)
+    return line if source.name in line else f"{source.name}: {line}"
+
+
 def _identity(source: Source) -> object:
     """Return what two spellings of one picture or video file have in common; a link to it is one of its own."""
     if source.kind in (Kind.IMAGE, Kind.VIDEO):
-        return source.path.parent.resolve() / source.path.name, source.kind
+        return _real(source.path.parent) / source.path.name, source.kind
     return source
 
 

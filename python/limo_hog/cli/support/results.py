@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from limo_hog.atomic import about, is_stream, part_of, write_text
-from limo_hog.cli.support.output import STDOUT, UsageError
+from limo_hog.atomic import about, alone, is_stream, part_of, write_text
+from limo_hog.cli.support.output import STDOUT, UsageError, emit
 from limo_hog.exceptions import LimoHogError
 
 #: One line: source, frame, width, height, boxes, windows, scores, probabilities, ms, parameters.
@@ -77,10 +77,17 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
     """
     if target is None or target == STDOUT:
         # Flushed line by line for a reader at the other end of a pipe.
-        show = (lambda result: print(json.dumps(result | {"parameters": parameters}), flush=True)) if target else _drop
+        show = (
+            (lambda result: emit(json.dumps(result | {"parameters": parameters}, allow_nan=False))) if target else _drop
+        )
         yield Results(show, None)
         return
     path = Path(target)
+    with alone(path):
+        yield from _written(path, parameters, resume, overwrite)
+
+
+def _written(path: Path, parameters: dict[str, Any], resume: bool, overwrite: bool) -> Iterator[Results]:
     part = part_of(path)
     kept = part != path
     if not resume and not overwrite:
@@ -94,7 +101,7 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
 
         def write(result: Result) -> None:
             nonlocal whole
-            line = json.dumps(result | {"parameters": parameters}).encode() + b"\n"
+            line = json.dumps(result | {"parameters": parameters}, allow_nan=False).encode() + b"\n"
             written = 0
             with about(path):
                 while written < len(line):
@@ -191,4 +198,5 @@ def write_coco(path: Path, results: Iterable[Result]) -> None:
             annotation |= {"area": box[2] * box[3], "iscrowd": 0, "score": score}
             annotations.append(annotation | {"probability": probability, "window": window})
     categories = [{"id": 1, "name": "person"}]
-    write_text(path, json.dumps({"images": images, "annotations": annotations, "categories": categories}) + "\n")
+    table = {"images": images, "annotations": annotations, "categories": categories}
+    write_text(path, json.dumps(table, allow_nan=False) + "\n")

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from limo_hog.cli.support.output import printable
+
 
 @contextmanager
 def warnings_in_one_line() -> Iterator[None]:
@@ -15,7 +17,7 @@ def warnings_in_one_line() -> Iterator[None]:
     shown: set[str] = set()
 
     def show(message: Warning | str, *_: Any, **__: Any) -> None:
-        line = " ".join(str(message).split())
+        line = printable(" ".join(str(message).split()))
         if line not in shown:
             shown.add(line)
             print(f"limo-hog: warning: {line}", file=sys.stderr)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.atomic import is_utf8
 from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
@@ -193,6 +194,8 @@ class OnnxDetector:
 
         if not self.path.is_file():
             raise DetectorError(f"{self.path}: no such file; --detector onnx:FILE wants an ONNX network")
+        if not is_utf8(str(self.path)):
+            raise DetectorError(f"{self.path}: OpenCV takes no name that is not UTF-8; give the file another")
         try:
             return cv2.dnn.readNetFromONNX(str(self.path))
         except cv2.error as error:

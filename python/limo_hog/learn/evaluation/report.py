@@ -52,7 +52,7 @@ def write_report(
     figures["mistakes"] = [
         {"kind": m.kind, "picture": str(m.path), "box": list(m.box), "score": m.score} for m in mistakes
     ]
-    write_text(folder / "figures.json", json.dumps(figures, indent=2) + "\n")
+    write_text(folder / "figures.json", json.dumps(figures, indent=2, allow_nan=False) + "\n")
     page = folder / "index.html"
     write_text(page, _page(figures["pictures"], figures["objects"], evaluations, how, bool(mistakes)))
     return page

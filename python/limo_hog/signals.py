@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 #: A terminal that closes and a service manager stop a program as Ctrl-C does; Windows has no SIGHUP.
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -83,3 +88,18 @@ def _stop(number: int, _: FrameType | None) -> None:
     _State.came, _State.when = number, now
     if not _State.depth:
         raise Stopped(number)
+
+
+def end_with(alive: Connection) -> None:
+    """End this worker process as soon as the other end of a pipe is closed, by its parent or with it.
+
+    It is here, where little is imported, so that a worker that has hardly begun ends, too.
+    """
+
+    def wait() -> None:
+        alive.poll(None)
+        os._exit(1)
+
+    # Ctrl-C in a terminal reaches every process; the parent decides.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=wait, daemon=True).start()

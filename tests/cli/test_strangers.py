@@ -1,0 +1,279 @@
+"""Names, files, pipes and terminals of others: a command names what it cannot use, does the rest, and ends."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import signal
+import struct
+import subprocess
+import sys
+import time
+import zlib
+from pathlib import Path
+
+import pytest
+from tests.cli.material import PICTURE, film_of, lines_of
+
+from limo_hog.atomic import alone, whole_file
+from limo_hog.cli.main import main
+from limo_hog.cli.support import output
+from limo_hog.cli.support.console import console
+from limo_hog.imaging.reading import Source
+from limo_hog.imaging.writing import write_image
+
+LIMO_HOG = Path(sys.executable).with_name("limo-hog")
+#: A name with a byte that is no UTF-8, as an old camera or archive leaves it.
+WRONG_BYTE = os.fsdecode(b"caf\xe9")
+
+
+def ended(
+    *arguments: object, shell: str = "", env: dict[str, str] | None = None, cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """The command in a process of its own; `shell` is what a shell adds, such as >&- or | head -1."""
+    command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", str(LIMO_HOG), *map(str, arguments)]
+    return subprocess.run(
+        command, check=False, capture_output=True, text=True, timeout=120, env={**os.environ, **(env or {})}, cwd=cwd
+    )
+
+
+def tall_png(side: int) -> bytes:
+    """A small PNG file of side × side pixels: all black, and so squeezed to a thousandth."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    squeeze = zlib.compressobj(9)
+    rows = b"".join(squeeze.compress(bytes(1 + side)) for _ in range(side)) + squeeze.flush()
+    header = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
+
+
+def test_a_film_whose_name_is_not_utf8_is_searched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    film_of(tmp_path / "film.mp4", frames=3)
+    (tmp_path / "film.mp4").rename(tmp_path / f"{WRONG_BYTE}.mp4")
+    assert ended("detect", tmp_path, "--json", tmp_path / "found").returncode == 0
+    assert [line["frame"] for line in lines_of((tmp_path / "found").read_text())] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    "typed", [f"detect http://127.0.0.1:9/{WRONG_BYTE}.avi", f"follow --detector onnx:{WRONG_BYTE}"]
+)
+def test_a_name_that_opencv_cannot_take_is_refused_by_name(typed: str, tmp_path: Path) -> None:
+    (tmp_path / WRONG_BYTE).write_bytes(b"no network")
+    done = ended(*typed.split(), cwd=tmp_path)
+    assert done.returncode == 1
+    assert "caf\\udce9" in done.stderr.splitlines()[0] and "UTF-8" in done.stderr.splitlines()[0]
+
+
+def test_a_pipe_among_the_pictures_is_named_and_the_rest_is_done(pictures: Path) -> None:
+    os.mkfifo(pictures / "b.png")
+    os.mkfifo(pictures / "b.mp4")
+    done = ended("detect", pictures, "--json", "-")
+    assert (done.returncode, len(lines_of(done.stdout))) == (1, 3)
+    assert sum("b.png: a pipe, a device or a folder" in line for line in done.stderr.splitlines()) == 1
+    assert sum("b.mp4: a pipe, a device or a folder" in line for line in done.stderr.splitlines()) == 1
+
+
+def test_stopping_does_not_wait_for_a_reader_that_never_returns(pictures: Path, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "stalled")
+    # A drive that does not answer: opening waits, as a pipe's without a writer does.
+    code = (
+        "import os, sys\nfrom limo_hog.cli.support import pictures\n"
+        f"pictures.read_image = lambda source: os.open({str(tmp_path / 'stalled')!r}, os.O_RDONLY)\n"
+        "from limo_hog.cli.main import main\nprint('begun', flush=True)\nsys.exit(main())"
+    )
+    command = [sys.executable, "-c", code, "detect", str(pictures)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None and child.stdout.readline() == "begun\n"
+        time.sleep(1.5)
+        began = time.monotonic()
+        child.send_signal(signal.SIGINT)
+        try:
+            assert child.wait(5) == 128 + signal.SIGINT
+        finally:
+            child.kill()
+        assert time.monotonic() - began < 2.5
+
+
+def test_links_that_lead_to_themselves_are_named_and_the_rest_is_done(pictures: Path, tmp_path: Path) -> None:
+    (pictures / "loop.png").symlink_to("loop.png")
+    (pictures / "up").symlink_to("..")
+    done = ended("detect", pictures, "--out", tmp_path / "out", "--json", "-")
+    assert (done.returncode, len(lines_of(done.stdout))) == (1, 3)
+    assert done.stderr.splitlines()[0].endswith("loop.png: Too many levels of symbolic links")
+
+
+def test_a_picture_of_too_many_pixels_is_refused_by_its_header(pictures: Path) -> None:
+    (pictures / "huge.png").write_bytes(tall_png(20_000))
+    limited = f"ulimit -v 4000000; exec {LIMO_HOG} detect {pictures} --threads 1 --json -"
+    done = subprocess.run(["bash", "-c", limited], check=False, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, len(lines_of(done.stdout))) == (1, 3)
+    assert "huge.png: too many pixels; at most 268435456 are read" in done.stderr
+
+
+def test_a_picture_that_memory_does_not_hold_is_named_and_the_rest_is_done(
+    pictures: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+
+    def read(source: Source) -> object:
+        if source.path.name == "a.png":
+            raise MemoryError("1 GB")
+        return PICTURE
+
+    monkeypatch.setattr("limo_hog.cli.support.pictures.read_image", read)
+    assert main(["detect", str(pictures)]) == 1
+    shown = capsys.readouterr()
+    assert len(shown.out.splitlines()) == 2
+    assert f"limo-hog: {pictures / 'a.png'}: out of memory: 1 GB" in shown.err.splitlines()
+
+
+def test_copies_in_a_folder_below_the_pictures_are_no_inputs(
+    pictures: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    typed = ["detect", str(pictures), "--out", str(pictures / "found"), "--json", str(pictures / "found.json")]
+    assert main(typed) == 0
+    assert main([*typed, "--resume"]) == 0
+    assert "0 pictures, 0 people in 0 of them; 3 done before" in capsys.readouterr().err
+    assert len(list((pictures / "found").rglob("*.png"))) == 3
+
+
+def test_an_earlier_run_of_another_search_is_not_gone_on_from(
+    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    typed = ["detect", str(pictures), "--json", str(tmp_path / "found")]
+    assert main([*typed, "--search", "guided"]) == 0
+    assert main([*typed, "--resume"]) == 1
+    assert "other parameters: search guided, now exact" in capsys.readouterr().err
+
+
+def test_control_characters_of_a_name_do_not_reach_the_terminal(tmp_path: Path) -> None:
+    write_image(tmp_path / "a\x1b[31m\nb.png", PICTURE)
+    (tmp_path / "c\x1b[2J\rd.png").write_bytes(b"no picture")
+    done = ended("detect", tmp_path)
+    assert len(done.stdout.splitlines()) == 1 and len(done.stderr.splitlines()) == 2
+    assert not [letter for letter in done.stdout + done.stderr if letter != "\n" and not letter.isprintable()]
+    assert "a\\x1b[31m\\nb.png" in done.stdout and "c\\x1b[2J\\rd.png" in done.stderr
+
+
+def test_control_characters_and_markup_of_a_file_do_not_reach_the_terminal(tmp_path: Path) -> None:
+    (tmp_path / "evil.toml").write_text('name = "[/]\\u001b[2J"\n"\\u001b[2Jx" = 1\n')
+    refused = ended("follow", "--scenario", tmp_path / "evil.toml", "--seconds", 1)
+    assert refused.returncode == 1 and "\x1b" not in refused.stderr and "\\x1b[2Jx" in refused.stderr
+    (tmp_path / "evil.toml").write_text('name = "[/]\\u001b[2J"\n')
+    done = ended("follow", "--scenario", tmp_path / "evil.toml", "--seconds", 1)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "[/]\\x1b[2J" in done.stdout and "\x1b" not in done.stdout
+
+
+def test_a_table_escapes_what_a_terminal_would_obey() -> None:
+    screen = console()
+    screen.file = text = io.StringIO()
+    screen.print("a\x1b[2J\x07b\x9bc", markup=False)
+    assert text.getvalue() == "a\\x1b[2J\\x07b\\x9bc\n" or text.getvalue() == "a\\x1b[2Jb\\x9bc\n"
+
+
+#: Commands that end soon, with the lines they print where nothing is closed.
+QUICK = ("info", "completion bash", "detect a.png", "detect a.png --json found", "follow --seconds 0.5")
+
+
+@pytest.mark.parametrize("typed", QUICK)
+@pytest.mark.parametrize("shell", [">&-", "2>&-", "<&-", ">&- 2>&-", "| head -1"])
+def test_closed_descriptors_and_lost_readers_change_nothing(typed: str, shell: str, tmp_path: Path) -> None:
+    write_image(tmp_path / "a.png", PICTURE)
+    done = ended(*typed.split(), shell=shell, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stderr.splitlines()) <= 1 and "rror" not in done.stderr
+    assert "found" not in typed or len(lines_of((tmp_path / "found").read_text())) == 1
+
+
+@pytest.mark.parametrize("typed", QUICK)
+def test_a_terminal_that_knows_ascii_alone_changes_nothing(typed: str, tmp_path: Path) -> None:
+    write_image(tmp_path / "café.png", PICTURE)
+    ascii_alone = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+    done = ended(*typed.replace("a.png", "café.png").split(), env=ascii_alone, cwd=tmp_path)
+    assert done.returncode == 0 and "rror" not in done.stderr
+    assert done.stdout.isascii() and len(done.stderr.splitlines()) <= 1
+
+
+def test_a_narrow_terminal_changes_nothing(tmp_path: Path) -> None:
+    for columns in ("1", "3", "20"):
+        assert ended("follow", "--seconds", 0.5, env={"COLUMNS": columns}).returncode == 0
+        assert ended("info", env={"COLUMNS": columns}).returncode == 0
+
+
+def test_a_reader_who_leaves_ends_a_run_that_keeps_nothing(tmp_path: Path) -> None:
+    for number in range(40):
+        write_image(tmp_path / f"{number:02d}.png", PICTURE)
+    done = ended("detect", tmp_path, "--threads", 1, shell="| head -1")
+    assert done.returncode == 1 and int(done.stderr.split()[0]) < 40
+    kept = ended("detect", tmp_path, "--csv", tmp_path / "found.csv", shell="| head -1")
+    assert kept.returncode == 0 and len((tmp_path / "found.csv").read_text().splitlines()) > 40
+
+
+def test_a_terminal_that_is_gone_is_survived_and_a_full_disk_is_told() -> None:
+    class Gone(io.StringIO):
+        number = errno.EIO
+
+        def write(self, _: str) -> int:
+            raise OSError(self.number, os.strerror(self.number))
+
+    class Full(Gone):
+        number = errno.ENOSPC
+
+    output._Lasting(Gone(), every_error=False).write("x")
+    output._Lasting(Full(), every_error=True).write("x")
+    with pytest.raises(OSError, match="standard output"):
+        output._Lasting(Full(), every_error=False).write("x")
+
+
+def test_two_runs_do_not_write_one_file(pictures: Path, tmp_path: Path) -> None:
+    found = tmp_path / "found.json"
+    assert main(["detect", str(pictures), "--json", str(found)]) == 0
+    before = found.read_bytes()
+    for how in ("--resume", "--overwrite"):
+        with alone(found):
+            done = ended("detect", pictures, "--json", found, how)
+        assert (done.returncode, found.read_bytes()) == (1, before)
+        assert done.stderr == f"limo-hog: {found}: another run is writing it, and holds .found.lock.json\n"
+    assert ended("detect", pictures, "--json", found, "--resume").returncode == 0
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_two_writers_of_one_file_do_not_share_a_temporary_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    with whole_file(path) as first:
+        first.write_text("first")
+        with whole_file(path) as second:
+            second.write_text("second")
+        assert path.read_text() == "second"
+    assert path.read_text() == "first"
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        "evaluate opencv labels.json --json labels.json",
+        "train labels.json --out labels.json",
+        "detect a.png --model m.yml --csv m.yml --overwrite",
+        "follow --scenario s.toml --json s.toml",
+    ],
+)
+def test_an_input_is_never_written_over(
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("labels.json", "m.yml", "s.toml", "a.png"):
+        Path(name).write_text("mine")
+    assert main(typed.split()) == 2
+    assert "is itself an input: give another name" in capsys.readouterr().err
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
+
+
+def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    for option in ("--json", "--csv"):
+        target = tmp_path / "file" / "a.csv"
+        assert main(["score", option, str(target)]) == 1
+        assert capsys.readouterr().err == f"limo-hog: {target}: Not a directory\n"

@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     found = bus.topics(2.0, enough=lambda topics: topic in topics and args.action != "info")
     if topic not in found:
         known = ", ".join(found) or "none"
-        raise TopicError(f"topic {topic} is not there in ROS domain {bus.domain}; there are: {known}")
+        raise TopicError(f"topic {topic} is not there in {bus.network}; there are: {known}")
     if args.action == "info":
         ends = found[topic]
         print(f"Type: {ends.type_name}")

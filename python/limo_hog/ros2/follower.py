@@ -13,8 +13,9 @@ from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, FrameLog
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.ros2 import messages, names
-from limo_hog.ros2.dds import Bus, BusError, Endpoints
+from limo_hog.ros2.dds import Bus, Endpoints
 from limo_hog.ros2.messages import MessageError
+from limo_hog.ros2.network import BusError
 from limo_hog.ros2.outputs import Commands, Findings
 from limo_hog.ros2.senses import Senses, picture_of
 
@@ -73,8 +74,7 @@ def camera_topic(bus: Bus) -> str:
 
     if not either(bus.topics(SILENT_AFTER, enough=either)):
         raise BusError(
-            f"no publisher of {names.IMAGE} or {names.IMAGE_COMPRESSED} in ROS domain {bus.domain} "
-            f"within {SILENT_AFTER:g} s"
+            f"no publisher of {names.IMAGE} or {names.IMAGE_COMPRESSED} in {bus.network} within {SILENT_AFTER:g} s"
         )
     # Of a camera that offers both, either topic may be discovered first.
     found = bus.topics(0.5, enough=lambda found: offered(names.IMAGE, found))
@@ -158,7 +158,7 @@ def drive(
             if frame is not None:
                 heard, stamp = came, frame.stamp
             elif came - heard > SILENT_AFTER:
-                raise BusError(f"no image on {camera} in ROS domain {bus.domain} for {SILENT_AFTER:g} s")
+                raise BusError(f"no image on {camera} in {bus.network} for {SILENT_AFTER:g} s")
             elif not report.frames:
                 continue
             # The robot's clock, by the last image's stamp and the time since on this machine's clock.

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         from limo_hog.ros2.dds import Bus
 
         bus = Bus()
-        print(f"arena {scenario.name!r} is on ROS domain {bus.domain}; Ctrl-C ends it", file=sys.stderr)
+        print(f"arena {scenario.name!r} is in {bus.network}; Ctrl-C ends it", file=sys.stderr)
     with observing(args, scenario) as observers:
         arena = run_live(scenario, args.seed, args.seconds, bus, observers.notify if observers else None)
     contacts = arena.contacts

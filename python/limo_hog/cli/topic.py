@@ -49,9 +49,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Look."""
+    from limo_hog.ros2.arguments import NodeNames
     from limo_hog.ros2.dds import Bus
 
-    bus = Bus()
+    # ROS 2 hides nodes whose names begin so.
+    bus = Bus(NodeNames("_limo_hog_topic"))
     if args.action == "list":
         for name, ends in bus.topics().items():
             print(f"{name} [{ends.type_name}]" if args.show_types else name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -23,6 +24,8 @@ S = TypeVar("S")
 
 #: The drive ends after so long without a camera image [s]: discovery takes up to 3 s, a driver as long to start.
 SILENT_AFTER = 10.0
+#: So many answers are kept: an hour's at 10 Hz.
+_ANSWERS = 36_000
 
 
 @dataclass
@@ -36,7 +39,7 @@ class Report:
     dropped
         Messages that could not be read.
     answer_ms
-        From the arrival of each image to its command [ms].
+        From the arrival of each image to its command, for the last hour [ms].
     modes
         Number of commands in each mode.
     """
@@ -44,7 +47,7 @@ class Report:
     frames: int = 0
     found: int = 0
     dropped: int = 0
-    answer_ms: list[float] = field(default_factory=list)
+    answer_ms: deque[float] = field(default_factory=lambda: deque(maxlen=_ANSWERS))
     modes: dict[str, int] = field(default_factory=dict)
 
     def add(self, log: FrameLog, answer_ms: float) -> None:
@@ -57,28 +60,41 @@ class Report:
             self.answer_ms.append(answer_ms)
 
 
-def camera_topic(bus: Bus) -> str:
+def camera_topic(bus: Bus, *, compressed: bool = False) -> str:
     """Wait for a camera; returns the topic of its raw images or, without these, of its compressed ones.
+
+    With `compressed` it waits for compressed images alone.
 
     Raises
     ------
     BusError
         If no camera is found within 10 s.
     """
+    wanted = (names.IMAGE_COMPRESSED,) if compressed else (names.IMAGE, names.IMAGE_COMPRESSED)
+    names_here = {topic: names.resolved(bus.node, topic) for topic in wanted}
 
     def offered(topic: str, found: dict[str, Endpoints]) -> bool:
-        return topic in found and found[topic].publishers > 0
+        return names_here[topic] in found and found[names_here[topic]].publishers > 0
 
-    def either(found: dict[str, Endpoints]) -> bool:
-        return offered(names.IMAGE, found) or offered(names.IMAGE_COMPRESSED, found)
-
-    if not either(bus.topics(SILENT_AFTER, enough=either)):
+    found = bus.topics(SILENT_AFTER, enough=lambda found: any(offered(topic, found) for topic in wanted))
+    if not any(offered(topic, found) for topic in wanted):
         raise BusError(
-            f"no publisher of {names.IMAGE} or {names.IMAGE_COMPRESSED} in {bus.network} within {SILENT_AFTER:g} s"
+            f"no publisher of {' or '.join(names_here.values())} in {bus.network}, within {SILENT_AFTER:g} s; "
+            + _images_in(found)
         )
     # Of a camera that offers both, either topic may be discovered first.
-    found = bus.topics(0.5, enough=lambda found: offered(names.IMAGE, found))
-    return names.IMAGE if offered(names.IMAGE, found) else names.IMAGE_COMPRESSED
+    found = bus.topics(0.5, enough=lambda found: offered(wanted[0], found))
+    return next(topic for topic in wanted if offered(topic, found))
+
+
+def _images_in(found: dict[str, Endpoints]) -> str:
+    """Say which images there are, and how one is chosen."""
+    kinds = (names.TYPES[names.IMAGE], names.TYPES[names.IMAGE_COMPRESSED])
+    images = [topic for topic, ends in found.items() if ends.type_name in kinds and ends.publishers]
+    if images:
+        own = names.IMAGE.lstrip("/")
+        return f"images are on {', '.join(images)}: choose one by --ros-args -r {own}:=TOPIC"
+    return f"there are no images; topics: {', '.join(found) or 'none'}"
 
 
 class Inputs:
@@ -88,11 +104,13 @@ class Inputs:
     ----------
     senses
         The other sensors' newest readings.
+    complaint
+        Why the last message that was not read was not; "" while all were.
     """
 
     def __init__(self, bus: Bus, camera: str) -> None:
         self.senses = Senses()
-        self._unreadable = 0
+        self.complaint, self._unreadable = "", 0
         self._camera = bus.subscription(camera, names.TYPES[camera], depth=5)
         self._others = [
             bus.subscription(topic, names.TYPES[topic], depth=5)
@@ -120,8 +138,8 @@ class Inputs:
         """Read a message; None of one that contradicts itself, which is counted."""
         try:
             return read(message)
-        except MessageError:
-            self._unreadable += 1
+        except MessageError as error:
+            self.complaint, self._unreadable = str(error), self._unreadable + 1
             return None
 
 
@@ -133,21 +151,24 @@ def drive(
     watch: Callable[[FrameLog], None] | None = None,
     *,
     moves: bool = True,
+    compressed: bool = False,
+    report: Report | None = None,
 ) -> Report:
     """Follow the person the camera sees until the time is up; the last command is always to stand.
 
-    With `moves` False no command is sent: a planner drives to what is found.
+    With `moves` False no command is sent: a planner drives to what is found. With `compressed` no raw images are asked
+    for. A `report` that is given is kept up to date, for a drive that is interrupted.
 
     Raises
     ------
     BusError
         If there is no camera, or no image comes for 10 s.
     """
-    camera = camera_topic(bus)
+    camera = camera_topic(bus, compressed=compressed)
     inputs = Inputs(bus, camera)
     commands, findings = Commands(bus) if moves else None, Findings(bus)
     follower = Follower(controller, detector)
-    report = Report()
+    report = Report() if report is None else report
     began = heard = time.monotonic()
     stamp = 0.0
     try:
@@ -158,7 +179,9 @@ def drive(
             if frame is not None:
                 heard, stamp = came, frame.stamp
             elif came - heard > SILENT_AFTER:
-                raise BusError(f"no image on {camera} in {bus.network} for {SILENT_AFTER:g} s")
+                why = f"; {inputs.dropped} messages were not read: {inputs.complaint}" if inputs.complaint else ""
+                where = f"{names.resolved(bus.node, camera)} in {bus.network}"
+                raise BusError(f"no image on {where}, for {SILENT_AFTER:g} s{why}")
             elif not report.frames:
                 continue
             # The robot's clock, by the last image's stamp and the time since on this machine's clock.

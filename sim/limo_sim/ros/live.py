@@ -87,6 +87,13 @@ def run_live(
     return arena
 
 
+def second_publishers(bus: Bus) -> list[str]:
+    """Look around for others who publish what a robot has one publisher of; returns these topics."""
+    found = bus.topics()
+    own = [names.resolved(bus.node, topic) for topic in (names.SCAN, names.ODOMETRY, names.CLOCK)]
+    return [topic for topic in own if topic in found and found[topic].publishers]
+
+
 def _step(arena: Arena, twist: Twist) -> Step:
     frame = arena.frame()
     mode = Mode.STAND if twist == Twist() else Mode.DRIVE

@@ -134,7 +134,7 @@ def test_a_file_that_is_no_recording_is_one_line(
 
 
 def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(kept / "run.mcap"), "--image", "/other"]) == 1
+    assert main(["replay", str(kept / "run.mcap"), "--ros-args", "-r", "limo_camera/image:=/other"]) == 1
     assert "no images on /other; the recording holds /cmd_vel, " in capsys.readouterr().err
 
 

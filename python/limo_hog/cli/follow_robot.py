@@ -23,6 +23,7 @@ from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.ros2.dds import Bus
 from limo_hog.ros2.follower import Report, drive
+from limo_hog.ros2.network import BusError
 from limo_hog.ros2.outputs import FRAMES
 
 
@@ -71,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     for name in bus.node.parameters.keys() - FRAMES.keys() - {"use_sim_time"}:
         print(f"parameter {name} is not known; known are {', '.join(FRAMES)}", file=sys.stderr)
     report = Report()
-    stopped: KeyboardInterrupt | None = None
+    stopped: KeyboardInterrupt | BusError | None = None
     with ExitStack() as stack:
         lines = None
         if args.json:
@@ -108,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
                 compressed=args.compressed,
                 report=report,
             )
-        except KeyboardInterrupt as error:
+        except (KeyboardInterrupt, BusError) as error:
             stopped = error
         answers = report.answer_ms
         card = {

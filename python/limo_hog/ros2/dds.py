@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -96,18 +96,65 @@ def _qos(type_name: str, depth: int, *, reliable: bool = True, kept: bool = Fals
     )
 
 
+class _Graph:
+    """Tells the network which node a participant is, and which readers and writers are its: `ros_discovery_info`."""
+
+    def __init__(self, participant: Any, node: NodeNames) -> None:
+        def struct(name: str, **fields: Any) -> Any:
+            return make_idl_struct(f"{name}_", f"rmw_dds_common.msg.dds_.{name}_", fields)
+
+        # Humble's numbers have 24 bytes, of which 8 are zero; it takes no others.
+        self._size = 24 if os.environ.get("ROS_DISTRO") == "humble" else 16
+        generic: Any = types
+        self._gid = struct("Gid", data=generic.array[types.byte, self._size])
+        gids = generic.sequence[self._gid]
+        self._info = struct(
+            "NodeEntitiesInfo", node_namespace=str, node_name=str, reader_gid_seq=gids, writer_gid_seq=gids
+        )
+        kind = struct("ParticipantEntitiesInfo", gid=self._gid, node_entities_info_seq=generic.sequence[self._info])
+        qos = Qos(
+            Policy.Reliability.Reliable(duration(milliseconds=100)),
+            Policy.Durability.TransientLocal,
+            Policy.History.KeepLast(1),
+            Policy.DataRepresentation(use_cdrv0_representation=True),
+        )
+        self._writer = DataWriter(participant, Topic(participant, "ros_discovery_info", kind), qos=qos)
+        self._kind, self._node, self._own = kind, node, bytes(participant.guid.bytes)
+        self._readers: list[bytes] = []
+        self._writers: list[bytes] = []
+        self._announce()
+
+    def add_reader(self, guid: bytes, before: bytes | None = None) -> None:
+        """Tell it of a reader, in the place of the one `before`."""
+        self._readers = [one for one in self._readers if one != before] + [guid]
+        self._announce()
+
+    def add_writer(self, guid: bytes) -> None:
+        """Tell it of a writer."""
+        self._writers.append(guid)
+        self._announce()
+
+    def _announce(self) -> None:
+        def number(guid: bytes) -> Any:
+            return self._gid(data=list(guid.ljust(self._size, b"\0")))
+
+        info = self._info(
+            node_namespace=self._node.namespace,
+            node_name=self._node.name,
+            reader_gid_seq=[number(guid) for guid in self._readers],
+            writer_gid_seq=[number(guid) for guid in self._writers],
+        )
+        self._writer.write(self._kind(gid=number(self._own), node_entities_info_seq=[info]))
+
+
 class Publisher:
     """Sends messages of one topic."""
 
-    def __init__(self, participant: Any, topic: str, type_name: str, depth: int, *, kept: bool) -> None:
+    def __init__(self, participant: Any, graph: _Graph, topic: str, type_name: str, depth: int, *, kept: bool) -> None:
         self._type = dds_type(type_name)
         qos = _qos(type_name, depth, kept=kept)
         self._writer = DataWriter(participant, Topic(participant, _PREFIX + topic, self._type), qos=qos)
-
-    @property
-    def guid(self) -> bytes:
-        """Its number in the network."""
-        return bytes(self._writer.guid.bytes)
+        graph.add_writer(bytes(self._writer.guid.bytes))
 
     @property
     def has_readers(self) -> bool:
@@ -146,19 +193,20 @@ class Subscription:
     def __init__(
         self,
         participant: Any,
+        graph: _Graph,
         wakers: WaitSet,
         topic: str,
         type_name: str,
         depth: int,
-        reopened: Callable[[], None],
         *,
         kept: bool,
     ) -> None:
         self._participant, self._wakers, self._type_name, self._depth = participant, wakers, type_name, depth
-        self._reopened, self._kept = reopened, kept
+        self._graph, self._kept = graph, kept
         self._topic = Topic(participant, _PREFIX + topic, dds_type(type_name))
         self._mismatch = _Mismatch()
         self.dropped = 0
+        self._guid: bytes | None = None
         self._open(reliable=True)
 
     def _open(self, *, reliable: bool) -> None:
@@ -167,11 +215,8 @@ class Subscription:
         self._reader = DataReader(self._participant, self._topic, qos=qos, listener=listener)
         self._unread = ReadCondition(self._reader, ViewState.Any | SampleState.NotRead | Instance.Any)
         self._wakers.attach(self._unread)
-
-    @property
-    def guid(self) -> bytes:
-        """Its number in the network."""
-        return bytes(self._reader.guid.bytes)
+        before, self._guid = self._guid, bytes(self._reader.guid.bytes)
+        self._graph.add_reader(self._guid, before)
 
     def take(self) -> list[Any]:
         """Return the messages that have come since, oldest first."""
@@ -179,53 +224,11 @@ class Subscription:
             self._mismatch.seen = False
             self._wakers.detach(self._unread)
             self._open(reliable=False)
-            self._reopened()
         samples = self._reader.take(N=max(self._depth, 1))
         messages = [sample.message for sample in samples if not isinstance(sample, InvalidSample)]
         good = [message for message in messages if message is not None]
         self.dropped += len(messages) - len(good)
         return good
-
-
-class _Graph:
-    """Tells the network which node a participant is, and which readers and writers are its: `ros_discovery_info`."""
-
-    def __init__(self, participant: Any, node: NodeNames) -> None:
-        def struct(name: str, **fields: Any) -> Any:
-            return make_idl_struct(f"{name}_", f"rmw_dds_common.msg.dds_.{name}_", fields)
-
-        # Humble's numbers have 24 bytes, of which 8 are zero; it takes no others.
-        self._size = 24 if os.environ.get("ROS_DISTRO") == "humble" else 16
-        generic: Any = types
-        self._gid = struct("Gid", data=generic.array[types.byte, self._size])
-        gids = generic.sequence[self._gid]
-        self._info = struct(
-            "NodeEntitiesInfo", node_namespace=str, node_name=str, reader_gid_seq=gids, writer_gid_seq=gids
-        )
-        kind = struct("ParticipantEntitiesInfo", gid=self._gid, node_entities_info_seq=generic.sequence[self._info])
-        qos = Qos(
-            Policy.Reliability.Reliable(duration(milliseconds=100)),
-            Policy.Durability.TransientLocal,
-            Policy.History.KeepLast(1),
-            Policy.DataRepresentation(use_cdrv0_representation=True),
-        )
-        self._writer = DataWriter(participant, Topic(participant, "ros_discovery_info", kind), qos=qos)
-        self._kind, self._node, self._own = kind, node, bytes(participant.guid.bytes)
-        self.announce([], [])
-
-    def announce(self, readers: Sequence[Subscription], writers: Sequence[Publisher]) -> None:
-        """Tell it, in place of what was told before."""
-
-        def number(guid: bytes) -> Any:
-            return self._gid(data=list(guid.ljust(self._size, b"\0")))
-
-        info = self._info(
-            node_namespace=self._node.namespace,
-            node_name=self._node.name,
-            reader_gid_seq=[number(one.guid) for one in readers],
-            writer_gid_seq=[number(one.guid) for one in writers],
-        )
-        self._writer.write(self._kind(gid=number(self._own), node_entities_info_seq=[info]))
 
 
 class Bus:
@@ -258,27 +261,17 @@ class Bus:
         except Exception as error:
             raise BusError(f"DDS does not start in {self.network}: {error}") from error
         self._wakers = WaitSet(self._participant)
-        self._publishers: list[Publisher] = []
-        self._subscriptions: list[Subscription] = []
         self._graph = _Graph(self._participant, self.node)
-
-    def _announce(self) -> None:
-        self._graph.announce(self._subscriptions, self._publishers)
 
     def publisher(self, topic: str, type_name: str, depth: int = 10, *, kept: bool = False) -> Publisher:
         """Begin to publish; of what is `kept` (transient local), later readers get the last `depth` messages."""
-        publisher = Publisher(self._participant, names.resolved(self.node, topic), type_name, depth, kept=kept)
-        self._publishers.append(publisher)
-        self._announce()
-        return publisher
+        topic = names.resolved(self.node, topic)
+        return Publisher(self._participant, self._graph, topic, type_name, depth, kept=kept)
 
     def subscription(self, topic: str, type_name: str, depth: int = 10, *, kept: bool = False) -> Subscription:
         """Begin to listen; `wait` wakes up for it. With `kept`, what a publisher kept before comes, too."""
         topic = names.resolved(self.node, topic)
-        reader = Subscription(self._participant, self._wakers, topic, type_name, depth, self._announce, kept=kept)
-        self._subscriptions.append(reader)
-        self._announce()
-        return reader
+        return Subscription(self._participant, self._graph, self._wakers, topic, type_name, depth, kept=kept)
 
     def wait(self, seconds: float) -> None:
         """Return when a subscription has something, or after so long."""

@@ -33,7 +33,7 @@ from limo_sim.ros.lockstep.turns import RunOver, ThreadEnded, Turns
 from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import Episode
-from limo_sim.run.log import Step, Watch
+from limo_sim.run.log import Passed, Step, Watch
 from limo_sim.run.score import Scorer
 from limo_sim.sensing.camera import TrueFrame
 from limo_sim.world.scenario import Scenario
@@ -115,6 +115,7 @@ class World:
         self.scorer = Scorer(self.arena.scenario)
         self._frame: TrueFrame | None = None
         self._render_ms = 0.0
+        self._passed: list[Passed] = []
         self._periods = Periods()
         self._seen_before = False
         self._began = time.perf_counter() if began is None else began
@@ -158,6 +159,7 @@ class World:
         if self.over:
             raise RunOver
         if self._collected:
+            self._passed.append(Passed(self.time, self.arena.odometry(), self.arena.imu()))
             self._log()
             self.arena.step()
         self._collected = True
@@ -329,7 +331,9 @@ class World:
             found,
             detect_ms=sum(found.ms for found in self.found) if new else 0.0,
         )
-        step = Step(log, self.arena.truth(), frame.truth if new else None, self._render_ms, self.windows)
+        seen, passed = frame.truth if new else None, tuple(self._passed)
+        step = Step(log, self.arena.truth(), seen, self._render_ms, self.windows, passed)
+        self._passed.clear()
         self.scorer.add(step)
         with self.patience.suspended():
             self.watch(step)

@@ -73,13 +73,19 @@ def test_the_recording_is_read_by_another_library_than_wrote_it(kept: Path) -> N
             elif connection.topic == "/detections":
                 boxes += len(message.detections)
     frames = 10 * SECONDS
+    # Up to the last command, a tenth of a second before the end.
+    steps = 50 * SECONDS - 4
     assert counts == {
         ("/limo_camera/image", "sensor_msgs/msg/Image"): frames,
         ("/limo_camera/depth/image_raw", "sensor_msgs/msg/Image"): frames,
         ("/limo_camera/camera_info", "sensor_msgs/msg/CameraInfo"): frames,
         ("/detections", "vision_msgs/msg/Detection2DArray"): frames,
         ("/cmd_vel", "geometry_msgs/msg/Twist"): frames,
-        ("/odom", "nav_msgs/msg/Odometry"): frames,
+        ("/odom", "nav_msgs/msg/Odometry"): steps,
+        ("/tf", "tf2_msgs/msg/TFMessage"): steps,
+        ("/clock", "rosgraph_msgs/msg/Clock"): steps,
+        ("/imu", "sensor_msgs/msg/Imu"): 2 * steps,
+        ("/tf_static", "tf2_msgs/msg/TFMessage"): 1,
         ("/scan", "sensor_msgs/msg/LaserScan"): 8 * SECONDS,
     }
     assert boxes > 10
@@ -150,8 +156,8 @@ def test_a_file_that_is_no_recording_is_one_line(
 
 
 def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(kept / "run.mcap"), "--image", "/other"]) == 1
-    assert "no images on /other; the recording holds /cmd_vel, " in capsys.readouterr().err
+    assert main(["replay", str(kept / "run.mcap"), "--ros-args", "-r", "limo_camera/image:=/other"]) == 1
+    assert "no images on /other; the recording holds /clock, /cmd_vel, " in capsys.readouterr().err
 
 
 def at_a_display(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:

@@ -12,6 +12,7 @@ import pytest
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.ros2 import messages
+from limo_hog.ros2.senses import picture_of
 
 
 def test_a_twist_is_a_header_and_six_little_endian_doubles() -> None:
@@ -253,3 +254,35 @@ def test_an_imu_sample_says_that_it_has_no_orientation() -> None:
     none = message.orientation
     assert (none.x, none.y, none.z, none.w) == (0.0, 0.0, 0.0, 1.0)
     messages.serialize(message)
+
+
+@pytest.mark.parametrize("encoding", ["bgr8", "rgb8", "bgra8", "rgba8", "mono8", "mono16", "yuv422_yuy2", "yuyv"])
+def test_a_camera_image_is_read_in_every_encoding_of_drivers(encoding: str) -> None:
+    colour = np.full((4, 6, 3), (200, 100, 50), np.uint8)
+    gray = np.full((4, 6), 180, np.uint8)
+    wanted = np.repeat(gray[..., None], 3, axis=2) if encoding.startswith("mono") else colour
+    # By ITU-R BT.601, as cameras have it: brightness, then blue or red.
+    brightness, blue, red = 99, 179, 99
+    yuyv = np.empty((4, 6, 2), np.uint8)
+    yuyv[..., 0], yuyv[:, ::2, 1], yuyv[:, 1::2, 1] = brightness, blue, red
+    sent = {
+        "bgr8": colour,
+        "rgb8": colour[..., ::-1],
+        "bgra8": np.dstack([colour, gray]),
+        "rgba8": np.dstack([colour[..., ::-1], gray]),
+        "mono8": gray,
+        "mono16": gray.astype(np.uint16) * 257,
+    }.get(encoding, yuyv)
+    message = messages.image(0.0, colour)
+    message.encoding, message.data = encoding, np.ascontiguousarray(sent).view(np.uint8).reshape(-1)
+    message.step = len(message.data) // 4
+    picture = picture_of(message)
+    assert picture.dtype == np.uint8
+    assert (picture.shape, picture.flags.c_contiguous) == ((4, 6, 3), True)
+    assert np.abs(picture.astype(int) - wanted).max() <= 3
+
+
+def test_an_encoding_that_no_camera_image_has_is_named() -> None:
+    message = messages.image(0.0, np.zeros((4, 6), np.float32))
+    with pytest.raises(messages.MessageError, match="camera image in '32FC1' is not read: want bgr8, rgb8, bgra8"):
+        picture_of(message)

@@ -16,7 +16,7 @@ from tests.follow.views import scan
 from limo_hog.cli import replay as command
 from limo_hog.cli.main import main
 from limo_hog.detections import Detections
-from limo_hog.follow import Decision, Mode, Observation, Odometry, Twist
+from limo_hog.follow import Decision, Mode, Observation, Odometry, Scan, Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.bag import Record, bag_writer
 from limo_hog.ros2.findings import stamped_twist
@@ -114,7 +114,7 @@ def test_until_the_calibration_comes_the_limos_own_focal_length_is_taken() -> No
 def test_what_is_no_depth_image_and_no_picture_is_named() -> None:
     with pytest.raises(MessageError, match="depth image of 'bgr8' is not read: want 32FC1 or 16UC1"):
         Senses().take(messages.image(0.0, PICTURE))
-    with pytest.raises(MessageError, match=r"camera image of float32 \(48, 64\) is not read"):
+    with pytest.raises(MessageError, match="camera image in '32FC1' is not read"):
         picture_of(messages.image(0.0, depth(1.0)))
 
 
@@ -172,3 +172,29 @@ def test_one_line_says_which_senses_are_there_and_which_are_not() -> None:
     senses.take(messages.laser_scan(scan()))
     senses.take(messages.image(0.0, depth(1.0)))
     assert senses.present() == "camera yes · camera_info yes · depth yes · scan yes · odom yes"
+
+
+def test_a_recording_of_other_names_is_replayed_by_the_robots_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scan = messages.laser_scan(Scan(0.9, np.ones(292, np.float32), -2.0, 2.0, 0.12, 8.0))
+    names_there = {names.IMAGE: "/r/rgb/image", names.CAMERA_INFO: "/r/rgb/camera_info", names.COMMAND: "/r/cmd_vel"}
+    with bag_writer(tmp_path / "run.mcap") as write:
+        write("/r/scan_filtered", 0.9, scan)
+        for record in records((1.0, depth(2.0))):
+            write(names_there.get(record.topic, "/r/depth"), record.time, record.message)
+    driver = Driver()
+    monkeypatch.setattr(command, "controller_named", lambda _name: driver)
+    monkeypatch.setattr(command, "detector_named", lambda _name: Empty())
+    some = ["replay", str(tmp_path / "run.mcap"), "--json", "-", "--ros-args", "-r", "__ns:=/r"]
+    some += ["-r", "limo_camera/image:=rgb/image"]
+    assert main(some) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["linear_difference_max"] == pytest.approx(0.2)
+    assert driver.told[0].scan is None
+    assert "/r/scan_filtered (sensor_msgs/msg/LaserScan); give --ros-args -r scan:=/r/scan_filtered" in err
+    assert "/r/depth (depth); give --ros-args -r limo_camera/depth/image_raw:=/r/depth" in err
+    assert main([*some, "-r", "scan:=scan_filtered", "-r", "limo_camera/depth/image_raw:=depth"]) == 0
+    assert capsys.readouterr().err == ""
+    assert driver.told[1].scan is not None
+    assert driver.told[1].depth is not None

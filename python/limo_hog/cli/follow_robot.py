@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import json
+import math
+import re
 import statistics
 import sys
 import time
+from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 
-from limo_hog.cli.support.arguments import add_follower, output_file, seconds
-from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.arguments import add_follower, add_ros_arguments, node_of, number, output_file, seconds
+from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
+from limo_hog.follow.control.limited import Limited
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import LIMO, load_robot
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.ros2.dds import Bus
-from limo_hog.ros2.follower import drive
+from limo_hog.ros2.follower import Report, drive
+from limo_hog.ros2.network import BusError
+from limo_hog.ros2.outputs import FRAMES
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -29,9 +37,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         epilog="To watch or record: give --view, --video or --record to `limo-hog arena --ros2`, or use ros2 bag.",
     )
     add_follower(parser)
-    parser.add_argument("--seconds", type=seconds, default=60.0, metavar="S", help="stop after this time (60)")
     parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write what happened as JSON; - is standard output"
+        "--seconds", type=seconds, default=math.inf, metavar="S", help="stop after this time (at Ctrl-C)"
+    )
+    parser.add_argument("--max-speed", type=_speed, default=math.inf, metavar="M/S", help="drive no faster [m/s]")
+    parser.add_argument("--max-turn", type=_turn, default=math.inf, metavar="RAD/S", help="turn no faster [rad/s]")
+    parser.add_argument("--compressed", action="store_true", help="take compressed images, though there are raw ones")
+    parser.add_argument(
+        "--json",
+        type=output_file,
+        metavar="FILE",
+        help="write a line of JSON for each change of mode or reason, and last one of what happened; - is standard "
+        "output",
     )
     parser.add_argument(
         "--no-drive", action="store_true", help="publish what is found and no commands: a planner, such as Nav2, drives"
@@ -41,50 +58,88 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--without-lidar", action="store_true", help="drive by depth alone where no scan comes: slowly, never backwards"
     )
     parser.add_argument("--ros2", action="store_true", help="follow on a ROS 2 robot instead of in the arena")
+    add_ros_arguments(parser, f"; parameters are {', '.join(FRAMES)}")
+
+
+def _speed(text: str) -> float:
+    return number(text, 0.05, 5.0, "speed in m/s")
+
+
+def _turn(text: str) -> float:
+    return number(text, 0.05, 10.0, "turn rate in rad/s")
 
 
 def run(args: argparse.Namespace) -> int:
     """Drive the robot that publishes the workshop's topics, then print how it went."""
-    controller = controller_named(args.controller, args.target)
+    controller = Limited(controller_named(args.controller, args.target), args.max_speed, args.max_turn)
     detector = detector_named(args.detector)
-    bus = Bus()
-    with progress("s") as bar:
-        task = bar.add_task("search", total=args.seconds)
+    bus = Bus(node_of(args, "limo_hog_follower"))
+    for name in bus.node.parameters.keys() - FRAMES.keys() - {"use_sim_time"}:
+        print(f"parameter {name} is not known; known are {', '.join(FRAMES)}", file=sys.stderr)
+    report = Report()
+    stopped: KeyboardInterrupt | BusError | None = None
+    with ExitStack() as stack:
+        lines = None
+        if args.json:
+            lines = sys.stdout if args.json == STDOUT else stack.enter_context(Path(args.json).open("w", buffering=1))
+        bar = stack.enter_context(progress("s"))
+        task = bar.add_task("search", total=None if math.isinf(args.seconds) else args.seconds)
         began = time.monotonic()
+        shown: tuple[str, str] | None = None
 
         def watch(log: FrameLog) -> None:
-            decision = log.decision
-            bar.update(
-                task, completed=time.monotonic() - began, description=f"{decision.mode.value}: {decision.reason}"
-            )
+            nonlocal shown
+            mode, reason = log.decision.mode.value, log.decision.reason
+            at = time.monotonic() - began
+            bar.update(task, completed=at, description=f"{mode}: {reason}")
+            # A reason whose numbers alone change is the same.
+            now = mode, re.sub(r"[\d.]+", "", reason)
+            if now == shown:
+                return
+            shown = now
+            if args.json != STDOUT:
+                bar.console.print(f"{at:.1f} s {mode}: {reason}", markup=False, highlight=False, soft_wrap=True)
+            if lines is not None:
+                event = {"seconds": round(at, 3), "stamp": log.time, "mode": mode, "reason": reason}
+                print(json.dumps(event), file=lines, flush=True)
 
-        report = drive(
-            bus,
-            controller,
-            detector,
-            args.seconds,
-            watch,
-            moves=not args.no_drive,
-            robot=load_robot(args.robot) if args.robot else LIMO,
-            without_lidar=args.without_lidar,
-            say=lambda line: print(line, file=sys.stderr),
-        )
-    answer = statistics.median(report.answer_ms) if report.answer_ms else None
-    card = {
-        "controller": args.controller,
-        "detector": args.detector,
-        "seconds": args.seconds,
-        "frames": report.frames,
-        "found": report.found,
-        "dropped": report.dropped,
-        "answer_ms_p50": answer,
-        "answer_ms_p95": float(np.percentile(report.answer_ms, 95)) if report.answer_ms else None,
-        "modes": report.modes,
-    }
-    if args.json:
-        write_json(args.json, card)
+        try:
+            drive(
+                bus,
+                controller,
+                detector,
+                args.seconds,
+                watch,
+                moves=not args.no_drive,
+                robot=load_robot(args.robot) if args.robot else LIMO,
+                without_lidar=args.without_lidar,
+                compressed=args.compressed,
+                say=lambda line: print(line, file=sys.stderr),
+                report=report,
+            )
+        except (KeyboardInterrupt, BusError) as error:
+            stopped = error
+        answers = report.answer_ms
+        card = {
+            "controller": args.controller,
+            "detector": args.detector,
+            "seconds": time.monotonic() - began,
+            "frames": report.frames,
+            "found": report.found,
+            "dropped": report.dropped,
+            "answer_ms_p50": statistics.median(answers) if answers else None,
+            "answer_ms_p95": float(np.percentile(answers, 95)) if answers else None,
+            "modes": report.modes,
+        }
+        if lines is not None:
+            print(json.dumps(card), file=lines, flush=True)
     if args.json != STDOUT:
         modes = ", ".join(f"{mode} {count}" for mode, count in report.modes.items())
         print(f"{report.frames} images, a person in {report.found}; commands: {modes}")
-        print(f"command {answer or 0:.1f} ms after an image; messages dropped {report.dropped}", file=sys.stderr)
+        print(
+            f"command {card['answer_ms_p50'] or 0:.1f} ms after an image; messages dropped {report.dropped}",
+            file=sys.stderr,
+        )
+    if stopped is not None:
+        raise stopped
     return 0

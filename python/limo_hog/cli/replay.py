@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from rich.table import Table
 from rich.text import Text
 
-from limo_hog.cli.support.arguments import add_detector, file_ending, output_file
+from limo_hog.cli.support.arguments import add_detector, add_ros_arguments, file_ending, node_of, output_file
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
@@ -22,6 +23,7 @@ from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.sense.detectors import detector_named
 
 if TYPE_CHECKING:
+    from limo_hog.ros2.bag import Record
     from limo_hog.ros2.replay import Replayed
 
 
@@ -45,21 +47,28 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="controller (%(default)s)")
     add_detector(parser)
-    parser.add_argument("--image", metavar="TOPIC", help="topic of the camera (/limo_camera/image)")
     parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="video of the detections (H.264)")
     parser.add_argument(
         "--json", type=output_file, metavar="FILE", help="write the figures as JSON; - is standard output"
     )
+    add_ros_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Replay a recording and show the figures."""
     from limo_hog.ros2.bag import read_bag
-    from limo_hog.ros2.names import IMAGE
-    from limo_hog.ros2.replay import replay
+    from limo_hog.ros2.replay import elsewhere, kind_of, replay
 
     detector, controller = detector_named(args.detector), controller_named(args.controller)
+    node = node_of(args, "limo_hog_follower")
+    kinds: dict[str, str] = {}
     frames: list[dict[str, Any]] = []
+
+    def records() -> Iterator[Record]:
+        for record in read_bag(args.file):
+            kinds.setdefault(record.topic, kind_of(record))
+            yield record
+
     with ExitStack() as stack:
         bar = stack.enter_context(progress("frames"))
         task = bar.add_task("replaying", total=None)
@@ -75,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
             found, target = frame.log.detections, frame.log.decision.target
             return annotate(frame.frame.image, found.boxes, found.labels, target, f"{frame.frame.stamp:.1f} s")
 
-        for frame in replay(read_bag(args.file), controller, detector, args.image or IMAGE):
+        for frame in replay(records(), controller, detector, node):
             frames.append(_compared(frame))
             if write is not None:
                 write(draw(frame))
@@ -93,6 +102,8 @@ def run(args: argparse.Namespace) -> int:
         out.print(table)
         if card["same_detections"] < card["frames_recorded_with_detections"] or card["linear_difference_max"]:
             out.print(_WHY, soft_wrap=True)
+    for line in elsewhere(kinds, node):
+        print(line, file=sys.stderr)
     failures = [frame["failure"] for frame in frames if frame["failure"]]
     if failures:
         print(f"{len(failures)} of {len(frames)} frames: {failures[0]}", file=sys.stderr)

@@ -46,13 +46,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Look."""
+    from limo_hog.ros2.arguments import NodeNames
     from limo_hog.ros2.dds import Bus
 
-    bus = Bus()
+    # ROS 2 hides nodes whose names begin so.
+    bus = Bus(NodeNames("_limo_hog_topic"))
     if args.action == "list":
         topics = bus.topics()
         if not topics:
-            print(f"no topics in ROS domain {bus.domain}", file=sys.stderr)
+            print(f"no topics in {bus.network}", file=sys.stderr)
         for name, ends in topics.items():
             print(printable(f"{name} [{ends.type_name}]" if args.show_types else name))
         return 0
@@ -60,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     found = bus.topics(2.0, enough=lambda topics: topic in topics and args.action != "info")
     if topic not in found:
         known = ", ".join(found) or "none"
-        raise LimoHogError(f"topic {topic} is not there in ROS domain {bus.domain}; there are: {known}")
+        raise LimoHogError(f"topic {topic} is not there in {bus.network}; there are: {known}")
     if args.action == "info":
         ends = found[topic]
         print(printable(f"Type: {ends.type_name}"))

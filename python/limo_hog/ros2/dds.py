@@ -1,7 +1,4 @@
-"""Topics over DDS, as ROS 2 Humble and Jazzy name, type and encode them; loopback alone unless told otherwise.
-
-ROS_DOMAIN_ID chooses the domain. CYCLONEDDS_URI, where it is set, replaces the loopback configuration.
-"""
+"""Topics over DDS, as ROS 2 Humble and Jazzy name, type and encode them, and the node that they belong to."""
 
 from __future__ import annotations
 
@@ -12,9 +9,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.ros2 import names
+from limo_hog.ros2.arguments import NodeNames
 from limo_hog.ros2.messages import Field, MessageError, deserialize, fields_of, serialize, typestore
+from limo_hog.ros2.network import BusError, network
 
 with needed(by="ROS 2 over the network"):
     from cyclonedds import builtin
@@ -28,29 +27,8 @@ with needed(by="ROS 2 over the network"):
     from cyclonedds.topic import Topic
     from cyclonedds.util import duration
 
-#: Discovery by unicast to this machine's own ports: loopback has no multicast.
-LOOPBACK = """
-<CycloneDDS><Domain id="any">
-  <General>
-    <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
-    <AllowMulticast>false</AllowMulticast>
-    <MaxMessageSize>65500B</MaxMessageSize>
-  </General>
-  <Discovery>
-    <ParticipantIndex>auto</ParticipantIndex>
-    <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
-    <SPDPInterval>1s</SPDPInterval>
-    <Peers><Peer address="127.0.0.1"/></Peers>
-  </Discovery>
-</Domain></CycloneDDS>
-"""
-
 #: ROS 2's prefix of topics in DDS.
 _PREFIX = "rt"
-
-
-class BusError(LimoHogError):
-    """The ROS 2 network cannot be used as asked, or no camera image comes over it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,13 +96,65 @@ def _qos(type_name: str, depth: int, *, reliable: bool = True, kept: bool = Fals
     )
 
 
+class _Graph:
+    """Tells the network which node a participant is, and which readers and writers are its: `ros_discovery_info`."""
+
+    def __init__(self, participant: Any, node: NodeNames) -> None:
+        def struct(name: str, **fields: Any) -> Any:
+            return make_idl_struct(f"{name}_", f"rmw_dds_common.msg.dds_.{name}_", fields)
+
+        # Humble's numbers have 24 bytes, of which 8 are zero; it takes no others.
+        self._size = 24 if os.environ.get("ROS_DISTRO") == "humble" else 16
+        generic: Any = types
+        self._gid = struct("Gid", data=generic.array[types.byte, self._size])
+        gids = generic.sequence[self._gid]
+        self._info = struct(
+            "NodeEntitiesInfo", node_namespace=str, node_name=str, reader_gid_seq=gids, writer_gid_seq=gids
+        )
+        kind = struct("ParticipantEntitiesInfo", gid=self._gid, node_entities_info_seq=generic.sequence[self._info])
+        qos = Qos(
+            Policy.Reliability.Reliable(duration(milliseconds=100)),
+            Policy.Durability.TransientLocal,
+            Policy.History.KeepLast(1),
+            Policy.DataRepresentation(use_cdrv0_representation=True),
+        )
+        self._writer = DataWriter(participant, Topic(participant, "ros_discovery_info", kind), qos=qos)
+        self._kind, self._node, self._own = kind, node, bytes(participant.guid.bytes)
+        self._readers: list[bytes] = []
+        self._writers: list[bytes] = []
+        self._announce()
+
+    def add_reader(self, guid: bytes, before: bytes | None = None) -> None:
+        """Tell it of a reader, in the place of the one `before`."""
+        self._readers = [one for one in self._readers if one != before] + [guid]
+        self._announce()
+
+    def add_writer(self, guid: bytes) -> None:
+        """Tell it of a writer."""
+        self._writers.append(guid)
+        self._announce()
+
+    def _announce(self) -> None:
+        def number(guid: bytes) -> Any:
+            return self._gid(data=list(guid.ljust(self._size, b"\0")))
+
+        info = self._info(
+            node_namespace=self._node.namespace,
+            node_name=self._node.name,
+            reader_gid_seq=[number(guid) for guid in self._readers],
+            writer_gid_seq=[number(guid) for guid in self._writers],
+        )
+        self._writer.write(self._kind(gid=number(self._own), node_entities_info_seq=[info]))
+
+
 class Publisher:
     """Sends messages of one topic."""
 
-    def __init__(self, participant: Any, topic: str, type_name: str, depth: int, *, kept: bool) -> None:
+    def __init__(self, participant: Any, graph: _Graph, topic: str, type_name: str, depth: int, *, kept: bool) -> None:
         self._type = dds_type(type_name)
         qos = _qos(type_name, depth, kept=kept)
         self._writer = DataWriter(participant, Topic(participant, _PREFIX + topic, self._type), qos=qos)
+        graph.add_writer(bytes(self._writer.guid.bytes))
 
     @property
     def has_readers(self) -> bool:
@@ -161,13 +191,22 @@ class Subscription:
     """
 
     def __init__(
-        self, participant: Any, wakers: WaitSet, topic: str, type_name: str, depth: int, *, kept: bool
+        self,
+        participant: Any,
+        graph: _Graph,
+        wakers: WaitSet,
+        topic: str,
+        type_name: str,
+        depth: int,
+        *,
+        kept: bool,
     ) -> None:
         self._participant, self._wakers, self._type_name, self._depth = participant, wakers, type_name, depth
-        self._kept = kept
+        self._graph, self._kept = graph, kept
         self._topic = Topic(participant, _PREFIX + topic, dds_type(type_name))
         self._mismatch = _Mismatch()
         self.dropped = 0
+        self._guid: bytes | None = None
         self._open(reliable=True)
 
     def _open(self, *, reliable: bool) -> None:
@@ -176,6 +215,8 @@ class Subscription:
         self._reader = DataReader(self._participant, self._topic, qos=qos, listener=listener)
         self._unread = ReadCondition(self._reader, ViewState.Any | SampleState.NotRead | Instance.Any)
         self._wakers.attach(self._unread)
+        before, self._guid = self._guid, bytes(self._reader.guid.bytes)
+        self._graph.add_reader(self._guid, before)
 
     def take(self) -> list[Any]:
         """Return the messages that have come since, oldest first."""
@@ -191,33 +232,46 @@ class Subscription:
 
 
 class Bus:
-    """A participant of the ROS 2 network.
+    """A node of the ROS 2 network, which others see in `ros2 node list`.
+
+    The workshop's topics are in the node's namespace, but for TF and the clock, and have the names that its arguments
+    give them.
+
+    Attributes
+    ----------
+    node
+        The node's names.
+    network
+        What it can reach; as text, for messages.
 
     Raises
     ------
     BusError
-        If ROS_DOMAIN_ID is no domain, or DDS does not start.
+        If the environment asks for no network that ROS 2 knows, or DDS does not start.
     """
 
-    def __init__(self) -> None:
-        text = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
-        if not text.isdecimal() or int(text) > 232:
-            raise BusError(f"ROS_DOMAIN_ID is {text!r}; wanted is a number from 0 to 232")
-        self.domain = int(text)
-        self._domain = None if os.environ.get("CYCLONEDDS_URI") else _domain(self.domain)
+    def __init__(self, node: NodeNames | None = None) -> None:
+        self.node = NodeNames("limo_hog") if node is None else node
+        self.network = network(os.environ)
+        if self.network.configuration is not None:
+            _domain(self.network.domain, self.network.configuration)
         try:
-            self._participant = DomainParticipant(self.domain)
+            # As ROS 2's participants do: the enclave of a network without security.
+            self._participant = DomainParticipant(self.network.domain, qos=Qos(Policy.Userdata(b"enclave=/;")))
         except Exception as error:
-            raise BusError(f"DDS does not start in domain {self.domain}: {error}") from error
+            raise BusError(f"DDS does not start in {self.network}: {error}") from error
         self._wakers = WaitSet(self._participant)
+        self._graph = _Graph(self._participant, self.node)
 
     def publisher(self, topic: str, type_name: str, depth: int = 10, *, kept: bool = False) -> Publisher:
         """Begin to publish; of what is `kept` (transient local), later readers get the last `depth` messages."""
-        return Publisher(self._participant, topic, type_name, depth, kept=kept)
+        topic = names.resolved(self.node, topic)
+        return Publisher(self._participant, self._graph, topic, type_name, depth, kept=kept)
 
     def subscription(self, topic: str, type_name: str, depth: int = 10, *, kept: bool = False) -> Subscription:
         """Begin to listen; `wait` wakes up for it. With `kept`, what a publisher kept before comes, too."""
-        return Subscription(self._participant, self._wakers, topic, type_name, depth, kept=kept)
+        topic = names.resolved(self.node, topic)
+        return Subscription(self._participant, self._graph, self._wakers, topic, type_name, depth, kept=kept)
 
     def wait(self, seconds: float) -> None:
         """Return when a subscription has something, or after so long."""
@@ -240,6 +294,7 @@ class Bus:
 
     def subscribed_types(self, topic: str) -> set[str]:
         """Return the ROS types with which others subscribe to a topic, as known now."""
+        topic = names.resolved(self.node, topic)
         reader = builtin.BuiltinDataReader(self._participant, builtin.BuiltinTopicDcpsSubscription)
         return {
             _ros_type(sample.type_name)
@@ -266,6 +321,6 @@ def _ros_type(type_name: str) -> str:
 
 
 @cache
-def _domain(number: int) -> Any:
+def _domain(number: int, configuration: str) -> Any:
     # One configuration a domain and process: the second would be an error.
-    return Domain(number, LOOPBACK)
+    return Domain(number, configuration)

@@ -46,26 +46,26 @@ def detections_message(stamp: float, found: Detections, frame: str, ids: Mapping
     return array
 
 
-def person_pose(stamp: float, person: Believed) -> Any:
-    """Return a person's geometry_msgs/PoseStamped in `base_link`; its x axis points away from the robot.
+def person_pose(stamp: float, person: Believed, base: str = messages.BASE_FRAME) -> Any:
+    """Return a person's geometry_msgs/PoseStamped in the frame `base`; its x axis points away from the robot.
 
     A planner that drives to this pose so ends with its camera on the person.
     """
     pose = default_message(names.FINDINGS[names.PERSON])
-    pose.header.stamp, pose.header.frame_id = to_time(stamp), messages.BASE_FRAME
+    pose.header.stamp, pose.header.frame_id = to_time(stamp), base
     pose.pose.position.x, pose.pose.position.y = person.x, person.y
     half = math.atan2(person.y, person.x) / 2
     pose.pose.orientation.z, pose.pose.orientation.w = math.sin(half), math.cos(half)
     return pose
 
 
-def people_message(stamp: float, people: Sequence[Believed]) -> Any:
-    """Return everyone tracked as people_msgs/People in `base_link`, the likeliest first.
+def people_message(stamp: float, people: Sequence[Believed], base: str = messages.BASE_FRAME) -> Any:
+    """Return everyone tracked as people_msgs/People in the frame `base`, the likeliest first.
 
     Names are the tracks' numbers, reliability is the probability of being a person.
     """
     array = default_message(names.FINDINGS[names.PEOPLE])
-    array.header.stamp, array.header.frame_id = to_time(stamp), messages.BASE_FRAME
+    array.header.stamp, array.header.frame_id = to_time(stamp), base
     for person in sorted(people, key=lambda one: -one.probability):
         one = default_message("people_msgs/msg/Person")
         one.name, one.reliability = str(person.number), float(person.probability)
@@ -75,12 +75,14 @@ def people_message(stamp: float, people: Sequence[Believed]) -> Any:
     return array
 
 
-def person_frames(stamp: float, people: Sequence[Believed], followed: int | None) -> Any:
-    """Return the TFMessage of everyone tracked: `person_NUMBER`, and `followed_person` once more, in `base_link`."""
+def person_frames(
+    stamp: float, people: Sequence[Believed], followed: int | None, base: str = messages.BASE_FRAME
+) -> Any:
+    """Return the TFMessage of everyone tracked: `person_NUMBER`, and `followed_person` once more, in `base`."""
     message = default_message("tf2_msgs/msg/TFMessage")
     for person in people:
         frames = [f"person_{person.number}"] + [PERSON_FRAME] * (person.number == followed)
-        pose = person_pose(stamp, person)
+        pose = person_pose(stamp, person, base)
         for frame in frames:
             one = default_message("geometry_msgs/msg/TransformStamped")
             one.header, one.child_frame_id = pose.header, frame
@@ -90,9 +92,9 @@ def person_frames(stamp: float, people: Sequence[Believed], followed: int | None
     return message
 
 
-def stamped_twist(stamp: float, command: Twist) -> Any:
-    """Return a velocity command with its time, in `base_link`."""
+def stamped_twist(stamp: float, command: Twist, base: str = messages.BASE_FRAME) -> Any:
+    """Return a velocity command with its time, in the frame `base`."""
     message = default_message(names.STAMPED_COMMAND_TYPE)
-    message.header.stamp, message.header.frame_id = to_time(stamp), messages.BASE_FRAME
+    message.header.stamp, message.header.frame_id = to_time(stamp), base
     message.twist = messages.twist(command)
     return message

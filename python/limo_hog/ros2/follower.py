@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -14,8 +15,9 @@ from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, FrameLog
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.ros2 import messages, names
-from limo_hog.ros2.dds import Bus, BusError, Endpoints
+from limo_hog.ros2.dds import Bus, Endpoints
 from limo_hog.ros2.messages import MessageError
+from limo_hog.ros2.network import BusError
 from limo_hog.ros2.outputs import Commands, Findings
 from limo_hog.ros2.senses import Senses, picture_of
 
@@ -23,6 +25,8 @@ S = TypeVar("S")
 
 #: The drive ends after so long without a camera image [s]: discovery takes up to 3 s, a driver as long to start.
 SILENT_AFTER = 10.0
+#: So many answers are kept: an hour's at 10 Hz.
+_ANSWERS = 36_000
 
 #: Other senses than the camera are said to be missing so long after the first image [s]: discovery takes up to 3 s.
 SETTLED = 3.0
@@ -39,7 +43,7 @@ class Report:
     dropped
         Messages that could not be read.
     answer_ms
-        From the arrival of each image to its command [ms].
+        From the arrival of each image to its command, for the last hour [ms].
     modes
         Number of commands in each mode.
     """
@@ -47,7 +51,7 @@ class Report:
     frames: int = 0
     found: int = 0
     dropped: int = 0
-    answer_ms: list[float] = field(default_factory=list)
+    answer_ms: deque[float] = field(default_factory=lambda: deque(maxlen=_ANSWERS))
     modes: dict[str, int] = field(default_factory=dict)
 
     def add(self, log: FrameLog, answer_ms: float) -> None:
@@ -60,29 +64,41 @@ class Report:
             self.answer_ms.append(answer_ms)
 
 
-def camera_topic(bus: Bus) -> str:
+def camera_topic(bus: Bus, *, compressed: bool = False) -> str:
     """Wait for a camera; returns the topic of its raw images or, without these, of its compressed ones.
+
+    With `compressed` it waits for compressed images alone.
 
     Raises
     ------
     BusError
         If no camera is found within 10 s.
     """
+    wanted = (names.IMAGE_COMPRESSED,) if compressed else (names.IMAGE, names.IMAGE_COMPRESSED)
+    names_here = {topic: names.resolved(bus.node, topic) for topic in wanted}
 
     def offered(topic: str, found: dict[str, Endpoints]) -> bool:
-        return topic in found and found[topic].publishers > 0
+        return names_here[topic] in found and found[names_here[topic]].publishers > 0
 
-    def either(found: dict[str, Endpoints]) -> bool:
-        return offered(names.IMAGE, found) or offered(names.IMAGE_COMPRESSED, found)
-
-    if not either(bus.topics(SILENT_AFTER, enough=either)):
+    found = bus.topics(SILENT_AFTER, enough=lambda found: any(offered(topic, found) for topic in wanted))
+    if not any(offered(topic, found) for topic in wanted):
         raise BusError(
-            f"no publisher of {names.IMAGE} or {names.IMAGE_COMPRESSED} in ROS domain {bus.domain} "
-            f"within {SILENT_AFTER:g} s"
+            f"no publisher of {' or '.join(names_here.values())} in {bus.network}, within {SILENT_AFTER:g} s; "
+            + _images_in(found)
         )
     # Of a camera that offers both, either topic may be discovered first.
-    found = bus.topics(0.5, enough=lambda found: offered(names.IMAGE, found))
-    return names.IMAGE if offered(names.IMAGE, found) else names.IMAGE_COMPRESSED
+    found = bus.topics(0.5, enough=lambda found: offered(wanted[0], found))
+    return next(topic for topic in wanted if offered(topic, found))
+
+
+def _images_in(found: dict[str, Endpoints]) -> str:
+    """Say which images there are, and how one is chosen."""
+    kinds = (names.TYPES[names.IMAGE], names.TYPES[names.IMAGE_COMPRESSED])
+    images = [topic for topic, ends in found.items() if ends.type_name in kinds and ends.publishers]
+    if images:
+        own = names.IMAGE.lstrip("/")
+        return f"images are on {', '.join(images)}: choose one by --ros-args -r {own}:=TOPIC"
+    return f"there are no images; topics: {', '.join(found) or 'none'}"
 
 
 class Inputs:
@@ -92,11 +108,13 @@ class Inputs:
     ----------
     senses
         The other sensors' newest readings.
+    complaint
+        Why the last message that was not read was not; "" while all were.
     """
 
     def __init__(self, bus: Bus, camera: str, robot: RobotGeometry = LIMO) -> None:
         self.senses = Senses(robot)
-        self._unreadable = 0
+        self.complaint, self._unreadable = "", 0
         self._camera = bus.subscription(camera, names.TYPES[camera], depth=5)
         self._others = [
             bus.subscription(topic, names.TYPES[topic], depth=5)
@@ -124,8 +142,8 @@ class Inputs:
         """Read a message; None of one that contradicts itself, which is counted."""
         try:
             return read(message)
-        except MessageError:
-            self._unreadable += 1
+        except MessageError as error:
+            self.complaint, self._unreadable = str(error), self._unreadable + 1
             return None
 
 
@@ -139,23 +157,26 @@ def drive(
     moves: bool = True,
     robot: RobotGeometry = LIMO,
     without_lidar: bool = False,
+    compressed: bool = False,
     say: Callable[[str], None] = lambda _: None,
+    report: Report | None = None,
 ) -> Report:
     """Follow the person the camera sees until the time is up; the last command is always to stand.
 
-    With `moves` False no command is sent: a planner drives to what is found. `say` is told which senses are there, when
-    all are, or some time after the first image, and whenever one more has come.
+    With `moves` False no command is sent: a planner drives to what is found. With `compressed` no raw images are asked
+    for. `say` is told which senses are there, when all are, or some time after the first image, and whenever one more
+    has come. A `report` that is given is kept up to date, for a drive that is interrupted.
 
     Raises
     ------
     BusError
         If there is no camera, or no image comes for 10 s.
     """
-    camera = camera_topic(bus)
+    camera = camera_topic(bus, compressed=compressed)
     inputs = Inputs(bus, camera, robot)
     commands, findings = Commands(bus) if moves else None, Findings(bus)
     follower = Follower(controller, detector, robot, without_lidar=without_lidar)
-    report = Report()
+    report = Report() if report is None else report
     first, said = math.inf, ""
     began = heard = time.monotonic()
     stamp = 0.0
@@ -167,7 +188,9 @@ def drive(
             if frame is not None:
                 heard, stamp, first = came, frame.stamp, min(first, came)
             elif came - heard > SILENT_AFTER:
-                raise BusError(f"no image on {camera} in ROS domain {bus.domain} for {SILENT_AFTER:g} s")
+                why = f"; {inputs.dropped} messages were not read: {inputs.complaint}" if inputs.complaint else ""
+                where = f"{names.resolved(bus.node, camera)} in {bus.network}"
+                raise BusError(f"no image on {where}, for {SILENT_AFTER:g} s{why}")
             elif not report.frames:
                 continue
             line = inputs.senses.present(without_lidar=without_lidar)

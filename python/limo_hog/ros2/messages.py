@@ -63,6 +63,9 @@ ENCODINGS: dict[str, tuple[type[np.generic], int]] = {
     "mono16": (np.uint16, 1),
     "16UC1": (np.uint16, 1),
     "32FC1": (np.float32, 1),
+    # Brightness, then blue or red in turn; one of its names is new.
+    "yuv422_yuy2": (np.uint8, 2),
+    "yuyv": (np.uint8, 2),
 }
 
 

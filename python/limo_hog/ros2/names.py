@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from limo_hog.ros2.arguments import NodeNames
+
 IMAGE = "/limo_camera/image"
 IMAGE_COMPRESSED = "/limo_camera/image/compressed"
 DEPTH = "/limo_camera/depth/image_raw"
@@ -49,3 +54,21 @@ FINDINGS = {
 
 #: What else drives a robot by `COMMAND`: from ROS 2 Jazzy on many expect a stamp.
 STAMPED_COMMAND_TYPE = "geometry_msgs/msg/TwistStamped"
+
+#: Topics that ROS 2 keeps outside of namespaces.
+_ABSOLUTE = (CLOCK, TF, TF_STATIC)
+
+
+def resolved(node: NodeNames, topic: str) -> str:
+    """Return the name that one of the workshop's topics has for a node.
+
+    As by image_transport's convention, compressed images are below the raw ones, and the camera's calibration beside
+    them, unless they are renamed themselves.
+    """
+    own = topic if topic in _ABSOLUTE else topic.lstrip("/")
+    moved = node.remap(own)
+    if moved is None and topic == IMAGE_COMPRESSED:
+        return f"{resolved(node, IMAGE)}/compressed"
+    if moved is None and topic == CAMERA_INFO:
+        return f"{resolved(node, IMAGE).rpartition('/')[0]}/camera_info"
+    return moved or node.expand(own)

@@ -10,17 +10,35 @@ from limo_hog.follow.robot import Twist
 from limo_hog.imaging.drawing import annotate
 from limo_hog.ros2 import findings, messages, names
 from limo_hog.ros2.dds import Bus
+from limo_hog.ros2.network import BusError
 
 #: While nothing listens to the commands, the robot's type is looked for again after so long [s]. Chosen: discovery
 #: takes about a second.
 _LOOK_EVERY = 1.0
+
+#: The node's parameters, each a frame that messages name, and its default.
+FRAMES = {"base_frame": messages.BASE_FRAME, "camera_frame": messages.CAMERA_FRAME}
+
+
+def frame_named(bus: Bus, parameter: str) -> str:
+    """Return a frame by its parameter.
+
+    Raises
+    ------
+    BusError
+        If the parameter is no text.
+    """
+    frame = bus.node.parameters.get(parameter, FRAMES[parameter])
+    if not isinstance(frame, str) or not frame:
+        raise BusError(f"parameter {parameter} is {frame!r}; wanted is a frame's name such as {FRAMES[parameter]}")
+    return frame
 
 
 class Commands:
     """Publishes commands as `Twist`, or as `TwistStamped` where the robot subscribes to that."""
 
     def __init__(self, bus: Bus) -> None:
-        self._bus = bus
+        self._bus, self._base = bus, frame_named(bus, "base_frame")
         self._looked = 0.0
         self._open(names.TYPES[names.COMMAND])
 
@@ -37,13 +55,15 @@ class Commands:
             if names.STAMPED_COMMAND_TYPE in taken and self.kind not in taken:
                 self._open(names.STAMPED_COMMAND_TYPE)
         stamped = self.kind == names.STAMPED_COMMAND_TYPE
-        self._publisher.publish(findings.stamped_twist(stamp, command) if stamped else messages.twist(command))
+        message = findings.stamped_twist(stamp, command, self._base) if stamped else messages.twist(command)
+        self._publisher.publish(message)
 
 
 class Findings:
     """Publishes what was made of a camera image, each topic only while something listens to it."""
 
     def __init__(self, bus: Bus) -> None:
+        self._base, self._camera = frame_named(bus, "base_frame"), frame_named(bus, "camera_frame")
         self._annotated = bus.publisher(names.ANNOTATED, names.TYPES[names.ANNOTATED])
         self._publishers = {topic: bus.publisher(topic, kind) for topic, kind in names.FINDINGS.items()}
         self._frames = bus.publisher(names.TF, names.TYPES[names.TF], depth=100)
@@ -54,16 +74,16 @@ class Findings:
             return
         stamp, found, belief = log.frame.stamp, log.detections, log.decision.belief
         ids = {one.box: one.number for one in belief.people if one.box is not None}
-        self._send(names.DETECTIONS, lambda: findings.detections_message(stamp, found, messages.CAMERA_FRAME, ids))
-        self._send(names.PEOPLE, lambda: findings.people_message(now, belief.people))
+        self._send(names.DETECTIONS, lambda: findings.detections_message(stamp, found, self._camera, ids))
+        self._send(names.PEOPLE, lambda: findings.people_message(now, belief.people, self._base))
         followed = next((one for one in belief.people if one.number == belief.followed), None)
         if followed is not None:
-            self._send(names.PERSON, lambda: findings.person_pose(now, followed))
+            self._send(names.PERSON, lambda: findings.person_pose(now, followed, self._base))
         if belief.people and self._frames.has_readers:
-            self._frames.publish(findings.person_frames(now, belief.people, belief.followed))
+            self._frames.publish(findings.person_frames(now, belief.people, belief.followed, self._base))
         if self._annotated.has_readers:
             drawn = annotate(log.frame.image, found.boxes, found.labels, log.decision.target, log.decision.reason)
-            self._annotated.publish(messages.image(stamp, drawn))
+            self._annotated.publish(messages.image(stamp, drawn, self._camera))
 
     def _send(self, topic: str, make: Any) -> None:
         publisher = self._publishers[topic]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -12,11 +12,28 @@ from limo_hog.follow.pipeline import Follower, FrameLog
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.ros2 import messages
+from limo_hog.ros2.arguments import NodeNames
 from limo_hog.ros2.bag import BagError, Record, to_detections
-from limo_hog.ros2.names import COMMAND, DETECTIONS_TYPE, IMAGE, STAMPED_COMMAND_TYPE, TYPES
+from limo_hog.ros2.names import (
+    CAMERA_INFO,
+    COMMAND,
+    DEPTH,
+    DEPTH_LCAS,
+    DETECTIONS_TYPE,
+    IMAGE,
+    IMAGE_COMPRESSED,
+    ODOMETRY,
+    SCAN,
+    STAMPED_COMMAND_TYPE,
+    TYPES,
+    resolved,
+)
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
 
 S = TypeVar("S")
+
+#: Sensors beside the camera's images.
+SENSED = (CAMERA_INFO, DEPTH, DEPTH_LCAS, SCAN, ODOMETRY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +57,13 @@ class Replayed:
 
 
 def replay(
-    records: Iterable[Record], controller: Controller[S], detector: Detector, image_topic: str = IMAGE
+    records: Iterable[Record], controller: Controller[S], detector: Detector, node: NodeNames | None = None
 ) -> Iterator[Replayed]:
     """Let a follower look at a recording; what it decides moves nothing.
 
     A frame is worked on when the command that answered it comes, or the next frame; the other sensors' messages up
-    to then are what the follower knows. A detector that raises is a fault of the frame, as on a robot.
+    to then are what the follower knows. A detector that raises is a fault of the frame, as on a robot. The topics have
+    the names that they have for `node`.
 
     Raises
     ------
@@ -60,6 +78,8 @@ def replay(
     recorded: Detections | None = None
     topics: set[str] = set()
     frames = 0
+    node = NodeNames("limo_hog_follower") if node is None else node
+    own = {resolved(node, topic): topic for topic in (*SENSED, IMAGE, IMAGE_COMPRESSED, COMMAND)}
 
     def work(now: float, twist: Twist | None) -> Replayed:
         if senses.focal_px is None:
@@ -72,8 +92,10 @@ def replay(
 
     for topic, time, message in records:
         topics.add(topic)
-        kind = message.__msgtype__
-        is_image, command = topic == image_topic, _command(topic, message)
+        name = own.get(topic, "")
+        # Of a camera recorded both ways, the raw images are looked at.
+        is_image = name == IMAGE or (name == IMAGE_COMPRESSED and resolved(node, IMAGE) not in topics)
+        command = _command(message) if name == COMMAND else None
         if waiting is not None and (is_image or command is not None):
             yield work(time, command)
             waiting, recorded, frames = None, None, frames + 1
@@ -81,22 +103,50 @@ def replay(
             follower.tick(time, None, senses.sensors)
         if is_image:
             waiting = message
-        elif kind == DETECTIONS_TYPE:
+        elif message.__msgtype__ == DETECTIONS_TYPE:
             recorded = to_detections(message)
-        elif kind != "sensor_msgs/msg/Image" or message.encoding in DEPTH_ENCODINGS:
+        elif name in SENSED:
             senses.take(message)
     if waiting is not None:
         yield work(time, None)
         frames += 1
     if not frames:
         there = ", ".join(sorted(topics)) or "nothing"
-        raise BagError(f"no images on {image_topic}; the recording holds {there}")
+        raise BagError(f"no images on {resolved(node, IMAGE)}; the recording holds {there}")
 
 
-def _command(topic: str, message: Any) -> Twist | None:
+def kind_of(record: Record) -> str:
+    """Return the type of a record's message; a depth image's is that of its own, "depth"."""
+    kind: str = record.message.__msgtype__
+    is_depth = kind == TYPES[DEPTH] and record.message.encoding in DEPTH_ENCODINGS
+    return "depth" if is_depth else kind
+
+
+def elsewhere(kinds: Mapping[str, str], node: NodeNames) -> list[str]:
+    """Name the sensors that a recording has on other topics than they have for a node.
+
+    Parameters
+    ----------
+    kinds
+        Of each topic of the recording, what `kind_of` says.
+    node
+        Whose names the topics have.
+    """
+    told = []
+    for topic in (SCAN, ODOMETRY, DEPTH):
+        wanted = "depth" if topic == DEPTH else TYPES[topic]
+        known = [resolved(node, one) for one in ((DEPTH, DEPTH_LCAS) if topic == DEPTH else (topic,))]
+        others = sorted(other for other, kind in kinds.items() if kind == wanted)
+        if others and not set(known) & set(others):
+            rule = f"--ros-args -r {topic.lstrip('/')}:={others[0]}"
+            told.append(f"not used, since it is not on {known[0]}: {', '.join(others)} ({wanted}); give {rule}")
+    return told
+
+
+def _command(message: Any) -> Twist | None:
     """Return the command that drives the robot, of either type; None of any other message."""
-    if topic == COMMAND and message.__msgtype__ == TYPES[COMMAND]:
+    if message.__msgtype__ == TYPES[COMMAND]:
         return messages.to_twist(message)
-    if topic == COMMAND and message.__msgtype__ == STAMPED_COMMAND_TYPE:
+    if message.__msgtype__ == STAMPED_COMMAND_TYPE:
         return messages.to_twist(message.twist)
     return None

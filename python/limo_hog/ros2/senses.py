@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.extras import needed
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors
 from limo_hog.ros2 import messages
@@ -22,6 +23,8 @@ _DEPTHS = 10
 
 #: Encodings of a depth image: metres as float32, millimetres as uint16.
 DEPTH_ENCODINGS = ("32FC1", "16UC1")
+#: Encodings of a camera image.
+CAMERA_ENCODINGS = ("bgr8", "rgb8", "bgra8", "rgba8", "mono8", "mono16", "yuv422_yuy2")
 
 
 class Senses:
@@ -108,15 +111,25 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
     Raises
     ------
     MessageError
-        The message contradicts itself, or holds no 8-bit gray or colour picture.
+        The message contradicts itself, or its encoding is none of a camera's.
     """
-    compressed = message.__msgtype__ == "sensor_msgs/msg/CompressedImage"
-    pixels = messages.decompressed(message) if compressed else messages.pixels_of(message)
+    if message.__msgtype__ == "sensor_msgs/msg/CompressedImage":
+        pixels: NDArray[Any] = messages.decompressed(message)
+    else:
+        pixels = messages.pixels_of(message)
+        if message.encoding in ("yuv422_yuy2", "yuyv"):
+            with needed(by=f"{message.encoding} images"):
+                import cv2
+            return cv2.cvtColor(pixels, cv2.COLOR_YUV2BGR_YUY2).astype(np.uint8, copy=False)
+        if message.encoding in ("rgb8", "rgba8"):
+            pixels = pixels[..., 2::-1]
+        elif message.encoding in ("bgra8", "8UC4"):
+            pixels = pixels[..., :3]
+        elif message.encoding == "mono16":
+            pixels = (pixels >> 8).astype(np.uint8)
     if pixels.dtype != np.uint8 or pixels.shape[2:] not in ((), (3,)):
-        raise MessageError(f"a camera image of {pixels.dtype} {pixels.shape} is not read: want rgb8, bgr8 or mono8")
-    if pixels.ndim == 2:
-        return np.repeat(pixels[..., None], 3, axis=2)
-    return np.ascontiguousarray(pixels[..., ::-1] if not compressed and message.encoding == "rgb8" else pixels)
+        raise MessageError(f"a camera image in {message.encoding!r} is not read: want {', '.join(CAMERA_ENCODINGS)}")
+    return np.repeat(pixels[..., None], 3, axis=2) if pixels.ndim == 2 else np.ascontiguousarray(pixels)
 
 
 def _metres(message: Any) -> NDArray[np.float32]:

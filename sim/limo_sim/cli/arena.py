@@ -7,6 +7,7 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
+from limo_hog.cli.support.arguments import add_ros_arguments, node_of
 from limo_hog.cli.support.output import UsageError
 from limo_sim.cli.options import add_scenario
 from limo_sim.cli.watching import add_watching, observing
@@ -27,6 +28,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_scenario(parser, math.inf, "simulated time after which to stop (never)")
     add_watching(parser, plot=False)
+    add_ros_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -35,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("an arena without any output: give --ros2, --view, --video or --record")
     if args.plot:
         raise UsageError(f"--plot {args.plot}: an arena has no run to draw; use it with follow or run")
-    from limo_sim.ros.live import run_live
+    from limo_sim.ros.live import run_live, second_publishers
     from limo_sim.world.scenario import Scenario
 
     scenario = Scenario.load(args.scenario)
@@ -43,8 +45,10 @@ def run(args: argparse.Namespace) -> int:
     if args.ros2:
         from limo_hog.ros2.dds import Bus
 
-        bus = Bus()
-        print(f"arena {scenario.name!r} is on ROS domain {bus.domain}; Ctrl-C ends it", file=sys.stderr)
+        bus = Bus(node_of(args, "limo_hog_arena"))
+        for topic in second_publishers(bus):
+            print(f"{topic} has another publisher, a robot or a second arena: nodes will hear both", file=sys.stderr)
+        print(f"arena {scenario.name!r} is in {bus.network}; Ctrl-C ends it", file=sys.stderr)
     with observing(args, scenario) as observers:
         arena = run_live(scenario, args.seed, args.seconds, bus, observers.notify if observers else None)
     contacts = arena.contacts

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from limo_hog.cli.support.arguments import add_ros_arguments
 from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
@@ -34,13 +35,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_scenario(parser, 60.0, "simulated time (60)")
     add_json(parser)
     add_watching(parser)
-    parser.add_argument(
-        "--ros-args",
-        nargs=argparse.REMAINDER,
-        default=[],
-        metavar="...",
-        help="-p name:=value, -r from:=to and --params-file FILE, as ROS 2 takes them; comes last",
-    )
+    add_ros_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

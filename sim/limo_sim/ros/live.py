@@ -12,7 +12,7 @@ from limo_hog.follow.sense.observation import Sensors
 from limo_hog.ros2 import names
 from limo_sim.ros.lockstep.calls import PUBLISHED
 from limo_sim.run.arena import Arena
-from limo_sim.run.log import Step, Watch
+from limo_sim.run.log import Passed, Step, Watch
 from limo_sim.world.robot import is_finite
 from limo_sim.world.scenario import Scenario
 
@@ -66,8 +66,11 @@ def run_live(
         }
         commands = [bus.subscription(names.COMMAND, kind) for kind in (names.TYPES[names.COMMAND], _STAMPED)]
     twist, shown = Twist(), -1.0
+    passed: list[Passed] = []
     began = time.monotonic()
     while arena.time < seconds:
+        if watch is not None:
+            passed.append(Passed(arena.time, arena.odometry(), arena.imu()))
         for message in [message for reader in commands for message in reader.take()]:
             twist = to_twist(message.twist if message.__msgtype__ == _STAMPED else message)
             arena.command(twist)
@@ -77,7 +80,8 @@ def run_live(
                 writer.publish(make())
         if watch is not None and arena.frame().stamp > shown:
             shown = arena.frame().stamp
-            watch(_step(arena, twist))
+            watch(_step(arena, twist, tuple(passed)))
+            passed.clear()
         arena.step()
         late = time.monotonic() - began - arena.time
         if late < 0:
@@ -88,10 +92,17 @@ def run_live(
     return arena
 
 
-def _step(arena: Arena, twist: Twist) -> Step:
+def second_publishers(bus: Bus) -> list[str]:
+    """Look around for others who publish what a robot has one publisher of; returns these topics."""
+    found = bus.topics()
+    own = [names.resolved(bus.node, topic) for topic in (names.SCAN, names.ODOMETRY, names.CLOCK)]
+    return [topic for topic in own if topic in found and found[topic].publishers]
+
+
+def _step(arena: Arena, twist: Twist, passed: tuple[Passed, ...]) -> Step:
     frame = arena.frame()
     twist = twist if is_finite(twist) else Twist()
     mode = Mode.STAND if twist == Twist() else Mode.DRIVE
     decision = Decision(twist, None, mode, "driven by /cmd_vel")
     log = FrameLog(arena.time, decision, Sensors(arena.scan(), arena.odometry()), frame)
-    return Step(log, arena.truth(), frame.truth)
+    return Step(log, arena.truth(), frame.truth, passed=passed)

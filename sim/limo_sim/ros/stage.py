@@ -27,7 +27,7 @@ from limo_sim.ros.lockstep.records import Callback, Command, Fault, Found, Log, 
 from limo_sim.ros.outlet import Outlet
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import Episode, score
-from limo_sim.run.log import Step, Watch
+from limo_sim.run.log import Passed, Step, Watch
 from limo_sim.run.score import ScoreCard, Scorer
 from limo_sim.sensing.camera import TrueFrame
 from limo_sim.world.scenario import Scenario
@@ -95,6 +95,7 @@ class Stage:
         self.scorer = Scorer(self.arena.scenario)
         self._frame: TrueFrame | None = None
         self._render_ms = 0.0
+        self._passed: list[Passed] = []
         self._periods = Periods()
         self._seen_before = False
         self._collected = False
@@ -156,6 +157,7 @@ class Stage:
             raise ValueError("a step after the end of the run")
         self.target_distance, self._told = target, 0
         if self._collected:
+            self._passed.append(Passed(self.time, self.arena.odometry(), self.arena.imu()))
             self._log()
             self.arena.step()
         self._collected = True
@@ -249,7 +251,9 @@ class Stage:
             detect_ms=sum(found.ms for found in self.found) if new else 0.0,
         )
         windows = {name: shown.picture for name, shown in self.shown.items()}
-        step = Step(log, self.arena.truth(), frame.truth if new else None, self._render_ms, windows)
+        seen, passed = frame.truth if new else None, tuple(self._passed)
+        step = Step(log, self.arena.truth(), seen, self._render_ms, windows, passed)
+        self._passed.clear()
         self.scorer.add(step)
         self.watch(step)
 

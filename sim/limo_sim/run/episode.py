@@ -13,7 +13,7 @@ from limo_hog.follow.sense.detectors import detect_in
 from limo_hog.follow.sense.observation import Sensors
 from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FaultySearch
-from limo_sim.run.log import Step, Watch
+from limo_sim.run.log import Passed, Step, Watch
 from limo_sim.run.score import ScoreCard, Scorer
 from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.truth import Contacts
@@ -99,14 +99,17 @@ def run_episode(
     if scenario.detector != DetectorFaults():
         search = FaultySearch(arena.scenario, seed, lambda: arena.frame().truth)
     follower = Follower(controller, detector, search=search)
+    passed: list[Passed] = []
     while arena.time < seconds:
+        passed.append(Passed(arena.time, arena.odometry(), arena.imu()))
         drawing = time.perf_counter()
         frame = arena.frame()
         render_ms = 1e3 * (time.perf_counter() - drawing)
         log = follower.tick(arena.time, frame, Sensors(arena.scan(), arena.odometry()))
         if log is not None:
             arena.command(log.decision.twist)
-            step = Step(log, arena.truth(), frame.truth if log.frame else None, render_ms)
+            step = Step(log, arena.truth(), frame.truth if log.frame else None, render_ms, passed=tuple(passed))
+            passed.clear()
             scorer.add(step)
             watch(step)
         arena.step()

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.pipeline import FrameLog
-from limo_hog.follow.sense.observation import Sensors
+from limo_hog.follow.sense.observation import Odometry, Sensors
+from limo_sim.sensing.imu import ImuReading
 from limo_sim.world.truth import Truth
+
+
+class Passed(NamedTuple):
+    """What the faster sensors read in one step of the arena, at a time [s]."""
+
+    time: float
+    odometry: Odometry
+    imu: tuple[ImuReading, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +39,8 @@ class Step:
         Wall time of drawing the frame [ms].
     windows
         The pictures that a node shows with `cv2.imshow`, by name: uint8 (H, W, 3) BGR or (H, W).
+    passed
+        What the faster sensors read since the control period before.
     """
 
     log: FrameLog
@@ -36,10 +48,11 @@ class Step:
     seen: Truth | None = None
     render_ms: float = 0.0
     windows: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+    passed: tuple[Passed, ...] = ()
 
     def bare(self) -> Step:
         """Return the step without images and scans: 4 kB instead of 3 MB."""
-        return replace(self, log=replace(self.log, frame=None, sensors=Sensors()), windows={})
+        return replace(self, log=replace(self.log, frame=None, sensors=Sensors()), windows={}, passed=())
 
 
 #: Is given every control period of a run.

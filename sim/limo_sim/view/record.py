@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +10,20 @@ from pathlib import Path
 from limo_hog.ros2 import messages
 from limo_hog.ros2.bag import bag_writer
 from limo_hog.ros2.findings import detections_message
-from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, DETECTIONS, IMAGE, ODOMETRY, SCAN
+from limo_hog.ros2.frames import odometry_transform, static_transforms
+from limo_hog.ros2.names import (
+    CAMERA_INFO,
+    CLOCK,
+    COMMAND,
+    DEPTH,
+    DETECTIONS,
+    IMAGE,
+    IMU,
+    ODOMETRY,
+    SCAN,
+    TF,
+    TF_STATIC,
+)
 from limo_sim.run.log import Step, Watch
 from limo_sim.world.scenario import Camera
 
@@ -21,20 +35,27 @@ def recorded(path: Path, camera: Camera) -> Iterator[Watch]:
     `camera` says how the lens bends.
     """
     with bag_writer(path) as write:
-        stamps: dict[str, float] = {}
-
-        def once(topic: str, stamp: float) -> bool:
-            fresh = stamps.get(topic) != stamp
-            stamps[topic] = stamp
-            return fresh
+        scanned = read = -math.inf
+        began = False
 
         def watch(step: Step) -> None:
+            nonlocal scanned, read, began
             log, frame = step.log, step.log.frame
-            now, scan, odometry = log.time, log.sensors.scan, log.sensors.odometry
-            if scan is not None and once(SCAN, scan.stamp):
+            now, scan = log.time, log.sensors.scan
+            for time, odometry, imu in step.passed:
+                write(CLOCK, time, messages.clock(time))
+                if not began:
+                    began = True
+                    write(TF_STATIC, time, static_transforms(time))
+                for reading in imu:
+                    write(IMU, time, messages.imu(reading.stamp, reading.angular_velocity, reading.acceleration))
+                if odometry.stamp > read:
+                    read = odometry.stamp
+                    write(TF, time, odometry_transform(odometry))
+                    write(ODOMETRY, time, messages.odometry(odometry))
+            if scan is not None and scan.stamp > scanned:
+                scanned = scan.stamp
                 write(SCAN, now, messages.laser_scan(scan))
-            if odometry is not None and once(ODOMETRY, odometry.stamp):
-                write(ODOMETRY, now, messages.odometry(odometry))
             if frame is not None and frame.depth is not None:
                 height, width = frame.image.shape[:2]
                 write(

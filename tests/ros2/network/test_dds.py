@@ -27,6 +27,7 @@ from limo_hog.cli.topic import as_yaml
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.ros2 import dds, follower, messages, names
+from limo_sim.ros.live import second_publishers
 from limo_sim.run.arena import Arena
 from limo_sim.world.scenario import Scenario
 
@@ -246,7 +247,46 @@ def test_a_follower_without_a_robot_says_so(
 ) -> None:
     monkeypatch.setattr(follower, "SILENT_AFTER", 0.3)
     assert main(["follow", "--ros2", "--seconds", "5"]) == 1
-    assert "no publisher of /limo_camera/image or /limo_camera/image/compressed in" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "no publisher of /limo_camera/image or /limo_camera/image/compressed in ROS domain 10" in said
+    assert "on this machine alone" in said
+    assert "there are no images; topics: " in said
+
+
+def test_a_camera_of_another_name_is_named_and_taken_under_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(follower, "SILENT_AFTER", 3.0)
+    with publishing("/robot1/camera/image_raw", messages.image(1.0, np.zeros((8, 8, 3), np.uint8))):
+        assert main(["follow", "--ros2", "--seconds", "5"]) == 1
+        said = "images are on /robot1/camera/image_raw: choose one by --ros-args -r limo_camera/image:=TOPIC"
+        assert said in capsys.readouterr().err
+        words = ["-r", "__ns:=/robot1", "-r", "limo_camera/image:=camera/image_raw"]
+        assert main(["follow", "--ros2", "--seconds", "1.5", "--json", "-", "--ros-args", *words]) == 0
+    first, *_, last = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert {"seconds", "stamp", "mode", "reason"} == set(first)
+    assert last["frames"] > 0
+
+
+def test_a_parameter_that_is_not_known_is_named_and_one_of_the_wrong_kind_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(follower, "SILENT_AFTER", 0.3)
+    assert main(["follow", "--ros2", "--ros-args", "-p", "base_fame:=x", "-p", "use_sim_time:=true"]) == 1
+    said = capsys.readouterr().err
+    assert "parameter base_fame is not known; known are base_frame, camera_frame" in said
+    assert "use_sim_time" not in said
+    with publishing(names.IMAGE, messages.image(1.0, np.zeros((8, 8, 3), np.uint8))):
+        monkeypatch.setattr(follower, "SILENT_AFTER", 5.0)
+        assert main(["follow", "--ros2", "--seconds", "1", "--ros-args", "-p", "base_frame:=7"]) == 1
+    assert "parameter base_frame is 7; wanted is a frame's name" in capsys.readouterr().err
+
+
+def test_an_arena_names_the_topics_that_another_publishes() -> None:
+    arena = dds.Bus()
+    assert second_publishers(arena) == []
+    with publishing(names.SCAN, messages.laser_scan(Scan(1.0, np.ones(292, np.float32), -2.0, 2.0, 0.12, 8.0))):
+        assert second_publishers(arena) == [names.SCAN]
 
 
 @pytest.mark.parametrize("kind", ["compressed", "mono8", "rgb8"])
@@ -260,7 +300,7 @@ def test_the_follower_reads_whatever_pictures_the_camera_sends(kind: str, capsys
         message.encoding = kind
     with publishing(topic, message):
         assert main(["follow", "--ros2", "--seconds", "1.5", "--json", "-"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    report = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert report["frames"] >= 5
     assert report["found"] == report["frames"]
 
@@ -273,7 +313,9 @@ def test_a_picture_of_a_kind_that_is_not_read_is_counted_and_the_robot_given_up(
     message.data = message.data[:20]
     with publishing(names.IMAGE_COMPRESSED, message):
         assert main(["follow", "--ros2", "--seconds", "5"]) == 1
-    assert "no image on /limo_camera/image/compressed in ROS domain" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "no image on /limo_camera/image/compressed in ROS domain" in said
+    assert "messages were not read: 20 bytes of 'bgr8; jpeg compressed bgr8' are no picture" in said
 
 
 def test_two_processes_close_the_loop(capsys: pytest.CaptureFixture[str]) -> None:

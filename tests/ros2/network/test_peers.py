@@ -18,6 +18,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow.decision import Believed
 from limo_hog.follow.robot import Twist
 from limo_hog.ros2 import dds, findings, messages, names
+from limo_hog.ros2.network import LOOPBACK
 
 HERE = Path(__file__).parent / "peer"
 
@@ -62,7 +63,7 @@ def test_a_peer_receives_every_image_and_twist_and_its_twists_arrive(
     commands = bus.subscription(names.COMMAND, names.TYPES[names.COMMAND])
     images = bus.publisher(names.IMAGE, names.TYPES[names.IMAGE])
     heard = bus.publisher("/heard", names.TYPES[names.COMMAND])
-    environment = {**os.environ, "CYCLONEDDS_URI": dds.LOOPBACK}
+    environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK}
     other = subprocess.Popen([str(peer), domain, "300"], stdout=subprocess.PIPE, text=True, env=environment)
     assert other.stdout is not None
     assert other.stdout.readline() == "ready\n"
@@ -106,7 +107,7 @@ def test_a_peer_receives_what_the_follower_finds_and_its_stamped_commands_arrive
         names.TF: findings.person_frames(12.5, [person], 7),
     }
     writers = {topic: bus.publisher(topic, message.__msgtype__) for topic, message in sent.items()}
-    environment = {**os.environ, "CYCLONEDDS_URI": dds.LOOPBACK}
+    environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK}
     other = subprocess.Popen([str(peer), domain, "200"], stdout=subprocess.PIPE, text=True, env=environment)
     assert other.stdout is not None
     assert other.stdout.readline() == "ready\n"

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError
+from argparse import REMAINDER, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from limo_hog.cv2_api.arguments import number as bounded
+
+if TYPE_CHECKING:
+    from limo_hog.ros2.arguments import NodeNames
 
 #: What a picture of `--size` may have: 64 megapixels take 1 GB to draw, and no camera has more.
 _MOST_PIXELS = 64_000_000
@@ -115,3 +119,21 @@ def add_detector(parser: ArgumentParser) -> None:
         help="the people detector: ours, ours on the half image, ours with another model, OpenCV's, or a network "
         "(%(default)s)",
     )
+
+
+def add_ros_arguments(parser: ArgumentParser, more: str = "") -> None:
+    """Add --ros-args; `more` ends its help."""
+    parser.add_argument(
+        "--ros-args",
+        nargs=REMAINDER,
+        default=[],
+        metavar="...",
+        help=f"-p name:=value, -r from:=to and --params-file FILE, as ROS 2 takes them; comes last{more}",
+    )
+
+
+def node_of(args: Namespace, name: str) -> NodeNames:
+    """Return the node that a command is, named and with names as --ros-args says."""
+    from limo_hog.ros2.arguments import parse_ros_arguments
+
+    return parse_ros_arguments(["--ros-args", *args.ros_args]).named(name)

@@ -63,6 +63,13 @@ class Future:
         else:
             self._callbacks.append(callback)
 
+    def remove_done_callback(self, callback: Callable[[Any], Any]) -> bool:
+        """Forget a callback; returns whether it was there."""
+        known = callback in self._callbacks
+        if known:
+            self._callbacks.remove(callback)
+        return known
+
     def _call_back(self) -> None:
         callbacks, self._callbacks = self._callbacks, []
         for callback in callbacks:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from limo_hog.ros2 import names
+from limo_hog.ros2.arguments import RosArguments
 from limo_sim.ros.interfaces import Message
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.clock import Clock, ClockType, Rate, Timer
@@ -67,12 +68,10 @@ class Node(PartialApi, missing=_MISSING):
         if cli_args is not None:
             raise StubError("limo-hog run does not offer Node(cli_args=...): give the arguments after --ros-args")
         arguments = context.arguments
-        self._remaps = arguments.remaps if use_global_arguments else {}
-        self._name = self._remaps.get("__node", node_name)
-        self._namespace = "/" + self._remaps.get("__ns", namespace or "").strip("/")
-        overrides = arguments.parameters_of(self._name, self._namespace) if use_global_arguments else {}
+        self._names = (arguments if use_global_arguments else RosArguments()).named(node_name, namespace or "")
+        overrides = self._names.parameters
         overrides = {p.name: p.value for p in parameter_overrides or ()} | overrides
-        context.world.called("nodes", self._name)
+        context.world.called("nodes", self._names.name)
         self._parameters = Parameters(
             overrides,
             context.world.parameters,
@@ -94,15 +93,15 @@ class Node(PartialApi, missing=_MISSING):
 
     def get_name(self) -> str:
         """Return the node's name."""
-        return self._name
+        return self._names.name
 
     def get_namespace(self) -> str:
         """Return the node's namespace."""
-        return self._namespace
+        return self._names.namespace
 
     def get_fully_qualified_name(self) -> str:
         """Return namespace and name."""
-        return f"{self._namespace.rstrip('/')}/{self._name}"
+        return self._names.full
 
     def get_logger(self) -> Logger:
         """Return the node's logger."""
@@ -139,13 +138,7 @@ class Node(PartialApi, missing=_MISSING):
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         """Return a topic's full name, after the command line's remaps unless `only_expand`."""
-        remaps = {} if only_expand else self._remaps
-        topic = remaps.get(topic, topic)
-        if topic.startswith("~"):
-            topic = f"{self.get_fully_qualified_name()}/{topic[1:].lstrip('/')}"
-        elif not topic.startswith("/"):
-            topic = f"{self._namespace.rstrip('/')}/{topic}"
-        return remaps.get(topic, topic)
+        return self._names.expand(topic) if only_expand else self._names.resolve(topic)
 
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
         """Return a service's full name, after the command line's remaps unless `only_expand`."""

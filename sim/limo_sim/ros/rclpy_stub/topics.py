@@ -66,7 +66,7 @@ class Publisher(
             writers.remove(self.topic)
 
 
-class Subscription(PartialApi, missing=("handle", "event_handlers", "raw", "logger_name")):
+class Subscription(PartialApi, missing=("handle", "event_handlers", "raw", "logger_name", "CallbackType")):
     """Calls back with each message of a topic; the newest `depth` wait for a slow callback."""
 
     def __init__(

@@ -1,0 +1,95 @@
+"""ROS 2's own rclpy, with Fast DDS and no settings, hears the arena, sees our nodes, and is followed as a robot."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
+
+from tests.ros2.real import needs_rclpy, start
+
+from limo_hog.ros2 import names
+
+pytestmark = needs_rclpy
+
+ROOT = Path(__file__).parents[3]
+NODES = ROOT / "tests" / "ros2" / "rclpy_nodes"
+COMMAND = [sys.executable, "-m", "limo_hog.cli.main"]
+
+#: The arena's rates [Hz]; a machine that is busy draws fewer images.
+RATES = {names.IMAGE: 10, names.SCAN: 8, names.ODOMETRY: 50, names.IMU: 100, names.CLOCK: 50}
+
+
+def heard(seconds: float) -> dict[str, Any]:
+    arena = subprocess.Popen([*COMMAND, "arena", "--ros2", "--seconds", "120"], stderr=subprocess.DEVNULL)
+    topics = [f"{topic}={names.TYPES[topic].replace('/msg/', '/')}" for topic in RATES]
+    listener = start(NODES / "listener.py", str(seconds), *topics)
+    try:
+        said = json.loads(listener.communicate(timeout=100)[0].splitlines()[-1])
+    finally:
+        listener.kill()
+        arena.terminate()
+        arena.wait(20)
+    assert isinstance(said, dict)
+    return said
+
+
+def test_a_stock_reader_hears_every_topic_and_sees_the_node_with_its_topics() -> None:
+    said = heard(4.0)
+    assert said["missing"] == []
+    writes, reads = said["nodes"]["/limo_hog_arena"]
+    assert writes[names.SCAN] == [names.TYPES[names.SCAN]]
+    assert reads == {names.COMMAND: ["geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"]}
+    # Short fragments brought a quarter of the images that the busiest machine sends.
+    assert said["counts"][names.IMAGE] > 0.6 * said["counts"][names.CLOCK] / 5
+    assert said["counts"][names.SCAN] > 0.6 * said["counts"][names.CLOCK] * 8 / 50
+
+
+@pytest.mark.slow
+def test_a_stock_reader_gets_nearly_every_raw_image_of_a_machine_at_rest() -> None:
+    said = heard(20.0)
+    assert {topic: said["counts"][topic] / 20 > 0.95 * rate for topic, rate in RATES.items()} == dict.fromkeys(
+        RATES, True
+    )
+
+
+def test_the_follower_drives_a_robot_in_a_namespace_with_names_of_its_own(tmp_path: Path) -> None:
+    path = os.pathsep.join([str(ROOT / "python"), str(ROOT / "sim"), sysconfig.get_path("purelib")])
+    robot = start(NODES / "robot.py", "15", PYTHONPATH=path)
+    assert robot.stdout is not None
+    assert robot.stdout.readline() == "ready\n"
+    renamed = {
+        "limo_camera/image": "camera/color/image_raw",
+        "limo_camera/depth/image_raw": "camera/depth/image_raw",
+        "scan": "scan_filtered",
+        "odom": "wheels/odom",
+        "cmd_vel": "base/cmd_vel",
+        "__ns": "/robot1",
+    }
+    rules = [word for old, new in renamed.items() for word in ("-r", f"{old}:={new}")]
+    log = tmp_path / "log.jsonl"
+    words = ["follow", "--ros2", "--max-speed", "0.3", "--json", str(log), "--ros-args", *rules]
+    follower = subprocess.Popen([*COMMAND, *words], stderr=subprocess.PIPE, text=True)
+    try:
+        said = json.loads(robot.communicate(timeout=120)[0].splitlines()[-1])
+        follower.send_signal(2)
+        error = follower.communicate(timeout=20)[1]
+    finally:
+        robot.kill()
+        follower.kill()
+    assert "follow: following a person" in error
+    assert said["in_view"] >= 0.9
+    assert said["contacts"] == 0
+    assert said["moved"] > 0.3
+    assert 0.05 < said["fastest"] <= 0.3 + 1e-6
+    events = [json.loads(line) for line in log.read_text().splitlines()]
+    assert {"follow"} <= {event.get("mode") for event in events}
+    assert events[-1]["frames"] > 50

@@ -1,0 +1,49 @@
+"""What ROS 2's environment variables mean for whom the topics reach."""
+
+from __future__ import annotations
+
+import pytest
+
+from limo_hog.ros2.network import LOOPBACK, BusError, network
+
+RANGE, PEERS, ONLY = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY"
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [{}, {ONLY: "1"}, {RANGE: "LOCALHOST"}, {ONLY: "1", RANGE: "SUBNET", PEERS: "10.0.0.2"}, {RANGE: "", PEERS: " ; "}],
+)
+def test_messages_stay_on_this_machine_unless_told_otherwise(environment: dict[str, str]) -> None:
+    got = network(environment)
+    assert got.configuration == LOOPBACK
+    assert "on this machine alone" in str(got)
+
+
+@pytest.mark.parametrize("environment", [{ONLY: "0"}, {RANGE: "SUBNET"}, {ONLY: "0", RANGE: "SUBNET"}])
+def test_the_local_network_is_reached_by_multicast(environment: dict[str, str]) -> None:
+    got = network(environment)
+    assert "<AllowMulticast>true" in (got.configuration or "")
+    assert "<NetworkInterface" not in (got.configuration or "")
+    assert str(got) == "ROS domain 0, on the local network"
+
+
+def test_static_peers_are_asked_beside_the_range() -> None:
+    both = network({PEERS: "10.0.0.2; robot<1>", "ROS_DOMAIN_ID": "7"})
+    assert '<Peer address="10.0.0.2"/><Peer address="robot&lt;1&gt;"/>' in (both.configuration or "")
+    assert "<AllowMulticast>true" in (both.configuration or "")
+    assert str(both) == "ROS domain 7, on the local network and with 10.0.0.2, robot<1>"
+    near = network({RANGE: "LOCALHOST", PEERS: "10.0.0.2"})
+    assert '<Peer address="localhost"/><Peer address="10.0.0.2"/>' in (near.configuration or "")
+    assert "<AllowMulticast>false" in (near.configuration or "")
+    assert "<NetworkInterface" not in (near.configuration or "")
+
+
+def test_the_whole_configuration_may_be_cyclone_dds_own() -> None:
+    assert network({"CYCLONEDDS_URI": "file:x.xml", ONLY: "1"}).configuration is None
+    assert network({RANGE: "SYSTEM_DEFAULT"}).configuration is None
+
+
+@pytest.mark.parametrize("environment", [{RANGE: "subnet"}, {ONLY: "yes"}, {"ROS_DOMAIN_ID": "233"}])
+def test_a_value_that_ros_2_does_not_know_is_refused(environment: dict[str, str]) -> None:
+    with pytest.raises(BusError, match=next(iter(environment))):
+        network(environment)

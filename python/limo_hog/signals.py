@@ -61,6 +61,7 @@ def stopping() -> Iterator[None]:
     finally:
         for one, handler in before.items():
             signal.signal(one, handler)
+        _State.came = None
 
 
 @contextmanager

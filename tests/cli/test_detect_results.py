@@ -181,7 +181,7 @@ def test_a_line_with_a_value_of_another_kind_is_not_gone_on_from(
     arguments = ["detect", str(pictures / "a.png"), "--json", str(file), "--csv", str(table)]
     assert main(arguments) == 0
     (line,) = lines_of(file.read_text())
-    kept = {"boxes": [[1, 2, 3, 4]], "scores": [0.5]}
+    kept = {"boxes": [[1, 2, 3, 4]], "windows": [[0, 0, 9, 9]], "scores": [0.5], "probabilities": [0.9]}
     file.write_text(json.dumps(line | kept | change) + "\n")
     capsys.readouterr()
     assert main([*arguments, "--resume"]) == 1

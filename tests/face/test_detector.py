@@ -249,7 +249,7 @@ def test_threads_share_a_detector() -> None:
 untyped: Any = limo_hog
 
 WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
-    ({"model": "bogus"}, ValueError, "model is 'bogus'; opencv, default, daimler, limo or the path"),
+    ({"model": "bogus"}, ValueError, "model is 'bogus': no such file, and none of the names opencv"),
     ({"model": 7}, TypeError, "model is 7"),
     ({"threshold": Decimal("sNaN")}, TypeError, "threshold is Decimal"),
     ({"threshold": np.complex128(1 + 2j)}, TypeError, "a real number is wanted"),

@@ -81,7 +81,7 @@ def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
 
 
 def test_what_is_neither_is_refused_as_before() -> None:
-    for image in ([[1, 2]], 7, None):
+    for image in ([[1, 2]], 7):
         with pytest.raises(ImageTypeError, match="an image is a uint8 numpy array"):
             PeopleDetector().detect(image)  # type: ignore[arg-type]
 
@@ -116,7 +116,13 @@ def test_without_either_the_error_names_what_to_install(file: Path) -> None:
     assert MissingExtraError.__name__ in done.stderr
 
 
-@pytest.mark.parametrize(("given", "told"), [([], "detect_many takes a list"), (None, "did imread fail")])
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ([], "also a file's name or a PIL image; this is a .*detect_many takes a list"),
+        (None, "did imread find no file"),
+    ],
+)
 def test_what_is_no_image_is_answered_with_what_was_meant(given: object, told: str) -> None:
-    with pytest.raises(ImageTypeError, match=rf"also a file's name or a PIL image; this is a .*{told}"):
+    with pytest.raises(ImageTypeError, match=told):
         PeopleDetector().detect(given)  # type: ignore[arg-type]

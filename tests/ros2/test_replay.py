@@ -190,7 +190,8 @@ def test_a_recording_of_other_names_is_replayed_by_the_robots_words(
     some += ["-r", "limo_camera/image:=rgb/image"]
     assert main(some) == 0
     out, err = capsys.readouterr()
-    assert json.loads(out)["linear_difference_max"] == pytest.approx(0.2)
+    # Without a scan the robot stands, as it did when this was recorded.
+    assert json.loads(out)["linear_difference_max"] == 0.0
     assert driver.told[0].scan is None
     assert "/r/scan_filtered (sensor_msgs/msg/LaserScan); give --ros-args -r scan:=/r/scan_filtered" in err
     assert "/r/depth (depth); give --ros-args -r limo_camera/depth/image_raw:=/r/depth" in err

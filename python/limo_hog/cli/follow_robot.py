@@ -10,6 +10,7 @@ import statistics
 import sys
 import time
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,6 @@ import numpy as np
 from limo_hog.cli.support.arguments import add_follower, add_ros_arguments, node_of, number, output_file, seconds
 from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
-from limo_hog.follow.control.limited import Limited
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import LIMO, load_robot
@@ -71,7 +71,9 @@ def _turn(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """Drive the robot that publishes the workshop's topics, then print how it went."""
-    controller = Limited(controller_named(args.controller, args.target), args.max_speed, args.max_turn)
+    controller = controller_named(args.controller, args.target)
+    robot = load_robot(args.robot) if args.robot else LIMO
+    robot = replace(robot, max_speed=min(robot.max_speed, args.max_speed), max_turn=min(robot.max_turn, args.max_turn))
     detector = detector_named(args.detector)
     bus = Bus(node_of(args, "limo_hog_follower"))
     for name in bus.node.parameters.keys() - FRAMES.keys() - {"use_sim_time"}:
@@ -111,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
                 args.seconds,
                 watch,
                 moves=not args.no_drive,
-                robot=load_robot(args.robot) if args.robot else LIMO,
+                robot=robot,
                 without_lidar=args.without_lidar,
                 compressed=args.compressed,
                 say=lambda line: print(line, file=sys.stderr),

@@ -351,3 +351,6 @@ def test_a_signal_within_a_step_is_raised_after_it(capfd: pytest.CaptureFixture[
     with pytest.raises(Stopped), stopping():
         arena.step()
     assert capfd.readouterr().err == ""
+    # It is told once: the arena can be used on.
+    arena._robot.velocity_func = roll
+    arena.step()

@@ -27,6 +27,9 @@ from limo_sim.world.scenario import Scenario
 
 WORKSHOP = Scenario.load("workshop")
 
+#: Quick, and the model whose people the arena was made for.
+DETECTOR = PeopleDetector(model="opencv", scale=1.2)
+
 
 def test_real_time_takes_its_time_and_all_it_can_does_not() -> None:
     pace = Pace(speed=4)
@@ -114,7 +117,7 @@ def test_the_map_follows_the_person_that_the_followed_box_is_on() -> None:
             assert left == pytest.approx(error_px, abs=FOCAL_PX * 0.3 / ahead)
 
     scenario = Scenario.load("two_people")
-    run_episode(scenario, controller_named("tracking", None), PeopleDetector(scale=1.2), 20, 0, watch=watch)
+    run_episode(scenario, controller_named("tracking", None), DETECTOR, 20, 0, watch=watch)
     assert len(told) > 30
     assert len(scenario.people) == 2
 
@@ -127,7 +130,7 @@ def test_the_distance_seen_is_from_the_camera_to_the_persons_front() -> None:
         if measured is not None and distance_m is not None:
             seen.append(distance_m - measured)
 
-    run_episode(WORKSHOP, controller_named("tracking", None), PeopleDetector(scale=1.2), 15, 0, watch=watch)
+    run_episode(WORKSHOP, controller_named("tracking", None), DETECTOR, 15, 0, watch=watch)
     # The camera is 8.4 cm ahead of the centre, a person's front 5 to 25 cm before their axis.
     assert len(seen) > 30
     assert 0.084 < statistics.median(seen) < 0.35
@@ -202,6 +205,6 @@ def test_a_run_goes_on_with_every_parameter_at_its_bound(name: str, bound: str) 
     controller: Tunable[Any] = Tunable(controller_named(name, None))
     for one in controller.parameters.values():
         controller.set(one.name, getattr(one, bound))
-    steps = steps_of(WORKSHOP, controller, PeopleDetector(scale=1.2), 6, 0)
+    steps = steps_of(WORKSHOP, controller, DETECTOR, 6, 0)
     reasons = [step.log.decision.reason for step in steps]
     assert not any("failed" in reason or "finite" in reason for reason in reasons), set(reasons)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Final, SupportsFloat, SupportsIndex
+from typing import Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,11 +16,6 @@ from limo_hog.exceptions import ParameterTypeError
 
 #: Rectangles or places and their weights.
 Found = tuple[NDArray[np.int32], NDArray[np.float64]] | tuple[Nothing, Nothing]
-
-
-def _of_geometry(name: str, doc: str) -> Any:
-    """Return a read-only attribute that the geometry in force holds."""
-    return property(lambda hog: getattr(hog._state.geometry, name), doc=doc)
 
 
 class HOGDescriptor:
@@ -80,20 +75,65 @@ class HOGDescriptor:
         if filename is not None:
             self.load(filename)
 
-    winSize: Final[tuple[int, int]] = _of_geometry("winSize", "Detection window (width, height) [px].")
-    blockSize: Final[tuple[int, int]] = _of_geometry("blockSize", "Block (width, height) [px].")
-    blockStride: Final[tuple[int, int]] = _of_geometry("blockStride", "Distance of neighbouring blocks (x, y) [px].")
-    cellSize: Final[tuple[int, int]] = _of_geometry("cellSize", "Cell (width, height) [px].")
-    nbins: Final[int] = _of_geometry("nbins", "Orientation bins of a cell.")
-    derivAperture: Final[int] = _of_geometry("derivAperture", "Kept and saved, never used, as in OpenCV.")
-    winSigma: Final[float] = _of_geometry("winSigma", "Gaussian window [px]; -1: the default, see `getWinSigma`.")
-    histogramNormType: Final[int] = _of_geometry(
-        "histogramNormType", "Kept and saved, never used: it is always L2-Hys."
-    )
-    L2HysThreshold: Final[float] = _of_geometry("L2HysThreshold", "Clipping value of the block normalisation.")
-    gammaCorrection: Final[bool] = _of_geometry("gammaCorrection", "Whether gradients are of the pixels' square roots.")
-    nlevels: Final[int] = _of_geometry("nlevels", "Most levels of a pyramid.")
-    signedGradient: Final[bool] = _of_geometry("signedGradient", "Whether the bins cover 2π instead of π.")
+    @property
+    def winSize(self) -> tuple[int, int]:
+        """Detection window (width, height) [px]."""
+        return self._state.geometry.winSize
+
+    @property
+    def blockSize(self) -> tuple[int, int]:
+        """Block (width, height) [px]."""
+        return self._state.geometry.blockSize
+
+    @property
+    def blockStride(self) -> tuple[int, int]:
+        """Distance of neighbouring blocks (x, y) [px]."""
+        return self._state.geometry.blockStride
+
+    @property
+    def cellSize(self) -> tuple[int, int]:
+        """Cell (width, height) [px]."""
+        return self._state.geometry.cellSize
+
+    @property
+    def nbins(self) -> int:
+        """Orientation bins of a cell."""
+        return self._state.geometry.nbins
+
+    @property
+    def derivAperture(self) -> int:
+        """Kept and saved, never used, as in OpenCV."""
+        return self._state.geometry.derivAperture
+
+    @property
+    def winSigma(self) -> float:
+        """Gaussian window of a block [px]; -1 stands for the default, see `getWinSigma`."""
+        return self._state.geometry.winSigma
+
+    @property
+    def histogramNormType(self) -> int:
+        """Kept and saved, never used, as in OpenCV: L2-Hys is the only one."""
+        return self._state.geometry.histogramNormType
+
+    @property
+    def L2HysThreshold(self) -> float:
+        """Clipping value of the block normalisation."""
+        return self._state.geometry.L2HysThreshold
+
+    @property
+    def gammaCorrection(self) -> bool:
+        """Whether the gradient is taken of the square root of the pixels."""
+        return self._state.geometry.gammaCorrection
+
+    @property
+    def nlevels(self) -> int:
+        """Most levels of a pyramid."""
+        return self._state.geometry.nlevels
+
+    @property
+    def signedGradient(self) -> bool:
+        """Whether the bins cover 2π instead of π."""
+        return self._state.geometry.signedGradient
 
     def getDescriptorSize(self) -> int:
         """Elements of one window's descriptor: bins × cells of a block × blocks of a window."""
@@ -195,8 +235,15 @@ class HOGDescriptor:
             if replaced(self, before, after):
                 return
 
-    getDefaultPeopleDetector = staticmethod(functions.HOGDescriptor_getDefaultPeopleDetector)
-    getDaimlerPeopleDetector = staticmethod(functions.HOGDescriptor_getDaimlerPeopleDetector)
+    @staticmethod
+    def getDefaultPeopleDetector() -> NDArray[np.float32]:
+        """float32 (3781,): OpenCV's people detector for the default geometry, bias last."""
+        return functions.HOGDescriptor_getDefaultPeopleDetector()
+
+    @staticmethod
+    def getDaimlerPeopleDetector() -> NDArray[np.float32]:
+        """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
+        return functions.HOGDescriptor_getDaimlerPeopleDetector()
 
     def detect(
         self,

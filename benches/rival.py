@@ -135,7 +135,7 @@ def descriptor(name):
 
 def installed():
     """Return how many bytes of files the rival needs beside Python, and its libraries' versions."""
-    found = {one.metadata["Name"].lower(): one for one in metadata.distributions()}
+    found = {installed.metadata["Name"].lower(): installed for installed in metadata.distributions()}
     if "limo-hog" in found:
         names, own = OURS, Path(importlib.import_module("limo_hog").__file__).parent
         files = [file for file in own.rglob("*") if file.is_file() and file.suffix != ".pyc"]

@@ -133,8 +133,8 @@ def running(entries: Sequence[Entry]) -> Iterator[list[Running]]:
             one.installed = one.read()
             started.append(one)
         yield started
-        for one in started:
-            one.process.communicate()
+        for rival in started:
+            rival.process.communicate()
 
 
 def usc(data: Path) -> list[Picture]:
@@ -175,11 +175,11 @@ def describe() -> None:
     image = street(512, 512, 1)
     with running(DESCRIBERS) as rivals:
         for _ in range(ROUNDS):
-            lengths = [one.ask(image)["length"] for one in rivals]
+            lengths = [rival.ask(image)["length"] for rival in rivals]
     print("\nDescriptors of a gray image of 512 × 512 px:\n")
     heads("", "version", "CPU ms", "parts", "numbers", "MB on disk")
     # The first image is for caches and tables.
-    least = [min(one.times[1:]) for one in rivals]
+    least = [min(rival.times[1:]) for rival in rivals]
     for entry, one, ms, length in zip(DESCRIBERS, rivals, least, lengths, strict=True):
         package = entry.needs[0].partition(">")[0] if entry.needs else "limo-hog"
         version = one.installed["versions"][package]

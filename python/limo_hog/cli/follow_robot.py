@@ -12,6 +12,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -121,18 +122,7 @@ def run(args: argparse.Namespace) -> int:
             )
         except (KeyboardInterrupt, BusError) as error:
             stopped = error
-        answers = report.answer_ms
-        card = {
-            "controller": args.controller,
-            "detector": args.detector,
-            "seconds": time.monotonic() - began,
-            "frames": report.frames,
-            "found": report.found,
-            "dropped": report.dropped,
-            "answer_ms_p50": statistics.median(answers) if answers else None,
-            "answer_ms_p95": float(np.percentile(answers, 95)) if answers else None,
-            "modes": report.modes,
-        }
+        card = _card(args, report, time.monotonic() - began)
         if lines is not None:
             print(json.dumps(card), file=lines, flush=True)
     if args.json != STDOUT:
@@ -145,3 +135,19 @@ def run(args: argparse.Namespace) -> int:
     if stopped is not None:
         raise stopped
     return 0
+
+
+def _card(args: argparse.Namespace, report: Report, taken: float) -> dict[str, Any]:
+    """Return how the drive of `taken` seconds went, for JSON."""
+    answers = report.answer_ms
+    return {
+        "controller": args.controller,
+        "detector": args.detector,
+        "seconds": taken,
+        "frames": report.frames,
+        "found": report.found,
+        "dropped": report.dropped,
+        "answer_ms_p50": statistics.median(answers) if answers else None,
+        "answer_ms_p95": float(np.percentile(answers, 95)) if answers else None,
+        "modes": report.modes,
+    }

@@ -178,7 +178,7 @@ def _assert_writable(args: argparse.Namespace) -> None:
 
 def _listed(value: Any) -> list[str]:
     values = value if isinstance(value, (list, tuple)) else [value]
-    return [os.fspath(one) for one in values if isinstance(one, (str, Path)) and str(one)]
+    return [os.fspath(value) for value in values if isinstance(value, (str, Path)) and str(value)]
 
 
 def _why(folder: Path) -> tuple[int, str]:

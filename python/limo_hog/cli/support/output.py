@@ -40,7 +40,7 @@ def write_json(target: str, value: object) -> None:
 
 def printable(text: str) -> str:
     """Return text in one line that a terminal shows and does not obey: other characters are escaped."""
-    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
 
 
 def emit(line: str) -> None:

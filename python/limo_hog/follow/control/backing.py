@@ -47,7 +47,7 @@ class Backing:
     Attributes
     ----------
     remembers_s
-        Ground seen to be free within this is known, and another person is remembered for so long [s]. Chosen: a second
+        How long ground seen to be free counts as known, and how long other people are remembered [s]. Chosen: a second
         less than `Guard.memory_s`, so that `Guard` does not slow the robot down on ground taken for known.
     lately_s
         Where a person out of sight can be, it must have been seen within this [s]. Chosen: at .75 m/s a person comes

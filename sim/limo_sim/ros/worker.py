@@ -12,12 +12,14 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from limo_hog.extras import needed
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.wire import FORKS
 
 with needed(by="limo-hog run"):
@@ -108,14 +110,25 @@ class Worker:
 #: Processes that wait for a node, and those that have one.
 idle: list[Worker] = []
 busy: list[Worker] = []
+#: Set while no node may start.
+_closed = threading.Event()
 
 
 @contextmanager
 def ready() -> Iterator[Worker]:
-    """Give a process that has imported what nodes need; it is kept for the next node unless it has ended."""
+    """Give a process that has imported what nodes need; it is kept for the next node unless it has ended.
+
+    Raises
+    ------
+    StubError
+        Inside of `no_nodes`.
+    """
     worker = idle.pop() if idle else Worker()
     busy.append(worker)
     try:
+        if _closed.is_set():
+            worker.leave()
+            raise StubError("no node may start any more")
         yield worker
     finally:
         busy.remove(worker)
@@ -123,10 +136,16 @@ def ready() -> Iterator[Worker]:
             idle.append(worker)
 
 
-def stop_nodes() -> None:
-    """End the nodes of all threads: their runs return soon."""
-    for worker in tuple(busy):
-        worker.leave()
+@contextmanager
+def no_nodes() -> Iterator[None]:
+    """End the nodes of all threads, whose runs return soon, and let none start."""
+    _closed.set()
+    try:
+        for worker in tuple(busy):
+            worker.leave()
+        yield
+    finally:
+        _closed.clear()
 
 
 @atexit.register

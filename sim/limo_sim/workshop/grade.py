@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from limo_sim.ros.runner import Limits
-from limo_sim.ros.worker import stop_nodes
+from limo_sim.ros.worker import no_nodes
 from limo_sim.workshop.check import examine
 from limo_sim.workshop.exercises import EXERCISES
 from limo_sim.workshop.report import to_json
@@ -53,8 +53,8 @@ def grade(
             for done in as_completed(waiting):
                 yield done.result()
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            stop_nodes()
+            with no_nodes():
+                pool.shutdown(cancel_futures=True)
             raise
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
 
@@ -68,19 +69,10 @@ def _pixel_slopes(
 
 @dataclass(frozen=True, slots=True)
 class DepthGrid:
-    """Which depth pixels are looked at.
+    """Which depth pixels are looked at."""
 
-    Attributes
-    ----------
-    step
-        Every so many rows and columns [px]. Chosen: an ankle, 5 cm wide, covers 40 px at 0.5 m, five of these.
-    floor
-        Points lower than this are the floor [m]. Chosen: to a camera pitched by 1° the floor at 1.8 m is 0.03 m
-        high.
-    """
-
-    step: int = 8
-    floor: float = 0.05
+    step: int = number(8, "px", "Every so many rows and columns are looked at.")
+    floor: float = number(0.05, "m", "Points lower than this are the floor.")
 
     def points(self, depth: NDArray[np.float32], focal_px: float, reach: float, robot: RobotGeometry) -> Points:
         """Return what the depth camera sees above the floor and nearer than `reach` [m] to the camera."""
@@ -97,18 +89,10 @@ class DepthGrid:
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """The ground kept free around the robot's outline, a quarter of an ellipse at each corner.
+    """The ground kept free around the robot's outline, a quarter of an ellipse at each corner."""
 
-    Attributes
-    ----------
-    ahead
-        In the direction of travel [m]. Chosen: the edge of Hall's intimate zone, 0.45 m, and a stride's half.
-    beside
-        To either side [m]. Chosen: the robot passes a door of 0.8 m with 9 cm to spare on either side.
-    """
-
-    ahead: float = 0.6
-    beside: float = 0.2
+    ahead: float = number(0.6, "m", "In the direction of travel.")
+    beside: float = number(0.2, "m", "To either side.")
 
 
 def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:

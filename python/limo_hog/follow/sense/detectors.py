@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limo_hog.follow.parameters import number
 import numpy as np
 from numpy.typing import NDArray
 
@@ -228,27 +229,14 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class RegionSize:
-    """How large a region is around the expected window.
+    """How large a region is around the expected window."""
 
-    Attributes
-    ----------
-    widths, heights
-        Sides, in expected window widths and heights [1]. Chosen: half a window to either side for a step and the
-        prediction's error, an eighth above and below for the gait.
-    grid
-        Sides are multiples of this [px], so that few different image sizes occur and buffers are used again.
-    most
-        A region larger than this share of the image is not worth it: all of the image is searched [1]. Chosen.
-    widest, nearest
-        Larger bearings are out of any image [rad]; a nearer person fills it [m].
-    """
-
-    widths: float = 2.0
-    heights: float = 1.25
-    grid: int = 16
-    most: float = 0.7
-    widest: float = 1.2
-    nearest: float = 0.3
+    widths: float = number(2.0, "window widths", "Width of a region.")
+    heights: float = number(1.25, "window heights", "Height of a region.")
+    grid: int = number(16, "px", "Sides are multiples of this, so that buffers are used again.")
+    most: float = number(0.7, "1", "Of a region larger than this share of the image all is searched.")
+    widest: float = number(1.2, "rad", "Larger bearings are out of any image.")
+    nearest: float = number(0.3, "m", "A nearer person fills the image.")
 
     def around(
         self, bearing: float, distance: float, window: float, centre: float, focal_px: float, width: int, height: int

@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Clothes, Observation
@@ -127,30 +128,15 @@ def median(values: NDArray[np.float32]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Strips:
-    """Where a detection window shows a person's chest, and what is beside it.
+    """Where a detection window shows a person's chest, and what is beside it."""
 
-    Attributes
-    ----------
-    top, bottom
-        Of the rows looked at [window heights]. Chosen: the chest, .27 to .5 of HOG's window.
-    chest
-        Half the width of the strip in the middle [window widths]. Chosen: narrower than a person seen from the side.
-    inner, outer
-        Edges of the two strips beside it, from the middle [window widths]. Chosen: outside of the arms, which reach to
-        .25, and inside of the window, in which HOG was trained to find background.
-    beyond
-        Depth taken where the camera sees none [m]: further than it reaches.
-    known
-        Share of pixels that must be valid for a depth to be known [1].
-    """
-
-    top: float = 0.27
-    bottom: float = 0.5
-    chest: float = 0.06
-    inner: float = 0.36
-    outer: float = 0.46
-    beyond: float = 20.0
-    known: float = 0.2
+    top: float = number(0.27, "window heights", "First of the rows looked at, of the chest.")
+    bottom: float = number(0.5, "window heights", "Last of these rows.")
+    chest: float = number(0.06, "window widths", "Half the width of the strip in the middle.")
+    inner: float = number(0.36, "window widths", "Inner edge of the two strips beside it, from the middle.")
+    outer: float = number(0.46, "window widths", "Their outer edge.")
+    beyond: float = number(20.0, "m", "Depth taken where the camera sees none.")
+    known: float = number(0.2, "1", "Share of pixels that must be valid for a depth to be known.")
 
 
 STRIPS = Strips()
@@ -190,27 +176,13 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """How a person's outline is followed upwards in the depth image.
+    """How a person's outline is followed upwards in the depth image."""
 
-    Attributes
-    ----------
-    half_width
-        Half the width of the strip looked at [window widths]. Chosen: a head is a quarter of HOG's window wide.
-    least_half_px
-        And at least this [px]: the middle of a box strays by 3 px.
-    tolerance
-        Depth within which a pixel is the person's [m]. Chosen: a trunk and an arm; people keep more from walls.
-    share
-        Part of the valid pixels of a row that must be the person's [1].
-    gap_px
-        So many rows without the person end the outline [px]. Chosen: more than the depth image's holes.
-    """
-
-    half_width: float = 0.08
-    least_half_px: int = 4
-    tolerance: float = 0.35
-    share: float = 0.25
-    gap_px: int = 5
+    half_width: float = number(0.08, "window widths", "Half the width of the strip looked at.")
+    least_half_px: int = number(4, "px", "And at least this.")
+    tolerance: float = number(0.35, "m", "Depth within which a pixel is the person's.")
+    share: float = number(0.25, "1", "Part of a row's valid pixels that must be the person's.")
+    gap_px: int = number(5, "px", "Rows without the person that end the outline.")
 
 
 OUTLINE = Outline()
@@ -247,35 +219,18 @@ def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, o
 
 @dataclass(frozen=True, slots=True)
 class Visibility:
-    """Where HOG finds people.
+    """Where HOG finds people."""
 
-    Attributes
-    ----------
-    smallest_window
-        Height of the model's window, and so of the smallest person's [px].
-    near
-        Nearer than this a person is often missed, and boxes are on parts of the body [m]. Measured in the arena, by
-        robot-centre distance: found at 1.5 m .67, 1.6 m .92, 1.65 m 1.0 of the frames.
-    widest
-        Larger bearings are out of any image [rad]: twice the Limo's half field of view of 0.62.
-    shown
-        The part of half a window, above and below its middle, that must be in the image [window heights]. Chosen: .5
-        is the whole window; .02 less allows for the middle's own error.
-    cut
-        Share of the window that may be above the image where a distance is chosen [window heights]. Measured in the
-        arena, by camera distance: a .9 m person is found in .92 of the frames at 1.52 m, where .05 is cut, a 1.75 m
-        person in .69 at 3.0 m (.10) and in all at 3.5 m (0).
-    occluder
-        Something nearer than the person by more than this hides them [m]. Measured: the depth at a box's centre was
-        never more than 0.5 m off the person in 3,500 frames.
-    """
-
-    smallest_window: float = 128
-    near: float = 1.7
-    widest: float = 1.2
-    shown: float = 0.48
-    cut: float = 0.06
-    occluder: float = 0.5
+    smallest_window: float = number(128, "px", "Height of the model's window, and so of the smallest person's.")
+    near: float = number(1.7, "m", "Nearer than this a person is often missed, and boxes are on parts of the body.")
+    widest: float = number(1.2, "rad", "Larger bearings are out of any image.")
+    shown: float = number(
+        0.48, "window heights", "Part of half a window, above and below its middle, that must be in the image."
+    )
+    cut: float = number(
+        0.06, "window heights", "Share of the window that may be above the image where a distance is chosen."
+    )
+    occluder: float = number(0.5, "m", "Something nearer than the person by more than this hides them.")
 
     def least_distance(self, window: float, centre: float, image_height: int) -> float:
         """Return how near a person may be with their window in the image, but for `cut` of it [m].

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
+from limo_hog.follow.parameters import number
 from limo_hog.follow.sense.detectors import Region
 
 Clothes = NDArray[np.float64]
@@ -231,30 +232,17 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
 
 @dataclass(frozen=True, slots=True)
 class ColourSampling:
-    """Where in a detection window the clothes are, and how much their colours vary.
+    """Where in a detection window the clothes are, and how much their colours vary."""
 
-    Attributes
-    ----------
-    chest, hips
-        Middle and half height of each patch, in window heights. HOG's window has the head at .1 to .2 and the feet at
-        .9; so the patches are on shirt and trousers of the arena's figure from all sides.
-    half_width
-        Half the width of the patches, in window heights. Chosen: narrower than a person seen from the side.
-    dark
-        Added to each channel [of 255]. Chosen: 8 standard deviations of the camera's noise, so that the hue of black
-        cloth is not the hue of noise.
-    red, green, brightness
-        Standard deviation of the same cloth in other light: share of red, share of green, logarithm of the brightness.
-        Chosen so that light from half to 1.3 times as bright, with noise, stays below half of `Appearance.other`.
-    """
-
-    chest: tuple[float, float] = (0.35, 0.07)
-    hips: tuple[float, float] = (0.54, 0.03)
-    half_width: float = 0.04
-    dark: float = 8.0
-    red: float = 0.05
-    green: float = 0.05
-    brightness: float = 0.5
+    chest: tuple[float, float] = number(
+        (0.35, 0.07), "window heights", "Middle and half height of the patch on the shirt."
+    )
+    hips: tuple[float, float] = number((0.54, 0.03), "window heights", "The same on the trousers.")
+    half_width: float = number(0.04, "window heights", "Half the width of the patches.")
+    dark: float = number(8.0, "of 255", "Added to each channel: the hue of black cloth is not the hue of noise.")
+    red: float = number(0.05, "1", "Standard deviation of one cloth's share of red in other light.")
+    green: float = number(0.05, "1", "The same of its share of green.")
+    brightness: float = number(0.5, "1", "The same of the logarithm of its brightness.")
 
 
 def clothes_in(
@@ -294,25 +282,12 @@ def clothes_in(
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """Compares and learns clothes.
+    """Compares and learns clothes."""
 
-    Attributes
-    ----------
-    max_shirt, max_trousers
-        The most that each can add to the cost [chi-squared of 3 numbers]. Chosen: the trousers less, since hands and
-        the gap between two legs are seen in their patch, and below `other`, so that only a shirt tells people apart.
-    other
-        A larger cost means another person [chi-squared]. Chosen between the arena's shirts (16 and more apart) and one
-        shirt in other light (below 6).
-    rate
-        Share by which the known clothes of a confirmed person move towards those in a new box [1]. Chosen: a time
-        constant of 20 frames, 2 s, slower than a shadow is crossed.
-    """
-
-    max_shirt: float = 16.0
-    max_trousers: float = 9.0
-    other: float = 12.0
-    rate: float = 0.05
+    max_shirt: float = number(16.0, "chi² of 3", "The most that a shirt can add to the cost.")
+    max_trousers: float = number(9.0, "chi² of 3", "The most that trousers can add.")
+    other: float = number(12.0, "chi²", "A larger cost means another person.")
+    rate: float = number(0.05, "1", "Share by which a confirmed person's clothes move towards those in a new box.")
 
     def cost(self, known: Clothes | None, seen: Clothes | None, *, slips: bool = True) -> float:
         """Return how much the colours in a box differ from known clothes [chi-squared].

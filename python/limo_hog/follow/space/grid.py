@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, beam_directions, lidar_at, to_odometry
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
@@ -50,48 +51,21 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """How the ground is mapped.
+    """How the ground is mapped."""
 
-    Attributes
-    ----------
-    cell
-        Side of a cell [m]. Chosen: a corridor of 1 m, less the robot's width on either side, is four cells wide.
-    cells
-        Along each side of the square [1]: 10 m, as far as HOG finds an adult to either side.
-    shift_after
-        The square moves along when the robot is so far from its middle [m]. Chosen: moving costs a copy.
-    reach
-        Of a beam's free part and of its end, no more is used [m]. Chosen: at 5 m two beams are .07 m apart.
-    every
-        One in so many beams clears cells [1]; all of them fill cells. Chosen: at 3.5 m two are a cell apart.
-    free, hit
-        What a beam takes and adds [log-odds]. Chosen: two hits make a free cell occupied, three misses free it again.
-    lowest, highest
-        Limits of the log-odds. Chosen: what has moved away is forgotten after seven scans, about a second.
-    person_radius
-        Returns nearer than this to a tracked person are the person's and fill no cell [m].
-    period_s
-        A scan sooner after the last one entered is left out [s]. Chosen: half the computing, and nothing that stands is
-        missed.
-    lasts_s
-        What stands for so long is taken to last [s]. Chosen: people stop for a few seconds.
-    own_radius
-        The ground under the robot is free [m]: the circle around its outline.
-    """
-
-    cell: float = 0.1
-    cells: int = 100
-    shift_after: float = 1.0
-    reach: float = 5.0
-    every: int = 2
-    free: float = 0.4
-    hit: float = 0.9
-    lowest: float = -1.2
-    highest: float = 2.5
-    person_radius: float = PERSON_RADIUS
-    period_s: float = 0.2
-    lasts_s: float = 6.0
-    own_radius: float = 0.2
+    cell: float = number(0.1, "m", "Side of a cell.")
+    cells: int = number(100, "1", "Along each side of the square.")
+    shift_after: float = number(1.0, "m", "The square moves along when the robot is this far from its middle.")
+    reach: float = number(5.0, "m", "Of a beam's free part and of its end, no more is used.")
+    every: int = number(2, "1", "One in so many beams clears cells; all of them fill cells.")
+    free: float = number(0.4, "log-odds", "What a beam takes from a cell that it passes.")
+    hit: float = number(0.9, "log-odds", "What it adds to the cell where it ends.")
+    lowest: float = number(-1.2, "log-odds", "Lower limit.")
+    highest: float = number(2.5, "log-odds", "Upper limit: what has moved away is forgotten after seven scans.")
+    person_radius: float = number(PERSON_RADIUS, "m", "Returns nearer than this to a tracked person fill no cell.")
+    period_s: float = number(0.2, "s", "A scan sooner after the last one entered is left out.")
+    lasts_s: float = number(6.0, "s", "What stands for this time is taken to last.")
+    own_radius: float = number(0.2, "m", "The ground under the robot is free: the circle around its outline.")
 
     def start(self, pose: Odometry) -> Ground:
         """Return ground of which nothing is known, around the robot."""

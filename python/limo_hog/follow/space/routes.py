@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
@@ -30,24 +31,12 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Router:
-    """Plans ways.
+    """Plans ways."""
 
-    Attributes
-    ----------
-    keep_off
-        Distance that a way keeps from the middles of occupied cells [m]. Chosen: half the robot's width and what
-        `Guard` wants beside it, .31, and a cell's half.
-    keep_off_far, detour
-        Nearer than this to something, a way counts as longer by this share [m, 1]. Chosen: along the middle of a
-        corridor of 1 m.
-    farthest
-        Longer ways are not looked for [m]. Chosen: the square's half.
-    """
-
-    keep_off: float = 0.36
-    keep_off_far: float = 0.5
-    detour: float = 1.0
-    farthest: float = 6.0
+    keep_off: float = number(0.36, "m", "Distance that a way keeps from the middles of occupied cells.")
+    keep_off_far: float = number(0.5, "m", "Nearer than this to something, a way counts as longer.")
+    detour: float = number(1.0, "1", "By this share.")
+    farthest: float = number(6.0, "m", "Longer ways are not looked for.")
 
     def field(self, grid: Grid, ground: Ground, pose: Odometry) -> Field:
         """Return the driving distance to every cell that is known to be free."""

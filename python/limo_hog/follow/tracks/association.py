@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry
@@ -32,33 +33,19 @@ class Association:
 
     Attributes
     ----------
-    gate
-        Squared Mahalanobis distance beyond which a box does not belong to a track [chi-squared of 2 numbers]: of a
-        person's own boxes, exp(-18/2), 1 in 8,100, is beyond.
-    max_cost
-        Highest cost of a match [chi-squared]. Chosen: a third more than the gate, for uncertainty and clothes. From 12
-        to 48 `crossing`, `two_people` and
-        `dropouts` give the same figures (seed 3).
-    same_place
-        Boxes and people nearer than this to each other are the same person [m]. Chosen: shoulders and an arm of an
-        adult; the depth at a box's centre was never further off in 3,500 frames of the arena.
-    size_tolerance
-        A range is not the person's where height times range differs from the known window by more than this share
-        [1]. Chosen; from .2 to .6 the pixel error in `crossing` changes by less than .5 px (seed 3).
-    low
-        A box lower than the person by more than this shows trousers in the shirt's place [window heights]. Measured in
-        the arena: of 424 boxes 98 % are within .12 of the middle.
     appearance
         Compares clothes.
     unknown
         Distance assumed of a box without depth.
     """
 
-    gate: float = 18.0
-    max_cost: float = 24.0
-    same_place: float = 0.5
-    size_tolerance: float = 0.35
-    low: float = 0.12
+    gate: float = number(18.0, "chi² of 2", "Squared Mahalanobis distance beyond which a box belongs to another track.")
+    max_cost: float = number(24.0, "chi²", "Highest cost of a match.")
+    same_place: float = number(0.5, "m", "Boxes and people nearer than this to each other are the same person.")
+    size_tolerance: float = number(0.35, "1", "Share by which height times range may differ from the known window.")
+    low: float = number(
+        0.12, "window heights", "A box lower than this on the person shows trousers in the shirt's place."
+    )
     appearance: Appearance = field(default_factory=Appearance)
     unknown: UnknownRange = field(default_factory=UnknownRange)
 
@@ -156,33 +143,14 @@ class Returns:
 
 @dataclass(frozen=True, slots=True)
 class Legs:
-    """Finds a tracked person's legs in a scan.
+    """Finds a tracked person's legs in a scan."""
 
-    Attributes
-    ----------
-    radius
-        Returns nearer than this to the predicted position are taken for legs [m]. Chosen: half a stride of 0.75 m.
-    widest
-        A wider group is a wall or a piece of furniture [m]. Chosen: in mid-stride the shins of a 0.9 m person are .3 m
-        apart, an adult's .55 m.
-    reach
-        Further away legs are not looked for [m]. Chosen: at 2.2 m a shin of 5 cm is less than 2 of the Limo's beams.
-    sigma
-        Standard deviation of the middle of two walking legs from the person's axis [m]. Chosen: of one leg alone, where
-        it hides the other, the axis is up to .17 m off.
-    trail_s
-        The middle of the legs is where the person was so long ago [s]: the shin that swings trails the trunk. Measured
-        in the arena, 1,000 scans: .05 m at .85 m/s, .02 m at half of it.
-    fewest
-        So many returns at least [1].
-    """
-
-    radius: float = 0.35
-    widest: float = 0.55
-    reach: float = 2.2
-    sigma: float = 0.1
-    trail_s: float = 0.05
-    fewest: int = 2
+    radius: float = number(0.35, "m", "Returns nearer than this to the predicted position are taken for legs.")
+    widest: float = number(0.55, "m", "A wider group is a wall or a piece of furniture.")
+    reach: float = number(2.2, "m", "Further away legs are not looked for.")
+    sigma: float = number(0.1, "m", "Standard deviation of the middle of two walking legs from the person's axis.")
+    trail_s: float = number(0.05, "s", "The middle of the legs is where the person was so long ago.")
+    fewest: int = number(2, "1", "Returns that legs have at least.")
 
     def update(
         self,

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.sense.measurement import WALK
 from limo_hog.follow.sense.observation import Clothes, chi_squared
 from limo_hog.follow.tracks.person import Person, separation
@@ -71,90 +72,37 @@ class Likeness:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Moves the probabilities from frame to frame.
+    """Moves the probabilities from frame to frame."""
 
-    Attributes
-    ----------
-    sure
-        From this probability on the person's place, clothes and stature are learnt [1]. Chosen: one in twenty wrong.
-    strange_shirt, strange_trousers
-        How likely it is that another person wears just this, in parts of how likely the person themself does [1].
-        Chosen: a tenth of the shirts are alike, half of the trousers are dark.
-    odd_shirt, odd_trousers
-        Share of boxes in which something else is seen in the shirt's or the trousers' place [1]. Measured in the arena,
-        424 whole boxes: one shirt, three trousers; chosen higher, for hands, bags and shadows.
-    stature_sigma
-        Standard deviation of the stature in the depth image, as a share [1]. Measured in the arena: .01 from frame to
-        frame, and up to .04 between far and near; chosen for shoes, hats and gait as well.
-    strange_stature, odd_stature
-        As for clothes [1]. Chosen: people's statures differ by a tenth; three outlines in ten are wrong, since
-        an arm or another's head is taken for the person's.
-    again
-        Share of its own evidence that a box counts for after a track's first [1]. Chosen: neighbouring frames show
-        nearly the same, as in `Existence`.
-    steady
-        The same for the stature, whose error lasts as long as the distance, and for all that the person followed shows
-        while their legs are the same (`legs_s`): an arm before the shirt stays there while a person stands [1]. Chosen:
-        a second is worth one box.
-    stays
-        Probability from which a track counts as the person for that [1]. Chosen: more likely than not.
-    most
-        The most that a box can tell either way [log-odds]. Chosen: a factor of twelve.
-    passes, strained
-        Chance that a track's next box is another person's, who is not tracked: where the box fits, and where its place
-        or size contradicts the track [1]. Chosen: once in a minute; once in a second.
-    legs_s, legs_apart
-        A track whose legs in the scan have been the same for so long, with no others nearer than this, is no other
-        person's [s, m]. Chosen: people pass each other in a second; more than `Legs.radius`, within which returns
-        count as one person's.
-    fades_s
-        Time constant with which a track that is not measured stops to be where the person is [s]. Chosen: people turn
-        within a second.
-    meets, swaps
-        Two tracks nearer than this to each other may swap their people [m]: in a frame with the chance `passes`, and
-        this for each metre by which they pass each other [1/m]. Chosen: a body's width and a stride. Measured in the
-        arena, where the legs of the two were not told apart: in a crowd, 5 swaps in 33 meetings of a metre or so; of
-        alike ones who walk side by side, for up to four seconds, none in 8.
-    unseen_s
-        A person not measured for longer than this may be a track that begins [s], and surely may be after two seconds.
-        Chosen: three frames.
-    reach, speed
-        A track that begins nearer than this to the last place, and so much more for each second since, may be the
-        person's [m, m/s]. Chosen: a body's width, and a walk.
-    clear
-        A shirt or trousers that differ by more are not learnt; if by less, they do not tell two apart [chi-squared of 3
-        numbers]. Chosen: half of `Appearance.other`; other light stays below.
-    rate
-        Share by which one box moves clothes and stature once they are learnt [1]. Chosen: as in `Appearance`.
-    remembered
-        So many other people are remembered [1].
-    """
-
-    sure: float = 0.95
-    strange_shirt: float = 0.1
-    strange_trousers: float = 0.5
-    odd_shirt: float = 0.1
-    odd_trousers: float = 0.3
-    stature_sigma: float = 0.05
-    strange_stature: float = 0.3
-    odd_stature: float = 0.3
-    again: float = 0.5
-    steady: float = 0.1
-    stays: float = 0.5
-    most: float = 2.5
-    passes: float = 0.002
-    strained: float = 0.1
-    legs_s: float = 1.0
-    legs_apart: float = 0.4
-    fades_s: float = 2.0
-    meets: float = 0.5
-    swaps: float = 0.2
-    unseen_s: float = 0.3
-    reach: float = 0.5
-    speed: float = WALK
-    clear: float = 6.0
-    rate: float = 0.05
-    remembered: int = 8
+    sure: float = number(0.95, "1", "From this probability on the person's place, clothes and stature are learnt.")
+    strange_shirt: float = number(
+        0.1, "1", "How likely another wears just this shirt, in parts of how likely the person does."
+    )
+    strange_trousers: float = number(0.5, "1", "The same of the trousers.")
+    odd_shirt: float = number(0.1, "1", "Share of boxes that show something else in the shirt's place.")
+    odd_trousers: float = number(0.3, "1", "The same of the trousers.")
+    stature_sigma: float = number(0.05, "1", "Standard deviation of the stature in the depth image, as a share.")
+    strange_stature: float = number(0.3, "1", "As `strange_shirt`, of the stature.")
+    odd_stature: float = number(0.3, "1", "As `odd_shirt`, of the stature.")
+    again: float = number(0.5, "1", "Share of its own evidence that a box counts for after a track's first.")
+    steady: float = number(0.1, "1", "The same for the stature, and for everything while the legs are the same.")
+    stays: float = number(0.5, "1", "Probability from which a track counts as the person for `steady`.")
+    most: float = number(2.5, "log-odds", "The most that a box can tell either way.")
+    passes: float = number(0.002, "1", "Chance that the next box of a track is on another person, where it fits.")
+    strained: float = number(0.1, "1", "The same where its place or size contradicts the track.")
+    legs_s: float = number(1.0, "s", "Legs that are the same for this time, with nobody's near, are the same person's.")
+    legs_apart: float = number(0.4, "m", "Other legs nearer than this may have changed places with them.")
+    fades_s: float = number(
+        2.0, "s", "Time constant with which a track that is not measured stops to be where the person is."
+    )
+    meets: float = number(0.5, "m", "Two tracks nearer than this to each other may swap their people.")
+    swaps: float = number(0.2, "1/m", "Chance of a swap for each metre by which they pass each other.")
+    unseen_s: float = number(0.3, "s", "A person not measured for longer may be a track that begins.")
+    reach: float = number(0.5, "m", "A track that begins nearer than this to the last place may be the person's.")
+    speed: float = number(WALK, "m/s", "And further off by this for each second since.")
+    clear: float = number(6.0, "chi² of 3", "A shirt or trousers that differ by more are not learnt.")
+    rate: float = number(0.05, "1", "Share by which one box moves clothes and stature once they are learnt.")
+    remembered: int = number(8, "1", "Other people that are remembered.")
 
     def begin(self, person: Person) -> Likeness:
         """Begin with a person who is followed from now on."""

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.sense.observation import Odometry
 
 Mean: TypeAlias = tuple[float, float, float, float]
@@ -25,30 +26,13 @@ Covariance: TypeAlias = tuple[float, float, float, float, float, float, float, f
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Process and measurement noise.
+    """Process and measurement noise."""
 
-    Attributes
-    ----------
-    acceleration
-        Square root of the spectral density of a person's acceleration [m/s^1.5]. A corner of the workshop's patrol
-        changes the velocity by 1.06 m/s in about a second: 1.8 standard deviations.
-    bearing
-        Standard deviation of a measured bearing [rad]. Measured in the arena, 10,000 boxes: .003 to .005 beyond 1.4 m,
-        .018 nearer; the rest allows for odometry.
-    range
-        Standard deviation of a measured range [m]. Measured in the same: .02 to .04 around the front of the body, .055
-        nearer than 1.1 m, where the patch may be on an arm.
-    velocity
-        Standard deviation of each component of the velocity of a new track [m/s]: people stand or walk at 0.75 m/s.
-    persistence
-        Time constant with which an unmeasured velocity decays [s]. Chosen: half a side of the workshop's patrol.
-    """
-
-    acceleration: float = 0.6
-    bearing: float = 0.015
-    range: float = 0.06
-    velocity: float = 0.6
-    persistence: float = 4.0
+    acceleration: float = number(0.6, "m/s^1.5", "Square root of the spectral density of a person's acceleration.")
+    bearing: float = number(0.015, "rad", "Standard deviation of a measured bearing.")
+    range: float = number(0.06, "m", "Standard deviation of a measured range.")
+    velocity: float = number(0.6, "m/s", "Standard deviation of each component of a new track's velocity.")
+    persistence: float = number(4.0, "s", "Time constant with which an unmeasured velocity decays.")
 
 
 @dataclass(frozen=True, slots=True)

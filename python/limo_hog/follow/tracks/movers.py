@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.measurement import Measurement
@@ -67,41 +68,21 @@ class Movers:
     legs
         How a group is found again: further off than a followed person's legs, since nothing else shows it. At 3.5 m two
         shins are two beams.
-    gap
-        Returns further apart than this are of two groups [m]. Chosen: in mid-stride the shins of a .9 m person.
-    beams
-        A beam within this passes a place [rad]. Chosen: two of the Limo's beams to either side.
-    fewest_scans, least_way
-        It counts as moving after so many scans, so far from where it began [1, m]. Chosen: half a second; more than the
-        middle of the legs of a person who shifts from one to the other moves.
-    forget_s
-        It is given up when a scan should have shown it for so long [s]. Chosen: four scans; one leg hides the other.
-    unseen_s
-        Where the lidar does not look, it is predicted for so long [s]. Chosen: at a walk, past the blind angle behind.
-    looks
-        After so many scans for which the camera looked there, it is no more turned to [1]. Chosen: a second and a half;
-        of people who are found in three frames of ten one in two hundred is not found in it.
-    beside, taken
-        A person is this far from their legs at most, and so much nearer to legs that were another's than to their own
-        [m]. Chosen: as `Legs.radius`, and the error of the depth; of two who pass close by each other, HOG finds one,
-        half a metre or less between the two.
-    nearer
-        A box is on other legs than a person's own if it is nearer to them by this [m]. Chosen: the error of its range.
     robot
         Where the lidar sits.
     """
 
     legs: Legs = field(default_factory=lambda: Legs(reach=3.5))
-    gap: float = 0.3
-    beams: float = 0.03
-    fewest_scans: int = 4
-    least_way: float = 0.25
-    forget_s: float = 0.5
-    unseen_s: float = 3.0
-    looks: int = 12
-    beside: float = 0.4
-    taken: float = 0.25
-    nearer: float = 0.15
+    gap: float = number(0.3, "m", "Returns further apart than this are of two groups.")
+    beams: float = number(0.03, "rad", "A beam within this passes a place.")
+    fewest_scans: int = number(4, "1", "Scans after which a group counts as moving.")
+    least_way: float = number(0.25, "m", "Way from where it began, from which it counts as moving.")
+    forget_s: float = number(0.5, "s", "A group is given up when a scan should have shown it for this time.")
+    unseen_s: float = number(3.0, "s", "Where the lidar does not look, a group is predicted for this time.")
+    looks: int = number(12, "1", "Scans without a person in the camera's view after which it is no more turned to.")
+    beside: float = number(0.4, "m", "A person is this far from their own legs at most.")
+    taken: float = number(0.25, "m", "A person must be nearer by this to legs that were another's than to their own.")
+    nearer: float = number(0.15, "m", "A box is on other legs than a person's own if it is nearer to them by this.")
     robot: RobotGeometry = LIMO
 
     def update(

@@ -11,6 +11,7 @@ import bisect
 import math
 from dataclasses import dataclass, field, replace
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Clothes, Odometry
 from limo_hog.follow.tracks import kalman
@@ -74,17 +75,10 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class UnknownRange:
-    """Where a new track begins whose first box has no depth.
+    """Where a new track begins whose first box has no depth."""
 
-    Attributes
-    ----------
-    distance, sigma
-        Assumed distance and its standard deviation [m]. Chosen: the middle of where HOG finds a 0.9 m person, 1.5 to
-        4.8 m, and its half.
-    """
-
-    distance: float = 3.0
-    sigma: float = 1.5
+    distance: float = number(3.0, "m", "Distance assumed of a first box without depth.")
+    sigma: float = number(1.5, "m", "Its standard deviation.")
 
 
 def initiate(
@@ -143,66 +137,31 @@ class Recall:
 
 @dataclass(frozen=True, slots=True)
 class Existence:
-    """Moves the log-odds of tracks, and learns the recall.
+    """Moves the log-odds of tracks, and learns the recall."""
 
-    Attributes
-    ----------
-    prior
-        Log-odds of a new track before its first box. Chosen: of ten boxes that begin a track one is on a person.
-    person_score
-        Scale of the scores [SVM margin] of boxes on people, which are taken to be gamma distributed with shape 2.
-        Measured in the arena, 1,027 boxes: median 2.9, lower quartile 1.9; near by a median of .8.
-    clutter_score
-        Mean score of boxes on other things, exponentially distributed. Measured: on the arena's furniture .39 (31
-        boxes), in photographs without people .64 (30 boxes).
-    clutter_again
-        Chance that a false box is there again in the next frame [1]. Measured: a pillar is found in 55 % of the frames,
-        a cone in 50 %, other furniture never; chosen, the mean over kinds.
-    weight
-        Share of its own evidence that a frame counts for [1]. Chosen: neighbouring frames show nearly the same, so that
-        two in a row tell as much as one.
-    most
-        The most that a frame can add [log-odds], and `least` the most that it can take. Chosen: four clear frames
-        confirm, and fifteen misses drop a track that was certain.
-    confirm, drop
-        Log-odds from which a track is confirmed, and below which it is not any more. Chosen: 95 % and 27 %.
-    lowest, highest
-        Limits of the log-odds: what is certain can still change within two seconds.
-    stands_out
-        A box whose surroundings are in one plane with it, to within this, is on a picture and no evidence [m].
-        Measured: of 1,027 boxes on people 97 % stand out further; a trunk of .9 m stature is .11 m deep.
-    sizes
-        Heights of windows that part the classes of size [px].
-    recall, recall_frames
-        Recall before anything is learnt, and how many frames that is worth [1]. Chosen: a start with a detector that
-        finds few, three people in ten or four; one that finds more has shown it after a second.
-    recall_memory
-        Share of what was learnt that is kept from frame to frame [1]. Chosen: 100 frames, ten seconds.
-    least_recall, most_recall
-        Limits of what is believed to be learnt [1].
-    run_of_misses
-        Misses in a row that are less likely than this are no chance: the person is not there [1].
-    """
-
-    prior: float = -2.2
-    person_score: float = 1.3
-    clutter_score: float = 0.5
-    clutter_again: float = 0.2
-    weight: float = 0.5
-    most: float = 1.5
-    least: float = 0.4
-    confirm: float = 3.0
-    drop: float = -1.0
-    lowest: float = -5.0
-    highest: float = 5.0
-    stands_out: float = 0.2
-    sizes: tuple[float, ...] = (170.0, 240.0, 330.0)
-    recall: float = 0.4
-    recall_frames: float = 10.0
-    recall_memory: float = 0.99
-    least_recall: float = 0.2
-    most_recall: float = 0.98
-    run_of_misses: float = 1e-3
+    prior: float = number(-2.2, "log-odds", "Of a new track before its first box.")
+    person_score: float = number(1.3, "SVM margin", "Scale of the scores on people, gamma distributed with shape 2.")
+    clutter_score: float = number(0.5, "SVM margin", "Mean of the scores on other things, exponentially distributed.")
+    clutter_again: float = number(0.2, "1", "Chance that a false box is there again in the next frame.")
+    weight: float = number(
+        0.5, "1", "Share of its own evidence that a frame counts for: neighbouring frames are alike."
+    )
+    most: float = number(1.5, "log-odds", "The most that a frame can add.")
+    least: float = number(0.4, "log-odds", "The most that a frame can take.")
+    confirm: float = number(3.0, "log-odds", "From here a track is confirmed.")
+    drop: float = number(-1.0, "log-odds", "Below this it is not any more.")
+    lowest: float = number(-5.0, "log-odds", "Lower limit of the log-odds.")
+    highest: float = number(5.0, "log-odds", "Upper limit of the log-odds.")
+    stands_out: float = number(0.2, "m", "A box in one plane with its surroundings, to within this, is on a picture.")
+    sizes: tuple[float, ...] = number((170.0, 240.0, 330.0), "px", "Heights of windows that part the classes of size.")
+    recall: float = number(0.4, "1", "Recall before anything is learnt.")
+    recall_frames: float = number(10.0, "1", "Frames that this first guess is worth.")
+    recall_memory: float = number(0.99, "1", "Share of what was learnt that is kept from frame to frame.")
+    least_recall: float = number(0.2, "1", "Lower limit of the recall that is believed.")
+    most_recall: float = number(0.98, "1", "Upper limit of the recall that is believed.")
+    run_of_misses: float = number(
+        1e-3, "1", "Misses in a row less likely than this are no chance: the person is not there."
+    )
 
     def of_box(self, seen: Measurement, recall: float) -> float:
         """Return how much a box adds to the log-odds; negative for one that is more likely on something else.

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from limo_hog.follow.parameters import number
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
 from limo_hog.follow.sense.measurement import WALK, Measurement, Visibility, measure
@@ -74,35 +75,6 @@ class Tracker:
     ----------
     noise, association, existence, legs, movers, visibility
         The parts, each with its parameters.
-    forget_s
-        An unmeasured person is forgotten after so long [s]. Chosen: the time the
-        workshop's person takes for one side of the patrol.
-    legs_only_s
-        A person not found by HOG is followed by legs alone that do not walk for so long [s]. Chosen: a chair's legs may
-        have been taken for theirs, so not as long as `forget_s`.
-    restart_s
-        A person measured again after so long has a new track: the old velocity tells nothing [s]. Chosen: people turn
-        within a second.
-    size_rate
-        Share by which one box moves a person's known size, and their clothes until they are confirmed [1]. Chosen: a
-        time constant of five frames, half a second.
-    turn_speed
-        Standard deviation added to each component of the velocity of a person whose box is outside the gate [m/s], and
-        `association.same_place` to the position's. Chosen: a sharp turn at 0.75 m/s changes the velocity by 1.06 m/s.
-    astray
-        A box whose range differs by more from the person's may be another's, who passes before them [m]. Chosen: half
-        of what people keep from each other; the depth at a box's centre strays by less but for an arm.
-    stature_from
-        From nearer the outline's top is no measure of the stature [m]. Measured in the arena: at 1.25 m it is a tenth
-        too low, since the head touches the image's edge.
-    poses_s, scans_s
-        How long odometry and scans are kept [s]: a camera image may be as late as this.
-    scan_period_s
-        A scan may be so much older than the image it is used with [s]: the lidar's period of 0.125 s at 8 Hz.
-    walk
-        How fast people walk who are not measured [m/s].
-    min_period_s, max_period_s
-        Limits of the time between two frames as it is used to predict the next [s]. Chosen: 2 to 50 Hz.
     robot
         Where camera and lidar sit.
     """
@@ -113,19 +85,25 @@ class Tracker:
     legs: Legs = field(default_factory=Legs)
     movers: Movers = field(default_factory=Movers)
     visibility: Visibility = field(default_factory=Visibility)
-    forget_s: float = 8.0
-    legs_only_s: float = 4.0
-    restart_s: float = 1.0
-    size_rate: float = 0.2
-    turn_speed: float = 1.0
-    astray: float = 0.25
-    stature_from: float = 1.4
-    poses_s: float = 2.0
-    scans_s: float = 1.0
-    scan_period_s: float = 0.13
-    walk: float = WALK
-    min_period_s: float = 0.02
-    max_period_s: float = 0.5
+    forget_s: float = number(8.0, "s", "An unmeasured person is forgotten after this time.")
+    legs_only_s: float = number(4.0, "s", "A person is followed for this time by legs alone that do not walk.")
+    restart_s: float = number(1.0, "s", "A person measured again after this time has a new track.")
+    size_rate: float = number(
+        0.2, "1", "Share by which one box moves a person's known size, and their clothes until confirmed."
+    )
+    turn_speed: float = number(
+        1.0, "m/s", "Standard deviation added to each velocity of a person whose box is outside the gate."
+    )
+    astray: float = number(
+        0.25, "m", "A box whose range differs by more may be on another, who passes before the person."
+    )
+    stature_from: float = number(1.4, "m", "From nearer the outline's top is no measure of the stature.")
+    poses_s: float = number(2.0, "s", "How long odometry is kept: a camera image may be as late as this.")
+    scans_s: float = number(1.0, "s", "How long scans are kept.")
+    scan_period_s: float = number(0.13, "s", "A scan may be older by this than the image it is used with.")
+    walk: float = number(WALK, "m/s", "How fast people walk who are not measured.")
+    min_period_s: float = number(0.02, "s", "Shortest time between two frames that is used to predict the next.")
+    max_period_s: float = number(0.5, "s", "Longest time between two frames that is used to predict the next.")
     robot: RobotGeometry = LIMO
 
     def update(self, observation: Observation, tracks: Tracks) -> tuple[Tracks, dict[int, int]]:

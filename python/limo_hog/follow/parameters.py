@@ -1,4 +1,4 @@
-"""Numbers of a controller as data: each is one entry, with its unit, its meaning and the bounds it may be set within."""
+"""Numbers of a controller as data: each is one entry, with unit, meaning and the bounds it may be set within."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 
-def number(default: Any, unit: str, meaning: str, low: float | None = None, high: float | None = None) -> Any:
+def param(default: Any, unit: str, meaning: str, low: float | None = None, high: float | None = None) -> Any:
     """Return a dataclass field with a default.
 
     Parameters

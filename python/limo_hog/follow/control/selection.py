@@ -8,14 +8,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from limo_hog.follow.control.backing import Other
 from limo_hog.follow.control.lookout import Hunt
+from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre
 from limo_hog.follow.decision import Believed
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import pose_at
 from limo_hog.follow.space.grid import Ground
+from limo_hog.follow.tracks.hiding import Other
 from limo_hog.follow.tracks.identity import Identity, Likeness
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, predict
 from limo_hog.follow.tracks.person import Person
@@ -53,43 +54,28 @@ class Selection:
 
     Attributes
     ----------
-    min_existence
-        Probability from which a person too far away for HOG is worth driving nearer, and waiting for [1]. Chosen: three
-        clear frames.
-    max_unconfirmed_frames
-        A track that is not confirmed after so many frames, and less likely than `min_existence`, is given up [1].
-        Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
-    reidentify_s
-        How long to look for a lost person before another is followed [s]. Chosen: two full turns of the search.
-    lead
-        Probability by which another must exceed the track that is faced already [1]. Chosen: one frame of evidence.
-    aside, further
-        What a person is less likely to be meant for each radian off straight ahead and for each metre of distance,
-        before one is followed [1]. Chosen: at the image's edge three frames of evidence; two metres are worth two.
-    likely
-        Probability of being the person followed from which a track in view is followed [1]. Chosen: more likely than
-        not.
-    odds
-        And it must be so many times as likely as any other in view; else it is not sure which of them it is [1].
-        Chosen: one wrong in four guesses would be too many.
-    possible
-        A track in view that is less likely than this is another person [1]. Chosen.
-    decide_s
-        After so long the likeliest is taken [s]. Chosen: people part within a few seconds, or leave the view.
     identity
         Which track the person followed is.
     """
 
-    min_existence: float = bounded(0.4, 0, 1)
-    max_unconfirmed_frames: int = bounded(30, 1, 1000)
-    reidentify_s: float = bounded(20.0, 0, 600)
-    lead: float = bounded(0.1, 0, 1)
-    aside: float = bounded(0.6, 0, 5)
-    further: float = bounded(0.1, 0, 5)
-    likely: float = bounded(0.5, 0, 1)
-    odds: float = bounded(3.0, 1, 100)
-    possible: float = bounded(0.1, 0, 1)
-    decide_s: float = bounded(4.0, 0, 60)
+    min_existence: float = param(
+        0.4, "1", "Probability from which somebody too far away for HOG is worth driving nearer, and waiting for.", 0, 1
+    )
+    max_unconfirmed_frames: int = param(
+        30, "1", "A track that is not confirmed after so many frames, and less likely, is given up.", 1, 1000
+    )
+    reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
+    lead: float = param(0.1, "1", "Probability by which another must exceed the track that is faced already.", 0, 1)
+    aside: float = param(
+        0.6, "1/rad", "What a person is less likely to be meant for each radian off straight ahead.", 0, 5
+    )
+    further: float = param(0.1, "1/m", "The same for each metre of distance.", 0, 5)
+    likely: float = param(
+        0.5, "1", "Probability of being the person followed from which a track in view is followed.", 0, 1
+    )
+    odds: float = param(3.0, "1", "And it must be this many times as likely as any other in view.", 1, 100)
+    possible: float = param(0.1, "1", "A track in view that is less likely than this is another person.", 0, 1)
+    decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)
     identity: Identity = field(default_factory=Identity)
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
@@ -177,8 +163,6 @@ class TrackingState:
         Which of them is followed.
     side
         Which way to search: 1 left, -1 right.
-    detour
-        How far off the direct way to the person the robot drives [rad].
     since_full
         Frames since the whole image was searched [1].
     ground
@@ -189,11 +173,8 @@ class TrackingState:
         What is remembered while looking for that person; None while they are measured.
     way, way_at
         float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
-    way_out
-        Direction in the odometry frame [rad] and speed [m/s] by which it gives way, and since when [s]; None while it
-        does not.
-    gave_way_at
-        When it last gave way [s].
+    kept
+        The manoeuvre begun.
     acceleration
         Of the wheels, as learnt [m/s²].
     sent
@@ -207,19 +188,17 @@ class TrackingState:
     tracks: Tracks = field(default_factory=Tracks)
     choice: Choice = field(default_factory=Choice)
     side: float = 1.0
-    detour: float = 0.0
     since_full: int = 0
     ground: Ground | None = None
     known: Track | None = None
     hunt: Hunt | None = None
     way: Points = field(default_factory=lambda: NO_POINTS)
     way_at: float = -math.inf
-    way_out: tuple[float, float, float] | None = None
-    gave_way_at: float = -math.inf
     acceleration: float = 1.0
     sent: Twist = field(default_factory=Twist)
     others: tuple[Other, ...] = ()
     brisk: float = 0.0
+    kept: Manoeuvre = DIRECT
 
 
 def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
 
@@ -71,8 +71,8 @@ def _pixel_slopes(
 class DepthGrid:
     """Which depth pixels are looked at."""
 
-    step: int = number(8, "px", "Every so many rows and columns are looked at.")
-    floor: float = number(0.05, "m", "Points lower than this are the floor.")
+    step: int = param(8, "px", "Every so many rows and columns are looked at.")
+    floor: float = param(0.05, "m", "Points lower than this are the floor.")
 
     def points(self, depth: NDArray[np.float32], focal_px: float, reach: float, robot: RobotGeometry) -> Points:
         """Return what the depth camera sees above the floor and nearer than `reach` [m] to the camera."""
@@ -91,8 +91,8 @@ class DepthGrid:
 class Margin:
     """The ground kept free around the robot's outline, a quarter of an ellipse at each corner."""
 
-    ahead: float = number(0.6, "m", "In the direction of travel.")
-    beside: float = number(0.2, "m", "To either side.")
+    ahead: float = param(0.6, "m", "In the direction of travel.")
+    beside: float = param(0.2, "m", "To either side.")
 
 
 def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:

@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limo_hog.follow.parameters import number
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +15,7 @@ from limo_hog.atomic import is_utf8
 from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.follow.parameters import param
 from limo_hog.models import PERSON_BOX, WHOLE_WINDOW, PersonBox
 from limo_hog.suppression import nms
 
@@ -231,12 +231,12 @@ class Region:
 class RegionSize:
     """How large a region is around the expected window."""
 
-    widths: float = number(2.0, "window widths", "Width of a region.")
-    heights: float = number(1.25, "window heights", "Height of a region.")
-    grid: int = number(16, "px", "Sides are multiples of this, so that buffers are used again.")
-    most: float = number(0.7, "1", "Of a region larger than this share of the image all is searched.")
-    widest: float = number(1.2, "rad", "Larger bearings are out of any image.")
-    nearest: float = number(0.3, "m", "A nearer person fills the image.")
+    widths: float = param(2.0, "window widths", "Width of a region.")
+    heights: float = param(1.25, "window heights", "Height of a region.")
+    grid: int = param(16, "px", "Sides are multiples of this, so that buffers are used again.")
+    most: float = param(0.7, "1", "Of a region larger than this share of the image all is searched.")
+    widest: float = param(1.2, "rad", "Larger bearings are out of any image.")
+    nearest: float = param(0.3, "m", "A nearer person fills the image.")
 
     def around(
         self, bearing: float, distance: float, window: float, centre: float, focal_px: float, width: int, height: int

@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Clothes, Observation
@@ -130,13 +130,13 @@ def median(values: NDArray[np.float32]) -> float:
 class Strips:
     """Where a detection window shows a person's chest, and what is beside it."""
 
-    top: float = number(0.27, "window heights", "First of the rows looked at, of the chest.")
-    bottom: float = number(0.5, "window heights", "Last of these rows.")
-    chest: float = number(0.06, "window widths", "Half the width of the strip in the middle.")
-    inner: float = number(0.36, "window widths", "Inner edge of the two strips beside it, from the middle.")
-    outer: float = number(0.46, "window widths", "Their outer edge.")
-    beyond: float = number(20.0, "m", "Depth taken where the camera sees none.")
-    known: float = number(0.2, "1", "Share of pixels that must be valid for a depth to be known.")
+    top: float = param(0.27, "window heights", "First of the rows looked at, of the chest.")
+    bottom: float = param(0.5, "window heights", "Last of these rows.")
+    chest: float = param(0.06, "window widths", "Half the width of the strip in the middle.")
+    inner: float = param(0.36, "window widths", "Inner edge of the two strips beside it, from the middle.")
+    outer: float = param(0.46, "window widths", "Their outer edge.")
+    beyond: float = param(20.0, "m", "Depth taken where the camera sees none.")
+    known: float = param(0.2, "1", "Share of pixels that must be valid for a depth to be known.")
 
 
 STRIPS = Strips()
@@ -178,11 +178,11 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
 class Outline:
     """How a person's outline is followed upwards in the depth image."""
 
-    half_width: float = number(0.08, "window widths", "Half the width of the strip looked at.")
-    least_half_px: int = number(4, "px", "And at least this.")
-    tolerance: float = number(0.35, "m", "Depth within which a pixel is the person's.")
-    share: float = number(0.25, "1", "Part of a row's valid pixels that must be the person's.")
-    gap_px: int = number(5, "px", "Rows without the person that end the outline.")
+    half_width: float = param(0.08, "window widths", "Half the width of the strip looked at.")
+    least_half_px: int = param(4, "px", "And at least this.")
+    tolerance: float = param(0.35, "m", "Depth within which a pixel is the person's.")
+    share: float = param(0.25, "1", "Part of a row's valid pixels that must be the person's.")
+    gap_px: int = param(5, "px", "Rows without the person that end the outline.")
 
 
 OUTLINE = Outline()
@@ -221,16 +221,16 @@ def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, o
 class Visibility:
     """Where HOG finds people."""
 
-    smallest_window: float = number(128, "px", "Height of the model's window, and so of the smallest person's.")
-    near: float = number(1.7, "m", "Nearer than this a person is often missed, and boxes are on parts of the body.")
-    widest: float = number(1.2, "rad", "Larger bearings are out of any image.")
-    shown: float = number(
+    smallest_window: float = param(128, "px", "Height of the model's window, and so of the smallest person's.")
+    near: float = param(1.7, "m", "Nearer than this a person is often missed, and boxes are on parts of the body.")
+    widest: float = param(1.2, "rad", "Larger bearings are out of any image.")
+    shown: float = param(
         0.48, "window heights", "Part of half a window, above and below its middle, that must be in the image."
     )
-    cut: float = number(
+    cut: float = param(
         0.06, "window heights", "Share of the window that may be above the image where a distance is chosen."
     )
-    occluder: float = number(0.5, "m", "Something nearer than the person by more than this hides them.")
+    occluder: float = param(0.5, "m", "Something nearer than the person by more than this hides them.")
 
     def least_distance(self, window: float, centre: float, image_height: int) -> float:
         """Return how near a person may be with their window in the image, but for `cut` of it [m].

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.detectors import Region
 
 Clothes = NDArray[np.float64]
@@ -234,15 +234,15 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
 class ColourSampling:
     """Where in a detection window the clothes are, and how much their colours vary."""
 
-    chest: tuple[float, float] = number(
+    chest: tuple[float, float] = param(
         (0.35, 0.07), "window heights", "Middle and half height of the patch on the shirt."
     )
-    hips: tuple[float, float] = number((0.54, 0.03), "window heights", "The same on the trousers.")
-    half_width: float = number(0.04, "window heights", "Half the width of the patches.")
-    dark: float = number(8.0, "of 255", "Added to each channel: the hue of black cloth is not the hue of noise.")
-    red: float = number(0.05, "1", "Standard deviation of one cloth's share of red in other light.")
-    green: float = number(0.05, "1", "The same of its share of green.")
-    brightness: float = number(0.5, "1", "The same of the logarithm of its brightness.")
+    hips: tuple[float, float] = param((0.54, 0.03), "window heights", "The same on the trousers.")
+    half_width: float = param(0.04, "window heights", "Half the width of the patches.")
+    dark: float = param(8.0, "of 255", "Added to each channel: the hue of black cloth is not the hue of noise.")
+    red: float = param(0.05, "1", "Standard deviation of one cloth's share of red in other light.")
+    green: float = param(0.05, "1", "The same of its share of green.")
+    brightness: float = param(0.5, "1", "The same of the logarithm of its brightness.")
 
 
 def clothes_in(
@@ -284,10 +284,10 @@ def clothes_in(
 class Appearance:
     """Compares and learns clothes."""
 
-    max_shirt: float = number(16.0, "chi² of 3", "The most that a shirt can add to the cost.")
-    max_trousers: float = number(9.0, "chi² of 3", "The most that trousers can add.")
-    other: float = number(12.0, "chi²", "A larger cost means another person.")
-    rate: float = number(0.05, "1", "Share by which a confirmed person's clothes move towards those in a new box.")
+    max_shirt: float = param(16.0, "chi² of 3", "The most that a shirt can add to the cost.")
+    max_trousers: float = param(9.0, "chi² of 3", "The most that trousers can add.")
+    other: float = param(12.0, "chi²", "A larger cost means another person.")
+    rate: float = param(0.05, "1", "Share by which a confirmed person's clothes move towards those in a new box.")
 
     def cost(self, known: Clothes | None, seen: Clothes | None, *, slips: bool = True) -> float:
         """Return how much the colours in a box differ from known clothes [chi-squared].

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, beam_directions, lidar_at, to_odometry
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
@@ -53,19 +53,19 @@ class Ground:
 class Grid:
     """How the ground is mapped."""
 
-    cell: float = number(0.1, "m", "Side of a cell.")
-    cells: int = number(100, "1", "Along each side of the square.")
-    shift_after: float = number(1.0, "m", "The square moves along when the robot is this far from its middle.")
-    reach: float = number(5.0, "m", "Of a beam's free part and of its end, no more is used.")
-    every: int = number(2, "1", "One in so many beams clears cells; all of them fill cells.")
-    free: float = number(0.4, "log-odds", "What a beam takes from a cell that it passes.")
-    hit: float = number(0.9, "log-odds", "What it adds to the cell where it ends.")
-    lowest: float = number(-1.2, "log-odds", "Lower limit.")
-    highest: float = number(2.5, "log-odds", "Upper limit: what has moved away is forgotten after seven scans.")
-    person_radius: float = number(PERSON_RADIUS, "m", "Returns nearer than this to a tracked person fill no cell.")
-    period_s: float = number(0.2, "s", "A scan sooner after the last one entered is left out.")
-    lasts_s: float = number(6.0, "s", "What stands for this time is taken to last.")
-    own_radius: float = number(0.2, "m", "The ground under the robot is free: the circle around its outline.")
+    cell: float = param(0.1, "m", "Side of a cell.")
+    cells: int = param(100, "1", "Along each side of the square.")
+    shift_after: float = param(1.0, "m", "The square moves along when the robot is this far from its middle.")
+    reach: float = param(5.0, "m", "Of a beam's free part and of its end, no more is used.")
+    every: int = param(2, "1", "One in so many beams clears cells; all of them fill cells.")
+    free: float = param(0.4, "log-odds", "What a beam takes from a cell that it passes.")
+    hit: float = param(0.9, "log-odds", "What it adds to the cell where it ends.")
+    lowest: float = param(-1.2, "log-odds", "Lower limit.")
+    highest: float = param(2.5, "log-odds", "Upper limit: what has moved away is forgotten after seven scans.")
+    person_radius: float = param(PERSON_RADIUS, "m", "Returns nearer than this to a tracked person fill no cell.")
+    period_s: float = param(0.2, "s", "A scan sooner after the last one entered is left out.")
+    lasts_s: float = param(6.0, "s", "What stands for this time is taken to last.")
+    own_radius: float = param(0.2, "m", "The ground under the robot is free: the circle around its outline.")
 
     def start(self, pose: Odometry) -> Ground:
         """Return ground of which nothing is known, around the robot."""

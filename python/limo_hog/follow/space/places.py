@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
@@ -43,15 +43,15 @@ class Places:
 class Wandering:
     """How people walk on unseen."""
 
-    count: int = number(150, "1", "Of particles.")
-    walk: float = number(0.5, "m/s", "Speed of a person who sets out again.")
-    stays: float = number(0.2, "1", "Share of the particles that stand at the beginning.")
-    turn: float = number(0.8, "rad/√s", "Square root of the spectral density of the heading.")
-    change_s: float = number(6.0, "s", "Mean time after which a person stands still or sets out.")
-    body: float = number(0.2, "m", "A beam that reaches further than a particle by this has looked through it.")
-    width: float = number(0.3, "m", "A person is looked through if all beams in this width pass.")
-    far: float = number(4.0, "m", "Beams do not tell further away.")
-    found: float = number(0.15, "1", "Chance that the camera finds a person in one frame who is not hidden.")
+    count: int = param(150, "1", "Of particles.")
+    walk: float = param(0.5, "m/s", "Speed of a person who sets out again.")
+    stays: float = param(0.2, "1", "Share of the particles that stand at the beginning.")
+    turn: float = param(0.8, "rad/√s", "Square root of the spectral density of the heading.")
+    change_s: float = param(6.0, "s", "Mean time after which a person stands still or sets out.")
+    body: float = param(0.2, "m", "A beam that reaches further than a particle by this has looked through it.")
+    width: float = param(0.3, "m", "A person is looked through if all beams in this width pass.")
+    far: float = param(4.0, "m", "Beams do not tell further away.")
+    found: float = param(0.15, "1", "Chance that the camera finds a person in one frame who is not hidden.")
 
     def start(self, stamp: float, mean: tuple[float, ...], covariance: NDArray[np.float64], seed: int) -> Places:
         """Begin with a track: `mean` is x, y, vx, vy in the odometry frame, `covariance` (4, 4) its."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
@@ -33,10 +33,10 @@ class Field:
 class Router:
     """Plans ways."""
 
-    keep_off: float = number(0.36, "m", "Distance that a way keeps from the middles of occupied cells.")
-    keep_off_far: float = number(0.5, "m", "Nearer than this to something, a way counts as longer.")
-    detour: float = number(1.0, "1", "By this share.")
-    farthest: float = number(6.0, "m", "Longer ways are not looked for.")
+    keep_off: float = param(0.36, "m", "Distance that a way keeps from the middles of occupied cells.")
+    keep_off_far: float = param(0.5, "m", "Nearer than this to something, a way counts as longer.")
+    detour: float = param(1.0, "1", "By this share.")
+    farthest: float = param(6.0, "m", "Longer ways are not looked for.")
 
     def field(self, grid: Grid, ground: Ground, pose: Odometry) -> Field:
         """Return the driving distance to every cell that is known to be free."""
@@ -101,13 +101,11 @@ class Router:
         return grid.middle_of(ground, np.array(cells[::-1]))
 
 
-def point_ahead(way: Points, pose: Odometry, ahead: float) -> Points:
-    """Return the first point (2,) of a way (N, 2) that is `ahead` [m] of the robot, or its last."""
-    gaps = np.hypot(way[:, 0] - pose.x, way[:, 1] - pose.y)
-    nearest = int(np.argmin(gaps))
-    beyond = np.flatnonzero(gaps[nearest:] >= ahead)
-    point: Points = way[nearest + beyond[0]] if len(beyond) else way[-1]
-    return point
+def along(way: Points, pose: Odometry, far: NDArray[np.float64]) -> Points:
+    """Return the points of a way (N, 2) that are so far (M,) along it from where it is nearest to the robot [m]."""
+    rest = way[int(np.argmin(np.hypot(way[:, 0] - pose.x, way[:, 1] - pose.y))) :]
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rest, axis=0).T))])
+    return np.stack([np.interp(far, arc, rest[:, 0]), np.interp(far, arc, rest[:, 1])], axis=1)
 
 
 def _dilated(cells: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry
@@ -39,11 +39,11 @@ class Association:
         Distance assumed of a box without depth.
     """
 
-    gate: float = number(18.0, "chi² of 2", "Squared Mahalanobis distance beyond which a box belongs to another track.")
-    max_cost: float = number(24.0, "chi²", "Highest cost of a match.")
-    same_place: float = number(0.5, "m", "Boxes and people nearer than this to each other are the same person.")
-    size_tolerance: float = number(0.35, "1", "Share by which height times range may differ from the known window.")
-    low: float = number(
+    gate: float = param(18.0, "chi² of 2", "Squared Mahalanobis distance beyond which a box belongs to another track.")
+    max_cost: float = param(24.0, "chi²", "Highest cost of a match.")
+    same_place: float = param(0.5, "m", "Boxes and people nearer than this to each other are the same person.")
+    size_tolerance: float = param(0.35, "1", "Share by which height times range may differ from the known window.")
+    low: float = param(
         0.12, "window heights", "A box lower than this on the person shows trousers in the shirt's place."
     )
     appearance: Appearance = field(default_factory=Appearance)
@@ -145,12 +145,12 @@ class Returns:
 class Legs:
     """Finds a tracked person's legs in a scan."""
 
-    radius: float = number(0.35, "m", "Returns nearer than this to the predicted position are taken for legs.")
-    widest: float = number(0.55, "m", "A wider group is a wall or a piece of furniture.")
-    reach: float = number(2.2, "m", "Further away legs are not looked for.")
-    sigma: float = number(0.1, "m", "Standard deviation of the middle of two walking legs from the person's axis.")
-    trail_s: float = number(0.05, "s", "The middle of the legs is where the person was so long ago.")
-    fewest: int = number(2, "1", "Returns that legs have at least.")
+    radius: float = param(0.35, "m", "Returns nearer than this to the predicted position are taken for legs.")
+    widest: float = param(0.55, "m", "A wider group is a wall or a piece of furniture.")
+    reach: float = param(2.2, "m", "Further away legs are not looked for.")
+    sigma: float = param(0.1, "m", "Standard deviation of the middle of two walking legs from the person's axis.")
+    trail_s: float = param(0.05, "s", "The middle of the legs is where the person was so long ago.")
+    fewest: int = param(2, "1", "Returns that legs have at least.")
 
     def update(
         self,

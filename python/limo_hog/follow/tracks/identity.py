@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.measurement import WALK
 from limo_hog.follow.sense.observation import Clothes, chi_squared
 from limo_hog.follow.tracks.person import Person, separation
@@ -74,35 +74,35 @@ class Likeness:
 class Identity:
     """Moves the probabilities from frame to frame."""
 
-    sure: float = number(0.95, "1", "From this probability on the person's place, clothes and stature are learnt.")
-    strange_shirt: float = number(
+    sure: float = param(0.95, "1", "From this probability on the person's place, clothes and stature are learnt.")
+    strange_shirt: float = param(
         0.1, "1", "How likely another wears just this shirt, in parts of how likely the person does."
     )
-    strange_trousers: float = number(0.5, "1", "The same of the trousers.")
-    odd_shirt: float = number(0.1, "1", "Share of boxes that show something else in the shirt's place.")
-    odd_trousers: float = number(0.3, "1", "The same of the trousers.")
-    stature_sigma: float = number(0.05, "1", "Standard deviation of the stature in the depth image, as a share.")
-    strange_stature: float = number(0.3, "1", "As `strange_shirt`, of the stature.")
-    odd_stature: float = number(0.3, "1", "As `odd_shirt`, of the stature.")
-    again: float = number(0.5, "1", "Share of its own evidence that a box counts for after a track's first.")
-    steady: float = number(0.1, "1", "The same for the stature, and for everything while the legs are the same.")
-    stays: float = number(0.5, "1", "Probability from which a track counts as the person for `steady`.")
-    most: float = number(2.5, "log-odds", "The most that a box can tell either way.")
-    passes: float = number(0.002, "1", "Chance that the next box of a track is on another person, where it fits.")
-    strained: float = number(0.1, "1", "The same where its place or size contradicts the track.")
-    legs_s: float = number(1.0, "s", "Legs that are the same for this time, with nobody's near, are the same person's.")
-    legs_apart: float = number(0.4, "m", "Other legs nearer than this may have changed places with them.")
-    fades_s: float = number(
+    strange_trousers: float = param(0.5, "1", "The same of the trousers.")
+    odd_shirt: float = param(0.1, "1", "Share of boxes that show something else in the shirt's place.")
+    odd_trousers: float = param(0.3, "1", "The same of the trousers.")
+    stature_sigma: float = param(0.05, "1", "Standard deviation of the stature in the depth image, as a share.")
+    strange_stature: float = param(0.3, "1", "As `strange_shirt`, of the stature.")
+    odd_stature: float = param(0.3, "1", "As `odd_shirt`, of the stature.")
+    again: float = param(0.5, "1", "Share of its own evidence that a box counts for after a track's first.")
+    steady: float = param(0.1, "1", "The same for the stature, and for everything while the legs are the same.")
+    stays: float = param(0.5, "1", "Probability from which a track counts as the person for `steady`.")
+    most: float = param(2.5, "log-odds", "The most that a box can tell either way.")
+    passes: float = param(0.002, "1", "Chance that the next box of a track is on another person, where it fits.")
+    strained: float = param(0.1, "1", "The same where its place or size contradicts the track.")
+    legs_s: float = param(1.0, "s", "Legs that are the same for this time, with nobody's near, are the same person's.")
+    legs_apart: float = param(0.4, "m", "Other legs nearer than this may have changed places with them.")
+    fades_s: float = param(
         2.0, "s", "Time constant with which a track that is not measured stops to be where the person is."
     )
-    meets: float = number(0.5, "m", "Two tracks nearer than this to each other may swap their people.")
-    swaps: float = number(0.2, "1/m", "Chance of a swap for each metre by which they pass each other.")
-    unseen_s: float = number(0.3, "s", "A person not measured for longer may be a track that begins.")
-    reach: float = number(0.5, "m", "A track that begins nearer than this to the last place may be the person's.")
-    speed: float = number(WALK, "m/s", "And further off by this for each second since.")
-    clear: float = number(6.0, "chi² of 3", "A shirt or trousers that differ by more are not learnt.")
-    rate: float = number(0.05, "1", "Share by which one box moves clothes and stature once they are learnt.")
-    remembered: int = number(8, "1", "Other people that are remembered.")
+    meets: float = param(0.5, "m", "Two tracks nearer than this to each other may swap their people.")
+    swaps: float = param(0.2, "1/m", "Chance of a swap for each metre by which they pass each other.")
+    unseen_s: float = param(0.3, "s", "A person not measured for longer may be a track that begins.")
+    reach: float = param(0.5, "m", "A track that begins nearer than this to the last place may be the person's.")
+    speed: float = param(WALK, "m/s", "And further off by this for each second since.")
+    clear: float = param(6.0, "chi² of 3", "A shirt or trousers that differ by more are not learnt.")
+    rate: float = param(0.05, "1", "Share by which one box moves clothes and stature once they are learnt.")
+    remembered: int = param(8, "1", "Other people that are remembered.")
 
     def begin(self, person: Person) -> Likeness:
         """Begin with a person who is followed from now on."""

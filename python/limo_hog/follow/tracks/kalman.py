@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.observation import Odometry
 
 Mean: TypeAlias = tuple[float, float, float, float]
@@ -28,11 +28,11 @@ Covariance: TypeAlias = tuple[float, float, float, float, float, float, float, f
 class Noise:
     """Process and measurement noise."""
 
-    acceleration: float = number(0.6, "m/s^1.5", "Square root of the spectral density of a person's acceleration.")
-    bearing: float = number(0.015, "rad", "Standard deviation of a measured bearing.")
-    range: float = number(0.06, "m", "Standard deviation of a measured range.")
-    velocity: float = number(0.6, "m/s", "Standard deviation of each component of a new track's velocity.")
-    persistence: float = number(4.0, "s", "Time constant with which an unmeasured velocity decays.")
+    acceleration: float = param(0.6, "m/s^1.5", "Square root of the spectral density of a person's acceleration.")
+    bearing: float = param(0.015, "rad", "Standard deviation of a measured bearing.")
+    range: float = param(0.06, "m", "Standard deviation of a measured range.")
+    velocity: float = param(0.6, "m/s", "Standard deviation of each component of a new track's velocity.")
+    persistence: float = param(4.0, "s", "Time constant with which an unmeasured velocity decays.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.measurement import Measurement
@@ -73,16 +73,16 @@ class Movers:
     """
 
     legs: Legs = field(default_factory=lambda: Legs(reach=3.5))
-    gap: float = number(0.3, "m", "Returns further apart than this are of two groups.")
-    beams: float = number(0.03, "rad", "A beam within this passes a place.")
-    fewest_scans: int = number(4, "1", "Scans after which a group counts as moving.")
-    least_way: float = number(0.25, "m", "Way from where it began, from which it counts as moving.")
-    forget_s: float = number(0.5, "s", "A group is given up when a scan should have shown it for this time.")
-    unseen_s: float = number(3.0, "s", "Where the lidar does not look, a group is predicted for this time.")
-    looks: int = number(12, "1", "Scans without a person in the camera's view after which it is no more turned to.")
-    beside: float = number(0.4, "m", "A person is this far from their own legs at most.")
-    taken: float = number(0.25, "m", "A person must be nearer by this to legs that were another's than to their own.")
-    nearer: float = number(0.15, "m", "A box is on other legs than a person's own if it is nearer to them by this.")
+    gap: float = param(0.3, "m", "Returns further apart than this are of two groups.")
+    beams: float = param(0.03, "rad", "A beam within this passes a place.")
+    fewest_scans: int = param(4, "1", "Scans after which a group counts as moving.")
+    least_way: float = param(0.25, "m", "Way from where it began, from which it counts as moving.")
+    forget_s: float = param(0.5, "s", "A group is given up when a scan should have shown it for this time.")
+    unseen_s: float = param(3.0, "s", "Where the lidar does not look, a group is predicted for this time.")
+    looks: int = param(12, "1", "Scans without a person in the camera's view after which it is no more turned to.")
+    beside: float = param(0.4, "m", "A person is this far from their own legs at most.")
+    taken: float = param(0.25, "m", "A person must be nearer by this to legs that were another's than to their own.")
+    nearer: float = param(0.15, "m", "A box is on other legs than a person's own if it is nearer to them by this.")
     robot: RobotGeometry = LIMO
 
     def update(

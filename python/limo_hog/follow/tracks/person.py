@@ -11,7 +11,7 @@ import bisect
 import math
 from dataclasses import dataclass, field, replace
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Clothes, Odometry
 from limo_hog.follow.tracks import kalman
@@ -77,8 +77,8 @@ class Person:
 class UnknownRange:
     """Where a new track begins whose first box has no depth."""
 
-    distance: float = number(3.0, "m", "Distance assumed of a first box without depth.")
-    sigma: float = number(1.5, "m", "Its standard deviation.")
+    distance: float = param(3.0, "m", "Distance assumed of a first box without depth.")
+    sigma: float = param(1.5, "m", "Its standard deviation.")
 
 
 def initiate(
@@ -139,27 +139,25 @@ class Recall:
 class Existence:
     """Moves the log-odds of tracks, and learns the recall."""
 
-    prior: float = number(-2.2, "log-odds", "Of a new track before its first box.")
-    person_score: float = number(1.3, "SVM margin", "Scale of the scores on people, gamma distributed with shape 2.")
-    clutter_score: float = number(0.5, "SVM margin", "Mean of the scores on other things, exponentially distributed.")
-    clutter_again: float = number(0.2, "1", "Chance that a false box is there again in the next frame.")
-    weight: float = number(
-        0.5, "1", "Share of its own evidence that a frame counts for: neighbouring frames are alike."
-    )
-    most: float = number(1.5, "log-odds", "The most that a frame can add.")
-    least: float = number(0.4, "log-odds", "The most that a frame can take.")
-    confirm: float = number(3.0, "log-odds", "From here a track is confirmed.")
-    drop: float = number(-1.0, "log-odds", "Below this it is not any more.")
-    lowest: float = number(-5.0, "log-odds", "Lower limit of the log-odds.")
-    highest: float = number(5.0, "log-odds", "Upper limit of the log-odds.")
-    stands_out: float = number(0.2, "m", "A box in one plane with its surroundings, to within this, is on a picture.")
-    sizes: tuple[float, ...] = number((170.0, 240.0, 330.0), "px", "Heights of windows that part the classes of size.")
-    recall: float = number(0.4, "1", "Recall before anything is learnt.")
-    recall_frames: float = number(10.0, "1", "Frames that this first guess is worth.")
-    recall_memory: float = number(0.99, "1", "Share of what was learnt that is kept from frame to frame.")
-    least_recall: float = number(0.2, "1", "Lower limit of the recall that is believed.")
-    most_recall: float = number(0.98, "1", "Upper limit of the recall that is believed.")
-    run_of_misses: float = number(
+    prior: float = param(-2.2, "log-odds", "Of a new track before its first box.")
+    person_score: float = param(1.3, "SVM margin", "Scale of the scores on people, gamma distributed with shape 2.")
+    clutter_score: float = param(0.5, "SVM margin", "Mean of the scores on other things, exponentially distributed.")
+    clutter_again: float = param(0.2, "1", "Chance that a false box is there again in the next frame.")
+    weight: float = param(0.5, "1", "Share of its own evidence that a frame counts for: neighbouring frames are alike.")
+    most: float = param(1.5, "log-odds", "The most that a frame can add.")
+    least: float = param(0.4, "log-odds", "The most that a frame can take.")
+    confirm: float = param(3.0, "log-odds", "From here a track is confirmed.")
+    drop: float = param(-1.0, "log-odds", "Below this it is not any more.")
+    lowest: float = param(-5.0, "log-odds", "Lower limit of the log-odds.")
+    highest: float = param(5.0, "log-odds", "Upper limit of the log-odds.")
+    stands_out: float = param(0.2, "m", "A box in one plane with its surroundings, to within this, is on a picture.")
+    sizes: tuple[float, ...] = param((170.0, 240.0, 330.0), "px", "Heights of windows that part the classes of size.")
+    recall: float = param(0.4, "1", "Recall before anything is learnt.")
+    recall_frames: float = param(10.0, "1", "Frames that this first guess is worth.")
+    recall_memory: float = param(0.99, "1", "Share of what was learnt that is kept from frame to frame.")
+    least_recall: float = param(0.2, "1", "Lower limit of the recall that is believed.")
+    most_recall: float = param(0.98, "1", "Upper limit of the recall that is believed.")
+    run_of_misses: float = param(
         1e-3, "1", "Misses in a row less likely than this are no chance: the person is not there."
     )
 

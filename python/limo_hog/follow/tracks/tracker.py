@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from limo_hog.follow.parameters import number
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
 from limo_hog.follow.sense.measurement import WALK, Measurement, Visibility, measure
@@ -85,25 +85,25 @@ class Tracker:
     legs: Legs = field(default_factory=Legs)
     movers: Movers = field(default_factory=Movers)
     visibility: Visibility = field(default_factory=Visibility)
-    forget_s: float = number(8.0, "s", "An unmeasured person is forgotten after this time.")
-    legs_only_s: float = number(4.0, "s", "A person is followed for this time by legs alone that do not walk.")
-    restart_s: float = number(1.0, "s", "A person measured again after this time has a new track.")
-    size_rate: float = number(
+    forget_s: float = param(8.0, "s", "An unmeasured person is forgotten after this time.")
+    legs_only_s: float = param(4.0, "s", "A person is followed for this time by legs alone that do not walk.")
+    restart_s: float = param(1.0, "s", "A person measured again after this time has a new track.")
+    size_rate: float = param(
         0.2, "1", "Share by which one box moves a person's known size, and their clothes until confirmed."
     )
-    turn_speed: float = number(
+    turn_speed: float = param(
         1.0, "m/s", "Standard deviation added to each velocity of a person whose box is outside the gate."
     )
-    astray: float = number(
+    astray: float = param(
         0.25, "m", "A box whose range differs by more may be on another, who passes before the person."
     )
-    stature_from: float = number(1.4, "m", "From nearer the outline's top is no measure of the stature.")
-    poses_s: float = number(2.0, "s", "How long odometry is kept: a camera image may be as late as this.")
-    scans_s: float = number(1.0, "s", "How long scans are kept.")
-    scan_period_s: float = number(0.13, "s", "A scan may be older by this than the image it is used with.")
-    walk: float = number(WALK, "m/s", "How fast people walk who are not measured.")
-    min_period_s: float = number(0.02, "s", "Shortest time between two frames that is used to predict the next.")
-    max_period_s: float = number(0.5, "s", "Longest time between two frames that is used to predict the next.")
+    stature_from: float = param(1.4, "m", "From nearer the outline's top is no measure of the stature.")
+    poses_s: float = param(2.0, "s", "How long odometry is kept: a camera image may be as late as this.")
+    scans_s: float = param(1.0, "s", "How long scans are kept.")
+    scan_period_s: float = param(0.13, "s", "A scan may be older by this than the image it is used with.")
+    walk: float = param(WALK, "m/s", "How fast people walk who are not measured.")
+    min_period_s: float = param(0.02, "s", "Shortest time between two frames that is used to predict the next.")
+    max_period_s: float = param(0.5, "s", "Longest time between two frames that is used to predict the next.")
     robot: RobotGeometry = LIMO
 
     def update(self, observation: Observation, tracks: Tracks) -> tuple[Tracks, dict[int, int]]:

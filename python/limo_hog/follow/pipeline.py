@@ -33,36 +33,17 @@ _SCANS_BETWEEN = 8
 
 @dataclass(frozen=True, slots=True)
 class FrameLog:
-    """One control period: what was sensed, found and commanded.
+    """One control period: what was sensed, found and commanded."""
 
-    Attributes
-    ----------
-    time
-        When the command was decided, on the robot's own clock [s].
-    decision
-        The command and the reason for it; its `target` is an index into `detections`.
-    sensors
-        The readings that it is based on.
-    frame
-        The camera image that was worked on; None in a period without a new one.
-    detections
-        What was found in the image, best first; empty without one, and where the detector failed.
-    region
-        Part of the image that was searched; None where all of it was.
-    failure
-        How the detector failed, "" where it did not.
-    detect_ms
-        Wall time of the detection [ms].
-    """
-
-    time: float
-    decision: Decision[None]
-    sensors: Sensors
-    frame: Frame | None = None
+    time: float  #: When the command was decided, on the robot's own clock [s].
+    decision: Decision[None]  #: The command and the reason for it; its `target` is an index into `detections`.
+    sensors: Sensors  #: The readings that it is based on.
+    frame: Frame | None = None  #: The camera image that was worked on; None in a period without a new one.
+    #: What was found in the image, best first; empty without one, and where the detector failed.
     detections: Detections = field(default_factory=Detections.none)
-    region: Region | None = None
-    failure: str = ""
-    detect_ms: float = 0.0
+    region: Region | None = None  #: Part of the image that was searched; None where all of it was.
+    failure: str = ""  #: How the detector failed, "" where it did not.
+    detect_ms: float = 0.0  #: Wall time of the detection [ms].
 
 
 class Periods:

@@ -51,7 +51,7 @@ class Following:
     bearing_tolerance: float = param(0.02, "rad", "Smaller errors of direction are not corrected.", 0, 0.5)
     steady_bearing_rate: float = param(0.05, "rad/s", "A person whose bearing changes more slowly stands.", 0, 1)
     steady_range_rate: float = param(0.1, "m/s", "And whose range changes more slowly.", 0, 1)
-    coast_s: float = param(0.8, "s", "How long to drive by the prediction alone.", 0, 5)
+    coast_s: float = param(2.0, "s", "How long to drive by the prediction alone.", 0, 5)
     waits_s: float = param(2.0, "s", "How long to face the predicted place before the person is looked for.", 0, 30)
     doubt_speed: float = param(0.5, "1", "Share of `max_speed` at which to drive to who may be a person.", 0, 1)
     headway_s: float = param(1.9, "s", "A person who walks fast is kept off by this part of their way.", 0, 5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -39,38 +39,29 @@ class Critic(Protocol):
         ...
 
 
-#: Why the goal's own command is not taken, by the critic that gains most.
+#: Why the robot stands, where none of the commands leads anywhere.
+NO_WAY = "no free way"
+#: Why the goal's own command is not taken: the first critic that gains at least a quarter of what all gain.
 REASONS = {
-    "goal_distance": "driving around an obstacle",
-    "in_view": "keeping the person in the image",
     "followed": "giving way to a person",
     "others": "giving way to a person",
     "walls": "keeping off an obstacle",
-    "unseen_ground": "not backing onto ground that was not seen lately",
+    "unseen_ground": "not backing onto ground where somebody may be",
+    "goal_distance": "driving around an obstacle",
+    "in_view": "keeping the person in the image",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What was decided, and why.
+    """What was decided, and why."""
 
-    Attributes
-    ----------
-    twist, manoeuvre
-        The command, and what it begins or goes on with.
-    reason
-        Why it is not the goal's own; "" where it is.
-    shares
-        Name of each critic and its share of the cost.
-    rollout
-        float64 (T, 2) [m]: where it leads, base frame.
-    """
-
+    #: The command, and what it begins or goes on with.
     twist: Twist
     manoeuvre: Manoeuvre
-    reason: str
-    shares: tuple[tuple[str, float], ...]
-    rollout: Points
+    reason: str  #: Why it is not the goal's own; "" where it is.
+    shares: tuple[tuple[str, float], ...]  #: Name of each critic and its share of the cost.
+    rollout: Points  #: float64 (T, 2) [m]: where it leads, base frame.
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +78,7 @@ class Planner:
     effort: Effort = field(default_factory=Effort)
     change_of_mind: ChangeOfMind = field(default_factory=ChangeOfMind)
     turn_gain: float = param(2.5, "1/s", "Turn rate for each radian to turn.", 0, 10)
+    stands: float = param(0.02, "m/s", "A slower robot stands.", 0, 1)
     max_turn: float = param(3.0, "rad/s", "Limit of the turn rate.", 0, 6)
 
     def critics(self) -> Iterator[tuple[str, Critic]]:
@@ -101,16 +93,20 @@ class Planner:
         names, critics = zip(*self.critics(), strict=True)
         costs = np.array([one.weight * one.cost(rollouts, situation) for one in critics])
         best = int(np.argmin(costs.sum(axis=0)))
-        gains = dict(zip(names, (costs[:, 0] - costs[:, best]).tolist(), strict=True))
-        why = max(REASONS, key=lambda name: gains.get(name, 0.0)) if best else ""
+        gains = np.maximum(costs[:, 0] - costs[:, best], 0.0)
+        gained = dict(zip(names, gains.tolist(), strict=True))
+        why = next((name for name in REASONS if 4 * gained.get(name, 0.0) > gains.sum()), "")
         off, speed = float(rollouts.offs[best]), float(rollouts.wanted[best])
         heading, rate = goal.heading + off, goal.rate if off == 0 else 0.0
         limit = min(stoppable_turn(heading, situation.acceleration, situation.robot) + abs(rate), self.max_turn)
         angular = min(max(self.turn_gain * heading + rate, -limit), limit)
         # Driving sideways to the person would lose sight of them: turn first, then drive.
         twist = Twist(speed * max(math.cos(heading), 0.0) ** 2, angular)
+        reason = REASONS.get(why, "")
+        if abs(speed) > self.stands > np.abs(rollouts.speeds[best]).max():
+            twist, reason = replace(twist, linear=0.0), NO_WAY
         manoeuvre = Manoeuvre(
             None if off == 0 else situation.pose.yaw + heading, None if speed == rollouts.wanted[0] else speed
         )
         shares = tuple(zip(names, costs[:, best].tolist(), strict=True))
-        return Plan(twist, manoeuvre, REASONS.get(why, ""), shares, rollouts.poses[best, :, :2])
+        return Plan(twist, manoeuvre, reason, shares, rollouts.poses[best, :, :2])

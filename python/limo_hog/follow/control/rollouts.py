@@ -28,33 +28,20 @@ DIRECT = Manoeuvre()
 
 @dataclass(frozen=True, slots=True)
 class Rollouts:
-    """K commands, each driven on for T steps; the first is the goal's own, the last the one begun, if it is another.
+    """K commands, each driven on for T steps; the first is the goal's own, the last the one begun, if it is another."""
 
-    Attributes
-    ----------
-    goal, kept
-        What they were made for, and the manoeuvre begun.
-    times
-        float64 (T,) [s].
-    poses, speeds
-        float64 (K, T, 3): x, y [m], yaw [rad], base frame as of now; float64 (K, T) [m/s].
-    offs, wanted
-        float64 (K,): direction faced, from the goal's [rad], and the speed driven to [m/s].
-    free
-        float64 (T, 2) [m]: where the first would be with nothing in its way.
-    places
-        float64 (T, N, 2) [m]: where the people are.
-    """
-
+    #: What they were made for, and the manoeuvre begun.
     goal: Goal
     kept: Manoeuvre
-    times: Array
+    times: Array  #: float64 (T,) [s].
+    #: float64 (K, T, 3): x, y [m], yaw [rad], base frame as of now; float64 (K, T) [m/s].
     poses: Array
     speeds: Array
+    #: float64 (K,): direction faced, from the goal's [rad], and the speed driven to [m/s].
     offs: Array
     wanted: Array
-    free: Array
-    places: Array
+    free: Array  #: float64 (T, 2) [m]: where the first would be with nothing in its way.
+    places: Array  #: float64 (T, N, 2) [m]: where the people are.
 
     @property
     def nothing(self) -> Array:

@@ -25,38 +25,20 @@ from limo_hog.follow.tracks.tracker import Tracks
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The person followed.
+    """The person followed."""
 
-    Attributes
-    ----------
-    number
-        Of the person; None while none is followed.
-    likeness
-        What the confirmed person followed last looks like, and which track that is; None where none was followed yet.
-    measured
-        When that person was last measured [s]; None where none was followed yet.
-    candidates
-        Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
-    unsure_at
-        Since when that is not sure [s]; None where it is.
-    """
-
-    number: int | None = None
+    number: int | None = None  #: Of the person; None while none is followed.
+    #: What the confirmed person followed last looks like, and which track that is; None where none was followed yet.
     likeness: Likeness | None = None
-    measured: float | None = None
+    measured: float | None = None  #: When that person was last measured [s]; None where none was followed yet.
+    #: Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
     candidates: tuple[int, ...] = ()
-    unsure_at: float | None = None
+    unsure_at: float | None = None  #: Since when that is not sure [s]; None where it is.
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Chooses the person to follow.
-
-    Attributes
-    ----------
-    identity
-        Which track the person followed is.
-    """
+    """Chooses the person to follow."""
 
     min_existence: float = param(
         0.4, "1", "Probability from which somebody too far away for HOG is worth driving nearer, and waiting for.", 0, 1
@@ -76,7 +58,7 @@ class Selection:
     odds: float = param(3.0, "1", "And it must be this many times as likely as any other in view.", 1, 100)
     possible: float = param(0.1, "1", "A track in view that is less likely than this is another person.", 0, 1)
     decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)
-    identity: Identity = field(default_factory=Identity)
+    identity: Identity = field(default_factory=Identity)  #: Which track the person followed is.
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
         """Follow the track that is the person followed so far; before there is one, the likeliest person in view."""
@@ -153,52 +135,23 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class TrackingState:
-    """What the controller remembers.
+    """What the controller remembers."""
 
-    Attributes
-    ----------
-    tracks
-        All tracked people.
-    choice
-        Which of them is followed.
-    side
-        Which way to search: 1 left, -1 right.
-    since_full
-        Frames since the whole image was searched [1].
-    ground
-        What stands where; None before the first scan.
-    known
-        The followed person's track when last measured; None before anyone was followed.
-    hunt
-        What is remembered while looking for that person; None while they are measured.
-    way, way_at
-        float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
-    kept
-        The manoeuvre begun.
-    acceleration
-        Of the wheels, as learnt [m/s²].
-    sent
-        The last command.
-    others
-        Other people than the followed one, measured lately.
-    brisk
-        How fast the followed person walks at most, as far as known [m/s].
-    """
-
-    tracks: Tracks = field(default_factory=Tracks)
-    choice: Choice = field(default_factory=Choice)
-    side: float = 1.0
-    since_full: int = 0
-    ground: Ground | None = None
-    known: Track | None = None
-    hunt: Hunt | None = None
+    tracks: Tracks = field(default_factory=Tracks)  #: All tracked people.
+    choice: Choice = field(default_factory=Choice)  #: Which of them is followed.
+    side: float = 1.0  #: Which way to search: 1 left, -1 right.
+    since_full: int = 0  #: Frames since the whole image was searched [1].
+    ground: Ground | None = None  #: What stands where; None before the first scan.
+    known: Track | None = None  #: The followed person's track when last measured; None before anyone was followed.
+    hunt: Hunt | None = None  #: What is remembered while looking for that person; None while they are measured.
+    #: float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
     way: Points = field(default_factory=lambda: NO_POINTS)
     way_at: float = -math.inf
-    acceleration: float = 1.0
-    sent: Twist = field(default_factory=Twist)
-    others: tuple[Other, ...] = ()
-    brisk: float = 0.0
-    kept: Manoeuvre = DIRECT
+    acceleration: float = 1.0  #: Of the wheels, as learnt [m/s²].
+    sent: Twist = field(default_factory=Twist)  #: The last command.
+    others: tuple[Other, ...] = ()  #: Other people than the followed one, measured lately.
+    brisk: float = 0.0  #: How fast the followed person walks at most, as far as known [m/s].
+    kept: Manoeuvre = DIRECT  #: The manoeuvre begun.
 
 
 def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:

@@ -25,39 +25,26 @@ LATELY_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """The robot, the people and the ground.
+    """The robot, the people and the ground."""
 
-    Attributes
-    ----------
-    now, pose, driven
-        The newest stamp [s]; where the robot is then, odometry frame, and what its wheels do.
-    robot, acceleration
-        Its geometry and limits; its wheels' acceleration as learnt [m/s²].
-    period, late_s
-        The time to the next command, and what the image will be late then [s].
-    people, followed
-        float64 (N, 4): x, y [m], vx, vy [m/s] of everybody; the row of the person followed, None without one.
-    points
-        float64 (M, 2) [m]: what stands around the robot, without people who are predicted.
-    grid, ground
-        The map; None before the first scan.
-    hiding
-        float64 (H, 3): where people out of sight can be, `Hiding.circles`.
-    """
-
+    #: The newest stamp [s]; where the robot is then, odometry frame, and what its wheels do.
     now: float
     pose: Odometry
     driven: Twist
+    #: Its geometry and limits; its wheels' acceleration as learnt [m/s²].
     robot: RobotGeometry
     acceleration: float
+    #: The time to the next command, and what the image will be late then [s].
     period: float
     late_s: float
+    #: float64 (N, 4): x, y [m], vx, vy [m/s] of everybody; the row of the person followed, None without one.
     people: Array
     followed: int | None
-    points: Points
+    points: Points  #: float64 (M, 2) [m]: what stands around the robot, without people who are predicted.
+    #: The map; None before the first scan.
     grid: Grid
     ground: Ground | None
-    hiding: Array
+    hiding: Array  #: float64 (H, 3): where people out of sight can be, `Hiding.circles`.
 
     @property
     def mapped(self) -> Ground:
@@ -105,25 +92,16 @@ def carried(people: Array, pose: Odometry) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Where the robot should be, looking where.
+    """Where the robot should be, looking where."""
 
-    Attributes
-    ----------
-    heading, rate
-        Direction to drive in and to face now [rad], and how it changes [rad/s].
-    speed, speed_later
-        Best speed now, and once the distance is right [m/s].
-    places, keeps
-        float64 (T, 2) [m]: the place to be near, after each step of a rollout; None to drive nowhere. The distance to
-        hold from it, from the robot's centre [m].
-    faces
-        Whether it matters that the person followed stays in the image.
-    """
-
+    #: Direction to drive in and to face now [rad], and how it changes [rad/s].
     heading: float
     rate: float = 0.0
+    #: Best speed now, and once the distance is right [m/s].
     speed: float = 0.0
     speed_later: float = 0.0
+    #: float64 (T, 2) [m]: the place to be near, after each step of a rollout; None to drive nowhere. The distance to
+    #: hold from it, from the robot's centre [m].
     places: Points | None = None
     keeps: float = 0.0
-    faces: bool = True
+    faces: bool = True  #: Whether it matters that the person followed stays in the image.

@@ -9,14 +9,14 @@ import numpy as np
 
 from limo_hog.follow.control.following import Aimed, Followed, Following
 from limo_hog.follow.control.lookout import Lookout
-from limo_hog.follow.control.planner import Planner
+from limo_hog.follow.control.planner import NO_WAY, Planner
 from limo_hog.follow.control.selection import Selection, TrackingState, believed
 from limo_hog.follow.control.situation import Goal, Situation, carried
 from limo_hog.follow.control.wheels import Wheels
 from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
-from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, scan_points, to_odometry
+from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, from_odometry, scan_points, to_odometry
 from limo_hog.follow.sense.detectors import Region, RegionSize
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
 from limo_hog.follow.sense.observation import Observation, pose_at
@@ -29,38 +29,27 @@ from limo_hog.follow.tracks.tracker import Tracker
 
 @dataclass(frozen=True, slots=True)
 class TrackingController:
-    """Follows one person among others.
-
-    Attributes
-    ----------
-    following, lookout
-        Where to be while the person is known to be somewhere, and where to look for one who is lost.
-    planner, wheels
-        Which command to send, and what the wheels can do.
-    selection, tracker, hiding
-        Whom to follow; where all people are; who is out of sight.
-    region
-        How much of the image to search.
-    grid, depth_grid
-        How the ground is mapped, and which depth pixels are looked at for it.
-    robot
-        Where camera and lidar sit.
-    """
+    """Follows one person among others."""
 
     target_distance: float = param(1.5, "m", "Distance to hold, as the depth image measures it.", 0.1, 8)
     full_every: int = param(15, "1", "Every so many frames the whole image is searched.", 1, 1000)
     slowest: float = param(0.3, "m/s", "People slower than this stand: the lidar shows them where they are.", 0, 2)
+    #: Where to be while the person is known to be somewhere, and where to look for one who is lost.
+    near_behind: float = param(1.2, "m", "Behind the robot, what the map shows this near counts as well.", 0, 5)
     following: Following = field(default_factory=Following)
     lookout: Lookout = field(default_factory=Lookout)
+    #: Which command to send, and what the wheels can do.
     planner: Planner = field(default_factory=Planner)
     wheels: Wheels = field(default_factory=Wheels)
+    #: Whom to follow; where all people are; who is out of sight.
     selection: Selection = field(default_factory=Selection)
     tracker: Tracker = field(default_factory=Tracker)
     hiding: Hiding = field(default_factory=Hiding)
-    region: RegionSize = field(default_factory=RegionSize)
+    region: RegionSize = field(default_factory=RegionSize)  #: How much of the image to search.
+    #: How the ground is mapped, and which depth pixels are looked at for it.
     grid: Grid = field(default_factory=Grid)
     depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))
-    robot: RobotGeometry = LIMO
+    robot: RobotGeometry = LIMO  #: Where camera and lidar sit.
 
     def __post_init__(self) -> None:
         tracker = self.tracker
@@ -88,7 +77,8 @@ class TrackingController:
         plan = self.planner.plan(situation, goal, state.kept)
         twist = plan.twist
         if plan.reason:
-            mode, reason = mode if mode in (Mode.LOST, Mode.SEARCH) else Mode.FOLLOW, plan.reason
+            moves = Mode.BLOCKED if plan.reason == NO_WAY else Mode.FOLLOW
+            mode, reason = mode if mode in (Mode.LOST, Mode.SEARCH) else moves, plan.reason
         if observation.odometry is not None:
             twist = self.wheels.within_reach(
                 twist, situation.driven, state.acceleration, situation.period, situation.robot
@@ -155,6 +145,9 @@ class TrackingController:
         points = NO_POINTS if observation.scan is None else scan_points(observation.scan, self.robot)
         if observation.remembered is not None:
             points = np.concatenate([points, observation.remembered])
+        if state.ground is not None:
+            mapped = from_odometry(self.grid.lasting_near(state.ground, pose, self.near_behind), pose)
+            points = np.concatenate([points, mapped[mapped[:, 0] < -self.robot.half_length]])
         if walks.any():
             gaps = np.hypot(*(points[:, None] - people[walks][None, :, :2]).transpose(2, 0, 1)).min(axis=1)
             points = points[gaps > PERSON_RADIUS]
@@ -177,7 +170,7 @@ class TrackingController:
         now, following = situation.now, self.following
         track = predict(person.track, now, self.tracker.noise)
         bearing, distance = bearing_range(track, situation.pose)
-        lost_s = min(observation.stamp - person.seen, now - person.felt)
+        lost_s, brisk = min(observation.stamp - person.seen, now - person.felt), state.brisk
         if lost_s <= self.tracker.scan_period_s:
             state = self._measured(person, bearing, situation, state)
         hidden = following.is_hidden(bearing, distance, situation)
@@ -193,8 +186,7 @@ class TrackingController:
             visibility = self.tracker.visibility
             least = visibility.least_distance(person.window, person.centre, observation.height) - self.robot.camera_x
         soon = predict(person.track, now + following.foresight_s, self.tracker.noise).place
-        brisk = state.brisk if person.confirmed else 0.0
-        keeps = following.keeps(self.target_distance, least, brisk, soon, situation)
+        keeps = following.keeps(self.target_distance, least, brisk if person.confirmed else 0.0, soon, situation)
         too_small = person.window <= distance * self.tracker.visibility.smallest_window
         worth_nearing = too_small and person.existence >= self.selection.min_existence
         aimed = following.aim(Followed(person, track, keeps, worth_nearing), situation, state, self.planner.sampling)

@@ -11,14 +11,9 @@ CAMERA, DEPTH, SCAN, ODOMETRY = "camera frame", "depth image", "scan", "odometry
 
 @dataclass(frozen=True, slots=True)
 class Arrivals:
-    """The newest reading of each sense.
+    """The newest reading of each sense."""
 
-    Attributes
-    ----------
-    newest
-        By the sense's name: the reading's stamp on the sensor's clock, and when it came on the robot's own [s].
-    """
-
+    #: By the sense's name: the reading's stamp on the sensor's clock, and when it came on the robot's own [s].
     newest: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def after(self, now: float, stamps: Mapping[str, float]) -> Arrivals:

@@ -141,23 +141,13 @@ class OnnxDetector:
     The network takes float32 (1, 3, size, size), RGB in 0..1, and gives (1, 4 + classes, N): centre x, centre y,
     width, height [px of its input] and a score in 0..1 for each class, people first: what YOLOv8 exports. The image
     is made to fit at its own aspect, grey below or beside it.
-
-    Attributes
-    ----------
-    path
-        The ONNX file.
-    size
-        Side of the network's input [px].
-    threshold
-        Least score of a person [0..1].
-    overlap
-        Boxes with a larger intersection over union than this are the same person [1]. Both are the defaults of YOLOv8's
-        own non-maximum suppression.
     """
 
-    path: Path
-    size: int = 640
-    threshold: float = 0.25
+    path: Path  #: The ONNX file.
+    size: int = 640  #: Side of the network's input [px].
+    threshold: float = 0.25  #: Least score of a person [0..1].
+    #: Boxes with a larger intersection over union than this are the same person [1]. Both are the defaults of YOLOv8's
+    #: own non-maximum suppression.
     overlap: float = 0.45
 
     def __post_init__(self) -> None:
@@ -205,20 +195,14 @@ class OnnxDetector:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Part of an image worth searching.
+    """Part of an image worth searching."""
 
-    Attributes
-    ----------
-    x, y, width, height
-        Within the image [px], top left corner first.
-    window_height
-        Expected height of the detection window [px]: the person's, with the margin HOG was trained with.
-    """
-
+    #: Within the image [px], top left corner first.
     x: int
     y: int
     width: int
     height: int
+    #: Expected height of the detection window [px]: the person's, with the margin HOG was trained with.
     window_height: float
 
     def holds(self, column: float) -> bool:

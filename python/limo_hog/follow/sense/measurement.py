@@ -24,36 +24,23 @@ WINDOW_PER_STATURE = 4 / 3
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One box, as seen from the robot.
+    """One box, as seen from the robot."""
 
-    Attributes
-    ----------
-    bearing, range
-        From the robot's centre [rad, m]; range None where the depth is unknown.
-    height, centre
-        Height of the box, and its middle below the image's [px].
-    score
-        SVM margin.
-    window, middle
-        Height of the window of the whole person, and its middle below the image's, times the distance [px m]. By the
-        stature in the depth image; without one, the box's.
-    whole
-        Whether that is all of the person: at the image's edge people can only be taller than they show.
-    clothes
-        What is worn in the box; None without a colour image.
-    stands_out
-        How far what is beside the box is behind its middle [m], by `stands_out`; None without depth.
-    """
-
+    #: From the robot's centre [rad, m]; range None where the depth is unknown.
     bearing: float
     range: float | None
+    #: Height of the box, and its middle below the image's [px].
     height: int
     centre: float
-    score: float
-    clothes: Clothes | None = None
+    score: float  #: SVM margin.
+    clothes: Clothes | None = None  #: What is worn in the box; None without a colour image.
+    #: How far what is beside the box is behind its middle [m], by `stands_out`; None without depth.
     stands_out: float | None = None
+    #: Height of the window of the whole person, and its middle below the image's, times the distance [px m]. By the
+    #: stature in the depth image; without one, the box's.
     window: float = 0.0
     middle: float = 0.0
+    #: Whether that is all of the person: at the image's edge people can only be taller than they show.
     whole: bool = True
 
     def is_low(self, share: float) -> bool:

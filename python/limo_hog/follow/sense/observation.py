@@ -21,24 +21,14 @@ deviations of `ColourSampling`."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scan:
-    """One turn of a planar lidar. Two scans are equal only if they are the same object.
+    """One turn of a planar lidar. Two scans are equal only if they are the same object."""
 
-    Attributes
-    ----------
-    stamp
-        When the turn was finished [s], on the clock of `Observation.stamp`.
-    ranges
-        float32 (N,) [m], counter-clockwise from `angle_min`; inf where nothing was hit.
-    angle_min, angle_max
-        Direction of the first and the last beam [rad], 0 straight ahead, counter-clockwise positive.
-    range_min, range_max
-        Limits between which a range is valid [m].
-    """
-
-    stamp: float
-    ranges: NDArray[np.float32]
+    stamp: float  #: When the turn was finished [s], on the clock of `Observation.stamp`.
+    ranges: NDArray[np.float32]  #: float32 (N,) [m], counter-clockwise from `angle_min`; inf where nothing was hit.
+    #: Direction of the first and the last beam [rad], 0 straight ahead, counter-clockwise positive.
     angle_min: float
     angle_max: float
+    #: Limits between which a range is valid [m].
     range_min: float
     range_max: float
 
@@ -79,24 +69,13 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One image of the robot's camera.
+    """One image of the robot's camera."""
 
-    Attributes
-    ----------
-    stamp
-        When it was taken [s].
-    image
-        uint8 (H, W, 3) BGR or (H, W).
-    focal_px
-        Focal length of the camera [px].
-    depth
-        float32 (H, W), distance along the optical axis [m] of the same view; inf too far, -inf too near, NaN unknown
-        (REP 118). None without a depth camera.
-    """
-
-    stamp: float
-    image: NDArray[np.uint8]
-    focal_px: float
+    stamp: float  #: When it was taken [s].
+    image: NDArray[np.uint8]  #: uint8 (H, W, 3) BGR or (H, W).
+    focal_px: float  #: Focal length of the camera [px].
+    #: float32 (H, W), distance along the optical axis [m] of the same view; inf too far, -inf too near, NaN unknown
+    #: (REP 118). None without a depth camera.
     depth: NDArray[np.float32] | None
 
 
@@ -110,57 +89,30 @@ class Sensors:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """One camera frame's detections with the other sensors' newest readings.
+    """One camera frame's detections with the other sensors' newest readings."""
 
-    Attributes
-    ----------
-    stamp
-        When the camera frame was taken [s].
-    width, height
-        Size of the camera image [px].
-    focal_px
-        Focal length of the camera [px]; the principal point is the image centre.
-    detections
-        People found in the frame, best first.
-    region
-        Part of the image that was searched; None where all of it was.
-    depth
-        float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; or None.
-    scan
-        The newest lidar scan; None without a lidar.
-    odometry
-        The newest odometry; None without wheel encoders.
-    fault
-        Why the frame cannot be used, "" where it can; with a fault the robot stands still.
-    clothes
-        float64 (N, 2, 3): what the person in each detection wears, by `clothes_in`; None without a colour image.
-    between
-        Scans that came since the frame before, and where the robot was, oldest first: of a camera slower than the
-        lidar.
-    remembered
-        float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
-        not look. `Guard` fills it in; None without it.
-    clock
-        When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
-    now
-        The newest stamp of all sensors [s]: a camera frame may arrive late.
-    """
-
-    stamp: float
+    stamp: float  #: When the camera frame was taken [s].
+    #: Size of the camera image [px].
     width: int
     height: int
-    focal_px: float
-    detections: Detections
-    region: Region | None = None
+    focal_px: float  #: Focal length of the camera [px]; the principal point is the image centre.
+    detections: Detections  #: People found in the frame, best first.
+    region: Region | None = None  #: Part of the image that was searched; None where all of it was.
+    #: float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; or None.
     depth: NDArray[np.float32] | None = None
-    scan: Scan | None = None
-    odometry: Odometry | None = None
-    fault: str = ""
+    scan: Scan | None = None  #: The newest lidar scan; None without a lidar.
+    odometry: Odometry | None = None  #: The newest odometry; None without wheel encoders.
+    fault: str = ""  #: Why the frame cannot be used, "" where it can; with a fault the robot stands still.
+    #: float64 (N, 2, 3): what the person in each detection wears, by `clothes_in`; None without a colour image.
     clothes: Clothes | None = None
+    #: Scans that came since the frame before, and where the robot was, oldest first: of a camera slower than the lidar.
     between: tuple[tuple[Scan, Odometry], ...] = ()
+    #: float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
+    #: not look. `Guard` fills it in; None without it.
     remembered: NDArray[np.float64] | None = None
+    #: When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
     clock: float | None = None
-    now: float = field(init=False)
+    now: float = field(init=False)  #: The newest stamp of all sensors [s]: a camera frame may arrive late.
 
     def __post_init__(self) -> None:
         newest = self.stamp if self.scan is None else max(self.stamp, self.scan.stamp)

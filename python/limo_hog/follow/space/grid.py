@@ -25,28 +25,16 @@ Cells = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """What is known about the ground.
+    """What is known about the ground."""
 
-    Attributes
-    ----------
-    corner
-        Lower corner of cell (0, 0), x and y in the odometry frame [cells].
-    occupied
-        float32 (N, N): log-odds of each cell's being occupied; rows along x, columns along y.
-    seen
-        float64 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never. On a robot times count
-        from 1970: in float32 they would be two minutes apart.
-    freed
-        float64 (N, N): when each cell was last seen to be free [s]; -inf for never.
-    stamp
-        Of the last scan [s].
-    """
-
-    corner: tuple[int, int]
+    corner: tuple[int, int]  #: Lower corner of cell (0, 0), x and y in the odometry frame [cells].
+    #: float32 (N, N): log-odds of each cell's being occupied; rows along x, columns along y.
     occupied: NDArray[np.float32]
+    #: float64 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never. On a robot times count
+    #: from 1970: in float32 they would be two minutes apart.
     seen: NDArray[np.float64]
-    freed: NDArray[np.float64]
-    stamp: float = -math.inf
+    freed: NDArray[np.float64]  #: float64 (N, N): when each cell was last seen to be free [s]; -inf for never.
+    stamp: float = -math.inf  #: Of the last scan [s].
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +155,14 @@ class Grid:
         flat = np.where(inside, lowest[:, 0] * self.cells + lowest[:, 1], 0)
         steps = np.array((0, 1, self.cells, self.cells + 1), np.int64)
         return np.asarray(inside & self._is_occupied(ground, flat[:, None] + steps, lasting).any(axis=1))
+
+    def lasting_near(self, ground: Ground, pose: Odometry, reach: float) -> Points:
+        """Return the middles of cells within `reach` [m] in which something lasts, float64 (N, 2), odometry frame."""
+        x, y = self.index(ground, np.array([[pose.x, pose.y]]))[0][0].tolist()
+        side = int(reach / self.cell)
+        rows, columns = slice(max(x - side, 0), x + side + 1), slice(max(y - side, 0), y + side + 1)
+        lasts = (ground.occupied[rows, columns] > 0) & (ground.freed[rows, columns] < ground.stamp - self.lasts_s)
+        return self.middle_of(ground, np.argwhere(lasts) + np.array([rows.start, columns.start]))
 
     def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> NDArray[np.bool_]:
         """Return whether the cells of flat indices are occupied, bool of their shape; `lasting` as `is_blocked`."""

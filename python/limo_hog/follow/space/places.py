@@ -21,22 +21,13 @@ from limo_hog.follow.space.grid import Grid, Ground
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where the person may be.
+    """Where the person may be."""
 
-    Attributes
-    ----------
-    stamp
-        Time of the estimate [s].
-    points, velocities
-        float64 (N, 2) [m, m/s], odometry frame: each as likely as the others.
-    seed
-        Of the next step's random numbers.
-    """
-
-    stamp: float
+    stamp: float  #: Time of the estimate [s].
+    #: float64 (N, 2) [m, m/s], odometry frame: each as likely as the others.
     points: Points
     velocities: NDArray[np.float64]
-    seed: int = 0
+    seed: int = 0  #: Of the next step's random numbers.
 
 
 @dataclass(frozen=True, slots=True)

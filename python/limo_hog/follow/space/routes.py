@@ -18,15 +18,9 @@ _NEIGHBOURS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """How far it is to drive to each cell.
+    """How far it is to drive to each cell."""
 
-    Attributes
-    ----------
-    distance
-        float32 (N, N) [m]: inf where no way leads.
-    """
-
-    distance: NDArray[np.float32]
+    distance: NDArray[np.float32]  #: float32 (N, N) [m]: inf where no way leads.
 
 
 @dataclass(frozen=True, slots=True)

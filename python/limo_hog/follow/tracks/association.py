@@ -29,15 +29,7 @@ from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to
 
 @dataclass(frozen=True, slots=True)
 class Association:
-    """Pairs people with boxes.
-
-    Attributes
-    ----------
-    appearance
-        Compares clothes.
-    unknown
-        Distance assumed of a box without depth.
-    """
+    """Pairs people with boxes."""
 
     gate: float = param(18.0, "chi² of 2", "Squared Mahalanobis distance beyond which a box belongs to another track.")
     max_cost: float = param(24.0, "chi²", "Highest cost of a match.")
@@ -46,8 +38,8 @@ class Association:
     low: float = param(
         0.12, "window heights", "A box lower than this on the person shows trousers in the shirt's place."
     )
-    appearance: Appearance = field(default_factory=Appearance)
-    unknown: UnknownRange = field(default_factory=UnknownRange)
+    appearance: Appearance = field(default_factory=Appearance)  #: Compares clothes.
+    unknown: UnknownRange = field(default_factory=UnknownRange)  #: Distance assumed of a box without depth.
 
     def pair(
         self,
@@ -124,21 +116,11 @@ class Association:
 
 @dataclass(frozen=True, slots=True)
 class Returns:
-    """A scan's returns in the odometry frame.
+    """A scan's returns in the odometry frame."""
 
-    Attributes
-    ----------
-    stamp
-        Of the scan [s].
-    points
-        float64 (N, 2) [m].
-    pose
-        Where the robot was.
-    """
-
-    stamp: float
-    points: Points
-    pose: Odometry
+    stamp: float  #: Of the scan [s].
+    points: Points  #: float64 (N, 2) [m].
+    pose: Odometry  #: Where the robot was.
 
 
 @dataclass(frozen=True, slots=True)

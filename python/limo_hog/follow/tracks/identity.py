@@ -23,47 +23,25 @@ from limo_hog.follow.tracks.tracker import Tracks
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """What a person looks like.
+    """What a person looks like."""
 
-    Attributes
-    ----------
-    number
-        Of the track it was learnt from.
-    clothes
-        What is worn; None where no colour image tells.
-    window
-        Height of the detection window, times the distance [px m]: the stature.
-    boxes
-        Boxes it was learnt from [1].
-    """
-
-    number: int
-    clothes: Clothes | None
-    window: float
-    boxes: int = 1
+    number: int  #: Of the track it was learnt from.
+    clothes: Clothes | None  #: What is worn; None where no colour image tells.
+    window: float  #: Height of the detection window, times the distance [px m]: the stature.
+    boxes: int = 1  #: Boxes it was learnt from [1].
 
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """The person followed, and which track that is.
+    """The person followed, and which track that is."""
 
-    Attributes
-    ----------
-    traits
-        What the person looks like.
-    place, at
-        Where and when the person was last measured for sure: x, y [m] in the odometry frame, [s].
-    chances
-        Number and probability of each track; what is missing to 1 is the probability that none is the person.
-    others
-        What other people look like, who were about lately.
-    """
-
-    traits: Traits
+    traits: Traits  #: What the person looks like.
+    #: Where and when the person was last measured for sure: x, y [m] in the odometry frame, [s].
     place: tuple[float, float]
     at: float
+    #: Number and probability of each track; what is missing to 1 is the probability that none is the person.
     chances: tuple[tuple[int, float], ...]
-    others: tuple[Traits, ...] = ()
+    others: tuple[Traits, ...] = ()  #: What other people look like, who were about lately.
 
     def of(self, number: int) -> float:
         """Return the probability that a track is the person followed."""

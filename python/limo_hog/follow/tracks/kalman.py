@@ -37,21 +37,12 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """The estimate of one person's position and velocity.
+    """The estimate of one person's position and velocity."""
 
-    Attributes
-    ----------
-    stamp
-        Time of the estimate [s].
-    mean
-        x, y [m], vx, vy [m/s] in the odometry frame. Numbers: for four of them arrays cost several times as much.
-    covariance
-        Of `mean`.
-    """
-
-    stamp: float
+    stamp: float  #: Time of the estimate [s].
+    #: x, y [m], vx, vy [m/s] in the odometry frame. Numbers: for four of them arrays cost several times as much.
     mean: Mean
-    covariance: Covariance
+    covariance: Covariance  #: Of `mean`.
 
     @property
     def place(self) -> tuple[float, float]:
@@ -127,26 +118,16 @@ def rates(track: Track, pose: Odometry) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Innovation:
-    """A measurement of bearing and range compared with the prediction.
+    """A measurement of bearing and range compared with the prediction."""
 
-    Attributes
-    ----------
-    bearing, range
-        Measured less predicted [rad, m]; range None where only the bearing is measured.
-    by_bearing, by_range
-        How bearing and range change with x and y [rad/m, 1]; with the velocity they do not.
-    covariance
-        Of the two differences: bearing, both, range [rad², rad m, m²].
-    variances
-        Of the measurement alone: bearing, range [rad², m²].
-    """
-
+    #: Measured less predicted [rad, m]; range None where only the bearing is measured.
     bearing: float
     range: float | None
+    #: How bearing and range change with x and y [rad/m, 1]; with the velocity they do not.
     by_bearing: tuple[float, float]
     by_range: tuple[float, float]
-    covariance: tuple[float, float, float]
-    variances: tuple[float, float]
+    covariance: tuple[float, float, float]  #: Of the two differences: bearing, both, range [rad², rad m, m²].
+    variances: tuple[float, float]  #: Of the measurement alone: bearing, range [rad², m²].
 
     @property
     def distance2(self) -> float:

@@ -27,31 +27,18 @@ from limo_hog.follow.tracks.person import Person
 
 @dataclass(frozen=True, slots=True)
 class Mover:
-    """A group of returns that may be two legs.
+    """A group of returns that may be two legs."""
 
-    Attributes
-    ----------
-    track
-        Position and velocity.
-    began, since
-        Where it was first, x and y in the odometry frame [m], and when [s].
-    left
-        Whether that place was seen to be empty since.
-    felt
-        Stamp of the last scan that showed it [s].
-    scans, shown
-        How many did, and for how many of these the camera looked there and showed no person [1].
-    number, named
-        Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
-    """
-
-    track: Track
+    track: Track  #: Position and velocity.
+    #: Where it was first, x and y in the odometry frame [m], and when [s].
     began: tuple[float, float]
     since: float
-    felt: float
-    left: bool = False
+    felt: float  #: Stamp of the last scan that showed it [s].
+    left: bool = False  #: Whether that place was seen to be empty since.
+    #: How many did, and for how many of these the camera looked there and showed no person [1].
     scans: int = 1
     shown: int = 0
+    #: Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
     number: int | None = None
     named: float = math.inf
 
@@ -62,16 +49,10 @@ class Movers:
 
     The end of what is seen of a wall, where a corner or a person hides the rest, moves as well; what it has moved from
     is still wall. So a group moves only when the place where it began is empty.
-
-    Attributes
-    ----------
-    legs
-        How a group is found again: further off than a followed person's legs, since nothing else shows it. At 3.5 m two
-        shins are two beams.
-    robot
-        Where the lidar sits.
     """
 
+    #: How a group is found again: further off than a followed person's legs, since nothing else shows it. At 3.5 m two
+    #: shins are two beams.
     legs: Legs = field(default_factory=lambda: Legs(reach=3.5))
     gap: float = param(0.3, "m", "Returns further apart than this are of two groups.")
     beams: float = param(0.03, "rad", "A beam within this passes a place.")
@@ -83,7 +64,7 @@ class Movers:
     beside: float = param(0.4, "m", "A person is this far from their own legs at most.")
     taken: float = param(0.25, "m", "A person must be nearer by this to legs that were another's than to their own.")
     nearer: float = param(0.15, "m", "A box is on other legs than a person's own if it is nearer to them by this.")
-    robot: RobotGeometry = LIMO
+    robot: RobotGeometry = LIMO  #: Where the lidar sits.
 
     def update(
         self,

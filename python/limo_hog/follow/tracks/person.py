@@ -20,49 +20,26 @@ from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person, or something that looks like one.
+    """A person, or something that looks like one."""
 
-    Attributes
-    ----------
-    number
-        Identifies the person; never used twice.
-    track
-        Position and velocity.
-    seen, felt
-        Stamp of the last frame in which HOG found them, and of the last scan with their legs [s].
-    log_odds
-        Of being a person, by all frames in which one should have been found (`Existence`).
-    window, centre
-        Height of the detection window, and its middle below the image's, times the distance [px m].
-    confirmed
-        Whether the log-odds have been high enough, and not too low since.
-    age, misses
-        Frames in which the person should have been found, and those since they were.
-    clothes
-        What they wear; None while no colour image tells.
-    worn, tall
-        Clothes and window as the last box showed them; None where it did not.
-    strained
-        Whether the last box was not where the person was expected, or not of their size.
-    measured
-        Stamp of the last frame or scan that showed the person [s].
-    """
-
-    number: int
-    track: Track
-    seen: float
-    log_odds: float
+    number: int  #: Identifies the person; never used twice.
+    track: Track  #: Position and velocity.
+    seen: float  #: Stamp of the last frame in which HOG found them [s].
+    log_odds: float  #: Of being a person, by all frames in which one should have been found (`Existence`).
+    #: Height of the detection window, and its middle below the image's, times the distance [px m].
     window: float
     centre: float
-    confirmed: bool = False
+    confirmed: bool = False  #: Whether the log-odds have been high enough, and not too low since.
+    #: Frames in which the person should have been found, and those since they were.
     age: int = 1
     misses: int = 0
-    felt: float = -math.inf
-    clothes: Clothes | None = None
+    felt: float = -math.inf  #: Stamp of the last scan with their legs [s].
+    clothes: Clothes | None = None  #: What they wear; None while no colour image tells.
+    #: Clothes and window as the last box showed them; None where it did not.
     worn: Clothes | None = None
     tall: float | None = None
-    strained: bool = False
-    measured: float = field(init=False)
+    strained: bool = False  #: Whether the last box was not where the person was expected, or not of their size.
+    measured: float = field(init=False)  #: Stamp of the last frame or scan that showed the person [s].
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "measured", max(self.seen, self.felt))
@@ -122,15 +99,10 @@ def distance_to(person: Person, seen: Measurement, pose: Odometry) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """How often people were found, by the height of their window.
+    """How often people were found, by the height of their window."""
 
-    Attributes
-    ----------
-    found, expected
-        Frames in which a person was found, and in which one should have been, for each class of size; old frames count
-        less.
-    """
-
+    #: Frames in which a person was found, and in which one should have been, for each class of size; old frames count
+    #: less.
     found: tuple[float, ...] = ()
     expected: tuple[float, ...] = ()
 

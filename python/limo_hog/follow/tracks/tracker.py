@@ -23,34 +23,19 @@ from limo_hog.follow.tracks.person import Existence, Person, Recall, initiate, p
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """What is known about people and the robot's recent past.
+    """What is known about people and the robot's recent past."""
 
-    Attributes
-    ----------
-    people
-        Everyone tracked.
-    boxes
-        Number and index of the box of each person found in the last frame.
-    next_number
-        Number of the next new person.
-    poses, scans
-        Where the robot was and what the lidar hit lately, oldest first.
-    stamp, period
-        Stamp of the last frame, None before the first, and the time between the last two [s].
-    recall
-        How often people are found, as learnt so far.
-    movers, moved_at
-        What may move in the scan, whether the camera shows it or not, and the stamp of that scan [s].
-    """
-
-    people: tuple[Person, ...] = ()
-    boxes: tuple[tuple[int, int], ...] = ()
-    next_number: int = 1
+    people: tuple[Person, ...] = ()  #: Everyone tracked.
+    boxes: tuple[tuple[int, int], ...] = ()  #: Number and index of the box of each person found in the last frame.
+    next_number: int = 1  #: Number of the next new person.
+    #: Where the robot was and what the lidar hit lately, oldest first.
     poses: tuple[Odometry, ...] = ()
     scans: tuple[Returns, ...] = ()
+    #: Stamp of the last frame, None before the first, and the time between the last two [s].
     stamp: float | None = None
     period: float = 0.1
-    recall: Recall = field(default_factory=Recall)
+    recall: Recall = field(default_factory=Recall)  #: How often people are found, as learnt so far.
+    #: What may move in the scan, whether the camera shows it or not, and the stamp of that scan [s].
     movers: tuple[Mover, ...] = ()
     moved_at: float = -math.inf
 
@@ -69,16 +54,9 @@ class Tracks:
 
 @dataclass(frozen=True, slots=True)
 class Tracker:
-    """Keeps the tracks of all people.
+    """Keeps the tracks of all people."""
 
-    Attributes
-    ----------
-    noise, association, existence, legs, movers, visibility
-        The parts, each with its parameters.
-    robot
-        Where camera and lidar sit.
-    """
-
+    #: The parts, each with its parameters.
     noise: Noise = field(default_factory=Noise)
     association: Association = field(default_factory=Association)
     existence: Existence = field(default_factory=Existence)
@@ -104,7 +82,7 @@ class Tracker:
     walk: float = param(WALK, "m/s", "How fast people walk who are not measured.")
     min_period_s: float = param(0.02, "s", "Shortest time between two frames that is used to predict the next.")
     max_period_s: float = param(0.5, "s", "Longest time between two frames that is used to predict the next.")
-    robot: RobotGeometry = LIMO
+    robot: RobotGeometry = LIMO  #: Where camera and lidar sit.
 
     def update(self, observation: Observation, tracks: Tracks) -> tuple[Tracks, dict[int, int]]:
         """Bring all tracks up to a frame.

@@ -13,7 +13,7 @@ from limo_hog.follow.parameters import param
 class ChangeOfMind:
     """One for a command other than the one begun; back to the goal's own it is less."""
 
-    weight: float = param(0.15, "1", "What another command must gain.", 0, 100)
+    weight: float = param(0.1, "1", "What another command must gain.", 0, 100)
     direct: float = param(0.5, "1", "Share of it that the goal's own command must gain.", 0, 1)
 
     def cost(self, rollouts: Rollouts, _: Situation) -> Array:

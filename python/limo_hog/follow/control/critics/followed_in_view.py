@@ -13,15 +13,16 @@ from limo_hog.follow.parameters import param
 
 @dataclass(frozen=True, slots=True)
 class FollowedInView:
-    """Mean angle by which the person followed is off the middle of the image."""
+    """Mean angle of the person followed beyond `edge`, and a share of that off the middle."""
 
-    weight: float = param(1.5, "1/rad", "Cost of a radian.", 0, 100)
-    free: float = param(0.15, "rad", "So far to either side costs nothing.", 0, 2)
-    most: float = param(1.0, "rad", "Further off costs no more: out of the image is out of the image.", 0, 4)
+    weight: float = param(2.0, "1/rad", "Cost of a radian.", 0, 100)
+    edge: float = param(0.5, "rad", "Further to either side than this the camera does not show a whole person.", 0, 2)
+    share: float = param(0.1, "1", "Share that a radian off the middle counts for.", 0, 1)
+    most: float = param(1.5, "rad", "Further off costs no more: out of the image is out of the image.", 0, 4)
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [rad]."""
         if situation.followed is None or not rollouts.goal.faces:
             return rollouts.nothing
-        off = rollouts.offs_to(rollouts.places[:, situation.followed])
-        return np.asarray(np.minimum(np.maximum(off - self.free, 0.0), self.most).mean(axis=1))
+        off = np.minimum(rollouts.offs_to(rollouts.places[:, situation.followed]), self.most)
+        return np.asarray((self.share * off + np.maximum(off - self.edge, 0.0)).mean(axis=1))

@@ -15,7 +15,7 @@ from limo_hog.follow.parameters import param
 class GoalDistance:
     """Mean error of the distance to the goal's place, beyond that of the goal's own command if nothing held it."""
 
-    weight: float = param(1.0, "1/m", "Cost of a metre.", 0, 100)
+    weight: float = param(2.0, "1/m", "Cost of a metre.", 0, 100)
 
     def cost(self, rollouts: Rollouts, _: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [m]."""

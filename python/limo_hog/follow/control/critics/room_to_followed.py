@@ -13,10 +13,12 @@ from limo_hog.follow.parameters import param
 
 @dataclass(frozen=True, slots=True)
 class RoomToFollowed:
-    """Mean distance short of `clear` to the person followed; what is far off in time counts less."""
+    """Mean distance short of `clear` to the person followed, and more from where it would touch them."""
 
     weight: float = param(12.0, "1/m", "Cost of a metre.", 0, 100)
     clear: float = param(0.65, "m", "Distance wanted from the outline to the person's axis.", 0, 3)
+    touches: float = param(0.2, "m", "Nearer than this is taken for a contact.", 0, 1)
+    contact: float = param(3.0, "m", "What a contact costs besides.", 0, 100)
     fades_s: float = param(2.5, "s", "Time constant with which the future counts less.", 0.1, 60)
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
@@ -24,5 +26,6 @@ class RoomToFollowed:
         if situation.followed is None:
             return rollouts.nothing
         own = rollouts.places[:, situation.followed, None]
-        short = np.maximum(self.clear - rollouts.gaps(own, situation.robot)[..., 0], 0.0)
+        gap = rollouts.gaps(own, situation.robot)[..., 0]
+        short = np.maximum(self.clear - gap, 0.0) + self.contact * np.logical_or.accumulate(gap < self.touches, axis=1)
         return np.asarray((short * np.exp(-rollouts.times / self.fades_s)).mean(axis=1))

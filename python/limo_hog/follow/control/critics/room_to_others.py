@@ -13,13 +13,13 @@ from limo_hog.follow.parameters import param
 
 @dataclass(frozen=True, slots=True)
 class RoomToOthers:
-    """Mean distance short of `clear` to the nearest of the others, and more where it would touch them.
+    """Mean distance short of `clear` to the nearest of the others, and more from where it would touch them.
 
     A robot that takes people never to give way finds no way among them and freezes (Trautman and Krause 2010).
     """
 
     weight: float = param(12.0, "1/m", "Cost of a metre.", 0, 100)
-    clear: float = param(0.4, "m", "Distance wanted from the outline to a person's axis.", 0, 3)
+    clear: float = param(0.35, "m", "Distance wanted from the outline to a person's axis.", 0, 3)
     touches: float = param(0.2, "m", "Nearer than this is taken for a contact.", 0, 1)
     contact: float = param(3.0, "m", "What a contact costs besides.", 0, 100)
     fades_s: float = param(1.2, "s", "Time constant with which the future counts less.", 0.1, 60)
@@ -31,5 +31,5 @@ class RoomToOthers:
         if others.shape[1] == 0:
             return rollouts.nothing
         gap = rollouts.gaps(others, situation.robot).min(axis=2)
-        short = np.maximum(self.clear - gap, 0.0) + self.contact * (gap < self.touches)
+        short = np.maximum(self.clear - gap, 0.0) + self.contact * np.logical_or.accumulate(gap < self.touches, axis=1)
         return np.asarray((short * np.exp(-rollouts.times / self.fades_s)).mean(axis=1))

@@ -1,4 +1,4 @@
-"""The robot backs onto ground that was seen to be free and that nobody can have come to since: it cannot look there."""
+"""The robot does not back onto ground to which somebody out of sight can have come since it was seen to be free."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from limo_hog.follow.parameters import param
 
 @dataclass(frozen=True, slots=True)
 class UnseenGround:
-    """Share of the time in which the robot backs onto ground that is not known, or where somebody can be."""
+    """Share of the time in which the robot backs onto ground where somebody can be; the near future counts most."""
 
     weight: float = param(6.0, "1", "Cost of backing so all the time.", 0, 100)
-    blind_speed: float = param(0.2, "m/s", "So fast it may back where nobody can be.", 0, 1)
     stands: float = param(0.02, "m/s", "A slower robot stands.", 0, 1)
+    fades_s: float = param(1.2, "s", "Time constant with which the future counts less.", 0.1, 60)
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [1]."""
         cost, backs = rollouts.nothing, np.flatnonzero(rollouts.speeds.min(axis=1) < -self.stands)
-        if len(backs):
-            speeds = rollouts.speeds[backs, ::2]
-            known, risky = situation.is_known_behind(rollouts.poses[backs, ::2])
-            blind = (~known & (speeds < -self.blind_speed - self.stands)) | (risky & (speeds < -self.stands))
-            cost[backs] = blind.mean(axis=1)
+        if len(backs) and len(situation.hiding):
+            _, risky = situation.is_known_behind(rollouts.poses[backs, ::2])
+            onto = risky & (rollouts.speeds[backs, ::2] < -self.stands)
+            cost[backs] = (onto * np.exp(-rollouts.times[::2] / self.fades_s)).mean(axis=1)
         return cost

@@ -15,10 +15,10 @@ from limo_hog.follow.parameters import param
 class Walls:
     """Mean distance short of `clear` from the robot's centre to the nearest return, and more where it would touch."""
 
-    weight: float = param(6.0, "1/m", "Cost of a metre.", 0, 100)
-    clear: float = param(0.3, "m", "Distance wanted from the robot's centre.", 0, 3)
+    weight: float = param(3.0, "1/m", "Cost of a metre.", 0, 100)
+    clear: float = param(0.45, "m", "Distance wanted from the robot's centre.", 0, 3)
     touches: float = param(0.2, "m", "Nearer than this a corner of the robot may touch it.", 0, 1)
-    contact: float = param(2.0, "m", "What that costs besides.", 0, 100)
+    contact: float = param(10.0, "m", "What that costs besides.", 0, 100)
     near: float = param(2.5, "m", "Returns further off than this are not looked at.", 0, 10)
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:

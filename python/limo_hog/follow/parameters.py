@@ -7,16 +7,9 @@ from typing import Any
 
 
 def param(default: Any, unit: str, meaning: str, low: float | None = None, high: float | None = None) -> Any:
-    """Return a dataclass field with a default.
+    """Return a dataclass field with a default, its unit, "1" for none, and its meaning in a sentence.
 
-    Parameters
-    ----------
-    unit
-        Its unit; "1" for none.
-    meaning
-        What it does, in a sentence.
-    low, high
-        Where it may be set while the controller drives: its bounds, both included.
+    With `low` and `high`, both included, it may be set while the controller drives.
     """
     about: dict[str, Any] = {"unit": "" if unit == "1" else unit, "tooltip": meaning}
     return dataclasses.field(default=default, metadata=about if high is None else about | {"low": low, "high": high})

@@ -54,14 +54,10 @@ class Periods:
         self._last: object = None
 
     def begins(self, now: float, frame: object) -> tuple[bool, bool]:
-        """Return whether a control period begins now, and whether it has a new camera image.
+        """Return whether a control period begins `now` [s], on the robot's own clock, and whether with a new image.
 
-        Parameters
-        ----------
-        now
-            Time on the robot's own clock [s]; one that was set back begins a period.
-        frame
-            The newest camera image: new if it is another object than the last. None without one.
+        A clock that was set back begins one. `frame` is the newest camera image: new if it is another object than the
+        last.
         """
         new = frame is not None and frame is not self._last
         if not new and self._began is not None and 0 <= now - self._began <= CONTROL_PERIOD - _SLACK:
@@ -118,15 +114,8 @@ class Follower(Generic[S]):
     def tick(self, now: float, frame: Frame | None, sensors: Sensors) -> FrameLog | None:
         """Decide what to do now; None while the last control period lasts.
 
-        Parameters
-        ----------
-        now
-            Time on the robot's own clock [s], which only goes on: ages are counted on it, whatever the stamps say.
-        frame
-            The newest camera image: a new one is searched for people, without one the last command is checked against
-            the newest scan. None without any.
-        sensors
-            The newest readings of the other sensors.
+        `now` is on the robot's own clock [s], which only goes on: ages are counted on it, whatever the stamps say. A
+        new camera image is searched for people; without one the last command is checked against the newest scan.
         """
         begins, new = self._periods.begins(now, frame)
         if not begins:

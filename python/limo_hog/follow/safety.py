@@ -62,25 +62,15 @@ class Guard(Generic[S]):
 
     controller: Controller[S]  #: Whose commands are limited.
     margin: Margin = field(default_factory=Margin)  #: Ground kept free ahead of the robot's outline, and behind it.
-    reaction_s: float = param(
-        0.25, "s", "Time from an obstacle's appearance to braking: a scan's period, a command's, and computing."
-    )
+    reaction_s: float = param(0.25, "s", "From an obstacle's appearance to braking: periods of scan and command.")
     depth_reach: float = param(1.0, "m", "Depth further than this from the margin's end is not looked at.")
-    memory_s: float = param(
-        60.0, "s", "How long returns near the robot, and ground seen to be free, count for the way back."
-    )
+    memory_s: float = param(60.0, "s", "How long what was seen behind counts for the way back.")
     memory_radius: float = param(1.5, "m", "Returns count for the way back if they were this near.")
-    look_every_s: float = param(
-        0.5, "s", "A scan is kept for the ground it shows to be free when the last one kept is so old."
-    )
+    look_every_s: float = param(0.5, "s", "How often a scan is kept for the ground it shows to be free.")
     unseen_speed: float = param(0.2, "m/s", "Highest speed backwards onto other ground.")
-    max_backward: float = param(
-        0.6, "m/s", "Highest speed backwards: what has come up from behind is in no sensor's field of view."
-    )
+    max_backward: float = param(0.6, "m/s", "Highest speed backwards: no sensor looks there.")
     max_blind: float = param(0.2, "m/s", "Highest speed without a lidar, and none backwards.")
-    max_age_s: float = param(
-        0.5, "s", "The robot stops when a sense brings nothing new for this time, or is so late by its stamp."
-    )
+    max_age_s: float = param(0.5, "s", "The robot stops when a sense brings nothing new for this time.")
     max_late_s: float = param(1.0, "s", "The same for a camera frame's stamp.")
     #: The robot has none: it drives by the depth image alone, slowly. Without depth or odometry no robot drives.
     without_lidar: bool = False
@@ -243,12 +233,7 @@ class Guard(Generic[S]):
 def find_fault(observation: Observation, last_stamp: float | None) -> str:
     """Return what is wrong with an observation, in one line; "" if nothing is.
 
-    Parameters
-    ----------
-    observation
-        The sensors' readings and the detections.
-    last_stamp
-        Stamp of the observation before [s]; None for the first.
+    `last_stamp` is that of the observation before [s]; None for the first.
     """
     if observation.fault:
         return observation.fault

@@ -39,7 +39,9 @@ def keeps(one: Person, late: float = 0.0, **known: Any) -> float | None:
         (0.7, 1.0, 1.5),
         (1.0, 1.0, 2.0),
         (1.5, 4.0, 1.5 * (0.1 + 0.95)),
-        (1.0, 0.25, 0.1 + 3.8),
+        (1.0, 0.49, 0.1 + 1.9 / 0.7),
+        # Never so far that HOG finds nobody.
+        (1.0, 0.25, 3.0),
     ],
 )
 def test_it_keeps_off_a_person_by_their_way_in_the_time_it_needs(
@@ -115,6 +117,13 @@ def test_the_command_is_what_the_wheels_reach_in_a_period_and_a_half() -> None:
     after = step(1, someone(1, 4.0))
     assert after.twist == after.state.sent
     assert after.twist.linear == pytest.approx(0.15)
+
+
+def test_a_decision_carries_its_rollout_and_what_each_critic_adds() -> None:
+    belief = step(1, someone(1, 4.0)).belief
+    assert len(belief.rollout) == CONTROLLER.planner.sampling.steps
+    assert belief.rollout[-1][0] > 0.5
+    assert dict(belief.shares).keys() >= {"goal_distance", "followed", "change_of_mind"}
 
 
 def test_others_are_kept_in_mind_and_the_person_followed_is_none() -> None:

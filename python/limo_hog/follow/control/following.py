@@ -55,6 +55,7 @@ class Following:
     waits_s: float = param(2.0, "s", "How long to face the predicted place before the person is looked for.", 0, 30)
     doubt_speed: float = param(0.5, "1", "Share of `max_speed` at which to drive to who may be a person.", 0, 1)
     headway_s: float = param(1.9, "s", "A person who walks fast is kept off by this part of their way.", 0, 5)
+    most_headway: float = param(3.0, "m", "But no further: further off HOG soon finds nobody.", 0.5, 8)
     rise: float = param(0.15, "1", "Share by which a faster frame moves the speed they are known to walk at.", 0, 1)
     fall: float = param(0.0015, "1", "Share by which a slower frame moves it.", 0, 1)
     prompt_s: float = param(0.1, "s", "An image this late costs no distance.", 0, 5)
@@ -70,18 +71,13 @@ class Following:
     def keeps(self, asked: float, least: float, brisk: float, soon: tuple[float, float], situation: Situation) -> float:
         """Return the distance to hold from the camera [m]: as asked, but none from which a person is cut off.
 
-        Parameters
-        ----------
-        asked, least
-            Distance asked for, and that from which the camera shows all of the person [m].
-        brisk
-            How fast the person walks at most [m/s].
-        soon
-            Where the person will be after `foresight_s`, odometry frame [m].
+        From `least` [m] the camera shows all of the person, who walks at most at `brisk` [m/s] and will be at the place
+        `soon` after `foresight_s`, odometry frame [m].
         """
         late_s = situation.late_s
         least += 2 * brisk * max(late_s - self.prompt_s, 0.0)
-        keeps = max(asked, least, (late_s + self.headway_s / math.sqrt(situation.acceleration)) * brisk)
+        headway = (late_s + self.headway_s / math.sqrt(situation.acceleration)) * brisk
+        keeps = max(asked, least, min(headway, self.most_headway))
         return self.near_hiding if keeps > self.near_hiding and situation.is_behind(soon) else keeps
 
     def learnt(self, brisk: float, speed: float) -> float:

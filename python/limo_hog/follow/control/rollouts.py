@@ -75,7 +75,7 @@ class Sampling:
     """
 
     offsets: tuple[float, ...] = param(
-        (0.08, 0.18, 0.3, 0.44, 0.6, 0.8, 1.1, 1.6), "rad", "Directions compared, to either side of the goal's."
+        (0.08, 0.18, 0.3, 0.44, 0.6, 0.8, 1.1, 1.6), "rad", "Compared, to either side of the goal."
     )
     speeds: tuple[float, ...] = param((-0.6, 0.0, 0.3, 0.7), "m/s", "Speeds compared with the goal's own.")
     steps: int = param(15, "1", "Steps of a rollout.")

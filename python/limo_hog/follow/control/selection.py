@@ -40,21 +40,13 @@ class Choice:
 class Selection:
     """Chooses the person to follow."""
 
-    min_existence: float = param(
-        0.4, "1", "Probability from which somebody too far away for HOG is worth driving nearer, and waiting for.", 0, 1
-    )
-    max_unconfirmed_frames: int = param(
-        30, "1", "A track that is not confirmed after so many frames, and less likely, is given up.", 1, 1000
-    )
+    min_existence: float = param(0.4, "1", "From here somebody too far away for HOG is worth driving to.", 0, 1)
+    max_unconfirmed_frames: int = param(30, "1", "Unconfirmed tracks are given up after so many frames.", 1, 1000)
     reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
     lead: float = param(0.1, "1", "Probability by which another must exceed the track that is faced already.", 0, 1)
-    aside: float = param(
-        0.6, "1/rad", "What a person is less likely to be meant for each radian off straight ahead.", 0, 5
-    )
+    aside: float = param(0.6, "1/rad", "A person is this less likely to be meant for each radian aside.", 0, 5)
     further: float = param(0.1, "1/m", "The same for each metre of distance.", 0, 5)
-    likely: float = param(
-        0.5, "1", "Probability of being the person followed from which a track in view is followed.", 0, 1
-    )
+    likely: float = param(0.5, "1", "Probability from which a track in view is followed.", 0, 1)
     odds: float = param(3.0, "1", "And it must be this many times as likely as any other in view.", 1, 100)
     possible: float = param(0.1, "1", "A track in view that is less likely than this is another person.", 0, 1)
     decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)

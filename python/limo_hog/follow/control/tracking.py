@@ -88,7 +88,8 @@ class TrackingController:
         region = self._region(person, state, observation) if person and in_view else None
         since_full = 0 if region is None else state.since_full + 1
         state = replace(state, kept=plan.manoeuvre, sent=twist, since_full=since_full)
-        belief = replace(belief, people=believed(state, observation.now, self.tracker.noise))
+        people, leads = believed(state, observation.now, self.tracker.noise), tuple(map(tuple, plan.rollout.tolist()))
+        belief = replace(belief, people=people, rollout=leads, shares=plan.shares)
         return Decision(twist, state, mode, reason, target, region, belief)
 
     def _estimate(self, observation: Observation, state: TrackingState) -> TrackingState:

@@ -21,14 +21,9 @@ class Wheels:
     reserve: float = param(1.5, "1", "A command may ask for this much of what the wheels reach before the next.")
 
     def learn(self, believed: float, sent: Twist, before: Odometry, after: Odometry, robot: RobotGeometry) -> float:
-        """Return the wheels' acceleration [m/s²] after one more period.
+        """Return the wheels' acceleration [m/s²] after one more period, `believed` before it.
 
-        Parameters
-        ----------
-        believed
-            As learnt so far [m/s²].
-        sent
-            The command between the two readings of the wheels, `before` and `after`.
+        `sent` was the command between the two readings of the wheels, `before` and `after`.
         """
         seconds = after.stamp - before.stamp
         if seconds <= 0:

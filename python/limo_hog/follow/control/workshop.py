@@ -20,9 +20,7 @@ class ApproachController:
     The state is whether a person was detected before. The numbers are the workshop's.
     """
 
-    angular_gain: float = param(
-        0.005, "rad/s/px", "Turn rate for each pixel between the box and the middle of the image.", 0, 0.05
-    )
+    angular_gain: float = param(0.005, "rad/s/px", "Turn rate for each pixel off the middle.", 0, 0.05)
     dead_band_px: float = param(20.0, "px", "Errors smaller than this do not turn the robot.", 0, 320)
     linear_speed: float = param(0.2, "m/s", "Speed towards a person.", 0, 1)
 

@@ -40,10 +40,7 @@ class Arrivals:
     def disagreement(self, max_age: float, max_late: float) -> str:
         """Return which sense's stamps do not fit the others'; "" if all do.
 
-        Parameters
-        ----------
-        max_age, max_late
-            How late a reading may be when it comes [s], and an image.
+        A reading may be `max_age` [s] late when it comes, an image `max_late` [s].
         """
         # A depth image has its camera frame's stamp. What the others' clocks showed when the last reading came:
         now = max((came for _, came in self.newest.values()), default=0.0)

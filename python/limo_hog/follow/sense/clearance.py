@@ -133,8 +133,8 @@ def room_behind(points: Points, margin: Margin, robot: RobotGeometry) -> float:
 def speed_within(room: float, braking: float, reaction: float) -> float:
     """Return the highest speed [m/s] that still stops within `room` [m].
 
-    The robot drives on for `reaction` [s] before it brakes with `braking` [m/s²]: the v that solves
-    v·reaction + v²/(2·braking) = room.
+    The robot drives on for `reaction` [s] before it brakes with `braking` [m/s²]: the v that solves v·reaction +
+    v²/(2·braking) = room.
     """
     if room <= 0:
         return 0.0
@@ -176,14 +176,8 @@ class Look:
 def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry) -> float:
     """Return how far behind the robot's outline the ground was seen to be free [m]; `FARTHEST_BEHIND` at most.
 
-    Parameters
-    ----------
-    looks
-        Scans of the last seconds. Ground that the robot covered when one was taken was free as well.
-    pose
-        Where the robot is now.
-    robot
-        Its outline and mounts.
+    `looks` are the scans of the last seconds, `pose` is where the robot is now. Ground that the robot covered when a
+    scan was taken was free as well.
     """
     if not looks:
         return 0.0

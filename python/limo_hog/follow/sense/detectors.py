@@ -138,9 +138,9 @@ class Cv2Detector:
 class OnnxDetector:
     """A network from a file, run by `cv2.dnn`.
 
-    The network takes float32 (1, 3, size, size), RGB in 0..1, and gives (1, 4 + classes, N): centre x, centre y,
-    width, height [px of its input] and a score in 0..1 for each class, people first: what YOLOv8 exports. The image
-    is made to fit at its own aspect, grey below or beside it.
+    The network takes float32 (1, 3, size, size), RGB in 0..1, and gives (1, 4 + classes, N): centre x, centre y, width,
+    height [px of its input] and a score in 0..1 for each class, people first: what YOLOv8 exports. The image is made to
+    fit at its own aspect, grey below or beside it.
     """
 
     path: Path  #: The ONNX file.
@@ -227,18 +227,8 @@ class RegionSize:
     ) -> Region | None:
         """Return where to look for a person expected at a bearing [rad] and a distance [m] from the camera.
 
-        Parameters
-        ----------
-        window
-            Height of the detection window times the distance [px m].
-        centre
-            Middle of the window below the image's middle, times the distance [px m]; above is negative.
-        focal_px, width, height
-            The camera's focal length and image size [px].
-
-        Returns
-        -------
-        None where the expected place is not in the image, or the region would be most of it.
+        `window` is the height of the detection window and `centre` its middle below the image's, times the distance [px
+        m]; the rest is the camera's [px]. None where that is not in the image, or would be most of it.
         """
         if abs(bearing) > self.widest or distance < self.nearest:
             return None

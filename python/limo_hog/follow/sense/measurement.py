@@ -85,17 +85,9 @@ def box_centre(box: NDArray[np.int32]) -> tuple[int, int]:
 def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int = 20) -> float | None:
     """Return how far away the person in a box is [m]; None where the camera does not know.
 
-    The median of the valid depths in a square at the centre of the box: pixels that see past the person, or nothing,
-    do not change it as long as they are less than half.
-
-    Parameters
-    ----------
-    depth
-        float32 (H, W) [m], not finite or <= 0 where unknown.
-    box
-        int32 (4,): x, y, w, h [px].
-    side
-        Side of the square [px]; the workshop's is 20.
+    The median of the valid depths in a square of `side` [px] at the box's centre: pixels that see past the person, or
+    nothing, do not change it as long as they are less than half. `depth` is float32 (H, W) [m], not finite or <= 0
+    where unknown, `box` int32 (4,): x, y, w, h [px]; the workshop's side is 20.
     """
     x, y = box_centre(box)
     half = side // 2
@@ -134,16 +126,7 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
 
     The inverse depth of a plane is linear in the image, so the plane through the strips left and right of the person
     has, in the middle between them, the mean of their inverse depths. A picture on a wall is in that plane, seen from
-    whatever side: 0.
-
-    Parameters
-    ----------
-    depth
-        float32 (H, W) [m], not finite or <= 0 where unknown.
-    box
-        int32 (4,): x, y, w, h [px].
-    strips
-        Where to look.
+    whatever side: 0. `depth` is float32 (H, W) [m], `box` int32 (4,): x, y, w, h [px].
     """
     x, y, w, h = box.tolist()
     band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
@@ -178,16 +161,7 @@ OUTLINE = Outline()
 def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, outline: Outline = OUTLINE) -> int:
     """Return the highest image row [px] of the person in a box; 0 where they reach the image's edge or beyond.
 
-    Parameters
-    ----------
-    depth
-        float32 (H, W) [m], not finite or <= 0 where unknown.
-    box
-        int32 (4,): x, y, w, h [px].
-    person
-        Depth of the person [m].
-    outline
-        How to follow the outline.
+    `depth` is float32 (H, W) [m], `box` int32 (4,): x, y, w, h [px], `person` the depth of the person [m].
     """
     column, row = box_centre(box)
     half = max(round(outline.half_width * int(box[2])), outline.least_half_px)
@@ -211,23 +185,14 @@ class Visibility:
     smallest_window: float = param(128, "px", "Height of the model's window, and so of the smallest person's.")
     near: float = param(1.7, "m", "Nearer than this a person is often missed, and boxes are on parts of the body.")
     widest: float = param(1.2, "rad", "Larger bearings are out of any image.")
-    shown: float = param(
-        0.48, "window heights", "Part of half a window, above and below its middle, that must be in the image."
-    )
-    cut: float = param(
-        0.06, "window heights", "Share of the window that may be above the image where a distance is chosen."
-    )
+    shown: float = param(0.48, "window heights", "Part of each half of a window that must be shown.")
+    cut: float = param(0.06, "window heights", "Share that a kept distance may cut off at the top.")
     occluder: float = param(0.5, "m", "Something nearer than the person by more than this hides them.")
 
     def least_distance(self, window: float, centre: float, image_height: int) -> float:
         """Return how near a person may be with their window in the image, but for `cut` of it [m].
 
-        Parameters
-        ----------
-        window, centre
-            Height of the detection window, and its middle below the image's, times the distance [px m].
-        image_height
-            Of the camera [px].
+        `window` and `centre` are those of `Person`, `image_height` is the camera's [px].
         """
         return ((0.5 - self.cut) * window - centre) / (image_height / 2)
 
@@ -236,17 +201,9 @@ class Visibility:
     ) -> bool:
         """Whether a person's whole window should be in the part of the image that was searched.
 
-        Parameters
-        ----------
-        bearing, distance
-            Of the person, from the robot's centre [rad, m].
-        window, centre
-            Height of the detection window, and its middle below the image's, times the distance [px m].
-        observation
-            The image that was searched, with its depth.
-        confirmed
-            Whether the track is known to be a person. Near by, the head and the space HOG wants above it are out of
-            the image: that excuses a miss of a person, and not of a track that has yet to prove itself.
+        The person is at a bearing [rad] and a distance [m] from the robot's centre; `window` and `centre` as in
+        `Person`. Near by, the head and the space HOG wants above it are out of the image: that excuses a miss of a
+        `confirmed` person, and not of a track that has yet to prove itself.
         """
         if abs(bearing) > self.widest:
             return False

@@ -157,8 +157,8 @@ def observed(
 def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
     """Return the robot's pose at `stamp` [s].
 
-    Interpolated between the two nearest of `poses`, which are oldest first. Before the first the robot is taken to
-    have stood; after the last its speeds are taken to have lasted.
+    Interpolated between the two nearest of `poses`, which are oldest first. Before the first the robot is taken to have
+    stood; after the last its speeds are taken to have lasted.
     """
     if not poses:
         return Odometry(stamp)
@@ -186,9 +186,7 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
 class ColourSampling:
     """Where in a detection window the clothes are, and how much their colours vary."""
 
-    chest: tuple[float, float] = param(
-        (0.35, 0.07), "window heights", "Middle and half height of the patch on the shirt."
-    )
+    chest: tuple[float, float] = param((0.35, 0.07), "window heights", "Middle and half height of the shirt's patch.")
     hips: tuple[float, float] = param((0.54, 0.03), "window heights", "The same on the trousers.")
     half_width: float = param(0.04, "window heights", "Half the width of the patches.")
     dark: float = param(8.0, "of 255", "Added to each channel: the hue of black cloth is not the hue of noise.")
@@ -200,20 +198,9 @@ class ColourSampling:
 def clothes_in(
     image: NDArray[np.uint8], boxes: NDArray[np.int32], sampling: ColourSampling | None = None
 ) -> NDArray[np.float64]:
-    """Return what the person in each box wears.
+    """Return what the person in each box wears, float64 (N, 2, 3); NaN where that is out of the image.
 
-    Parameters
-    ----------
-    image
-        uint8 (H, W, 3), BGR, or (H, W), in which all clothes are gray.
-    boxes
-        int32 (N, 4): x, y, w, h of detection windows [px].
-    sampling
-        Where to look.
-
-    Returns
-    -------
-    float64 (N, 2, 3): `Clothes` of each; NaN where they are out of the image.
+    `image` is uint8 (H, W, 3), BGR, or (H, W), in which all clothes are gray; `boxes` are windows int32 (N, 4) [px].
     """
     sampling = sampling or ColourSampling()
     worn: NDArray[np.float64] = np.full((len(boxes), 2, 3), np.nan)

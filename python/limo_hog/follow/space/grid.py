@@ -70,20 +70,10 @@ class Grid:
         depth_points: Points,
         robot: RobotGeometry = LIMO,
     ) -> Ground:
-        """Enter a scan.
+        """Enter a scan, taken at `pose`, into what was known: None before the first.
 
-        Parameters
-        ----------
-        ground
-            What was known; None before the first scan.
-        scan, pose
-            The scan, and where the robot was at its stamp.
-        people
-            float64 (N, 2) [m], odometry frame: tracked people, who are not part of the ground.
-        depth_points
-            float64 (N, 2) [m], odometry frame: what the depth image shows above the floor; it fills cells only.
-        robot
-            Where the lidar sits.
+        `people` and `depth_points` are float64 (N, 2) [m], odometry frame: people who are tracked are no part of the
+        ground; what the depth image shows above the floor fills cells and clears none.
         """
         ground = self._moved(ground or self.start(pose), pose)
         ranges = scan.ranges.astype(np.float64)

@@ -84,16 +84,8 @@ class Wandering:
     ) -> Places | None:
         """Remove places where the person was not found, in favour of the others; None where no place is left.
 
-        Parameters
-        ----------
-        places
-            Where the person may be.
-        scan, pose
-            The newest scan; where the robot was. Nobody is where its beams pass.
-        shown
-            bool (N,): the places that the camera shows, without a person in them.
-        robot
-            Where the lidar sits.
+        Nobody is where the beams of the newest scan, taken at `pose`, pass; `shown`, bool (N,), are the places that the
+        camera shows, without a person in them.
         """
         random = np.random.default_rng([places.seed, 2])
         kept = ~self.looked_through(places.points, scan, pose, robot)

@@ -35,9 +35,7 @@ class Association:
     max_cost: float = param(24.0, "chi²", "Highest cost of a match.")
     same_place: float = param(0.5, "m", "Boxes and people nearer than this to each other are the same person.")
     size_tolerance: float = param(0.35, "1", "Share by which height times range may differ from the known window.")
-    low: float = param(
-        0.12, "window heights", "A box lower than this on the person shows trousers in the shirt's place."
-    )
+    low: float = param(0.12, "window heights", "Lower boxes show trousers in the shirt's place.")
     appearance: Appearance = field(default_factory=Appearance)  #: Compares clothes.
     unknown: UnknownRange = field(default_factory=UnknownRange)  #: Distance assumed of a box without depth.
 

@@ -33,18 +33,10 @@ class Hiding:
     def remember(
         self, others: tuple[Other, ...], seen: Points, felt: Points, followed: Points, now: float
     ) -> tuple[Other, ...]:
-        """Bring the other people up to `now` [s]; places are in the odometry frame.
+        """Bring the other people up to `now` [s]; all places are float64 (N, 2) [m], odometry frame.
 
-        Parameters
-        ----------
-        others
-            Those remembered.
-        seen
-            float64 (N, 2) [m]: where others are measured now.
-        felt
-            float64 (M, 2) [m]: what the scan shows now that may be legs: of those remembered, not of more.
-        followed
-            float64 (1, 2) [m]: where the person followed is, who may have been taken for another; (0, 2) if unknown.
+        `seen` is where others are measured now, `felt` what the scan shows that may be the legs of those remembered,
+        and `followed` where the person followed is, who may have been taken for another: none if that is unknown.
         """
         # Of a few places, lists are faster than arrays.
         own, legs = followed.tolist(), felt.tolist()

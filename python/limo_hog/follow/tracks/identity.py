@@ -53,9 +53,7 @@ class Identity:
     """Moves the probabilities from frame to frame."""
 
     sure: float = param(0.95, "1", "From this probability on the person's place, clothes and stature are learnt.")
-    strange_shirt: float = param(
-        0.1, "1", "How likely another wears just this shirt, in parts of how likely the person does."
-    )
+    strange_shirt: float = param(0.1, "1", "How likely another is to wear just this shirt.")
     strange_trousers: float = param(0.5, "1", "The same of the trousers.")
     odd_shirt: float = param(0.1, "1", "Share of boxes that show something else in the shirt's place.")
     odd_trousers: float = param(0.3, "1", "The same of the trousers.")
@@ -70,9 +68,7 @@ class Identity:
     strained: float = param(0.1, "1", "The same where its place or size contradicts the track.")
     legs_s: float = param(1.0, "s", "Legs that are the same for this time, with nobody's near, are the same person's.")
     legs_apart: float = param(0.4, "m", "Other legs nearer than this may have changed places with them.")
-    fades_s: float = param(
-        2.0, "s", "Time constant with which a track that is not measured stops to be where the person is."
-    )
+    fades_s: float = param(2.0, "s", "Time constant with which an unmeasured track loses the person.")
     meets: float = param(0.5, "m", "Two tracks nearer than this to each other may swap their people.")
     swaps: float = param(0.2, "1/m", "Chance of a swap for each metre by which they pass each other.")
     unseen_s: float = param(0.3, "s", "A person not measured for longer may be a track that begins.")

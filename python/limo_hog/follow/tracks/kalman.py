@@ -141,8 +141,8 @@ class Innovation:
     def log_volume_ratio(self) -> float:
         """Logarithm of det(covariance) over the measurement's own: 0 for a certain prediction.
 
-        A track that has not been measured for long has a large gate and would match any measurement; this is the
-        term of the log-likelihood that penalises it.
+        A track that has not been measured for long has a large gate and would match any measurement; this is the term
+        of the log-likelihood that penalises it.
         """
         (a, b, d), (of_bearing, of_range) = self.covariance, self.variances
         if self.range is None:

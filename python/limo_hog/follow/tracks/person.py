@@ -129,19 +129,12 @@ class Existence:
     recall_memory: float = param(0.99, "1", "Share of what was learnt that is kept from frame to frame.")
     least_recall: float = param(0.2, "1", "Lower limit of the recall that is believed.")
     most_recall: float = param(0.98, "1", "Upper limit of the recall that is believed.")
-    run_of_misses: float = param(
-        1e-3, "1", "Misses in a row less likely than this are no chance: the person is not there."
-    )
+    run_of_misses: float = param(1e-3, "1", "Misses in a row less likely than this are no chance.")
 
     def of_box(self, seen: Measurement, recall: float) -> float:
         """Return how much a box adds to the log-odds; negative for one that is more likely on something else.
 
-        Parameters
-        ----------
-        seen
-            The box.
-        recall
-            Share of frames in which a person of this size is found [1].
+        `recall` is the share of frames in which a person of this size is found.
         """
         if not self.is_solid(seen):
             return -self.least

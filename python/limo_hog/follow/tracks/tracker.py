@@ -66,15 +66,9 @@ class Tracker:
     forget_s: float = param(8.0, "s", "An unmeasured person is forgotten after this time.")
     legs_only_s: float = param(4.0, "s", "A person is followed for this time by legs alone that do not walk.")
     restart_s: float = param(1.0, "s", "A person measured again after this time has a new track.")
-    size_rate: float = param(
-        0.2, "1", "Share by which one box moves a person's known size, and their clothes until confirmed."
-    )
-    turn_speed: float = param(
-        1.0, "m/s", "Standard deviation added to each velocity of a person whose box is outside the gate."
-    )
-    astray: float = param(
-        0.25, "m", "A box whose range differs by more may be on another, who passes before the person."
-    )
+    size_rate: float = param(0.2, "1", "Share by which one box moves a person's size, and clothes at first.")
+    turn_speed: float = param(1.0, "m/s", "Added to the velocity's deviation by a box outside the gate.")
+    astray: float = param(0.25, "m", "A box whose range differs by more may be on another person.")
     stature_from: float = param(1.4, "m", "From nearer the outline's top is no measure of the stature.")
     poses_s: float = param(2.0, "s", "How long odometry is kept: a camera image may be as late as this.")
     scans_s: float = param(1.0, "s", "How long scans are kept.")

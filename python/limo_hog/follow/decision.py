@@ -16,32 +16,23 @@ S = TypeVar("S")
 class Mode(str, Enum):
     """What the follower is doing, in words for the score card."""
 
-    SEARCH = "search"
-    """No person has been found yet."""
-    FOLLOW = "follow"
-    """A person is being followed."""
-    HOLD = "hold"
-    """The followed person is at the target distance: no need to drive."""
-    BLOCKED = "blocked"
-    """An obstacle is in the way, or an input is faulty: the robot may not do what the controller asked for."""
-    LOST = "lost"
-    """A person was followed and is not found any more."""
-    DRIVE = "drive"
-    """The robot is commanded by a node that does not say what it is doing: it moves."""
-    STAND = "stand"
-    """The same, and it does not move."""
+    SEARCH = "search"  #: No person has been found yet.
+    FOLLOW = "follow"  #: A person is being followed.
+    HOLD = "hold"  #: The followed person is at the target distance: no need to drive.
+    BLOCKED = "blocked"  #: An obstacle is in the way, or an input is faulty: the command was not let through.
+    LOST = "lost"  #: A person was followed and is not found any more.
+    DRIVE = "drive"  #: The robot is commanded by a node that does not say what it is doing: it moves.
+    STAND = "stand"  #: The same, and it does not move.
 
 
 class Believed(NamedTuple):
     """A tracked person: where, how surely, and which of the frame's boxes is theirs."""
 
-    #: Position in the base frame [m].
-    x: float
+    x: float  #: Position in the base frame [m].
     y: float
     probability: float  #: That it is a person, 0 … 1.
     number: int = 0  #: Identifies the person; never used twice.
-    #: Velocity over the ground, along the base frame's axes [m/s].
-    vx: float = 0.0
+    vx: float = 0.0  #: Velocity over the ground, along the base frame's axes [m/s].
     vy: float = 0.0
     box: int | None = None  #: Index into `observation.detections`; None where HOG did not find them in this frame.
     same: float | None = None  #: Probability that it is the person followed, 0 … 1; None while none was followed.
@@ -69,8 +60,7 @@ class Decision(Generic[S]):
 
     twist: Twist  #: What the robot should do now.
     state: S  #: The controller's memory, to be handed in with the next observation.
-    #: What the follower is doing, and why, in a few words.
-    mode: Mode
+    mode: Mode  #: What the follower is doing, and why, in a few words.
     reason: str
     target: int | None = None  #: Index into `observation.detections` of the person followed; None where there is none.
     region: Region | None = None  #: Where to look in the next frame; None asks for the whole image.

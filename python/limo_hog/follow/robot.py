@@ -33,8 +33,7 @@ class RobotGeometry:
         A value is of another type, or out of its range.
     """
 
-    #: Half of the body's outline [m].
-    half_length: float = _within(0.145, 0.02, 2.0)
+    half_length: float = _within(0.145, 0.02, 2.0)  #: Half of the body's outline [m].
     half_width: float = _within(0.11, 0.02, 2.0)
     #: Where the camera sits, ahead of the centre and above the floor [m]; it looks level and straight ahead.
     camera_x: float = _within(0.084, -2.0, 2.0)
@@ -47,8 +46,7 @@ class RobotGeometry:
     lidar_yaw: float = _within(0.0, -math.pi, math.pi)
     #: Between the left and the right wheels, as the differential drive counts it [m].
     wheel_separation: float = _within(0.172, 0.02, 4.0)
-    #: The most that it is told to drive and to turn [m/s, rad/s].
-    max_speed: float = _within(1.0, 0.01, 10.0)
+    max_speed: float = _within(1.0, 0.01, 10.0)  #: The most that it is told to drive and to turn [m/s, rad/s].
     max_turn: float = _within(11.6, 0.01, 100.0)
     acceleration: float = _within(1.0, 0.05, 20.0)  #: How fast it speeds up and brakes [m/s²].
     may_back: bool = True  #: Whether it may drive backwards.

@@ -25,7 +25,6 @@ from limo_hog.follow.sense.clearance import (
     Points,
     from_odometry,
     room_ahead,
-    room_behind,
     room_seen_behind,
     scan_points,
     speed_within,
@@ -176,7 +175,7 @@ class Guard(Generic[S]):
         around = from_odometry(state.scan_points, pose)
         room = room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot)
         ahead = speed_within(room, self.braking, self.reaction_s)
-        behind = speed_within(room_behind(around, self.margin, self.robot), self.braking, self.reaction_s)
+        behind = speed_within(room_ahead(-around, self.margin, self.robot), self.braking, self.reaction_s)
         fastest, backward = self.robot.max_speed, self.max_backward if self.robot.may_back else 0.0
         if scan is None or odometry is None:
             fastest, backward = min(fastest, self.max_blind), 0.0

@@ -56,8 +56,7 @@ REASONS = {
 class Plan:
     """What was decided, and why."""
 
-    #: The command, and what it begins or goes on with.
-    twist: Twist
+    twist: Twist  #: The command, and what it begins or goes on with.
     manoeuvre: Manoeuvre
     reason: str  #: Why it is not the goal's own; "" where it is.
     shares: tuple[tuple[str, float], ...]  #: Name of each critic and its share of the cost.

@@ -30,15 +30,12 @@ DIRECT = Manoeuvre()
 class Rollouts:
     """K commands, each driven on for T steps; the first is the goal's own, the last the one begun, if it is another."""
 
-    #: What they were made for, and the manoeuvre begun.
-    goal: Goal
+    goal: Goal  #: What they were made for, and the manoeuvre begun.
     kept: Manoeuvre
     times: Array  #: float64 (T,) [s].
-    #: float64 (K, T, 3): x, y [m], yaw [rad], base frame as of now; float64 (K, T) [m/s].
-    poses: Array
+    poses: Array  #: float64 (K, T, 3): x, y [m], yaw [rad], base frame as of now; float64 (K, T) [m/s].
     speeds: Array
-    #: float64 (K,): direction faced, from the goal's [rad], and the speed driven to [m/s].
-    offs: Array
+    offs: Array  #: float64 (K,): direction faced, from the goal's [rad], and the speed driven to [m/s].
     wanted: Array
     free: Array  #: float64 (T, 2) [m]: where the first would be with nothing in its way.
     places: Array  #: float64 (T, N, 2) [m]: where the people are.

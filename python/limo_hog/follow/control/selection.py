@@ -8,8 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from limo_hog.follow.control.lookout import Hunt
 from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre
+from limo_hog.follow.control.situation import carried
 from limo_hog.follow.decision import Believed
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import Twist
@@ -148,23 +151,18 @@ class TrackingState:
 
 def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:
     """Return everyone tracked, in the base frame, as of the newest stamp `now` [s]."""
-    boxes, likeness = dict(state.tracks.boxes), state.choice.likeness
-    pose = pose_at(state.tracks.poses, now)
-    people = []
-    for one in state.tracks.people:
-        track = predict(one.track, now, noise)
-        bearing, distance = bearing_range(track, pose)
-        speed, heading = math.hypot(*track.mean[2:]), math.atan2(track.mean[3], track.mean[2]) - pose.yaw
-        people.append(
-            Believed(
-                distance * math.cos(bearing),
-                distance * math.sin(bearing),
-                one.existence,
-                one.number,
-                speed * math.cos(heading),
-                speed * math.sin(heading),
-                boxes.get(one.number),
-                None if likeness is None else likeness.of(one.number),
-            )
+    boxes, likeness, people = dict(state.tracks.boxes), state.choice.likeness, state.tracks.people
+    means = np.array([predict(one.track, now, noise).mean for one in people]).reshape(-1, 4)
+    return tuple(
+        Believed(
+            x,
+            y,
+            one.existence,
+            one.number,
+            vx,
+            vy,
+            boxes.get(one.number),
+            None if likeness is None else likeness.of(one.number),
         )
-    return tuple(people)
+        for one, (x, y, vx, vy) in zip(people, carried(means, pose_at(state.tracks.poses, now)).tolist(), strict=True)
+    )

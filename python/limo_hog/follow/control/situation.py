@@ -27,22 +27,18 @@ LATELY_S = 5.0
 class Situation:
     """The robot, the people and the ground."""
 
-    #: The newest stamp [s]; where the robot is then, odometry frame, and what its wheels do.
-    now: float
+    now: float  #: The newest stamp [s]; where the robot is then, odometry frame, and what its wheels do.
     pose: Odometry
     driven: Twist
-    #: Its geometry and limits; its wheels' acceleration as learnt [m/s²].
-    robot: RobotGeometry
+    robot: RobotGeometry  #: Its geometry and limits; its wheels' acceleration as learnt [m/s²].
     acceleration: float
-    #: The time to the next command, and what the image will be late then [s].
-    period: float
+    period: float  #: The time to the next command, and what the image will be late then [s].
     late_s: float
     #: float64 (N, 4): x, y [m], vx, vy [m/s] of everybody; the row of the person followed, None without one.
     people: Array
     followed: int | None
     points: Points  #: float64 (M, 2) [m]: what stands around the robot, without people who are predicted.
-    #: The map; None before the first scan.
-    grid: Grid
+    grid: Grid  #: The map; None before the first scan.
     ground: Ground | None
     hiding: Array  #: float64 (H, 3): where people out of sight can be, `Hiding.circles`.
 
@@ -94,11 +90,9 @@ def carried(people: Array, pose: Odometry) -> Array:
 class Goal:
     """Where the robot should be, looking where."""
 
-    #: Direction to drive in and to face now [rad], and how it changes [rad/s].
-    heading: float
+    heading: float  #: Direction to drive in and to face now [rad], and how it changes [rad/s].
     rate: float = 0.0
-    #: Best speed now, and once the distance is right [m/s].
-    speed: float = 0.0
+    speed: float = 0.0  #: Best speed now, and once the distance is right [m/s].
     speed_later: float = 0.0
     #: float64 (T, 2) [m]: the place to be near, after each step of a rollout; None to drive nowhere. The distance to
     #: hold from it, from the robot's centre [m].

@@ -38,16 +38,14 @@ class TrackingController:
     near_behind: float = param(1.2, "m", "Behind the robot, what the map shows this near counts as well.", 0, 5)
     following: Following = field(default_factory=Following)
     lookout: Lookout = field(default_factory=Lookout)
-    #: Which command to send, and what the wheels can do.
-    planner: Planner = field(default_factory=Planner)
+    planner: Planner = field(default_factory=Planner)  #: Which command to send, and what the wheels can do.
     wheels: Wheels = field(default_factory=Wheels)
     #: Whom to follow; where all people are; who is out of sight.
     selection: Selection = field(default_factory=Selection)
     tracker: Tracker = field(default_factory=Tracker)
     hiding: Hiding = field(default_factory=Hiding)
     region: RegionSize = field(default_factory=RegionSize)  #: How much of the image to search.
-    #: How the ground is mapped, and which depth pixels are looked at for it.
-    grid: Grid = field(default_factory=Grid)
+    grid: Grid = field(default_factory=Grid)  #: How the ground is mapped, and which depth pixels are looked at for it.
     depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))
     robot: RobotGeometry = LIMO  #: Where camera and lidar sit.
 

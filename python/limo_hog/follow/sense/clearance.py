@@ -96,38 +96,22 @@ class Margin:
 
 
 def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
-    """Return how far the robot can drive straight on before a point comes into the ground kept free [m].
-
-    Negative where a point ahead is too near already, inf where nothing is in the way.
-    """
-    x, beside = points[:, 0], np.abs(points[:, 1]) - robot.half_width
-    # Most points are not in the way; only the rest are worth a square root.
-    (near,) = ((x > 0) & (beside < margin.beside)).nonzero()
-    return float(_room_to(x[near], beside[near], margin, robot).min(initial=math.inf))
+    """Return `rooms_ahead` for straight on [m]."""
+    return float(rooms_ahead(points, np.zeros(1), margin, robot)[0])
 
 
 def rooms_ahead(
     points: Points, headings: NDArray[np.float64], margin: Margin, robot: RobotGeometry
 ) -> NDArray[np.float64]:
-    """Return `room_ahead` of a robot that has turned to each of H headings [rad], float64 (H,)."""
+    """Return how far the robot, turned to each of H headings [rad], can drive until a point is too near, float64 (H,).
+
+    In metres: negative where a point ahead is too near already, inf where nothing is in the way. Backwards: `-points`.
+    """
     (x, y), cos, sin = points.T, np.cos(headings)[:, None], np.sin(headings)[:, None]
-    ahead, aside = cos * x + sin * y, cos * y - sin * x
-    beside = np.abs(aside) - robot.half_width
-    room = _room_to(ahead, beside, margin, robot)
-    return np.asarray(np.where((ahead > 0) & (beside < margin.beside), room, np.inf).min(axis=1, initial=np.inf))
-
-
-def _room_to(
-    ahead: NDArray[np.float64], beside: NDArray[np.float64], margin: Margin, robot: RobotGeometry
-) -> NDArray[np.float64]:
-    """Return how far the robot can drive before points so far ahead, and beside its outline, are too near [m]."""
+    ahead, beside = cos * x + sin * y, np.abs(cos * y - sin * x) - robot.half_width
     share = np.maximum(beside, 0) / margin.beside
-    return np.asarray(ahead - robot.half_length - margin.ahead * np.sqrt(np.maximum(1 - share**2, 0)))
-
-
-def room_behind(points: Points, margin: Margin, robot: RobotGeometry) -> float:
-    """Return how far the robot can drive straight back, as `room_ahead`."""
-    return room_ahead(-points, margin, robot)
+    room = ahead - robot.half_length - margin.ahead * np.sqrt(np.maximum(1 - share**2, 0))
+    return np.asarray(np.where((ahead > 0) & (beside < margin.beside), room, np.inf).min(axis=1, initial=np.inf))
 
 
 def speed_within(room: float, braking: float, reaction: float) -> float:

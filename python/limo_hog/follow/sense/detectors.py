@@ -197,8 +197,7 @@ class OnnxDetector:
 class Region:
     """Part of an image worth searching."""
 
-    #: Within the image [px], top left corner first.
-    x: int
+    x: int  #: Within the image [px], top left corner first.
     y: int
     width: int
     height: int

@@ -26,11 +26,9 @@ WINDOW_PER_STATURE = 4 / 3
 class Measurement:
     """One box, as seen from the robot."""
 
-    #: From the robot's centre [rad, m]; range None where the depth is unknown.
-    bearing: float
+    bearing: float  #: From the robot's centre [rad, m]; range None where the depth is unknown.
     range: float | None
-    #: Height of the box, and its middle below the image's [px].
-    height: int
+    height: int  #: Height of the box, and its middle below the image's [px].
     centre: float
     score: float  #: SVM margin.
     clothes: Clothes | None = None  #: What is worn in the box; None without a colour image.

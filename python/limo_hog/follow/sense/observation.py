@@ -25,11 +25,9 @@ class Scan:
 
     stamp: float  #: When the turn was finished [s], on the clock of `Observation.stamp`.
     ranges: NDArray[np.float32]  #: float32 (N,) [m], counter-clockwise from `angle_min`; inf where nothing was hit.
-    #: Direction of the first and the last beam [rad], 0 straight ahead, counter-clockwise positive.
-    angle_min: float
+    angle_min: float  #: Direction of the first and the last beam [rad], 0 straight ahead, counter-clockwise positive.
     angle_max: float
-    #: Limits between which a range is valid [m].
-    range_min: float
+    range_min: float  #: Limits between which a range is valid [m].
     range_max: float
 
     def turned(self, yaw: float) -> Scan:
@@ -92,8 +90,7 @@ class Observation:
     """One camera frame's detections with the other sensors' newest readings."""
 
     stamp: float  #: When the camera frame was taken [s].
-    #: Size of the camera image [px].
-    width: int
+    width: int  #: Size of the camera image [px].
     height: int
     focal_px: float  #: Focal length of the camera [px]; the principal point is the image centre.
     detections: Detections  #: People found in the frame, best first.
@@ -246,9 +243,13 @@ class Appearance:
 
     def learn(self, known: Clothes, seen: Clothes) -> Clothes:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""
-        same = ((seen - known) ** 2).sum(axis=1) < (self.max_shirt, self.max_trousers)
-        moved: Clothes = known + self.rate * same[:, None] * (seen - known)
-        return moved
+        return mixed(known, seen, self.rate, (self.max_shirt, self.max_trousers))
+
+
+def mixed(known: Clothes, seen: Clothes, rate: float, most: float | tuple[float, float]) -> Clothes:
+    """Move known clothes by a share towards those seen, but for parts that differ by `most` [chi-squared] or more."""
+    same = ((seen - known) ** 2).sum(axis=1) < most
+    return np.asarray(known + rate * same[:, None] * (seen - known))
 
 
 def chi_squared(known: list[float], seen: list[float]) -> float:

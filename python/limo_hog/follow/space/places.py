@@ -24,8 +24,7 @@ class Places:
     """Where the person may be."""
 
     stamp: float  #: Time of the estimate [s].
-    #: float64 (N, 2) [m, m/s], odometry frame: each as likely as the others.
-    points: Points
+    points: Points  #: float64 (N, 2) [m, m/s], odometry frame: each as likely as the others.
     velocities: NDArray[np.float64]
     seed: int = 0  #: Of the next step's random numbers.
 

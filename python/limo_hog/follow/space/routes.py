@@ -16,11 +16,8 @@ from limo_hog.follow.space.grid import Grid, Ground
 _NEIGHBOURS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
 
-@dataclass(frozen=True, slots=True)
-class Field:
-    """How far it is to drive to each cell."""
-
-    distance: NDArray[np.float32]  #: float32 (N, N) [m]: inf where no way leads.
+Field = NDArray[np.float32]
+"""(N, N): how far it is to drive to each cell [m]; inf where no way leads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +38,7 @@ class Router:
         cells, inside = grid.index(ground, np.array([[pose.x, pose.y]]))
         distance = np.full(free.shape, np.inf, np.float32)
         if not inside[0]:
-            return Field(distance)
+            return distance
         x, y = cells[0]
         # The robot may stand nearer to something than a way should lead.
         free[max(x - reach, 0) : x + reach + 1, max(y - reach, 0) : y + reach + 1] |= ~blocked[
@@ -66,12 +63,12 @@ class Router:
             if np.array_equal(nearer, before):
                 break
             before[...] = nearer
-        return Field(edged[1:-1, 1:-1])
+        return np.asarray(edged[1:-1, 1:-1])
 
     def way_towards(self, grid: Grid, ground: Ground, pose: Odometry, place: Points) -> Points:
         """Return the shortest way to the cell nearest to a place (2,) [m] of those that a way leads to."""
         field = self.field(grid, ground, pose)
-        cells = np.argwhere(np.isfinite(field.distance))
+        cells = np.argwhere(np.isfinite(field))
         if len(cells) == 0:
             return np.empty((0, 2))
         x, y = cells[np.argmin(np.hypot(*(grid.middle_of(ground, cells) - place).T))].tolist()
@@ -79,16 +76,15 @@ class Router:
 
     def way(self, grid: Grid, ground: Ground, field: Field, goal: tuple[int, int]) -> Points:
         """Return the shortest way from the robot to a cell, float64 (N, 2) [m]; empty where none leads there."""
-        distance = field.distance
-        if not math.isfinite(distance[goal]):
+        if not math.isfinite(field[goal]):
             return np.empty((0, 2))
         cells, here = [goal], goal
-        while distance[here] > 0:
+        while field[here] > 0:
             x, y = here
             around = [
-                (float(distance[x + dx, y + dy]) + cost * grid.cell, (x + dx, y + dy))
+                (float(field[x + dx, y + dy]) + cost * grid.cell, (x + dx, y + dy))
                 for dx, dy, cost in _NEIGHBOURS
-                if 0 <= x + dx < len(distance) and 0 <= y + dy < len(distance)
+                if 0 <= x + dx < len(field) and 0 <= y + dy < len(field)
             ]
             here = min(around)[1]
             cells.append(here)

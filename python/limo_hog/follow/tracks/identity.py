@@ -16,7 +16,7 @@ import numpy as np
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.measurement import WALK
-from limo_hog.follow.sense.observation import Clothes, chi_squared
+from limo_hog.follow.sense.observation import Clothes, chi_squared, mixed
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
 
@@ -224,13 +224,7 @@ class Identity:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
         clothes, window = traits.clothes, traits.window
         if person.worn is not None:
-            clothes = person.worn if clothes is None else self._mixed(clothes, person.worn, rate)
+            clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, self.clear)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)
         return Traits(person.number, clothes, window, traits.boxes + 1)
-
-    def _mixed(self, clothes: Clothes, worn: Clothes, rate: float) -> Clothes:
-        """Return clothes moved towards those in a box, but for a shirt or trousers that clearly differ."""
-        same = ((worn - clothes) ** 2).sum(axis=1) < self.clear
-        moved: Clothes = clothes + rate * same[:, None] * (worn - clothes)
-        return moved

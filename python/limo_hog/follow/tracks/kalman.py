@@ -120,8 +120,7 @@ def rates(track: Track, pose: Odometry) -> tuple[float, float]:
 class Innovation:
     """A measurement of bearing and range compared with the prediction."""
 
-    #: Measured less predicted [rad, m]; range None where only the bearing is measured.
-    bearing: float
+    bearing: float  #: Measured less predicted [rad, m]; range None where only the bearing is measured.
     range: float | None
     #: How bearing and range change with x and y [rad/m, 1]; with the velocity they do not.
     by_bearing: tuple[float, float]

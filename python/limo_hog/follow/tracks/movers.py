@@ -30,13 +30,11 @@ class Mover:
     """A group of returns that may be two legs."""
 
     track: Track  #: Position and velocity.
-    #: Where it was first, x and y in the odometry frame [m], and when [s].
-    began: tuple[float, float]
+    began: tuple[float, float]  #: Where it was first, x and y in the odometry frame [m], and when [s].
     since: float
     felt: float  #: Stamp of the last scan that showed it [s].
     left: bool = False  #: Whether that place was seen to be empty since.
-    #: How many did, and for how many of these the camera looked there and showed no person [1].
-    scans: int = 1
+    scans: int = 1  #: How many did, and for how many of these the camera looked there and showed no person [1].
     shown: int = 0
     #: Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
     number: int | None = None

@@ -26,17 +26,14 @@ class Person:
     track: Track  #: Position and velocity.
     seen: float  #: Stamp of the last frame in which HOG found them [s].
     log_odds: float  #: Of being a person, by all frames in which one should have been found (`Existence`).
-    #: Height of the detection window, and its middle below the image's, times the distance [px m].
-    window: float
+    window: float  #: Height of the detection window, and its middle below the image's, times the distance [px m].
     centre: float
     confirmed: bool = False  #: Whether the log-odds have been high enough, and not too low since.
-    #: Frames in which the person should have been found, and those since they were.
-    age: int = 1
+    age: int = 1  #: Frames in which the person should have been found, and those since they were.
     misses: int = 0
     felt: float = -math.inf  #: Stamp of the last scan with their legs [s].
     clothes: Clothes | None = None  #: What they wear; None while no colour image tells.
-    #: Clothes and window as the last box showed them; None where it did not.
-    worn: Clothes | None = None
+    worn: Clothes | None = None  #: Clothes and window as the last box showed them; None where it did not.
     tall: float | None = None
     strained: bool = False  #: Whether the last box was not where the person was expected, or not of their size.
     measured: float = field(init=False)  #: Stamp of the last frame or scan that showed the person [s].

@@ -28,8 +28,7 @@ class Tracks:
     people: tuple[Person, ...] = ()  #: Everyone tracked.
     boxes: tuple[tuple[int, int], ...] = ()  #: Number and index of the box of each person found in the last frame.
     next_number: int = 1  #: Number of the next new person.
-    #: Where the robot was and what the lidar hit lately, oldest first.
-    poses: tuple[Odometry, ...] = ()
+    poses: tuple[Odometry, ...] = ()  #: Where the robot was and what the lidar hit lately, oldest first.
     scans: tuple[Returns, ...] = ()
     #: Stamp of the last frame, None before the first, and the time between the last two [s].
     stamp: float | None = None
@@ -56,8 +55,7 @@ class Tracks:
 class Tracker:
     """Keeps the tracks of all people."""
 
-    #: The parts, each with its parameters.
-    noise: Noise = field(default_factory=Noise)
+    noise: Noise = field(default_factory=Noise)  #: The parts, each with its parameters.
     association: Association = field(default_factory=Association)
     existence: Existence = field(default_factory=Existence)
     legs: Legs = field(default_factory=Legs)

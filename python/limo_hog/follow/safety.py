@@ -111,11 +111,7 @@ class Guard(Generic[S]):
             reach = 2 * self.robot.half_length + self.margin.ahead + self.depth_reach
             depth_points = self.depth_grid.points(observation.depth, observation.focal_px, reach, self.robot)
         state = replace(
-            state,
-            inner=proposed.state,
-            proposed=proposed,
-            stamp=observation.stamp,
-            depth_points=depth_points,
+            state, inner=proposed.state, proposed=proposed, stamp=observation.stamp, depth_points=depth_points
         )
         return self._limited(proposed, state, observation.scan, observation.odometry, observation.at)
 
@@ -156,12 +152,7 @@ class Guard(Generic[S]):
         return state.arrivals.missing(now, needed, self.max_age_s)
 
     def _limited(
-        self,
-        proposed: Decision[S],
-        state: GuardState[S],
-        scan: Scan | None,
-        odometry: Odometry | None,
-        now: float,
+        self, proposed: Decision[S], state: GuardState[S], scan: Scan | None, odometry: Odometry | None, now: float
     ) -> Decision[GuardState[S]]:
         pose = odometry or Odometry()
 

@@ -42,8 +42,7 @@ class Believed(NamedTuple):
 class Belief:
     """What a controller takes to be true, for those who watch; nothing is decided by it."""
 
-    #: Distance it holds now [m]; more than its target where nearer the camera would not show the whole person. None for
-    #: a controller that holds none, and while no person is followed.
+    #: Distance it holds now [m], more than its target where the camera would else cut the person off; None without one.
     keeps: float | None = None
     people: tuple[Believed, ...] = ()  #: Everyone tracked.
     #: Where a lost person may be, each as likely: x, y in the base frame [m].
@@ -82,10 +81,7 @@ class Controller(Protocol[S]):
 def made_for(controller: Controller[S], robot: RobotGeometry) -> Controller[S]:
     """Return a controller that drives `robot`: one that knows its robot is given this one.
 
-    Raises
-    ------
-    RobotError
-        It was made for another robot than the Limo and this one.
+    Raises `RobotError` for one that was made for another robot than the Limo and this one.
     """
     known = getattr(controller, "robot", robot)
     if known not in (robot, LIMO):

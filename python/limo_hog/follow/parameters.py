@@ -7,9 +7,6 @@ from typing import Any
 
 
 def param(default: Any, unit: str, meaning: str, low: float | None = None, high: float | None = None) -> Any:
-    """Return a dataclass field with a default, its unit, "1" for none, and its meaning in a sentence.
-
-    With `low` and `high`, both included, it may be set while the controller drives.
-    """
+    """Return a dataclass field: default, unit or "1", meaning, and the bounds it may be set within while driving."""
     about: dict[str, Any] = {"unit": "" if unit == "1" else unit, "tooltip": meaning}
     return dataclasses.field(default=default, metadata=about if high is None else about | {"low": low, "high": high})

@@ -71,27 +71,10 @@ class Periods:
 class Follower(Generic[S]):
     """A detector and a controller behind the safety layer, fed with one stream of camera images.
 
-    The controllers and the guard are pure functions of observation and state. This object keeps their state between two
-    control periods, and the region to search next. The decisions that it logs hold no state, so that a list of logs
-    does not keep every scan in memory.
-
-    Parameters
-    ----------
-    controller
-        Steers by what the detector finds; `Guard` limits its commands.
-    detector
-        Finds people in uint8 (H, W, 3) BGR images. If it raises, the robot stops and the decision says so.
-    robot
-        Its outline, limits, camera and lidar, for the guard and for a controller that has a `robot`.
-    search
-        Applies the detector to a region of an image.
-    without_lidar
-        The robot has none; see `Guard`.
-
-    Raises
-    ------
-    RobotError
-        The controller was made for another robot.
+    Controllers and guard are pure functions; this object keeps their state, and the region to search next. The detector
+    finds people in uint8 (H, W, 3) BGR images; if it raises, the robot stops and the decision says so. `search` applies
+    it to a region of an image. Without lidar see `Guard`. The decisions that are logged hold no state, so that a list
+    of them does not keep every scan. Raises `RobotError` for a controller that was made for another robot.
     """
 
     def __init__(

@@ -27,10 +27,7 @@ def _within(default: float, low: float, high: float) -> Any:
 class RobotGeometry:
     """A robot with two driven sides; by default the Limo, its lengths from LCAS/limo_ros2's `limo_four_diff.xacro`.
 
-    Raises
-    ------
-    RobotError
-        A value is of another type, or out of its range.
+    Raises `RobotError` for a value of another type, or out of its range.
     """
 
     half_length: float = _within(0.145, 0.02, 2.0)  #: Half of the body's outline [m].
@@ -73,10 +70,7 @@ LIMO = RobotGeometry()
 def load_robot(path: str | Path) -> RobotGeometry:
     """Read a robot from a TOML file with `RobotGeometry`'s names; what is left out is the Limo's.
 
-    Raises
-    ------
-    RobotError
-        With the file, the key and what is allowed there.
+    Raises `RobotError` with the file, the key and what is allowed there.
     """
     if sys.version_info >= (3, 11):
         import tomllib

@@ -118,10 +118,7 @@ class Guard(Generic[S]):
     def recheck(
         self, now: float, scan: Scan | None, odometry: Odometry | None, state: GuardState[S]
     ) -> Decision[GuardState[S]]:
-        """Check the controller's last decision against a newer scan, for a control period without a camera frame.
-
-        The decision has no target and no region: these belong to a frame. `now` is on the robot's own clock [s].
-        """
+        """Check the last decision, less target and region, against a newer scan, `now` on the robot's own clock [s]."""
         if fault := scan_fault(scan) or _odometry(odometry):
             return Decision(Twist(), state, Mode.BLOCKED, fault)
         state = self._heard(now, scan, odometry, state)
@@ -221,10 +218,7 @@ class Guard(Generic[S]):
 
 
 def find_fault(observation: Observation, last_stamp: float | None) -> str:
-    """Return what is wrong with an observation, in one line; "" if nothing is.
-
-    `last_stamp` is that of the observation before [s]; None for the first.
-    """
+    """Return what is wrong with an observation, "" if nothing is; `last_stamp` [s] is that of the one before."""
     if observation.fault:
         return observation.fault
     if not math.isfinite(observation.stamp):

@@ -22,10 +22,7 @@ from limo_hog.follow.tracks.person import Person
 
 
 class Followed(NamedTuple):
-    """The person followed: their track at the newest stamp, the distance to hold from the camera [m].
-
-    And whether driving nearer will show if an unconfirmed track is a person.
-    """
+    """The person followed, at the newest stamp; the distance to hold [m]; whether nearing them shows if it is one."""
 
     person: Person
     track: Track

@@ -95,8 +95,8 @@ class Lookout:
 
     def ways(self, hunt: Hunt, situation: Situation) -> tuple[tuple[tuple[float, float], ...], ...]:
         """Return the places and the way in the base frame [m], for those who watch."""
-        moved = (from_odometry(points, situation.pose) for points in (hunt.places.points, hunt.way))
-        return tuple(tuple((float(x), float(y)) for x, y in points) for points in moved)
+        moved = (from_odometry(points, situation.pose).tolist() for points in (hunt.places.points, hunt.way))
+        return tuple(tuple((x, y) for x, y in points) for points in moved)
 
     def _plan(self, hunt: Hunt, situation: Situation) -> Hunt:
         now, pose, grid, ground = situation.now, situation.pose, situation.grid, situation.mapped

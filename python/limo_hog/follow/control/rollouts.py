@@ -66,9 +66,8 @@ class Rollouts:
 class Sampling:
     """Which commands are compared, and how the robot and the people move on.
 
-    The robot turns as a critically damped controller would, to a direction that stays or follows the goal's place, and
-    drives the faster the less it has yet to turn; it stops where `Guard` would stop it. So a rollout is a closed
-    formula, and all of them together are a few operations on arrays.
+    The robot turns as a critically damped controller would, drives the faster the less it has yet to turn, and stops
+    where `Guard` would stop it: a closed formula, so all rollouts together are a few operations on arrays.
     """
 
     offsets: tuple[float, ...] = param(

@@ -1,7 +1,4 @@
-"""Which of the tracked people to follow, and what else the tracking controller remembers from frame to frame.
-
-It stays with one person, says so where it is not sure which that is, and recognises them after a loss.
-"""
+"""Which of the tracked people to follow, and what else the tracking controller remembers from frame to frame."""
 
 from __future__ import annotations
 

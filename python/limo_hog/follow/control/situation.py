@@ -34,9 +34,8 @@ class Situation:
     acceleration: float
     period: float  #: The time to the next command, and what the image will be late then [s].
     late_s: float
-    #: float64 (N, 4): x, y [m], vx, vy [m/s] of everybody; the row of the person followed, None without one.
-    people: Array
-    followed: int | None
+    people: Array  #: float64 (N, 4): x, y [m], vx, vy [m/s] of everybody.
+    followed: int | None  #: The row of the person followed.
     points: Points  #: float64 (M, 2) [m]: what stands around the robot, without people who are predicted.
     grid: Grid  #: The map; None before the first scan.
     ground: Ground | None
@@ -50,10 +49,7 @@ class Situation:
         return self.ground
 
     def is_known_behind(self, poses: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return whether the ground behind the robot at poses (..., 3) was seen to be free, bool (...).
-
-        And whether a person out of sight can be where it was not seen to be free lately.
-        """
+        """Return whether ground behind poses (..., 3) was seen free, and if somebody can be where not, bool (...)."""
         if self.ground is None:
             return np.ones(poses.shape[:-1], bool), np.zeros(poses.shape[:-1], bool)
         behind = places_behind(DEPTHS, self.robot)
@@ -94,8 +90,7 @@ class Goal:
     rate: float = 0.0
     speed: float = 0.0  #: Best speed now, and once the distance is right [m/s].
     speed_later: float = 0.0
-    #: float64 (T, 2) [m]: the place to be near, after each step of a rollout; None to drive nowhere. The distance to
-    #: hold from it, from the robot's centre [m].
+    #: float64 (T, 2) [m]: the place to be near, after each step of a rollout; None to drive nowhere.
     places: Points | None = None
-    keeps: float = 0.0
+    keeps: float = 0.0  #: The distance to hold from it, from the robot's centre [m].
     faces: bool = True  #: Whether it matters that the person followed stays in the image.

@@ -212,9 +212,8 @@ class TrackingController:
         now, noise = situation.now, self.tracker.noise
         offs = [bearing_range(predict(one.track, now, noise), situation.pose)[0] for one in people]
         off = sum(chance * off for chance, off in zip(chances, offs, strict=True)) / max(sum(chances), 1e-6)
-        which = "which of several" if len(people) > 1 else "whether this"
-        which = f"not sure {which.replace('several', str(len(people)))} is the person followed"
-        return Aimed(Goal(off), Mode.HOLD, which, state)
+        which = f"which of {len(people)}" if len(people) > 1 else "whether this"
+        return Aimed(Goal(off), Mode.HOLD, f"not sure {which} is the person followed", state)
 
     def _search(self, situation: Situation, observation: Observation, state: TrackingState) -> tuple[Aimed, Belief]:
         """Turn to what may be the person, look where they may be, or turn on and on."""
@@ -223,9 +222,7 @@ class TrackingController:
         mode = Mode.LOST if lost else Mode.SEARCH
         if (off := self._off_unknown(situation, state)) is not None:
             return Aimed(lookout.facing(off), mode, "turning to what moves in the scan", state), Belief()
-        goal, reason, belief = None, "searching for a person", Belief()
-        if lost:
-            reason = "searching for the lost person"
+        goal, belief, reason = None, Belief(), "searching for the lost person" if lost else "searching for a person"
         young = known is not None and situation.now - known.stamp < lookout.give_up_s
         if lost and known is not None and young and scan is not None and situation.ground is not None:
             hunt = state.hunt or lookout.begin(known, choice.number or 0, situation)
@@ -239,10 +236,7 @@ class TrackingController:
         return Aimed(goal, mode, reason, state), belief
 
     def _off_unknown(self, situation: Situation, state: TrackingState) -> float | None:
-        """Return the bearing [rad] of what moves in the scan and may be the person; None where there is none.
-
-        A lost person cannot be further off than they walk.
-        """
+        """Return the bearing [rad] of what moves in the scan, where a lost person can be by now; None without any."""
         now, known = situation.now, state.known
         tracks = self.tracker.may_be(state.choice.number, state.tracks, now)
         if known is not None:

@@ -21,10 +21,7 @@ class Wheels:
     reserve: float = param(1.5, "1", "A command may ask for this much of what the wheels reach before the next.")
 
     def learn(self, believed: float, sent: Twist, before: Odometry, after: Odometry, robot: RobotGeometry) -> float:
-        """Return the wheels' acceleration [m/s²] after one more period, `believed` before it.
-
-        `sent` was the command between the two readings of the wheels, `before` and `after`.
-        """
+        """Return the wheels' acceleration [m/s²], so far `believed`, after `sent` between two readings of them."""
         seconds = after.stamp - before.stamp
         if seconds <= 0:
             return believed
@@ -42,10 +39,7 @@ class Wheels:
     def within_reach(
         self, wanted: Twist, now: Twist, acceleration: float, period: float, robot: RobotGeometry
     ) -> Twist:
-        """Return the command that comes nearest to the wanted one within a period [s]: the turn first, then the drive.
-
-        `acceleration` is each wheel's [m/s²], `now` what they do.
-        """
+        """Return the command nearest to `wanted` that wheels that do `now` reach in a period [s]: the turn first."""
         most, half = acceleration * self.reserve * period, robot.wheel_separation / 2
         turn = min(max(wanted.angular - now.angular, -most / half), most / half)
         left = most - half * abs(turn)

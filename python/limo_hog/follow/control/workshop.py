@@ -1,4 +1,7 @@
-"""The workshop's two controllers: drive to the box with the highest score, or hold a distance to the person."""
+"""The workshop's two controllers: drive to the box with the highest score, or hold a distance to the person.
+
+Their state is whether a person was detected before; the numbers are the workshop's.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,7 @@ from limo_hog.follow.sense.observation import Observation
 
 @dataclass(frozen=True, slots=True)
 class ApproachController:
-    """Steer by the horizontal error of the best box, drive at one speed, stop without a box.
-
-    The state is whether a person was detected before. The numbers are the workshop's.
-    """
+    """Steer by the horizontal error of the best box, drive at one speed, stop without a box."""
 
     angular_gain: float = param(0.005, "rad/s/px", "Turn rate for each pixel off the middle.", 0, 0.05)
     dead_band_px: float = param(20.0, "px", "Errors smaller than this do not turn the robot.", 0, 320)
@@ -39,10 +39,7 @@ class ApproachController:
 
 @dataclass(frozen=True, slots=True)
 class ProxemicController:
-    """Two proportional controllers: the box to the middle of the image, the person to a distance.
-
-    The state is whether a person was detected before. The numbers are the workshop's.
-    """
+    """Two proportional controllers: the box to the middle of the image, the person to a distance."""
 
     target_distance: float = param(1.5, "m", "Distance to hold, by the depth image.", 0.1, 8)
     linear_gain: float = param(0.5, "1/s", "Speed of approach for each metre of error.", 0, 5)

@@ -38,10 +38,7 @@ class Arrivals:
         return "; ".join(reasons)
 
     def disagreement(self, max_age: float, max_late: float) -> str:
-        """Return which sense's stamps do not fit the others'; "" if all do.
-
-        A reading may be `max_age` [s] late when it comes, an image `max_late` [s].
-        """
+        """Return which sense's stamps do not fit the others': readings may be `max_age`, images `max_late` [s] late."""
         # A depth image has its camera frame's stamp. What the others' clocks showed when the last reading came:
         now = max((came for _, came in self.newest.values()), default=0.0)
         clocks = {name: stamp + now - came for name, (stamp, came) in self.newest.items() if name != DEPTH}

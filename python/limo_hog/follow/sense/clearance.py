@@ -158,11 +158,7 @@ class Look:
 
 
 def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry) -> float:
-    """Return how far behind the robot's outline the ground was seen to be free [m]; `FARTHEST_BEHIND` at most.
-
-    `looks` are the scans of the last seconds, `pose` is where the robot is now. Ground that the robot covered when a
-    scan was taken was free as well.
-    """
+    """Return how far behind the outline ground was seen free in `looks`, or lay under the robot [m]; 0.6 at most."""
     if not looks:
         return 0.0
     places = to_odometry(places_behind(_DEPTHS_BEHIND, robot), pose)
@@ -171,10 +167,7 @@ def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry
 
 
 def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> NDArray[np.bool_]:
-    """Return for each of L looks and N points, odometry frame, whether a beam passed over it or the robot stood there.
-
-    bool (L, N). All looks at once: one by one they took a millisecond.
-    """
+    """Return whether a beam of each look passed over each point, or the robot stood there, bool (L, N): all at once."""
     numbers = [
         (
             *(look.pose.x, look.pose.y, math.cos(look.pose.yaw), math.sin(look.pose.yaw)),

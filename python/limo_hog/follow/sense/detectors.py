@@ -36,13 +36,7 @@ def detector_named(name: str) -> Detector:
     """Return one of `NAMES`; MODEL is a model of `PeopleDetector`, by name or file, FILE a network.
 
     "hog" groups its hits as `cv2.HOGDescriptor` does, "hog:MODEL" suppresses them greedily; neither enlarges the image.
-
-    Raises
-    ------
-    DetectorError
-        There is no such detector, OpenCV has no HOG, or the file is no network.
-    ParameterError, ModelFormatError
-        The file holds no model.
+    Raises `DetectorError` where there is none, OpenCV has no HOG or the file is no network.
     """
     kind, colon, file = name.partition(":")
     if kind == "onnx" and colon:
@@ -106,12 +100,9 @@ class HalfSize:
 
 @dataclass(frozen=True)
 class Cv2Detector:
-    """OpenCV's own HOG with the workshop's parameters, where the installed OpenCV has one.
+    """OpenCV's own HOG with the workshop's parameters.
 
-    Raises
-    ------
-    MissingExtraError, DetectorError
-        There is no OpenCV, or it has no HOG.
+    Raises `MissingExtraError` or `DetectorError` where there is no OpenCV, or it has no HOG.
     """
 
     def __post_init__(self) -> None:
@@ -146,9 +137,9 @@ class OnnxDetector:
     path: Path  #: The ONNX file.
     size: int = 640  #: Side of the network's input [px].
     threshold: float = 0.25  #: Least score of a person [0..1].
-    #: Boxes with a larger intersection over union than this are the same person [1]. Both are the defaults of YOLOv8's
-    #: own non-maximum suppression.
-    overlap: float = 0.45
+    overlap: float = (
+        0.45  #: Boxes with a larger intersection over union are one person [1]; both are YOLOv8's defaults.
+    )
 
     def __post_init__(self) -> None:
         # A wrong file is an error before the robot starts, not a fault of every frame.

@@ -81,11 +81,10 @@ def box_centre(box: NDArray[np.int32]) -> tuple[int, int]:
 
 
 def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int = 20) -> float | None:
-    """Return how far away the person in a box is [m]; None where the camera does not know.
+    """Return how far away the person in a box is [m]: the median depth in its middle; None where that is unknown.
 
-    The median of the valid depths in a square of `side` [px] at the box's centre: pixels that see past the person, or
-    nothing, do not change it as long as they are less than half. `depth` is float32 (H, W) [m], not finite or <= 0
-    where unknown, `box` int32 (4,): x, y, w, h [px]; the workshop's side is 20.
+    Pixels that see past the person do not change it as long as they are less than half. `depth` is float32 (H, W) [m],
+    not finite or <= 0 where unknown, `box` int32 (4,): x, y, w, h, and `side` the square's [px]; the workshop's is 20.
     """
     x, y = box_centre(box)
     half = side // 2

@@ -152,10 +152,9 @@ def observed(
 
 
 def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
-    """Return the robot's pose at `stamp` [s].
+    """Return the robot's pose at `stamp` [s], interpolated between the nearest of `poses`, oldest first.
 
-    Interpolated between the two nearest of `poses`, which are oldest first. Before the first the robot is taken to have
-    stood; after the last its speeds are taken to have lasted.
+    Before the first the robot is taken to have stood; after the last its speeds are taken to have lasted.
     """
     if not poses:
         return Odometry(stamp)

@@ -119,10 +119,7 @@ class Grid:
         return np.asarray((cells + ground.corner + 0.5) * self.cell, np.float64)
 
     def is_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
-        """Return whether each point is in an occupied cell, bool (N,); outside of the square none is.
-
-        With `lasting`, only cells count that were not free within `lasts_s`: what came in since can go away as well.
-        """
+        """Return whether each point is in an occupied cell; `lasting`: one not free within `lasts_s`. bool (N,)."""
         cells, inside = self.index(ground, points)
         flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
         return inside & self._is_occupied(ground, flat, lasting)
@@ -135,10 +132,7 @@ class Grid:
         return free
 
     def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
-        """Return whether an occupied cell is within half a cell of each point, bool (N,); `lasting` as `is_blocked`.
-
-        At the square's edge and outside of it none is.
-        """
+        """Return whether an occupied cell is within half a cell of each point, bool (N,); at the edge none is."""
         lowest, _ = self.index(ground, points - self.cell / 2)
         within = lowest.view(np.uint64) < self.cells - 1
         inside = within[:, 0] & within[:, 1]
@@ -164,11 +158,7 @@ class Grid:
     def sees(
         self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24
     ) -> NDArray[np.bool_]:
-        """Return whether nothing occupied is between each of (K, 2) origins and each of (N, 2) places, bool (K, N).
-
-        `samples` points on each line are looked at [1]; chosen: at 3 m one in every cell. `lasting` is that of
-        `is_blocked`.
-        """
+        """Return whether nothing occupied is between (K, 2) origins and (N, 2) places, at `samples` points, (K, N)."""
         shares = (np.arange(samples) + 0.5) / samples
         way = origins[:, None, None, :] + shares[None, None, :, None] * (places[None, :] - origins[:, None])[:, :, None]
         blocked = self.is_blocked(ground, way.reshape(-1, 2), lasting=lasting).reshape(

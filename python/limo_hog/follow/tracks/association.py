@@ -1,12 +1,8 @@
 """Which box, and which legs in the scan, belong to which person.
 
-Boxes by a gate, a cost and a greedy assignment. The cost is minus twice the log-likelihood of a match but for a
-constant: the squared Mahalanobis distance, the log volume of the prediction's uncertainty, and the difference of the
-clothes.
-
-Legs keep a track alive where the camera does not show the person: HOG needs space above the head, so nearer than about
-1.6 m, beside the image or between two frames, only the lidar tells where a person is. It cannot tell a person from a
-chair: it may continue a track and never begins one.
+Boxes by a gate, a cost, minus twice the log-likelihood of a match but for a constant, and a greedy assignment. Legs
+keep a track alive where the camera does not show the person: nearer than about 1.6 m, beside the image, between two
+frames. The lidar cannot tell a person from a chair: legs may continue a track and never begin one.
 """
 
 from __future__ import annotations
@@ -48,11 +44,10 @@ class Association:
         flat: AbstractSet[int] = frozenset(),
         others: AbstractSet[tuple[int, int]] = frozenset(),
     ) -> dict[int, int]:
-        """Pair people with boxes: confirmed people first, then by cost.
+        """Pair people with boxes, confirmed people first, then by cost: index of the person -> index of the box.
 
-        `flat` are the indices of boxes that do not stand out from what is behind them: no confirmed person's; `others`
-        are pairs, person and box, of which the scan shows that the box is another's. Returns index of the person ->
-        index of the measurement. Every track must be at the frame's stamp.
+        `flat` boxes do not stand out from what is behind them: no confirmed person's; of the pairs `others` the scan
+        shows that the box is another's. Every track must be at the frame's stamp.
         """
         matches = []
         for who, person in enumerate(people):
@@ -95,10 +90,7 @@ class Association:
         return abs(seen.range * seen.height - person.window) < self.size_tolerance * person.window
 
     def worn(self, seen: Measurement) -> Clothes | None:
-        """Return the clothes in a box; None where its patches are not on shirt and trousers.
-
-        Where the head is cut off, or the box sits lower, they are not.
-        """
+        """Return the clothes in a box; None where the head is cut off or the box sits low, and shows other parts."""
         return seen.clothes if seen.range is None or (seen.whole and not seen.is_low(self.low)) else None
 
     def _is_double(self, seen: Measurement, other: Measurement) -> bool:
@@ -139,10 +131,7 @@ class Legs:
         noise: Noise,
         is_ground: Callable[[Points], NDArray[np.bool_]] | None = None,
     ) -> Track | None:
-        """Return the track predicted for the scan's stamp and corrected by its legs; None where there are none.
-
-        `is_ground` tells of points (N, 2), odometry frame, which of them are on what is known to stand there: no legs.
-        """
+        """Return the track at a scan's stamp, corrected by legs that are not on the ground known; None without any."""
         track = predict(track, returns.stamp, noise)
         if math.dist(track.mean[:2], (returns.pose.x, returns.pose.y)) > self.reach:
             return None
@@ -152,10 +141,7 @@ class Legs:
         return self.corrected(track, legs, returns.pose, noise)
 
     def corrected(self, track: Track, legs: Points, pose: Odometry, noise: Noise) -> Track | None:
-        """Return the track corrected by the returns (N, 2) near it, odometry frame; None where these are no legs.
-
-        The track is predicted for the scan's stamp; `pose` is where the robot was then.
-        """
+        """Return the track, at the scan's stamp, corrected by returns (N, 2) near it; None where these are no legs."""
         x, y, vx, vy = track.mean
         distance = math.hypot(x - pose.x, y - pose.y)
         if len(legs) < self.fewest or distance > self.reach:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,8 +13,7 @@ from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import WALK
 
 
-@dataclass(frozen=True, slots=True)
-class Other:
+class Other(NamedTuple):
     """Another person than the one followed: where they were last measured, odometry frame [m], and when [s]."""
 
     x: float

@@ -107,10 +107,7 @@ class Identity:
     def _passed(
         self, known: Likeness, people: dict[int, Person], tracks: Tracks, walking: AbstractSet[int]
     ) -> dict[int, float]:
-        """Return the probabilities of the tracks before the frame's boxes are looked at.
-
-        `walking` are the numbers of those whose legs go on (`_walks_on`).
-        """
+        """Return the tracks' probabilities before the frame's boxes; `walking` are those whose legs go on."""
         stamp = tracks.stamp or 0.0
         chances = {number: chance for number, chance in known.chances if number in people}
         for number in chances:
@@ -196,10 +193,7 @@ class Identity:
         return clothes + stature if first else self.again * clothes + self.steady * stature
 
     def _learnt(self, known: Likeness, person: Person, chance: float, *, alone: bool) -> Likeness:
-        """Learn from a box who looks how: of the person followed where that is sure, of others where they are not.
-
-        `chance` is the probability that this is the person followed; `alone`, whether the box shows nobody else.
-        """
+        """Learn who looks how: the person followed where `chance` is sure and they are `alone` in it, else others."""
         if chance >= self.sure:
             x, y, _, _ = person.track.mean
             traits = self._moved(known.traits, person) if alone else known.traits

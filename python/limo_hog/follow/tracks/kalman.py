@@ -70,10 +70,7 @@ def initiate(stamp: float, bearing: float, distance: float, pose: Odometry, nois
 
 
 def predict(track: Track, stamp: float, noise: Noise) -> Track:
-    """Predict the track for `stamp` [s].
-
-    For an earlier stamp the mean moves back along the velocity and the covariance stays as it is.
-    """
+    """Predict the track for `stamp` [s]; for an earlier one the mean moves back, and the covariance stays."""
     dt = stamp - track.stamp
     if dt == 0:
         return track
@@ -140,8 +137,7 @@ class Innovation:
     def log_volume_ratio(self) -> float:
         """Logarithm of det(covariance) over the measurement's own: 0 for a certain prediction.
 
-        A track that has not been measured for long has a large gate and would match any measurement; this is the term
-        of the log-likelihood that penalises it.
+        It penalises a track not measured for long, whose large gate would match any measurement.
         """
         (a, b, d), (of_bearing, of_range) = self.covariance, self.variances
         if self.range is None:

@@ -1,7 +1,6 @@
 """What moves in the scan, without a box: people beside and behind, whom the camera does not show.
 
-A group of returns as wide as two legs is followed from scan to scan. It counts once it has moved: walls, furniture and
-people who stand are nothing to be predicted.
+A group of returns as wide as two legs is followed from scan to scan. It counts once it has moved.
 """
 
 from __future__ import annotations
@@ -49,8 +48,7 @@ class Movers:
     is still wall. So a group moves only when the place where it began is empty.
     """
 
-    #: How a group is found again: further off than a followed person's legs, since nothing else shows it. At 3.5 m two
-    #: shins are two beams.
+    #: How a group is found again, further off than a followed person's legs: at 3.5 m two shins are two beams.
     legs: Legs = field(default_factory=lambda: Legs(reach=3.5))
     gap: float = param(0.3, "m", "Returns further apart than this are of two groups.")
     beams: float = param(0.03, "rad", "A beam within this passes a place.")
@@ -152,10 +150,7 @@ class Movers:
         pose: Odometry,
         noise: Noise,
     ) -> set[tuple[int, int]]:
-        """Return the pairs, person and box, of people whose own legs walk while the box is on other legs that walk.
-
-        People must be at the frame's stamp, the robot at `pose`.
-        """
+        """Return the pairs, person and box, of people whose own legs walk while the box is on other legs that walk."""
         pairs: set[tuple[int, int]] = set()
         if len(moving) < 2 or not people:
             return pairs

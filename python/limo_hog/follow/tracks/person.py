@@ -129,10 +129,7 @@ class Existence:
     run_of_misses: float = param(1e-3, "1", "Misses in a row less likely than this are no chance.")
 
     def of_box(self, seen: Measurement, recall: float) -> float:
-        """Return how much a box adds to the log-odds; negative for one that is more likely on something else.
-
-        `recall` is the share of frames in which a person of this size is found.
-        """
+        """Return how much a box adds to the log-odds where people are found with `recall`; negative for clutter."""
         if not self.is_solid(seen):
             return -self.least
         score = max(seen.score, 1e-3)

@@ -40,10 +40,7 @@ class Tracks:
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
-        for one in self.people:
-            if one.number == number:
-                return one
-        return None
+        return next((one for one in self.people if one.number == number), None)
 
     @property
     def in_view(self) -> list[Person]:
@@ -77,10 +74,7 @@ class Tracker:
     robot: RobotGeometry = LIMO  #: Where camera and lidar sit.
 
     def update(self, observation: Observation, tracks: Tracks) -> tuple[Tracks, dict[int, int]]:
-        """Bring all tracks up to a frame.
-
-        Returns the new tracks, and number -> index of the box of each person found.
-        """
+        """Bring all tracks up to a frame; also number -> index of the box of each person found."""
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
         known: list[Person] = []
@@ -133,10 +127,7 @@ class Tracker:
         return initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds)
 
     def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
-        """Update a person by their box; the track is at the box's stamp.
-
-        `recall` is the share of frames in which a person of this size is found.
-        """
+        """Update a person, found with `recall`, by their box; the track is at the box's stamp."""
         window, centre = person.window, person.centre
         solid, fits = self.existence.is_solid(seen), self.association.fits_size(person, seen)
         if seen.range is not None and solid:
@@ -181,12 +172,9 @@ class Tracker:
         )
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
-        """Bring a person up to the newest scan, if their legs are in it.
+        """Bring a person up to the newest scan, if their legs are in it; returns on the known `ground` are none.
 
-        `ground` is what stands around, where that is known: its returns are not legs.
-
-        Returns the person at the newest scan's stamp, and the tracks. There, a person found in the last frame stays at
-        the frame's stamp, since the next frame may be older than the scans.
+        Among the tracks returned, a person found in the last frame stays at its stamp: the next may be older.
         """
         if tracks.stamp is None:
             return person, tracks
@@ -218,10 +206,7 @@ class Tracker:
         return now, replace(tracks, people=tuple(people))
 
     def _walked(self, person: Person, scans: tuple[Returns, ...], stamp: float) -> Person:
-        """Bring a person up to the last scan before a frame of `stamp` [s] that shows their legs.
-
-        Between slow frames a person turns and walks further than the next frame's gate.
-        """
+        """Bring a person up to the last scan before `stamp` [s] with their legs: between slow frames people turn."""
         for returns in scans:
             if person.confirmed and person.track.stamp < returns.stamp <= stamp and returns.stamp > person.felt:
                 track = self.legs.update(person.track, returns, self.noise)
@@ -279,9 +264,8 @@ class Tracker:
     ) -> tuple[list[Track], Points, Track | None]:
         """Return all people, seen by the camera or moving in the scan, as of `now` [s].
 
-        Also the places of those who are not followed and were measured within `lately_s` [s], float64 (N, 2) [m] in the
-        odometry frame, and which track is the person followed, None for none of them. `followed` is the person
-        followed, as measured last; people found by the camera count for `lately_s`.
+        Also where others than `followed` were measured within `lately_s` [s], float64 (N, 2) [m] in the odometry frame,
+        and which track is the person followed; None for none of them.
         """
         people: dict[int, Track] = {}
         for one in tracks.people:

@@ -9,7 +9,7 @@ from types import FunctionType
 import numpy as np
 import pytest
 
-from limo_hog.follow.control.planner import NO_WAY, Plan, Planner
+from limo_hog.follow.control.planner import NO_WAY, Move, Planner
 from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre, Rollouts
 from limo_hog.follow.control.situation import Array, Goal, Situation
 from limo_hog.follow.robot import LIMO, Twist
@@ -164,5 +164,5 @@ def test_another_critic_is_one_class_and_one_line() -> None:
 
 def test_people_who_would_be_met_in_two_seconds_hardly_count() -> None:
     # They give way as well; a robot that takes them not to would stand.
-    plan: Plan = PLANNER.plan(situation((3.2, 0.2, -0.8, 0.0)), towards(6.0), DIRECT)
+    plan: Move = PLANNER.plan(situation((3.2, 0.2, -0.8, 0.0)), towards(6.0), DIRECT)
     assert plan.twist.linear > 0.3

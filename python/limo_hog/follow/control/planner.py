@@ -53,7 +53,7 @@ REASONS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class Move:
     """What was decided, and why."""
 
     twist: Twist  #: The command, and what it begins or goes on with.
@@ -86,7 +86,7 @@ class Planner:
             if hasattr(getattr(self, one.name), "cost"):
                 yield one.name, getattr(self, one.name)
 
-    def plan(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> Plan:
+    def plan(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> Move:
         """Return the command that costs least; `kept` is the manoeuvre begun."""
         rollouts = self.sampling.roll_out(situation, goal, kept)
         names, critics = zip(*self.critics(), strict=True)
@@ -108,4 +108,4 @@ class Planner:
             None if off == 0 else situation.pose.yaw + heading, None if speed == rollouts.wanted[0] else speed
         )
         shares = tuple(zip(names, costs[:, best].tolist(), strict=True))
-        return Plan(twist, manoeuvre, reason, shares, rollouts.poses[best, :, :2])
+        return Move(twist, manoeuvre, reason, shares, rollouts.poses[best, :, :2])

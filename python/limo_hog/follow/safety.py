@@ -262,10 +262,7 @@ def _depth(observation: Observation) -> str:
 
 
 def scan_fault(scan: Scan | None) -> str:
-    """Return what is wrong with a scan, in one line; "" if nothing is, or if there is none.
-
-    A range below `range_min` is no measurement, inf is a beam that met nothing (REP-117, sensor_msgs/LaserScan).
-    """
+    """Return what is wrong with a scan, "" if nothing: inf is a beam that met nothing (REP-117, LaserScan)."""
     if scan is None:
         return ""
     if scan.ranges.size == 0:

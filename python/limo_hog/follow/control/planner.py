@@ -18,7 +18,7 @@ from limo_hog.follow.control.critics.room_to_followed import RoomToFollowed
 from limo_hog.follow.control.critics.room_to_others import RoomToOthers
 from limo_hog.follow.control.critics.unseen_ground import UnseenGround
 from limo_hog.follow.control.critics.walls import Walls
-from limo_hog.follow.control.rollouts import Manoeuvre, Rollouts, Sampling
+from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre, Rollouts, Sampling
 from limo_hog.follow.control.situation import Array, Goal, Situation
 from limo_hog.follow.control.wheels import stoppable_turn
 from limo_hog.follow.parameters import param
@@ -35,7 +35,7 @@ class Critic(Protocol):
         ...
 
     def cost(self, rollouts: Rollouts, _: Situation, /) -> Array:
-        """Return the cost of each of K rollouts, float64 (K,)."""
+        """Return the cost of each of K rollouts, float64 (K,), never negative."""
         ...
 
 
@@ -88,9 +88,13 @@ class Planner:
 
     def plan(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> Move:
         """Return the command that costs least; `kept` is the manoeuvre begun."""
-        rollouts = self.sampling.roll_out(situation, goal, kept)
         names, critics = zip(*self.critics(), strict=True)
-        costs = np.array([one.weight * one.cost(rollouts, situation) for one in critics])
+        for own_only in (True, False) if kept == DIRECT else (False,):
+            rollouts = self.sampling.roll_out(situation, goal, kept, own_only=own_only)
+            costs = np.array([one.weight * one.cost(rollouts, situation) for one in critics])
+            if costs.sum() <= self.change_of_mind.weight:
+                # Every other command costs more: a change of mind.
+                break
         best = int(np.argmin(costs.sum(axis=0)))
         gains = np.maximum(costs[:, 0] - costs[:, best], 0.0)
         gained = dict(zip(names, gains.tolist(), strict=True))

@@ -181,10 +181,7 @@ class Movers:
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
     def _whose(self, movers: tuple[Mover, ...], gaps: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return for each of N returns the number of the person whose legs it may be, the nearest; 0 for none.
-
-        `gaps` are the distances from the M movers, float64 (M, N) [m]; those whose number is known come first.
-        """
+        """Return whose legs each of N returns may be, the nearest, 0 for none; `gaps` as `all_distances`, known people first."""
         numbers = np.array([one.number for one in movers if one.number is not None], np.int64)
         if len(numbers) == 0:
             return np.zeros(gaps.shape[1], np.int64)

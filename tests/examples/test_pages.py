@@ -13,6 +13,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
+from benches.rivals import FOUND, finders
 from tests.examples.pages import ROOT, Page, file_of, pages
 
 PAGES = pages()
@@ -90,6 +91,29 @@ def test_a_page_opens_with_a_sentence_that_says_what_it_is_for(page: Page) -> No
     title, opening, *_ = page.text.split("\n\n")
     assert re.fullmatch(r"# .+", title)
     assert re.match(r"[*`]*\w", opening) and re.search(r"[.:][*]*$", opening)
+
+
+@pytest.mark.parametrize(
+    ("page", "told", "untold"),
+    [
+        ("README.md", "git clone https://github.com/limo-hog/limo-hog", "keeps its words after"),
+        ("README.md", "`CascadeClassifier` and `cv2.ml`, which limo-hog has not", "search without that in gray"),
+        ("docs/coming-from.md", "`cv2.ml` (SVM, KNearest, …) | gone", "all but EPS_SVR"),
+        ("docs/coming-from.md", "`warpAffine`, `warpPerspective` | pixels differ", "two cores can"),
+        ("docs/coming-from.md", '# mypy: disable-error-code="attr-defined"', "4.278 a second"),
+        ("docs/evaluation.md", "excludes 0, it is unlikely to come from the choice", "An interval without 0"),
+        ("docs/parity.md", "`computeGradient(image)` needs no arrays", "no surer hit is left out"),
+    ],
+)
+def test_a_page_tells_what_readers_missed_and_no_more_what_they_read_twice(page: str, told: str, untold: str) -> None:
+    text = " ".join(Page(ROOT / page).text.split())
+    assert told in text and untold not in text
+
+
+def test_the_readme_shows_a_table_that_the_comparison_prints() -> None:
+    table = [line for line in READMES[0].text.splitlines() if line.count("|") == 8]
+    assert table[0] == f"| {' | '.join(FOUND)} |"
+    assert [line.split(" | ")[0] for line in table[2:]] == [f"| {one.name}" for one in finders(64)]
 
 
 def sentences(page: Page) -> set[str]:

@@ -297,9 +297,8 @@ class Stage:
             message = " ".join(fault.message.split())
             return f"{self.script.name} {fault.how} at {failed_at:.2f} s: {message}; {ending}"
         if not self._driven:
-            other = ", ".join(sorted(self.published)) or "nothing at all"
-            never = f"never published on {names.COMMAND} (it published {other})"
-            return f"{self.script.name} {never}: the robot never moved"
+            sent = ", ".join(sorted(self.published)) or "nothing at all"
+            return f"{self.script.name} never published on {names.COMMAND} (it published {sent}): the robot never moved"
         return ""
 
 
@@ -341,8 +340,9 @@ def score_of(outcome: Ended) -> ScoreCard:
     Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
     """
     card, driving = score(outcome.episode), outcome.episode.scorer.driving
-    if outcome.failure:
-        card = replace(card, success=False, failure=outcome.failure)
+    still = f"{outcome.stage.script.name} never moved the robot" if card.success and not driving else ""
+    if failure := outcome.failure or still:
+        card = replace(card, success=False, failure=failure)
     if outcome.used_hog:
         return card
     return replace(

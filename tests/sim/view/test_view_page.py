@@ -155,6 +155,9 @@ def _see_the_controls_in_one_row(page: Page) -> None:
     assert max(page.evaluate(tops)) < 48
     assert page.evaluate("document.querySelector('.controls').getBoundingClientRect().height") < 60
     assert page.evaluate("document.querySelector('.controls label span').offsetWidth") > 20
+    # A word of a legend stays with its mark.
+    marks = "[...document.querySelectorAll('figcaption span')].map((mark) => mark.getClientRects().length)"
+    assert max(page.evaluate(marks)) == 1
 
 
 def _see_it_on_a_phone(browser: Browser, view: View, controller: Tunable[Any]) -> None:

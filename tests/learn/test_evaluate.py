@@ -100,18 +100,6 @@ def test_figures_from_few_objects_come_with_a_warning(
     assert told[0] in (tmp_path / "report" / "index.html").read_text("utf-8")
 
 
-def test_a_curve_without_misses_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    said: list[str] = []
-    monkeypatch.setattr("matplotlib.axes.Axes.text", lambda *at, **_: said.append(at[-1]))
-    write_image(tmp_path / "a.png", street(192, 256, 3))
-    found = PeopleDetector().detect(tmp_path / "a.png").boxes.tolist()
-    for boxes, words in ((found, ["no misses"]), ([*found, [10, 5, 15, 40]], [])):
-        (tmp_path / "boxes.json").write_text(json.dumps({"a.png": boxes}))
-        said.clear()
-        assert main(["evaluate", "limo", str(tmp_path), "--report", str(tmp_path / "report")]) == 0
-        assert said == words
-
-
 def test_the_report_speaks_of_figures_by_their_names_and_of_colours_as_they_are(streets: Path, tmp_path: Path) -> None:
     command = ["evaluate", "opencv", str(streets), "--against", "daimler", "--report", str(tmp_path / "report")]
     assert main(command) == 0
@@ -146,6 +134,18 @@ def test_bad_data_is_named_in_one_line(
     assert complaint in shown
     assert not out.exists()
     assert not (tmp_path / "x.json").exists()
+
+
+def test_a_curve_without_misses_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("matplotlib.axes.Axes.text", lambda *at, **_: said.append(at[-1]))
+    write_image(tmp_path / "a.png", street(192, 256, 3))
+    found = PeopleDetector().detect(tmp_path / "a.png").boxes.tolist()
+    for boxes, words in ((found, ["no misses"]), ([*found, [10, 5, 15, 40]], [])):
+        (tmp_path / "boxes.json").write_text(json.dumps({"a.png": boxes}))
+        said.clear()
+        assert main(["evaluate", "limo", str(tmp_path), "--report", str(tmp_path / "report")]) == 0
+        assert said == words
 
 
 def test_boxes_left_out_are_told_as_warnings(streets: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -297,8 +297,9 @@ class Stage:
             message = " ".join(fault.message.split())
             return f"{self.script.name} {fault.how} at {failed_at:.2f} s: {message}; {ending}"
         if not self._driven:
-            sent = ", ".join(sorted(self.published)) or "nothing at all"
-            return f"{self.script.name} never published on {names.COMMAND} (it published {sent}): the robot never moved"
+            other = ", ".join(sorted(self.published)) or "nothing at all"
+            never = f"never published on {names.COMMAND} (it published {other})"
+            return f"{self.script.name} {never}: the robot never moved"
         return ""
 
 
@@ -340,8 +341,7 @@ def score_of(outcome: Ended) -> ScoreCard:
     Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
     """
     card, driving = score(outcome.episode), outcome.episode.scorer.driving
-    still = f"{outcome.stage.script.name} never moved the robot" if card.success and not driving else ""
-    if failure := outcome.failure or still:
+    if failure := outcome.failure or ("" if driving or not card.success else "the node never moved the robot"):
         card = replace(card, success=False, failure=failure)
     if outcome.used_hog:
         return card

@@ -31,6 +31,7 @@ fn used(text: &str) -> Vec<String> {
     let code: Vec<_> = text.lines().map(|line| line.split("//").next().unwrap()).collect();
     let code = code.join(" ");
     let word = |path: &str| path.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+    let is_top = |name: &String| LAYERS.iter().any(|layer| layer.contains(&name.as_str()));
     let names = code.split("crate::").skip(1).flat_map(|path| match path.strip_prefix('{') {
         // Of a list those that are top modules: the others lie within them.
         Some(list) => {
@@ -39,10 +40,6 @@ fn used(text: &str) -> Vec<String> {
         None => vec![word(path)],
     });
     names.collect()
-}
-
-fn is_top(name: &String) -> bool {
-    LAYERS.iter().any(|layer| layer.contains(&name.as_str()))
 }
 
 /// What a file of the top module `module` uses that does not lie below it.

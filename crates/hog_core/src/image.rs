@@ -42,17 +42,17 @@ impl<'a> ImageView<'a> {
         Ok(Self { data, width, height, channels, row_stride })
     }
 
-    /// Width [px].
+    /// Width \[px\].
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height [px].
+    /// Height \[px\].
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Width and height [px].
+    /// Width and height \[px\].
     pub fn size(&self) -> Size {
         Size::new(self.width, self.height)
     }

@@ -11,7 +11,7 @@ use crate::params::HogSpec;
 pub struct Level {
     /// How many image pixels a level pixel spans.
     pub scale: f64,
-    /// Size of the level's image [px].
+    /// Size of the level's image \[px\].
     pub size: Size,
 }
 

@@ -27,6 +27,7 @@ from benches.follower import contacts_by
 from benches.oracle import ORACLES, oracle
 
 import limo_hog
+from limo_hog.atomic import whole_file
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow import detector_named
 from limo_hog.parallel import cores
@@ -36,7 +37,7 @@ from limo_sim.run.episode import play as drive
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.log import Step
 from limo_sim.run.matching import CRITERIA, NO_PERSON, person_of
-from limo_sim.run.provenance import code_version
+from limo_sim.run.provenance import code_version, fingerprint
 from limo_sim.run.sweep import in_processes
 from limo_sim.world.people import SOCIAL_FORCE, Person, Vary, check_person
 from limo_sim.world.scenario import Robot, Room, Scenario, Wall
@@ -50,6 +51,7 @@ BEHIND = 1.75
 ARRIVED = 0.5
 #: Files with higher numbers are kept back to check with.
 LAST = 40
+NAME = re.compile(r"[A-Za-z0-9.]+_back_([1-9]|[123]\d|40)")
 SECONDS = 60.0
 #: Blocks thicker than a wall may be become hollow, with walls so thick [m].
 SOLID, SHELL = 1.0, 0.1
@@ -64,8 +66,7 @@ class FollowBenchError(LimoHogError):
 
 def number_of(path: Path) -> int:
     """Return the number of a scene, by its file's name; refuse those kept back, and those not followed from behind."""
-    found = re.fullmatch(r"[A-Za-z0-9.]+_back_(\d+)", path.stem)
-    if found is None or not 1 <= int(found[1]) <= LAST:
+    if (found := NAME.fullmatch(path.stem)) is None:
         raise FollowBenchError(f"{path.name}: want a name such as KIND_back_N.yaml, N from 1 to {LAST}")
     return int(found[1])
 
@@ -216,6 +217,17 @@ def until_arrival(steps: Sequence[Step], target: Person) -> dict[str, float | No
     return {"arrived_s": arrived, "in_view_until": float(np.mean(frames)) if frames else None, "away_then_m": away}
 
 
+PAGE = Path(__file__).parents[1] / "docs" / "benchmark.md"
+HEADING = "## Follow-Bench at 1:2"
+PROSE = """Scenes that others wrote ([Follow-Bench](https://arxiv.org/abs/2509.10796), MIT), one run of 60 s each, by
+`python -m benches.follow_bench FOLDER --page`, which says how its files are read. `oracle` is `tracking` with true
+positions in place of what it sees; `crude` a sampled rollout with true positions and no routes: what could be won by
+better senses, and by a better planner. "Until arrival" is the way on which the person first walks to their goal.
+
+The figures are not comparable with those of the paper. There, planners know all positions and a run ends at the goal;
+here the senses are honest, the camera sees 71°, ORCA's people walk by social forces, and all walk to and fro, so that
+they meet the robot head-on as well. "Without a collision until arrival", their success, a robot that stands has too."""
+
 COLUMNS = {
     "success": ("success", sum),
     "in view": ("in_view", np.mean),
@@ -227,6 +239,13 @@ COLUMNS = {
     "own contacts": ("contacts_own", sum),
     "other contacts": ("contacts_other", sum),
 }  # fmt: skip
+
+
+#: Columns that count runs or contacts.
+COUNTS = (
+    "runs", "success", "own contacts", "other contacts",
+    "≥ .8 and ≤ 4 m then", "nearer than .1 m", "other followed first",
+)  # fmt: skip
 
 
 def row(cards: Sequence[dict[str, Any]]) -> dict[str, float]:
@@ -241,19 +260,31 @@ def row(cards: Sequence[dict[str, Any]]) -> dict[str, float]:
     return told
 
 
-def table(cards: Sequence[dict[str, Any]]) -> str:
-    """Return a Markdown table, a row for each controller and kind."""
-    lines: list[str] = []
-    for controller in dict.fromkeys(card["controller"] for card in cards):
-        mine = [card for card in cards if card["controller"] == controller]
-        kinds = {kind: [card for card in mine if card["kind"] == kind] for kind in sorted({c["kind"] for c in mine})}
-        for kind, some in {**kinds, "**all**": mine}.items():
-            told = row(some)
-            if not lines:
-                lines = [f"| controller | kind | {' | '.join(told)} |", "|---" * (len(told) + 2) + "|"]
-            cells = (f"{value:.0f}" if value == round(value) else f"{value:.2f}" for value in told.values())
-            lines.append(f"| `{controller}` | {kind} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+def table(groups: dict[str, Sequence[dict[str, Any]]]) -> list[str]:
+    """Return a Markdown table with a row for each group of cards."""
+    rows = {label: row(cards) for label, cards in groups.items()}
+    titles = list(next(iter(rows.values())))
+    lines = [f"| of 40 scenes | {' | '.join(titles)} |", "|---" * (len(titles) + 1) + "|"]
+    for label, told in rows.items():
+        cells = (f"{value:.0f}" if title in COUNTS else f"{value:.2f}" for title, value in told.items())
+        lines.append(f"| {label} | {' | '.join(cells)} |")
+    return lines
+
+
+def section(cards: dict[str, dict[str, dict[str, Any]]]) -> str:
+    """Return what docs/benchmark.md says of these cards, by controller and scene."""
+    by_kind: dict[str, list[str]] = {}
+    for scene, card in next(iter(cards.values())).items():
+        by_kind.setdefault(card["kind"], []).append(scene)
+    lines = [HEADING, "", PROSE, "", *table({f"`{name}`": list(of.values()) for name, of in cards.items()}), ""]
+    lines.append(f"| kind | successes: {' | '.join(f'`{name}`' for name in cards)} | files | hash of the scenes |")
+    lines.append("|---" * (len(cards) + 3) + "|")
+    for kind, scenes in sorted(by_kind.items()):
+        won = [f"{sum(of[scene]['success'] for scene in scenes)} of {len(scenes)}" for of in cards.values()]
+        hashes = "".join(next(iter(cards.values()))[scene]["scenario_hash"] for scene in scenes)
+        names = ", ".join(f"`{scene.removeprefix('Normal').removeprefix(kind)}`" for scene in scenes)
+        lines.append(f"| {kind} | {' | '.join(won)} | {names} | `{fingerprint(hashes.encode())[:16]}` |")
+    return "\n".join(lines) + "\n"
 
 
 def main() -> None:
@@ -265,8 +296,11 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=SECONDS, help="of each run (%(default)s)")
     parser.add_argument("--workers", type=int, default=cores(), help="processes (%(default)s)")
     parser.add_argument("--json", type=Path, default=Path("out/follow_bench.jsonl"), help="a line a run (%(default)s)")
+    parser.add_argument("--page", action="store_true", help=f"rewrite that part of docs/{PAGE.name}")
     args = parser.parse_args()
-    paths = sorted(args.folder.glob(f"{args.match}.yaml"), key=lambda path: (number_of(path), path.name))
+    paths = [path for path in args.folder.glob(f"{args.match}.yaml") if NAME.fullmatch(path.stem)]
+    paths.sort(key=lambda path: (number_of(path), path.name))
+    print(f"{len(paths)} files; those with numbers above {LAST} and of other following positions are left out")
     runs = [Play(path, controller, args.seconds) for controller in args.controllers for path in paths]
     args.json.parent.mkdir(parents=True, exist_ok=True)
     args.json.touch()
@@ -282,7 +316,16 @@ def main() -> None:
             file.write(json.dumps(card) + "\n")
             file.flush()
             print(run.controller, run.path.stem, *row([card]).values(), flush=True)
-    print(table([known[run.controller, run.path.stem] for run in runs]))
+    cards = {name: {path.stem: known[name, path.stem] for path in paths} for name in args.controllers}
+    for name, of in cards.items():
+        kinds = {
+            kind: [card for card in of.values() if card["kind"] == kind] for kind in {c["kind"]: 0 for c in of.values()}
+        }
+        print("\n".join([f"\n{name}", *table({**kinds, "**all**": list(of.values())})]))
+    if args.page:
+        before = PAGE.read_text(encoding="utf-8").partition(HEADING)[0].rstrip()
+        with whole_file(PAGE) as part:
+            part.write_text(f"{before}\n\n{section(cards)}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ that knows no routes. Both stand behind `Guard` as every controller does, and se
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -66,9 +66,13 @@ class TrueDetector:
 
 @dataclass(frozen=True, slots=True)
 class TrueTracker(Tracker):
-    """Every person of the arena as a track without an error, whether something hides them or not."""
+    """Every person of the arena as a track without an error, whether something hides them or not.
+
+    `past` is where everybody was in the last frame: a stamp [s], x, y in the arena [m]; a tracker is for one run.
+    """
 
     arena: Arena | None = None
+    past: dict[int, tuple[float, float, float]] = field(default_factory=dict)
 
     def update(self, observation: Observation, tracks: Tracks) -> tuple[Tracks, dict[int, int]]:
         """Bring all tracks up to a frame; as `Tracker.update`."""
@@ -76,16 +80,20 @@ class TrueTracker(Tracker):
         tracks = self._remember(observation, tracks)
         truth, pose = self.arena.frame().truth, pose_at(tracks.poses, observation.stamp)
         boxes = {number: box for box, number in enumerate(shown(self.arena))}
-        people = []
+        people, turned = [], pose.yaw - truth.robot[2]
         for number, one in enumerate(truth.people, 1):
             if one is None:
                 continue
             before, stamp = tracks.person(number), observation.stamp
             yaw = pose.yaw + one.bearing
             x, y = pose.x + one.distance * math.cos(yaw), pose.y + one.distance * math.sin(yaw)
-            past = Track(stamp - 1.0, (x, y, 0.0, 0.0), _EXACT) if before is None else before.track
-            dt = max(stamp - past.stamp, 1e-3)
-            track = Track(stamp, (x, y, (x - past.mean[0]) / dt, (y - past.mean[1]) / dt), _EXACT)
+            # By places in the arena: in the odometry frame a person far away moves as the robot's heading slips.
+            past = self.past.get(number, (stamp - 1.0, one.x, one.y))
+            self.past[number] = stamp, one.x, one.y
+            dt = max(stamp - past[0], 1e-3)
+            along, aside = (one.x - past[1]) / dt, (one.y - past[2]) / dt
+            cos, sin = math.cos(turned), math.sin(turned)
+            track = Track(stamp, (x, y, cos * along - sin * aside, sin * along + cos * aside), _EXACT)
             height = self.arena.scenario.people[number - 1].height
             window = WINDOW_PER_STATURE * height * observation.focal_px
             centre = (self.robot.camera_z - height / 2) * observation.focal_px

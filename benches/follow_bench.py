@@ -264,7 +264,7 @@ def table(groups: dict[str, Sequence[dict[str, Any]]]) -> list[str]:
     """Return a Markdown table with a row for each group of cards."""
     rows = {label: row(cards) for label, cards in groups.items()}
     titles = list(next(iter(rows.values())))
-    lines = [f"| of 40 scenes | {' | '.join(titles)} |", "|---" * (len(titles) + 1) + "|"]
+    lines = [f"| | {' | '.join(titles)} |", "|---" * (len(titles) + 1) + "|"]
     for label, told in rows.items():
         cells = (f"{value:.0f}" if title in COUNTS else f"{value:.2f}" for title, value in told.items())
         lines.append(f"| {label} | {' | '.join(cells)} |")

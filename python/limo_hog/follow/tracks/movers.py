@@ -181,7 +181,7 @@ class Movers:
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
     def _whose(self, movers: tuple[Mover, ...], gaps: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return whose legs each of N returns may be, the nearest, 0 for none; in `gaps`, (M, N), known people come first."""
+        """Return whose legs each of N returns may be, the nearest, 0 for none; in `gaps`, (M, N), known people lead."""
         numbers = np.array([one.number for one in movers if one.number is not None], np.int64)
         if len(numbers) == 0:
             return np.zeros(gaps.shape[1], np.int64)

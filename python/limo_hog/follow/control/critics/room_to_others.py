@@ -15,7 +15,7 @@ from limo_hog.follow.parameters import param
 class RoomToOthers:
     """Mean distance short of `clear` to the nearest of the others, and more from where it would touch them.
 
-    A robot that takes people never to give way finds no way among them and freezes (Trautman and Krause 2010).
+    A robot that takes people never to give way freezes among them (Trautman and Krause 2010).
     """
 
     weight: float = param(12.0, "1/m", "Cost of a metre.", 0, 100)
@@ -26,8 +26,11 @@ class RoomToOthers:
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [m]."""
-        own = [] if situation.followed is None else [situation.followed]
-        others = np.delete(rollouts.places, own, axis=1)
+        x, y, vx, vy = situation.people.T
+        # Who walks away, or touches the robot already, is not fled from: they walk on by themselves.
+        comes = (x * vx + y * vy < 0) & (np.hypot(x, y) > self.touches + situation.robot.half_length)
+        comes[[] if situation.followed is None else situation.followed] = False
+        others = rollouts.places[:, comes]
         if others.shape[1] == 0:
             return rollouts.nothing
         gap = rollouts.gaps(others, situation.robot).min(axis=2)

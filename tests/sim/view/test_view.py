@@ -71,9 +71,9 @@ def test_a_parameter_changes_the_controller_and_keeps_its_kind() -> None:
     tunable.set("full_every", 5.0)
     assert tunable.parameters["target_distance"].value == 2.0
     assert type(tunable.parameters["full_every"].value) is int
-    tunable.set("following.max_speed", 0.3)
-    assert tunable.parameters["following.max_speed"].value == 0.3
-    assert tunable.parameters["planner.max_turn"].value == 3.0
+    tunable.set("steering.max_linear", 0.3)
+    assert tunable.parameters["steering.max_linear"].value == 0.3
+    assert tunable.parameters["steering.max_angular"].value == 1.5
 
 
 @pytest.mark.parametrize(

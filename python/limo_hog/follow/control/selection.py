@@ -1,22 +1,21 @@
-"""Which of the tracked people to follow, and what else the tracking controller remembers from frame to frame."""
+"""Which of the tracked people to follow, and what else the tracking controller remembers from frame to frame.
+
+It stays with one person, says so where it is not sure which that is, and recognises them after a loss.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
+from limo_hog.follow.control.backing import Other
 from limo_hog.follow.control.lookout import Hunt
-from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre
-from limo_hog.follow.control.situation import carried
 from limo_hog.follow.decision import Believed
-from limo_hog.follow.parameters import param
+from limo_hog.follow.parameters import bounded
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import pose_at
 from limo_hog.follow.space.grid import Ground
-from limo_hog.follow.tracks.hiding import Other
 from limo_hog.follow.tracks.identity import Identity, Likeness
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, predict
 from limo_hog.follow.tracks.person import Person
@@ -25,32 +24,73 @@ from limo_hog.follow.tracks.tracker import Tracks
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The person followed."""
+    """The person followed.
 
-    number: int | None = None  #: Of the person; None while none is followed.
-    #: What the confirmed person followed last looks like, and which track that is; None where none was followed yet.
+    Attributes
+    ----------
+    number
+        Of the person; None while none is followed.
+    likeness
+        What the confirmed person followed last looks like, and which track that is; None where none was followed yet.
+    measured
+        When that person was last measured [s]; None where none was followed yet.
+    candidates
+        Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
+    unsure_at
+        Since when that is not sure [s]; None where it is.
+    """
+
+    number: int | None = None
     likeness: Likeness | None = None
-    measured: float | None = None  #: When that person was last measured [s]; None where none was followed yet.
-    #: Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
+    measured: float | None = None
     candidates: tuple[int, ...] = ()
-    unsure_at: float | None = None  #: Since when that is not sure [s]; None where it is.
+    unsure_at: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Chooses the person to follow."""
+    """Chooses the person to follow.
 
-    min_existence: float = param(0.4, "1", "From here somebody too far away for HOG is worth driving to.", 0, 1)
-    max_unconfirmed_frames: int = param(30, "1", "Unconfirmed tracks are given up after so many frames.", 1, 1000)
-    reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
-    lead: float = param(0.1, "1", "Probability by which another must exceed the track that is faced already.", 0, 1)
-    aside: float = param(0.6, "1/rad", "A person is this less likely to be meant for each radian aside.", 0, 5)
-    further: float = param(0.1, "1/m", "The same for each metre of distance.", 0, 5)
-    likely: float = param(0.5, "1", "Probability from which a track in view is followed.", 0, 1)
-    odds: float = param(3.0, "1", "And it must be this many times as likely as any other in view.", 1, 100)
-    possible: float = param(0.1, "1", "A track in view that is less likely than this is another person.", 0, 1)
-    decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)
-    identity: Identity = field(default_factory=Identity)  #: Which track the person followed is.
+    Attributes
+    ----------
+    min_existence
+        Probability from which a person too far away for HOG is worth driving nearer, and waiting for [1]. Chosen: three
+        clear frames.
+    max_unconfirmed_frames
+        A track that is not confirmed after so many frames, and less likely than `min_existence`, is given up [1].
+        Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
+    reidentify_s
+        How long to look for a lost person before another is followed [s]. Chosen: two full turns of the search.
+    lead
+        Probability by which another must exceed the track that is faced already [1]. Chosen: one frame of evidence.
+    aside, further
+        What a person is less likely to be meant for each radian off straight ahead and for each metre of distance,
+        before one is followed [1]. Chosen: at the image's edge three frames of evidence; two metres are worth two.
+    likely
+        Probability of being the person followed from which a track in view is followed [1]. Chosen: more likely than
+        not.
+    odds
+        And it must be so many times as likely as any other in view; else it is not sure which of them it is [1].
+        Chosen: one wrong in four guesses would be too many.
+    possible
+        A track in view that is less likely than this is another person [1]. Chosen.
+    decide_s
+        After so long the likeliest is taken [s]. Chosen: people part within a few seconds, or leave the view.
+    identity
+        Which track the person followed is.
+    """
+
+    min_existence: float = bounded(0.4, 0, 1)
+    max_unconfirmed_frames: int = bounded(30, 1, 1000)
+    reidentify_s: float = bounded(20.0, 0, 600)
+    lead: float = bounded(0.1, 0, 1)
+    aside: float = bounded(0.6, 0, 5)
+    further: float = bounded(0.1, 0, 5)
+    likely: float = bounded(0.5, 0, 1)
+    odds: float = bounded(3.0, 1, 100)
+    possible: float = bounded(0.1, 0, 1)
+    decide_s: float = bounded(4.0, 0, 60)
+    identity: Identity = field(default_factory=Identity)
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
         """Follow the track that is the person followed so far; before there is one, the likeliest person in view."""
@@ -127,39 +167,80 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class TrackingState:
-    """What the controller remembers."""
+    """What the controller remembers.
 
-    tracks: Tracks = field(default_factory=Tracks)  #: All tracked people.
-    choice: Choice = field(default_factory=Choice)  #: Which of them is followed.
-    side: float = 1.0  #: Which way to search: 1 left, -1 right.
-    since_full: int = 0  #: Frames since the whole image was searched [1].
-    ground: Ground | None = None  #: What stands where; None before the first scan.
-    known: Track | None = None  #: The followed person's track when last measured; None before anyone was followed.
-    hunt: Hunt | None = None  #: What is remembered while looking for that person; None while they are measured.
-    #: float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
+    Attributes
+    ----------
+    tracks
+        All tracked people.
+    choice
+        Which of them is followed.
+    side
+        Which way to search: 1 left, -1 right.
+    detour
+        How far off the direct way to the person the robot drives [rad].
+    since_full
+        Frames since the whole image was searched [1].
+    ground
+        What stands where; None before the first scan.
+    known
+        The followed person's track when last measured; None before anyone was followed.
+    hunt
+        What is remembered while looking for that person; None while they are measured.
+    way, way_at
+        float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
+    way_out
+        Direction in the odometry frame [rad] and speed [m/s] by which it gives way, and since when [s]; None while it
+        does not.
+    gave_way_at
+        When it last gave way [s].
+    acceleration
+        Of the wheels, as learnt [m/s²].
+    sent
+        The last command.
+    others
+        Other people than the followed one, measured lately.
+    brisk
+        How fast the followed person walks at most, as far as known [m/s].
+    """
+
+    tracks: Tracks = field(default_factory=Tracks)
+    choice: Choice = field(default_factory=Choice)
+    side: float = 1.0
+    detour: float = 0.0
+    since_full: int = 0
+    ground: Ground | None = None
+    known: Track | None = None
+    hunt: Hunt | None = None
     way: Points = field(default_factory=lambda: NO_POINTS)
     way_at: float = -math.inf
-    acceleration: float = 1.0  #: Of the wheels, as learnt [m/s²].
-    sent: Twist = field(default_factory=Twist)  #: The last command.
-    others: tuple[Other, ...] = ()  #: Other people than the followed one, measured lately.
-    brisk: float = 0.0  #: How fast the followed person walks at most, as far as known [m/s].
-    kept: Manoeuvre = DIRECT  #: The manoeuvre begun.
+    way_out: tuple[float, float, float] | None = None
+    gave_way_at: float = -math.inf
+    acceleration: float = 1.0
+    sent: Twist = field(default_factory=Twist)
+    others: tuple[Other, ...] = ()
+    brisk: float = 0.0
 
 
 def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:
     """Return everyone tracked, in the base frame, as of the newest stamp `now` [s]."""
-    boxes, likeness, people = dict(state.tracks.boxes), state.choice.likeness, state.tracks.people
-    means = np.array([predict(one.track, now, noise).mean for one in people]).reshape(-1, 4)
-    return tuple(
-        Believed(
-            x,
-            y,
-            one.existence,
-            one.number,
-            vx,
-            vy,
-            boxes.get(one.number),
-            None if likeness is None else likeness.of(one.number),
+    boxes, likeness = dict(state.tracks.boxes), state.choice.likeness
+    pose = pose_at(state.tracks.poses, now)
+    people = []
+    for one in state.tracks.people:
+        track = predict(one.track, now, noise)
+        bearing, distance = bearing_range(track, pose)
+        speed, heading = math.hypot(*track.mean[2:]), math.atan2(track.mean[3], track.mean[2]) - pose.yaw
+        people.append(
+            Believed(
+                distance * math.cos(bearing),
+                distance * math.sin(bearing),
+                one.existence,
+                one.number,
+                speed * math.cos(heading),
+                speed * math.sin(heading),
+                boxes.get(one.number),
+                None if likeness is None else likeness.of(one.number),
+            )
         )
-        for one, (x, y, vx, vy) in zip(people, carried(means, pose_at(state.tracks.poses, now)).tolist(), strict=True)
-    )
+    return tuple(people)

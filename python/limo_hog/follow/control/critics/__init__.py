@@ -1,1 +1,0 @@
-"""What a rollout costs: a critic a file, each with one weight; `planner.Planner` sums them."""

@@ -32,7 +32,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         epilog="What of ROS 2's Python API is offered: https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
     )
     parser.add_argument("node", metavar="NODE.py", type=Path, help="the script")
-    add_scenario(parser, 60.0, "simulated time (60)")
+    add_scenario(parser, None, "simulated time (60, or that of check:NAME)", " or check:NAME, a scene of the checker")
     add_json(parser)
     add_watching(parser)
     add_ros_arguments(parser)
@@ -46,7 +46,16 @@ def run(args: argparse.Namespace) -> int:
     with needed(by="limo-hog run"):
         from limo_sim.ros.runner import Limits, run_node
         from limo_sim.ros.stage import Stage, score_of
-    scenario = of_run(Scenario.load(args.scenario), args.seed)
+        from limo_sim.workshop.exercises import scene_named
+    ros_args = args.ros_args
+    if args.scenario.startswith("check:"):
+        scene = scene_named(args.scenario.removeprefix("check:"))
+        scenario, ros_args = scene.scenario, [*scene.arguments, *ros_args]
+        args.seconds = scene.seconds if args.seconds is None else args.seconds
+    else:
+        scenario = of_run(Scenario.load(args.scenario), args.seed)
+    if args.seconds is None:
+        args.seconds = 60.0
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
             # What the node prints must not mix with the JSON.
@@ -68,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
         stage = Stage(args.node, scenario, args.seconds, args.seed, log=log, watch=watch)
         limits = Limits(memory_mb=MEMORY_MB)
-        ended = run_node(stage, ["--ros-args", *args.ros_args], limits=limits, said=said)
+        ended = run_node(stage, ["--ros-args", *ros_args], limits=limits, said=said)
         card = score_of(ended)
         bar.stop()
         observers.end(ended.episode, card)

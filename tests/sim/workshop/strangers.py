@@ -1,6 +1,8 @@
+# ruff: noqa: E501
 """Sixty nodes by people who knew the tutorials alone: thirty right ones, and thirty with one mistake each.
 
-A node is a template and what is exchanged in it. They were written before the checker was read, and are not fitted to it.
+A node is a template and what is exchanged in it. All were written before the checker was read, and are not fitted to
+it.
 """
 
 from __future__ import annotations

@@ -104,9 +104,6 @@ def run(args: argparse.Namespace) -> int:
             from limo_sim.workshop.check import examine
             from limo_sim.workshop.html_report import to_html
             from limo_sim.workshop.report import to_gradescope, to_json
-        for written in (args.html, args.json, args.gradescope):
-            if written and written != STDOUT and Path(written).resolve() == args.file.resolve():
-                raise UsageError(f"{written} is the node itself; give the report another name")
         # What the node prints must not mix with the report or the JSON.
         examination = examine(args.file, node, said=lambda _, text: print(text, end="", file=sys.stderr))
         verdicts = examination.verdicts

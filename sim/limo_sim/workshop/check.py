@@ -107,7 +107,7 @@ def examine(
 def _is_hopeless(take: Take) -> bool:
     """Whether the node would fail in every scene alike, or has used up its time."""
     fault = take.outcome.fault if take.outcome else None
-    return fault is not None and (fault.how in ("hung", "was stopped") or not take.calls.images)
+    return not take.calls.images or (fault is not None and fault.how in ("hung", "was stopped"))
 
 
 def _is_late(checkpoint: Checkpoint, wanted: Exercise) -> bool:
@@ -127,7 +127,7 @@ def _judged(source: Source, checkpoint: Checkpoint, wanted: Exercise, takes: Seq
     no_image = no_picture(source, takes)
     if no_image is not None:
         return no_image if checkpoint is first else NOT_REACHED
-    if checkpoint.task > 1 and wanted.has("found"):
+    if checkpoint.task > 1 and any(point.check == "found" for point in wanted.checkpoints):
         blind = no_detection(source, takes)
         if blind is not None and red_on_person(takes).holds is not True:
             return blind if checkpoint.check == "found" or checkpoint is first else NOT_REACHED

@@ -72,10 +72,10 @@ def stands(takes: Sequence[Take]) -> Finding:
     there = {command.line for _, command, _, _ in _answers(takes, seeing=True)}
     if not answers or not (moves(takes) or here - there):
         return Finding(None, "not tried: the same zero command answers every picture, with a person and without")
-    return rests(takes) or Finding(True, f"{len(answers)} commands without a box are a zero Twist")
+    return _rests(takes) or Finding(True, f"{len(answers)} commands without a box are a zero Twist")
 
 
-def rests(takes: Sequence[Take]) -> Finding | None:
+def _rests(takes: Sequence[Take]) -> Finding | None:
     """Return where the robot still moves once nobody has been in view for a while; None where it never does."""
     for take in takes:
         seen = max((look.time for look in take.looks if len(look.people)), default=-_GONE_S)

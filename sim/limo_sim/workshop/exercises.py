@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -36,15 +36,15 @@ CHECKS: dict[str, Callable[..., Finding]] = {
 
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
-    """One checkpoint: its check, task, name and points, how it is judged and where, and hints from vague to plain."""
+    """One checkpoint: its points, check, task and name, hints from vague to plain, where and how it is judged."""
 
-    check: str
-    task: int
-    name: str
     points: int
-    judge: Callable[..., Finding]
+    check: str = ""
+    task: int = 1
+    name: str = ""
     hints: tuple[str, ...] = ()
     scenes: tuple[str, ...] = ()
+    judge: Callable[..., Finding] = sights.shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Exercise:
 
     Attributes
     ----------
-    name, title
+    title
         What it is called.
     scenes, checkpoints
         Where the node is tried, and what it is judged by.
@@ -61,15 +61,21 @@ class Exercise:
         Which of `workshop.solution`'s texts solves it; "" where none does.
     """
 
-    name: str
     title: str
     scenes: tuple[Scene, ...]
     checkpoints: tuple[Checkpoint, ...]
     solution: str = ""
 
-    def has(self, check: str) -> bool:
-        """Whether one of the checkpoints is of this check."""
-        return any(checkpoint.check == check for checkpoint in self.checkpoints)
+
+@dataclass(frozen=True, slots=True)
+class _File:
+    """A file: `scene` has the scenes of its own, by name, and `checkpoints` points, or a table with them, by name."""
+
+    title: str
+    scenes: tuple[str, ...]
+    checkpoints: dict  # type: ignore[type-arg]
+    scene: dict = field(default_factory=dict)  # type: ignore[type-arg]
+    solution: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,32 +90,12 @@ class _SceneTable:
     arguments: tuple[str, ...] = ()
     last: bool = False
 
-    def scene(self, name: str) -> Scene:
-        if self.scenario:
-            scenario = Scenario.load(self.scenario)
-        else:
-            standing = tuple(Person(route=((x, y, 3600.0),), facing=0.0) for x, y in self.people)
-            scenario = Scenario(
-                **{**_fields(self.arena), "name": f"check:{name}", "people": standing + self.arena.people}
-            )
-            scenario.check(f"scene.{name}: ")
+    def scene(self, name: str, where: str) -> Scene:
+        scenario = Scenario.load(self.scenario) if self.scenario else replace(self.arena, name=f"check:{name}")
+        standing = tuple(Person(route=((x, y, 3600.0),), facing=0.0) for x, y in self.people)
+        scenario = replace(scenario, people=standing + scenario.people)
+        scenario.check(where)
         return Scene(name, self.words, scenario, self.seconds, self.arguments, self.last)
-
-
-@dataclass(frozen=True, slots=True)
-class _CheckpointTable:
-    """A checkpoint in a file; what else its table has are bounds, arguments of the check."""
-
-    points: int
-    check: str = ""
-    task: int = 1
-    name: str = ""
-    hints: tuple[str, ...] = ()
-    scenes: tuple[str, ...] = ()
-
-
-def _fields(value: Any) -> dict[str, Any]:
-    return {name: getattr(value, name) for name in value.__dataclass_fields__}
 
 
 def task_name(task: int) -> str:
@@ -134,52 +120,38 @@ def exercise(name_or_path: str) -> Exercise:
     path = Path(name_or_path) if name_or_path.endswith(".toml") else _FOLDER / f"{name_or_path}.toml"
     if path.parent == _FOLDER and path.stem not in names():
         raise ScenarioError(f"unknown exercise {name_or_path}: want one of {', '.join(names())}, or a .toml file")
-    table, where = _table(path), f"{path.name}: "
-    unknown = [key for key in table if key not in ("title", "scenes", "scene", "checkpoints", "solution")]
-    if unknown or not {"title", "scenes", "checkpoints"} <= table.keys():
-        raise ScenarioError(
-            f"{where}{unknown[0] if unknown else 'title, scenes or checkpoints'}: "
-            + (
-                "unknown key; a file has title, scenes, [scene.NAME], [checkpoints] and solution"
-                if unknown
-                else "missing"
-            )
-        )
-    common = _table(_FOLDER / "common.toml")
-    own = common["scene"] | table.get("scene", {})
-    for name in table["scenes"]:
+    where, common = f"{path.name}: ", _table(_FOLDER / "common.toml")
+    file = build(_File, _table(path), where)
+    own = common["scene"] | file.scene
+    for name in file.scenes:
         if name not in own:
             raise ScenarioError(
                 f"{where}scenes: unknown scene {name!r}, want one of {', '.join(own)}, or [scene.{name}]"
             )
-    scenes = tuple(build(_SceneTable, own[name], f"{where}scene.{name}.").scene(name) for name in table["scenes"])
-    points = tuple(
-        _checkpoint(name, given, common["checkpoints"].get(name, {}), table["scenes"], where)
-        for name, given in table["checkpoints"].items()
+    keys = {name: f"{where}scene.{name}." for name in file.scenes}
+    scenes = tuple(build(_SceneTable, own[name], key).scene(name, key) for name, key in keys.items())
+    checkpoints = tuple(
+        _checkpoint(name, common["checkpoints"].get(name, {}), given, file.scenes, f"{where}checkpoints.{name}")
+        for name, given in file.checkpoints.items()
     )
-    return Exercise(path.stem, str(table["title"]), scenes, points, str(table.get("solution", "")))
+    return Exercise(file.title, scenes, checkpoints, file.solution)
 
 
-def _checkpoint(name: str, given: Any, common: Mapping[str, Any], scenes: list[str], where: str) -> Checkpoint:
-    where = f"{where}checkpoints.{name}"
-    given = dict(common) | (given if isinstance(given, dict) else {"points": given})
-    check = given.get("check", name)
-    if check not in CHECKS:
-        raise ScenarioError(f"{where}: unknown check {check!r}, want one of {', '.join(CHECKS)}")
-    own = {key: value for key, value in given.items() if key in _CheckpointTable.__dataclass_fields__}
-    bounds = {key: value for key, value in given.items() if key not in own}
-    table = build(_CheckpointTable, own, f"{where}.")
-    bound_names = list(inspect.signature(CHECKS[check]).parameters)[1:]
+def _checkpoint(name: str, common: dict[str, Any], given: Any, scenes: tuple[str, ...], where: str) -> Checkpoint:
+    table = {"check": name, "name": name} | common | (given if isinstance(given, dict) else {"points": given})
+    bounds = {key: table.pop(key) for key in list(table) if key == "judge" or key not in Checkpoint.__slots__}
+    point = build(Checkpoint, table, f"{where}.")
+    if point.check not in CHECKS:
+        raise ScenarioError(f"{where}: unknown check {point.check!r}, want one of {', '.join(CHECKS)}")
+    there = list(inspect.signature(CHECKS[point.check]).parameters)[1:]
     for key in bounds:
-        if key not in bound_names:
-            raise ScenarioError(
-                f"{where}.{key}: unknown key; bounds of {check!r} are: {', '.join(bound_names) or 'none'}"
-            )
-    for scene in table.scenes:
+        if key not in there:
+            said = f"unknown key; bounds of {point.check!r} are: {', '.join(there) or 'none'}"
+            raise ScenarioError(f"{where}.{key}: {said}")
+    for scene in point.scenes:
         if scene not in scenes:
             raise ScenarioError(f"{where}.scenes: {scene!r} is none of the exercise's scenes: {', '.join(scenes)}")
-    judge = partial(CHECKS[check], **bounds)
-    return Checkpoint(check, table.task, table.name or name, table.points, judge, table.hints, table.scenes)
+    return replace(point, judge=partial(CHECKS[point.check], **bounds))
 
 
 def _table(path: Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.ros2 import names
-from limo_sim.workshop.checkpoints import RIGHT, command_of, looks_of, rests, surest
+from limo_sim.workshop.checkpoints import RIGHT, looks_of, surest
 from limo_sim.workshop.mistakes import Finding
 from limo_sim.workshop.sights import RED
 from limo_sim.workshop.takes import Look, Take
@@ -116,21 +116,6 @@ def no_hog(takes: Sequence[Take]) -> Finding:
     return red_on_person(takes)
 
 
-def stands_alone(takes: Sequence[Take]) -> Finding:
-    """Whether the empty room is answered with a stop, while a person is answered with a motion."""
-    looks = [look for _, look in looks_of(takes) if look.commands]
-    empty = [look for look in looks if not len(look.people)]
-    moving = [c for look in looks for c in look.commands if len(look.people) and (c.twist.linear or c.twist.angular)]
-    if not empty or not moving:
-        return Finding(None, "not tried: no command answers the empty room, or none answers a person")
-    for look in empty:
-        for command in look.commands:
-            if command.twist.linear or command.twist.angular:
-                said = f"the room is empty, yet the command is {command_of(command)}"
-                return Finding(False, said, command.line, look)
-    return rests(takes) or Finding(True, f"{len(empty)} frames of the empty room are answered with a zero Twist")
-
-
 def stays(takes: Sequence[Take]) -> Finding:
     """Whether the red box stays on the person who was followed first, though HOG is surer of the second."""
     looks = [look for _, look in looks_of(takes) if len(look.truth.people) == 2]
@@ -179,7 +164,4 @@ def _room(take: Take, x: float, y: float, yaw: float) -> float:
 
 
 #: By the names that an exercise's file uses.
-CHECKS = {
-    check.__name__: check
-    for check in (reads, red_on_person, slows, every_hit, merged, no_hog, stands_alone, stays, stops)
-}
+CHECKS = {check.__name__: check for check in (reads, red_on_person, slows, every_hit, merged, no_hog, stays, stops)}

@@ -50,7 +50,7 @@ _FRICTION = 0.3  # of every surface; chosen, the outcome of a contact hardly dep
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """The end of a step: when [s], the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
+    """The end of a step [s]: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
 
     step: int
     time: float

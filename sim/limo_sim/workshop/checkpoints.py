@@ -217,38 +217,21 @@ def limits(takes: Sequence[Take], linear: float = 0.3, angular: float = 0.8) -> 
     return Finding(True, f"never faster than {linear:g} m/s and {angular:g} rad/s")
 
 
-def figure(takes: Sequence[Take], figure: str, at_least: float = -np.inf, at_most: float = np.inf) -> Finding:
-    """Whether a figure of the score card, such as in_view, is within bounds in each scene."""
-    said = []
+def figures(takes: Sequence[Take], **wanted: Sequence[float]) -> Finding:
+    """Whether figures of the score card, such as in_view, are between two bounds in each scene."""
+    told = []
     for take in takes:
         if take.outcome is None or take.outcome.failure:
             why = "" if take.outcome is None else take.outcome.failure
             line = take.outcome.fault.line if take.outcome is not None and take.outcome.fault else None
             return Finding(False, f"{take.scene.words}: {why}", line)
-        value = score_of(take.outcome).to_json()[figure]
-        bounds = " and ".join(
-            f"{how} {bound:g}" for how, bound in (("at least", at_least), ("at most", at_most)) if np.isfinite(bound)
-        )
-        said.append(
-            f"{take.scene.words}: {figure} is {'unknown' if value is None else f'{value:.2f}'}, wanted {bounds}"
-        )
-        if value is None or not at_least <= value <= at_most:
-            return Finding(False, said[-1], None, take.looks[-1] if take.looks else None)
-    return Finding(True, "; ".join(said)) if said else Finding(None, "not tried")
-
-
-def follows(takes: Sequence[Take], in_view: float = 0.7, contacts: int = 0) -> Finding:
-    """Whether the person stays in view for this share of the time, and is touched no more often than this."""
-    for finding in (figure(takes, "in_view", in_view), figure(takes, "contacts_person", at_most=contacts)):
-        if not finding.holds:
-            return finding
-    cards = [score_of(take.outcome) for take in takes if take.outcome is not None]
-    said = (
-        f"in view {c.in_view or 0:.0%} (wanted {in_view:.0%}), {c.pixel_error_mean or 0:.0f} px off the middle, "
-        f"nearest {c.distance_min_m or 0:.1f} m, {c.contacts_person + c.contacts_wall} contacts"
-        for c in cards
-    )
-    return Finding(True, "; ".join(said))
+        card = score_of(take.outcome).to_json()
+        for name, (least, most) in wanted.items():
+            said = "unknown" if card[name] is None else f"{card[name]:.2f}"
+            told.append(f"{take.scene.words}: {name} is {said}, wanted {least:g} to {most:g}")
+            if card[name] is None or not least <= card[name] <= most:
+                return Finding(False, told[-1], None, take.looks[-1] if take.looks else None)
+    return Finding(True, "; ".join(told)) if told else Finding(None, "not tried")
 
 
 def surest(look: Look) -> int:

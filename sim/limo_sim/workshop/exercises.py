@@ -10,6 +10,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from limo_sim.run.score import ScoreCard
 from limo_sim.workshop import checkpoints, sights, stretch
 from limo_sim.workshop.mistakes import Finding
 from limo_sim.workshop.scenes import Scene
@@ -28,7 +29,7 @@ CHECKS: dict[str, Callable[..., Finding]] = {
     **{name: getattr(sights, name) for name in ("shown", "found", "logged", "scaled_back", "best")},
     **{
         name: getattr(checkpoints, name)
-        for name in "stands turns dead_band drives speaks returns keeps limits figure follows".split()
+        for name in "stands turns dead_band drives speaks returns keeps limits figures".split()
     },
     **stretch.CHECKS,
 }
@@ -76,6 +77,7 @@ class _File:
     checkpoints: dict  # type: ignore[type-arg]
     scene: dict = field(default_factory=dict)  # type: ignore[type-arg]
     solution: str = ""
+    task: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,19 +133,25 @@ def exercise(name_or_path: str) -> Exercise:
     keys = {name: f"{where}scene.{name}." for name in file.scenes}
     scenes = tuple(build(_SceneTable, own[name], key).scene(name, key) for name, key in keys.items())
     checkpoints = tuple(
-        _checkpoint(name, common["checkpoints"].get(name, {}), given, file.scenes, f"{where}checkpoints.{name}")
+        _checkpoint(
+            {"check": name, "name": name, "task": file.task} | common["checkpoints"].get(name, {}),
+            given,
+            file.scenes,
+            f"{where}checkpoints.{name}",
+        )
         for name, given in file.checkpoints.items()
     )
     return Exercise(file.title, scenes, checkpoints, file.solution)
 
 
-def _checkpoint(name: str, common: dict[str, Any], given: Any, scenes: tuple[str, ...], where: str) -> Checkpoint:
-    table = {"check": name, "name": name} | common | (given if isinstance(given, dict) else {"points": given})
+def _checkpoint(common: dict[str, Any], given: Any, scenes: tuple[str, ...], where: str) -> Checkpoint:
+    table = common | (given if isinstance(given, dict) else {"points": given})
     bounds = {key: table.pop(key) for key in list(table) if key == "judge" or key not in Checkpoint.__slots__}
     point = build(Checkpoint, table, f"{where}.")
     if point.check not in CHECKS:
         raise ScenarioError(f"{where}: unknown check {point.check!r}, want one of {', '.join(CHECKS)}")
     there = list(inspect.signature(CHECKS[point.check]).parameters)[1:]
+    there = list(ScoreCard.__slots__) if there == ["wanted"] else there
     for key in bounds:
         if key not in there:
             said = f"unknown key; bounds of {point.check!r} are: {', '.join(there) or 'none'}"

@@ -85,28 +85,32 @@ def found(takes: Sequence[Take]) -> Finding:
     return Finding(True, f"{len(seeing)} of {len(looks)} frames with boxes; {take.at(look)}: {boxes_of(look)}")
 
 
-def logged(takes: Sequence[Take]) -> Finding:
-    """Whether a kind of log line tells the number of boxes, be it every frame or every thirtieth."""
+def logged(takes: Sequence[Take], of_people: bool = False) -> Finding:
+    """Whether a kind of log line tells the number of boxes, be it every frame or every thirtieth.
+
+    `of_people`: the number of people, where the detector returns more boxes than that.
+    """
     if not any(looks_of(takes, seeing=True)):
         return NOBODY_FOUND
-    kinds: dict[str, list[tuple[str, Take, Look]]] = defaultdict(list)
+    kinds: dict[str, list[tuple[bool, int, Finding]]] = defaultdict(list)
     for take, look in looks_of(takes):
+        found, people = len(look.found), len(look.people)
+        if look.searched is None or (of_people and not found > people > 0):
+            continue
+        right = {people} if of_people else {found, len(distinct(look))}
         for line in look.said:
-            if look.searched is not None and re.search(r"\d", line):
-                kinds[re.sub(r"[-+\d.,\s]+", "#", line)].append((line, take, look))
+            told = {int(number) for number in re.findall(r"\d+", line) if len(number) < 9}
+            said = f"{take.at(look)}: {found} boxes of {people} people, logged: {line!r}"
+            if told:
+                entry = bool(told & right), min(found, 2), Finding(False, said, look=look)
+                kinds[re.sub(r"[-+\d.,\s]+", "#", line)].append(entry)
     worst = Finding(False, "boxes are found, and no log line has their number: log len(boxes)")
     for lines in kinds.values():
         # Nobody, one and several are judged each: a line that always says 1 is right for most frames.
-        by_number: dict[int, list[bool]] = defaultdict(list)
-        for line, _, look in lines:
-            told = {int(number) for number in re.findall(r"\d+", line) if len(number) < 9}
-            by_number[min(len(look.found), 2)].append(bool(told & {len(look.found), len(distinct(look))}))
-        right = [sum(rights) >= RIGHT * len(rights) for rights in by_number.values()]
-        if any(number for number in by_number) and all(right):
-            return Finding(True, f"{len(lines)} log lines with the number of boxes")
-        told_wrong = by_number[next((n for n, ok in zip(by_number, right, strict=True) if not ok), 0)]
-        line, take, look = next((e for e in lines if not told_wrong or str(len(e[2].found)) not in e[0]), lines[0])
-        worst = Finding(False, f"{take.at(look)}: {len(look.found)} boxes found, logged: {line!r}", look=look)
+        by_number = [[right for right, number, _ in lines if number == wanted] for wanted in (0, 1, 2)]
+        if any(by_number[1] + by_number[2]) and all(sum(rights) >= RIGHT * len(rights) for rights in by_number):
+            return Finding(True, f"{len(lines)} log lines with the number of {'people' if of_people else 'boxes'}")
+        worst = next((finding for right, _, finding in lines if not right), worst)
     return worst
 
 

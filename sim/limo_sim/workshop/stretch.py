@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -87,28 +86,6 @@ def every_hit(takes: Sequence[Take]) -> Finding:
     return Finding(True, f"the detector returns up to {most} boxes of {len(more[0].people)} person")
 
 
-def merged(takes: Sequence[Take]) -> Finding:
-    """Whether the number that is logged is that of the people, while the detector returns many boxes."""
-    right = tried = 0
-    worst = Finding(False, "")
-    for take, look in looks_of(takes):
-        numbers = [re.findall(r"\d+", line) for line in look.said]
-        people = len(look.people)
-        if not len(look.found) > people > 0 or not any(numbers):
-            continue
-        tried += 1
-        if any(str(people) in found for found in numbers):
-            right += 1
-        else:
-            said = f"{take.at(look)}: {len(look.found)} boxes, {people} person, logged: {look.said[-1]!r}"
-            worst = Finding(False, said, None, look)
-    if not tried:
-        return Finding(None, "not tried: no log line has a number while the detector returns many boxes")
-    if right < RIGHT * tried:
-        return worst
-    return Finding(True, f"{right} of {tried} log lines have the number of people")
-
-
 def no_hog(takes: Sequence[Take]) -> Finding:
     """Whether people are found without OpenCV's HOG detector: a red box is on the person."""
     if any(take.outcome is not None and take.outcome.stage.detector_inputs for take in takes):
@@ -164,4 +141,4 @@ def _room(take: Take, x: float, y: float, yaw: float) -> float:
 
 
 #: By the names that an exercise's file uses.
-CHECKS = {check.__name__: check for check in (reads, red_on_person, slows, every_hit, merged, no_hog, stays, stops)}
+CHECKS = {check.__name__: check for check in (reads, red_on_person, slows, every_hit, no_hog, stays, stops)}

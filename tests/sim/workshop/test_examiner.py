@@ -33,9 +33,8 @@ seconds = 1.5
 turns = 60
 
 [checkpoints.touches]
-check = "figure"
-figure = "contacts_person"
-at_most = 0
+check = "figures"
+contacts_person = [0, 0]
 points = 40
 name = "nobody is touched"
 """
@@ -80,7 +79,7 @@ def test_a_walk_that_fails_tells_why_and_what_was_wanted(tmp_path: Path) -> None
     assert fails.line is not None
     loses = named(checked(tmp_path, changed(CALLBACK, ("0.005 * error", "0.0002 * error"))), "follows")
     assert "in_view is 0." in loses.evidence
-    assert "wanted at least 0.7" in loses.evidence
+    assert "wanted 0.7 to 1" in loses.evidence
 
 
 def test_a_crop_that_cannot_be_placed_is_judged_by_the_red_box(tmp_path: Path) -> None:
@@ -141,8 +140,8 @@ def test_an_exercise_can_be_a_lecturers_own(tmp_path: Path, capsys: pytest.Captu
 WRONG_FILES = {
     "scene": ('scenes = ["left", "corner"]', 'scenes = ["lefft"]', "unknown scene 'lefft', want one of left, right"),
     "key": ("title", "titel", "titel: unknown key"),
-    "check": ('check = "figure"', 'check = "figur"', "unknown check 'figur', want one of shown, found"),
-    "bound": ("at_most", "at_mots", "at_mots: unknown key; bounds of 'figure' are: figure, at_least, at_most"),
+    "check": ('check = "figures"', 'check = "figur"', "unknown check 'figur', want one of shown, found"),
+    "bound": ("contacts_p", "contact_p", "contact_person: unknown key; bounds of 'figures' are: scenario, "),
     "place": ("[[2.6, -1.1]]", "[[9.0, 0.0]]", "want x and y in"),
     "toml": ("title =", "title", "cannot be read as TOML"),
 }

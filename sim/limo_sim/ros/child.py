@@ -59,12 +59,12 @@ class SocketLink:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def advance(self, wanted: Sequence[str], target: float | None) -> tuple[float, list[tuple[str, bytes]]]:
+    def advance(self, wanted: Sequence[str], target: float | None) -> tuple[float, list[tuple[str, memoryview]]]:
         """Let one step pass."""
         self.tell("advance", wanted, target)
         said, size = HEAD.unpack(self._reading.read(HEAD.size))
         time, sizes = json.loads(self._reading.read(said))
-        data = self._reading.read(size)
+        data = memoryview(self._reading.read(size))
         news, at = [], 0
         for topic, length in sizes:
             news.append((topic, data[at : at + length]))

@@ -297,7 +297,9 @@ class _Run:
         now, news = self._stage.advance(wanted, target)
         sizes = [(topic, len(data)) for topic, data in news]
         with suppress(BrokenPipeError, ConnectionResetError):  # the node is gone: its link will say so
-            self._ends[-1].sendall(packed([now, sizes], b"".join(data for _, data in news)))
+            # (Images are not copied together.)
+            for part in (packed([now, sizes], more=sum(len(data) for _, data in news)), *(data for _, data in news)):
+                self._ends[-1].sendall(part)
         self._wait()
 
     def _wait(self) -> None:

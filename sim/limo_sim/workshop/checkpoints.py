@@ -96,7 +96,9 @@ def turns(takes: Sequence[Take]) -> Finding:
     clear = []
     for take, command, look, recent in _answers(takes, seeing=True):
         errors = [error_of(one) for one in recent]
-        if min(errors) > CLEAR_ERROR or max(errors) < -CLEAR_ERROR:
+        # (Of several people, which is the right one is asked elsewhere.)
+        alone = all(len(one.found) == 1 for one in recent)
+        if alone and (min(errors) > CLEAR_ERROR or max(errors) < -CLEAR_ERROR):
             clear.append((take, command, look, errors[0]))
     if not clear or not moves(takes):
         return NEVER_MOVES
@@ -160,10 +162,10 @@ def speaks(takes: Sequence[Take], seconds: float = SILENCE) -> Finding:
         return NEVER_MOVES
     for take in takes:
         stage = take.outcome.stage if take.outcome else None
-        if stage is None or not any(len(look.found) for look in take.looks):
+        seen = [look.time for look in take.looks if len(look.found)]
+        if stage is None or not seen:
             continue
-        end = take.looks[-1].time if take.failed else take.scene.seconds
-        times = [0.0, *(command.time for command in stage.commands), end]
+        times = [0.0, *(command.time for command in stage.commands if command.time < seen[-1]), seen[-1]]
         gap, at = max((b - a, a) for a, b in itertools.pairwise(times))
         if gap > seconds + 1e-6 and not blocked(take):
             said = f"{take.scene.words}: no command for {gap:.1f} s after {at:.1f} s; the watchdog stops the robot"

@@ -77,7 +77,7 @@ class _File:
     checkpoints: dict  # type: ignore[type-arg]
     scene: dict = field(default_factory=dict)  # type: ignore[type-arg]
     solution: str = ""
-    task: int = 1
+    task: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,10 +132,11 @@ def exercise(name_or_path: str) -> Exercise:
             )
     keys = {name: f"{where}scene.{name}." for name in file.scenes}
     scenes = tuple(build(_SceneTable, own[name], key).scene(name, key) for name, key in keys.items())
+    task = {"task": file.task} if file.task else {}
     checkpoints = tuple(
         _checkpoint(
-            {"check": name, "name": name, "task": file.task} | common["checkpoints"].get(name, {}),
-            given,
+            {"check": name, "name": name} | common["checkpoints"].get(name, {}) | task,
+            given if isinstance(given, dict) else {"points": given},
             file.scenes,
             f"{where}checkpoints.{name}",
         )
@@ -144,8 +145,8 @@ def exercise(name_or_path: str) -> Exercise:
     return Exercise(file.title, scenes, checkpoints, file.solution)
 
 
-def _checkpoint(common: dict[str, Any], given: Any, scenes: tuple[str, ...], where: str) -> Checkpoint:
-    table = common | (given if isinstance(given, dict) else {"points": given})
+def _checkpoint(common: dict[str, Any], given: dict[str, Any], scenes: tuple[str, ...], where: str) -> Checkpoint:
+    table = common | given
     bounds = {key: table.pop(key) for key in list(table) if key == "judge" or key not in Checkpoint.__slots__}
     point = build(Checkpoint, table, f"{where}.")
     if point.check not in CHECKS:

@@ -30,7 +30,7 @@ class Link(Protocol):
         """Tell what the script does: numbers, texts, None and lists of them, and the bytes of a picture."""
         ...
 
-    def advance(self, wanted: Sequence[str], target: float | None) -> tuple[float, list[tuple[str, bytes]]]:
+    def advance(self, wanted: Sequence[str], target: float | None) -> tuple[float, list[tuple[str, memoryview]]]:
         """Let one step pass; returns the time [s], and the new messages of the topics that are wanted, as CDR."""
         ...
 

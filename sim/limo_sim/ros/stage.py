@@ -303,7 +303,7 @@ class Stage:
 
     def finish(self, fault: Fault | None = None) -> Ended:
         """Let the arena go on without commands until the time is up, or the robot stands; return how the run ended."""
-        failed_at = self.time
+        failed_at, self._witness = self.time, Witness()
         if fault is not None:
             self.seconds = failed_at + _AFTERMATH
         while not self.over:

@@ -174,17 +174,17 @@ def speaks(takes: Sequence[Take], seconds: float = SILENCE) -> Finding:
 
 
 def returns(takes: Sequence[Take]) -> Finding:
-    """Whether no callback of a node that answers pictures sleeps for long."""
+    """Whether no callback of a node that answers pictures sleeps for longer than from one picture to the next."""
     for take in takes:
-        if blocked(take):
-            return Finding(False, f"{take.scene.words}: {blocked(take)}; meanwhile no frame is looked at")
+        if said := blocked(take, 1 / take.scene.scenario.camera.rate_hz):
+            return Finding(False, f"{take.scene.words}: {said}; meanwhile no frame is looked at")
     return Finding(True, "every callback returns in time") if moves(takes) else NEVER_MOVES
 
 
-def blocked(take: Take) -> str:
-    """Return which callback took longer than the watchdog's time, "" if none did."""
+def blocked(take: Take, seconds: float = SILENCE) -> str:
+    """Return which callback took longer than this, "" if none did; the default is the watchdog's time."""
     call = take.outcome.stage.longest if take.outcome else None
-    if call is None or call.slept <= SILENCE - 1e-6:
+    if call is None or call.slept <= seconds - 1e-6:
         return ""
     return f"the callback at {call.time:.1f} s slept for {call.slept:.1f} s"
 
@@ -230,9 +230,9 @@ def figures(takes: Sequence[Take], **wanted: Sequence[float]) -> Finding:
         card = score_of(take.outcome).to_json()
         for name, (least, most) in wanted.items():
             said = "unknown" if card[name] is None else f"{card[name]:.2f}"
-            told.append(f"{take.scene.words}: {name} is {said}, wanted {least:g} to {most:g}")
+            told.append(f"{name} is {said}, wanted {least:g} to {most:g}")
             if card[name] is None or not least <= card[name] <= most:
-                return Finding(False, told[-1], None, take.looks[-1] if take.looks else None)
+                return Finding(False, f"{take.scene.words}: {told[-1]}", None, take.looks[-1] if take.looks else None)
     return Finding(True, "; ".join(told)) if told else Finding(None, "not tried")
 
 

@@ -105,6 +105,8 @@ def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
         return Finding(False, said, searched_without_svm)
     if any(look.raw is not None for take in takes for look in take.looks) or any(take.unplaced for take in takes):
         return None
+    if any(take.outcome and take.outcome.stage.detector_inputs for take in takes):
+        return Finding(None, "not tried: the detector was asked, and gave no answer")
     line = source.first_call("detectMultiScale")
     if line is None:
         return Finding(False, "self.hog.detectMultiScale was never called")

@@ -38,9 +38,8 @@ def shown(takes: Sequence[Take]) -> Finding:
             continue
         for look in take.looks:
             # A timer may show its first picture half a second after the first frame.
-            here = [(at, of) for at, _, _, of in take.windows if of is not None and at <= look.time + 1e-6]
-            late = look.time >= SILENCE - 1e-6 and (not here or look.time - here[-1][1].time > SILENCE + 1e-6)
-            if late and not any(look.time - of.time <= SILENCE + 1e-6 for _, of in here):
+            ages = [look.time - of.time for at, _, _, of in take.windows if of and at <= look.time + 1e-6]
+            if look.time >= SILENCE - 1e-6 and min(ages, default=9.0) > SILENCE + 1e-6:
                 return _not_shown(take, look)
     if not any(look.pictures for _, look in looks_of(takes)):
         return Finding(None, "not tried: no window was shown")

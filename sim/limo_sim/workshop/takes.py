@@ -36,6 +36,8 @@ ON_PERSON = 0.2
 _ALIKE = 16
 #: Correlation from which a searched picture is taken for a camera image, or for a part of one. Chosen.
 _CORRELATED = 0.9
+#: A window's picture is looked for among images of this age or younger [s].
+_OLDEST = 4.0
 _THUMBNAIL = (160, 120)
 
 
@@ -149,13 +151,14 @@ class Take(Witness):
                 ]
                 yield command, answered, recent
 
-    def _recent(self, time: float) -> list[Look]:
+    def _recent(self, time: float, seconds: float = SILENCE) -> list[Look]:
         """Return the looks of the last half second before a time [s], the newest first."""
-        return [look for look in reversed(self.looks) if time - SILENCE - 1e-6 <= look.time <= time + 1e-6]
+        return [look for look in reversed(self.looks) if time - seconds - 1e-6 <= look.time <= time + 1e-6]
 
     def frame(self, time: float, frame: TrueFrame) -> None:
-        """Note that the node is given an image."""
-        self.looks.append(Look(time, frame.image, frame.truth))
+        """Note that the node is given an image, and has time to answer it."""
+        if time < self.scene.seconds - 1e-6:
+            self.looks.append(Look(time, frame.image, frame.truth))
 
     def found(self, time: float, found: Found, picture: Picture) -> None:
         """Note a search."""
@@ -168,7 +171,7 @@ class Take(Witness):
 
     def shown(self, window: str, shown: Shown) -> None:
         """Note a picture in a window."""
-        look = _shown_in(shown.picture, self._recent(shown.time))
+        look = _shown_in(shown.picture, self._recent(shown.time, _OLDEST))
         self.windows.append((shown.time, window, shown.picture, look))
         if look is not None:
             look.pictures.append(shown.picture)
@@ -203,12 +206,11 @@ def alike(shown: Picture, image: Picture) -> float:
 
 def _shown_in(picture: Picture, looks: list[Look]) -> Look | None:
     """Return the look whose image a picture shows, with things drawn on it; None if it shows none."""
-
-    def same(look: Look) -> float:
-        equal = picture.shape == look.image.shape and (picture[::4, ::4] == look.image[::4, ::4]).all(axis=2).mean()
-        return alike(picture, look.image) + float(equal)
-
-    best = max(looks, key=same, default=None)
+    for look in looks:
+        if picture.shape == look.image.shape and (picture[::4, ::4] == look.image[::4, ::4]).all(axis=2).mean() > 0.5:
+            return look
+    # Of compressed images no pixel is the same.
+    best = max(looks, key=lambda look: alike(picture, look.image), default=None)
     if best is None or alike(picture, best.image) <= 0.5:
         return None
     return None if alike(picture, best.image) < alike(picture, np.asarray(best.image[..., ::-1])) else best

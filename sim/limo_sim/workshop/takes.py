@@ -232,8 +232,8 @@ def _located(picture: Picture, looks: list[Look]) -> tuple[Look | None, tuple[fl
     for look in looks:
         scale = look.image.shape[0] / height
         if abs(width * scale - look.image.shape[1]) <= max(scale, 1.0):
-            small = [cv2.resize(one, _THUMBNAIL, interpolation=cv2.INTER_AREA) for one in (grey, _grey(look.image))]
-            match, place = float(cv2.matchTemplate(*small, cv2.TM_CCOEFF_NORMED).item()), (scale, 0, 0)
+            one, other = (cv2.resize(g, _THUMBNAIL, interpolation=cv2.INTER_AREA) for g in (grey, _grey(look.image)))
+            match, place = float(cv2.matchTemplate(one, other, cv2.TM_CCOEFF_NORMED)[0, 0]), (scale, 0, 0)
         elif height <= look.image.shape[0] and width <= look.image.shape[1] and min(height, width) >= 64:
             found = cv2.matchTemplate(_grey(look.image), grey, cv2.TM_CCOEFF_NORMED)
             _, match, _, (x, y) = cv2.minMaxLoc(found)

@@ -7,6 +7,8 @@ it.
 
 from __future__ import annotations
 
+from typing import Any
+
 #: A class that does all in the callback of the image.
 CALLBACK = """
 import cv2
@@ -341,7 +343,7 @@ PEOPLE = """        found = self.det.detect(img)
 """
 
 #: What to check, the template, and what is exchanged in it.
-Node = tuple[str, object, tuple[tuple[str, str], ...]]
+Node = tuple[str, Any, tuple[tuple[str, str], ...]]
 
 
 def scaled(by: float, back: str) -> tuple[tuple[str, str], ...]:
@@ -648,8 +650,8 @@ WRONG: dict[str, Node] = {
 def source(node: Node) -> str:
     """Return the node's file."""
     _, template, exchanged = node
-    text, *before = (template,) if isinstance(template, str) else template  # type: ignore[misc]
-    for old, new in (*before, *exchanged):
+    text = template if isinstance(template, str) else template[0]
+    for old, new in (*(() if isinstance(template, str) else template[1:]), *exchanged):
         assert text.count(old) == 1, (text.count(old), old)
         text = text.replace(old, new)
-    return str(text).lstrip("\n")
+    return text.lstrip("\n")

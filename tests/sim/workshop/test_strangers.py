@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ QUICK = (
 )
 
 
-def listed(nodes: dict[str, object]) -> list[object]:
+def listed(nodes: Iterable[str]) -> list[object]:
     return [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow, id=name.strip()) for name in nodes]
 
 

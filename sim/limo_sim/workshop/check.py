@@ -11,6 +11,7 @@ from limo_sim.ros.runner import Limits, Said
 from limo_sim.workshop.exercises import Checkpoint, Exercise, exercise
 from limo_sim.workshop.mistakes import Finding, Source, camera_read, no_command, no_detection, no_picture
 from limo_sim.workshop.scenes import play
+from limo_sim.workshop.sights import found
 from limo_sim.workshop.stretch import red_on_person
 from limo_sim.workshop.takes import Look, Take, judge_by_truth
 
@@ -68,6 +69,8 @@ NOT_REACHED = Finding(None, "not tried: see the first mistake above")
 LAST = Finding(None, "tried when all checkpoints above hold")
 #: What is judged by a node's boxes; where none could be placed in an image, by the red box and the arena's truth.
 _BOXES = ("found", "scaled_back", "best")
+#: What is judged by boxes that are on people.
+_ON_FOUND = ("logged", "scaled_back", "best", "stands")
 
 
 def check(script: Path, name: str = "follower") -> list[Verdict]:
@@ -143,6 +146,9 @@ def _judged(source: Source, checkpoint: Checkpoint, wanted: Exercise, takes: Seq
         why = f"pictures of {sizes} were searched, no part of a camera image" if sizes else "no detector known here ran"
         finding = red_on_person(here)
         return finding._replace(evidence=f"{why}, so the red box is judged by where people are: {finding.evidence}")
+    if checkpoint.check in _ON_FOUND and not by_truth and found(takes).holds is False:
+        # Boxes on nobody are no evidence of anything.
+        return NOT_REACHED
     return checkpoint.judge(here)
 
 

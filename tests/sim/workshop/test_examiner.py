@@ -160,7 +160,7 @@ def test_a_scene_of_the_checker_is_played_by_run(tmp_path: Path, capsys: pytest.
     arguments = ["--scenario", "check:proxemic/near", "--json", str(tmp_path / "card.json")]
     assert main(["run", str(tmp_path / "node.py"), *arguments]) == 0
     assert '"target_m": 2.5' in (tmp_path / "card.json").read_text()
-    assert main(["run", str(tmp_path / "node.py"), "--scenario", "check:lefft"]) == 2
+    assert main(["run", str(tmp_path / "node.py"), "--scenario", "check:lefft"]) == 1
     assert "unknown scene 'lefft', want one of left" in capsys.readouterr().err
     assert scene_named("left").seconds == 1.0
 

@@ -72,19 +72,20 @@ def _scene(take: Take, cited: Sequence[Look]) -> str:
     looks = [look for look in take.looks if any(look is one for one in cited)][:3] or _telling(take)
     if not looks:
         return f'<figure><div class="none">no frame</div><figcaption>{words}</figcaption></figure>'
-    figures = "".join(_figure(look, words) for look in looks)
+    figures = "".join(_figure(take, look, words) for look in looks)
     return figures + (_map(take, words) if take.scene.last else "")
 
 
-def _figure(look: Look, words: str) -> str:
+def _figure(take: Take, look: Look, words: str) -> str:
     picture = look.pictures[-1] if look.pictures else look.image
+    window = next((name for _, name, there, _ in take.windows if there is picture), "")
     height = max(round(picture.shape[0] * _WIDTH / picture.shape[1]), 1)
     small = cv2.resize(picture, (_WIDTH * 2, height * 2), interpolation=cv2.INTER_AREA)
     uri = data_uri(jpeg(small.astype(np.uint8, copy=False)))
     command = command_of(look.commands[-1]) if look.commands else "no command"
     count = len(look.found)
     boxes = "" if look.raw is None else f"{count} box{'es' if count != 1 else ''} found; "
-    shown = "" if look.pictures else "the camera's image: no window shows it; "
+    shown = f"window “{window}”; " if look.pictures else "the camera's image, no window shows it; "
     said = escape(f"at {look.time:.1f} s: {shown}{boxes}{command}")
     return f'<figure><img alt="{said}" src="{uri}"><figcaption>{words}<span>{said}</span></figcaption></figure>'
 

@@ -214,7 +214,9 @@ def test_the_report_cites_a_frame_and_folds_what_was_not_tried(
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) < 24
     assert max(map(len, lines)) <= 80
-    assert (tmp_path / "page.html").read_text().count("A person stands on the left<span>at 0.0 s: 1 box found") == 1
+    assert (tmp_path / "page.html").read_text().count(
+        "A person stands on the left<span>at 0.0 s: window “Limo Camera”; 1 box found"
+    ) == 1
     script.write_text("import rclpy\n")
     assert main(["workshop", "check", str(script)]) == 1
     out = capsys.readouterr().out

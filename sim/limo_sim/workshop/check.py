@@ -129,7 +129,7 @@ def _judged(source: Source, checkpoint: Checkpoint, wanted: Exercise, takes: Seq
     first = wanted.checkpoints[0]
     no_image = no_picture(source, takes)
     if no_image is not None:
-        return no_image if checkpoint is first else NOT_REACHED
+        return no_image if checkpoint is first and not takes[0].failed else NOT_REACHED
     if checkpoint.task > 1 and any(point.check == "found" for point in wanted.checkpoints):
         blind = no_detection(source, takes)
         if blind is not None and red_on_person(takes).holds is not True:

@@ -71,11 +71,18 @@ def _node_in(folder: Path) -> Path:
     except (OSError, ValueError):
         return folder
     nodes = [file for file in files if not _ASIDE.search(file.relative_to(folder).as_posix())]
+    # (What another file imports is its helper.)
+    nodes = [file for file in nodes if not _imported(file.stem, [text[other] for other in nodes if other != file])]
     starts = "".join(text[file] for file in files if file.name == "setup.py")
     named = [file for file in nodes if re.search(rf"=\s*[\w.]*\b{re.escape(file.stem)}:", starts)]
     drive = [file for file in named or nodes if "rclpy" in text[file] and "cmd_vel" in text[file]]
     spin = [file for file in drive if "spin" in text[file]]
     return next((those[0] for those in (spin, drive, named, nodes) if len(those) == 1), folder)
+
+
+def _imported(module: str, texts: Sequence[str]) -> bool:
+    named = re.compile(rf"^\s*(from|import)\s+[\w.]*\b{re.escape(module)}\b", re.MULTILINE)
+    return any(named.search(text) for text in texts)
 
 
 def _files(folder: Path) -> Iterator[os.DirEntry[str]]:

@@ -207,8 +207,13 @@ def alike(shown: Picture, image: Picture) -> float:
 def _shown_in(picture: Picture, looks: list[Look]) -> Look | None:
     """Return the look whose image a picture shows, with things drawn on it; None if it shows none."""
     for look in looks:
-        if picture.shape == look.image.shape and (picture[::4, ::4] == look.image[::4, ::4]).all(axis=2).mean() > 0.5:
-            return look
+        if picture.shape == look.image.shape:
+            same = [
+                float((picture[::4, ::4] == image[::4, ::4]).all(axis=2).mean())
+                for image in (look.image, look.image[..., ::-1])
+            ]
+            if same[0] > 0.5 and same[0] >= same[1]:
+                return look
     # Of compressed images no pixel is the same.
     best = max(looks, key=lambda look: alike(picture, look.image), default=None)
     if best is None or alike(picture, best.image) <= 0.5:

@@ -81,7 +81,7 @@ def _node_in(folder: Path) -> Path:
 
 
 def _imported(module: str, texts: Sequence[str]) -> bool:
-    named = re.compile(rf"^\s*(from|import)\s+[\w.]*\b{re.escape(module)}\b", re.MULTILINE)
+    named = re.compile(rf"^\s*(from|import)\s+(?!rclpy)[\w.]*\b{re.escape(module)}\b", re.MULTILINE)
     return any(named.search(text) for text in texts)
 
 

@@ -10,10 +10,9 @@ from pathlib import Path
 from limo_sim.ros.runner import Limits, Said
 from limo_sim.workshop.exercises import Checkpoint, Exercise, exercise
 from limo_sim.workshop.mistakes import Finding, Source, camera_read, no_command, no_detection, no_picture
-from limo_sim.workshop.scenes import play
 from limo_sim.workshop.sights import found
 from limo_sim.workshop.stretch import red_on_person
-from limo_sim.workshop.takes import Look, Take, judge_by_truth
+from limo_sim.workshop.takes import Look, Take, judge_by_truth, play
 
 #: What a verdict tells is no longer [characters].
 _LONGEST = 4000

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -18,12 +18,12 @@ from limo_hog.detections import Detections
 from limo_hog.suppression import intersection_over_union
 from limo_sim.ros.lockstep.calls import LOGGER, Calls
 from limo_sim.ros.lockstep.records import Command, Found, Shown
-from limo_sim.ros.stage import Ended, Witness
+from limo_sim.ros.runner import Limits, Said, run_node
+from limo_sim.ros.stage import Ended, Stage, Witness
+from limo_sim.run.log import Step
 from limo_sim.sensing.camera import TrueFrame
+from limo_sim.workshop.scenes import Scene
 from limo_sim.world.truth import Truth
-
-if TYPE_CHECKING:
-    from limo_sim.workshop.scenes import Scene
 
 Picture = NDArray[np.uint8]
 
@@ -185,6 +185,18 @@ class Take(Witness):
         """Note a line of the log."""
         if self.looks and name != LOGGER:
             (self._answered or self.looks[-1]).said.append(message)
+
+
+def play(script: Path, scene: Scene, limits: Limits | None = None, said: Said = lambda *_: None) -> Take:
+    """Run a node in a scene and note what it does; `said` is given what it prints."""
+    take = Take(scene)
+
+    def watch(step: Step) -> None:
+        take.path.append((step.log.time, *step.truth.robot))
+
+    stage = Stage(script, scene.scenario, scene.seconds, log=take.log, watch=watch, witness=take)
+    take.outcome = run_node(stage, ("--ros-args", *scene.arguments), limits=limits, said=said, checked=True)
+    return take
 
 
 def judge_by_truth(takes: list[Take]) -> bool:

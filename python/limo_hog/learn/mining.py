@@ -30,54 +30,26 @@ from limo_hog.suppression import intersection_over_union, nms
 
 @dataclass(frozen=True)
 class MiningParameters:
-    """How negatives are found; with these, 3000 photographs gave the weights that are shipped.
+    """How negatives are found; with these, 3000 photographs gave the weights that are shipped."""
 
-    Attributes
-    ----------
-    random_windows
-        Most windows drawn at random, from all negatives together, before there is a detector.
-    random_per_picture
-        Most of them of one picture: more would show the same again.
-    above
-        Least SVM margin of a hard negative: -1 is where the squared hinge begins to count.
-    per_picture
-        Most hard negatives of one picture and round.
-    scale
-        Ratio of neighbouring levels of the search.
-    surest
-        Hits of a picture that are looked at; the first detectors have thousands.
-    max_iou
-        Of two hits that overlap more, the surer is taken.
-    enlarged
-        Share of the pictures that are also searched at twice their size.
-    clear_of_objects
-        Most intersection over union of a negative with a labelled box.
-    """
-
+    #: Most windows drawn at random, from all negatives together, before there is a detector.
     random_windows: int = 20_000
-    random_per_picture: int = 40
-    above: float = -1.0
-    per_picture: int = 6
-    scale: float = 1.1
-    surest: int = 500
-    max_iou: float = 0.5
-    enlarged: float = 0.15
-    clear_of_objects: float = 0.3
+    random_per_picture: int = 40  #: most of them of one picture: more would show the same again
+    above: float = -1.0  #: least SVM margin of a hard negative: -1 is where the squared hinge begins to count
+    per_picture: int = 6  #: most hard negatives of one picture and round
+    scale: float = 1.1  #: ratio of neighbouring levels of the search
+    surest: int = 500  #: hits of a picture that are looked at; the first detectors have thousands
+    max_iou: float = 0.5  #: of two hits that overlap more, the surer is taken
+    enlarged: float = 0.15  #: share of the pictures that are also searched at twice their size
+    clear_of_objects: float = 0.3  #: most intersection over union of a negative with a labelled box
 
 
 @dataclass(frozen=True)
 class Negatives:
-    """Pictures to take negatives from.
+    """Pictures to take negatives from."""
 
-    Attributes
-    ----------
-    paths
-        The pictures.
-    objects
-        Of the pictures that do show objects, their boxes [px], float64 (N, 4).
-    """
-
-    paths: tuple[Path, ...]
+    paths: tuple[Path, ...]  #: the pictures
+    #: Of the pictures that do show objects, their boxes [px], float64 (N, 4).
     objects: dict[Path, NDArray[np.float64]] = field(default_factory=dict)
 
 

@@ -35,62 +35,34 @@ Progress = Callable[[str, int | None], None]
 
 @dataclass(frozen=True)
 class TrainingParameters:
-    """How a detector is trained; chosen on USC-C and TUD-Stadtmitte, frames 1 to 41.
+    """How a detector is trained; chosen on USC-C and TUD-Stadtmitte, frames 1 to 41."""
 
-    Attributes
-    ----------
-    c
-        Weight of the loss against ½‖w‖²; .0003 to .01 were tried.
-    bias_feature
-        The constant feature that makes the bias.
-    rounds
-        Of hard-negative mining; the first gives most.
-    mirror
-        Take each object the other way round, too.
-    most_bytes
-        Most memory of descriptors [B]; beyond it the least hard new negatives are left out.
-    seed
-        Of all that is drawn.
-    """
-
-    c: float = 0.003
-    bias_feature: float = 10.0
-    rounds: int = 3
-    mirror: bool = True
-    most_bytes: int = 2**31
-    seed: int = 0
+    c: float = 0.003  #: weight of the loss against ½‖w‖²; .0003 to .01 were tried
+    bias_feature: float = 10.0  #: the constant feature that makes the bias
+    rounds: int = 3  #: of hard-negative mining; the first gives most
+    mirror: bool = True  #: take each object the other way round, too
+    most_bytes: int = 2**31  #: most memory of descriptors [B]; beyond it the least hard new negatives are left out
+    seed: int = 0  #: of all that is drawn
     jitter: Jitter = field(default_factory=Jitter)
     mining: MiningParameters = field(default_factory=MiningParameters)
 
 
 @dataclass(frozen=True)
 class Round:
-    """What a round came to; round 0 has random negatives only.
-
-    Attributes
-    ----------
-    coefficients
-        float64 (D + 1,): weights and bias.
-    objects, negatives
-        How many different objects, and how many negatives, were learnt from.
-    new, left_out
-        Hard negatives that the round added, and those that were too many for the memory.
-    descriptor_bytes
-        Memory of all descriptors [B].
-    seconds
-        Since training began.
-    """
+    """What a round came to; round 0 has random negatives only."""
 
     number: int
-    coefficients: NDArray[np.float64]
+    coefficients: NDArray[np.float64]  #: float64 (D + 1,): weights and bias
+    #: objects, negatives: how many different objects, and how many negatives, were learnt from
     objects: int
     negatives: int
+    #: new, left_out: hard negatives that the round added, and those that were too many for the memory
     new: int
     left_out: int
-    descriptor_bytes: int
+    descriptor_bytes: int  #: memory of all descriptors [B]
     objective: float
     iterations: int
-    seconds: float
+    seconds: float  #: since training began
 
 
 def train(

@@ -29,20 +29,12 @@ class FalseBoxes:
 
     Measured: the 30 boxes that OpenCV's model finds, threshold 0, grouped, in 14 photographs without people, each at 1,
     1.5 and 2 times its size, and mirrored. Few, so that a single parameter was fitted to each quantity.
-
-    Attributes
-    ----------
-    least_height
-        Of a window [px]: HOG's own.
-    octaves
-        Mean of log2(height / least_height); heights are drawn from the exponential distribution of it.
-    score
-        Mean margin of the SVM, which is drawn from an exponential distribution.
     """
 
-    least_height: float = 128.0
+    least_height: float = 128.0  #: of a window [px]: HOG's own
+    #: Mean of log2(height / least_height); heights are drawn from the exponential distribution of it.
     octaves: float = 0.44
-    score: float = 0.64
+    score: float = 0.64  #: mean margin of the SVM, which is drawn from an exponential distribution
 
 
 FALSE_BOXES = FalseBoxes()
@@ -54,21 +46,11 @@ FIT_FILE = Path(__file__).with_name("detector_fit.json")
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Recall by height: top · σ(slope · log2(height / middle)).
+    """Recall by height: top · σ(slope · log2(height / middle))."""
 
-    Attributes
-    ----------
-    top
-        Recall of tall people, whom pose, clothes and background still hide [0 … 1].
-    middle_px
-        Height at which half of it is reached [px].
-    slope
-        Of the logistic function, for each doubling of the height.
-    """
-
-    top: float
-    middle_px: float
-    slope: float
+    top: float  #: recall of tall people, whom pose, clothes and background still hide [0 … 1]
+    middle_px: float  #: height at which half of it is reached [px]
+    slope: float  #: of the logistic function, for each doubling of the height
 
     def at(self, height: float) -> float:
         """Return the recall at a height [px]; a height of 0 stands for a person out of the image."""
@@ -77,22 +59,13 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How a model of people does on photographs.
+    """How a model of people does on photographs."""
 
-    Attributes
-    ----------
-    photographs, arena
-        Recall of the detector on photographs, and its own in the arena.
-    memory_s
-        Time in which the correlation of a person's misses falls to 1/e [s].
-    false_rate
-        Mean number of false boxes in a frame.
-    """
-
+    #: photographs, arena: recall of the detector on photographs, and its own in the arena
     photographs: Curve
     arena: Curve
-    memory_s: float
-    false_rate: float
+    memory_s: float  #: time in which the correlation of a person's misses falls to 1/e [s]
+    false_rate: float  #: mean number of false boxes in a frame
 
     def kept(self, height: float) -> float:
         """Return the share of what is found in the arena that is kept for people of a height [px], 0 … 1."""

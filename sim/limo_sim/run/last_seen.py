@@ -16,32 +16,19 @@ SIZE = 9
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What 1 stands for in a state and in an action.
+    """What 1 stands for in a state and in an action."""
 
-    Attributes
-    ----------
-    linear, angular
-        Speed and turn rate of an action of 1 [m/s, rad/s]: the limits of the tracking controller.
-    range_m
-        The depth camera's reach [m].
-    age_s
-        An older sighting is no older than this [s]. Chosen: half of the time after which a run has failed.
-    person
-        Speed of a person [m/s]. Chosen: a brisk walk is 1.4.
-    smoothing
-        Share by which a new difference of places changes the person's velocity [1]. Chosen: ranges stray by about 5 cm
-        from frame to frame, which is 0.5 m/s; this leaves 0.15.
-    gap_s
-        After a longer gap the velocity begins anew [s].
-    """
-
+    #: linear, angular: speed and turn rate of an action of 1 [m/s, rad/s]: the limits of the tracking controller.
     linear: float = 0.7
     angular: float = 1.5
-    range_m: float = 8.0
+    range_m: float = 8.0  #: the depth camera's reach [m]
+    #: An older sighting is no older than this [s]. Chosen: half of the time after which a run has failed.
     age_s: float = 5.0
-    person: float = 1.5
+    person: float = 1.5  #: speed of a person [m/s]. Chosen: a brisk walk is 1.4.
+    #: Share by which a new difference of places changes the person's velocity [1]. Chosen: ranges stray by about 5 cm
+    #: from frame to frame, which is 0.5 m/s; this leaves 0.15.
     smoothing: float = 0.2
-    gap_s: float = 0.5
+    gap_s: float = 0.5  #: after a longer gap the velocity begins anew [s]
 
 
 SCALE = Scale()

@@ -67,18 +67,12 @@ class ServeError(LimoHogError):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Page:
-    """One open page.
+    """One open page."""
 
-    Attributes
-    ----------
-    client, transport
-        Its connection, twice: what is sent through, and what can be cut.
-    complaints
-        What was wrong with its control messages, not told yet.
-    """
-
+    #: client, transport: its connection, twice: what is sent through, and what can be cut.
     client: web.WebSocketResponse
     transport: asyncio.Transport
+    #: What was wrong with its control messages, not told yet.
     complaints: deque[str] = field(default_factory=lambda: deque(maxlen=10))
 
     async def send(self, message: dict[str, Any] | bytes) -> None:

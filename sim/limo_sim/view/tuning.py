@@ -26,28 +26,15 @@ class ParameterError(LimoHogError):
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Parameter:
-    """A number that can be set.
+    """A number that can be set."""
 
-    Attributes
-    ----------
-    name
-        Of the controller's field; of a field of a field with a dot between them.
-    value
-        What it is now; a whole number stays one.
-    low, high
-        What it may be, both included.
-    unit
-        Its unit, such as "m"; empty where it has none.
-    tooltip
-        What it does, in a sentence.
-    """
-
-    name: str
-    value: float
+    name: str  #: of the controller's field; of a field of a field with a dot between them
+    value: float  #: what it is now; a whole number stays one
+    #: low, high: what it may be, both included
     low: float
     high: float
-    unit: str = ""
-    tooltip: str = ""
+    unit: str = ""  #: its unit, such as "m"; empty where it has none
+    tooltip: str = ""  #: what it does, in a sentence
 
     @property
     def whole(self) -> bool:

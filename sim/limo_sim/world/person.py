@@ -38,23 +38,14 @@ _TRUNK_HALF_DEPTH, _TRUNK_HALF_BREADTH = 0.052, 0.090
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a person is, and the phase of the gait.
+    """Where a person is, and the phase of the gait."""
 
-    Attributes
-    ----------
-    x, y, yaw
-        In the arena's frame [m, m, rad].
-    phase
-        Of the gait [rad]; a cycle is two steps.
-    swing
-        1 when walking, 0 when standing.
-    """
-
+    #: x, y, yaw: in the arena's frame [m, m, rad]
     x: float
     y: float
     yaw: float
-    phase: float = 0.0
-    swing: float = 0.0
+    phase: float = 0.0  #: of the gait [rad]; a cycle is two steps
+    swing: float = 0.0  #: 1 when walking, 0 when standing
 
 
 def earlier(before: Pose | None, now: Pose | None, steps: float) -> Pose | None:
@@ -72,25 +63,16 @@ def earlier(before: Pose | None, now: Pose | None, steps: float) -> Pose | None:
 
 @dataclass(frozen=True, slots=True)
 class _RouteLeg:
-    """The way from one corner of a route to the next, and the pauses at both.
+    """The way from one corner of a route to the next, and the pauses at both."""
 
-    Attributes
-    ----------
-    begins, duration
-        When the leg begins within a lap, and how long the walk takes [s].
-    walked, length
-        Way walked in the lap before, and on this leg [m].
-    heading
-        Direction of the walk [rad].
-    pause_before, pause_after
-        Time spent standing at either end [s].
-    """
-
+    #: begins, duration: when the leg begins within a lap, and how long the walk takes [s]
     begins: float
     duration: float
+    #: walked, length: way walked in the lap before, and on this leg [m]
     walked: float
     length: float
-    heading: float
+    heading: float  #: direction of the walk [rad]
+    #: pause_before, pause_after: time spent standing at either end [s]
     pause_before: float
     pause_after: float
 
@@ -168,29 +150,17 @@ def _blend(start: float, end: float, share: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class BodyMesh:
-    """The solids a person is made of, in the arena's frame.
+    """The solids a person is made of, in the arena's frame."""
 
-    Attributes
-    ----------
-    start, end
-        float64 (N, 3): the axes of tapered capsules [m].
-    start_radius, end_radius
-        float64 (N,): the radii of the balls at the ends [m].
-    centre
-        float64 (M, 3): the centres of ellipsoids [m].
-    axes
-        float64 (M, 3, 3): their semi-axes as columns [m].
-    colours
-        float64 (N + M, 3): red, green, blue, 0 … 255, capsules first.
-    """
-
+    #: start, end: float64 (N, 3): the axes of tapered capsules [m].
     start: NDArray[np.float64]
     end: NDArray[np.float64]
+    #: start_radius, end_radius: float64 (N,): the radii of the balls at the ends [m].
     start_radius: NDArray[np.float64]
     end_radius: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    colours: NDArray[np.float64]
+    centre: NDArray[np.float64]  #: float64 (M, 3): the centres of ellipsoids [m]
+    axes: NDArray[np.float64]  #: float64 (M, 3, 3): their semi-axes as columns [m]
+    colours: NDArray[np.float64]  #: float64 (N + M, 3): red, green, blue, 0 … 255, capsules first
 
 
 def _limb_angles(phase: float, swing: float) -> tuple[float, float, float]:

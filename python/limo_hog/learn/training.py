@@ -16,14 +16,7 @@ from numpy.typing import NDArray
 
 from limo_hog import _core
 from limo_hog.learn.labels import LabelError
-from limo_hog.learn.mining import (
-    Mined,
-    MiningParameters,
-    describe_objects,
-    hard_negatives,
-    hardest,
-    random_negatives,
-)
+from limo_hog.learn.mining import Mined, Miner, MiningParameters, describe_objects, hardest
 from limo_hog.learn.solver import solve
 from limo_hog.learn.sources import TrainingData
 from limo_hog.learn.windows import Jitter
@@ -98,8 +91,8 @@ def _rounds(
         raise LabelError(f"none of the {len(data.regions)} objects can be read")
     count, positives = len(objects), [np.concatenate(objects)]
     del objects
-    drawn = random_negatives(data.negatives, data.shape, how.mining, how.seed, workers)
-    negatives = _blocks(_told(drawn, "random negatives", len(data.negatives.paths), progress))
+    miner = Miner(data.negatives, data.shape, how.mining, how.seed, workers)
+    negatives = _blocks(_told(miner.random(), "random negatives", len(data.negatives.paths), progress))
     if not negatives:
         raise LabelError(
             f"none of the {len(data.negatives.paths)} pictures for negatives is as large as the window, "
@@ -110,7 +103,7 @@ def _rounds(
     for number in range(how.rounds + 1):
         new = left_out = 0
         if last is not None:
-            hard = hard_negatives(last, data.negatives, known, data.shape, how.mining, how.seed, workers)
+            hard = miner.hard(last, known)
             stage = f"round {number} of {how.rounds}: searching"
             room = how.most_bytes - sum(block.nbytes for block in (*positives, *negatives))
             found, left_out = hardest(list(_told(hard, stage, len(data.negatives.paths), progress)), room)

@@ -15,7 +15,6 @@ import sys
 import time
 import urllib.request
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +24,10 @@ import cv2
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
+from tests.cli.material import on_a_full_disk
 from tests.sim.view.stalled import stalled
 
 from limo_hog.cli.main import main
-from limo_hog.extras import MissingExtraError, needed
 from limo_hog.ros2.bag import read_bag
 
 LIMO_HOG = Path(sys.executable).with_name("limo-hog")
@@ -130,31 +129,6 @@ def test_a_recording_replayed_gives_the_same_detections(
         assert container.streams.video[0].frames == 10 * SECONDS
 
 
-def _cut(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-
-
-@pytest.mark.parametrize(
-    ("damage", "said"),
-    [
-        (lambda path: path.write_bytes(b""), "no ROS 2 recording"),
-        (lambda path: path.write_bytes(b"hello" * 100), "no ROS 2 recording"),
-        (_cut, "no ROS 2 recording"),
-        (lambda path: path.unlink(), "no such recording"),
-    ],
-)
-def test_a_file_that_is_no_recording_is_one_line(
-    damage: Callable[[Path], object], said: str, kept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "bad.mcap"
-    path.write_bytes((kept / "run.mcap").read_bytes())
-    damage(path)
-    assert main(["replay", str(path)]) == 1
-    complaint = capsys.readouterr().err
-    assert complaint.count("\n") == 1
-    assert f"bad.mcap: {said}" in complaint
-
-
 def test_a_recording_without_the_camera_says_what_it_holds(kept: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(kept / "run.mcap"), "--ros-args", "-r", "limo_camera/image:=/other"]) == 1
     assert "no images on /other; the recording holds /clock, /cmd_vel, " in capsys.readouterr().err
@@ -176,32 +150,21 @@ def at_a_display(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     return pages
 
 
-def test_follow_opens_its_page_unasked_where_a_display_is(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("options", "display", "opens"),
+    [("", True, True), ("--view off", True, False), ("--json -", True, False), ("", False, False)],
+)
+def test_follow_opens_its_page_unasked_where_a_display_is_and_else_says_how(
+    options: str, display: bool, opens: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     opened = at_a_display(monkeypatch)
-    assert main(["follow", "--seconds", "1"]) == 0
-    assert len(opened) == 1
-    assert b"<canvas" in opened[0]
-    assert "--view" not in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("options", [["--view", "off"], ["--json", "-"]])
-def test_follow_opens_no_page_where_it_is_told_otherwise(options: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    opened = at_a_display(monkeypatch)
-    assert main(["follow", "--seconds", "1", *options]) == 0
-    assert opened == []
-
-
-def test_follow_says_how_to_look_where_no_display_is(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    opened = at_a_display(monkeypatch)
-    monkeypatch.delenv("DISPLAY")
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    assert main(["follow", "--seconds", "1"]) == 0
-    assert opened == []
-    assert capsys.readouterr().out.splitlines()[-1].startswith("To see the robot follow: limo-hog follow --view")
+    if not display:
+        monkeypatch.delenv("DISPLAY")
+        monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert main(["follow", "--seconds", "1", *options.split()]) == 0
+    assert [b"<canvas" in page for page in opened] == [True] * opens
+    said = "To see the robot follow: limo-hog follow --view" in capsys.readouterr().out
+    assert said == (not opens and "--json" not in options)
 
 
 def test_a_port_in_use_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -211,21 +174,6 @@ def test_a_port_in_use_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1
     assert "give --view another port" in complaint
-
-
-def test_a_folder_that_may_not_be_written_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "file").write_text("no folder")
-    assert main(["follow", "--seconds", "1", "--record", str(tmp_path / "file" / "run.mcap")]) == 1
-    assert capsys.readouterr().err.count("\n") == 1
-
-
-#: Runs the command line with files that may not grow beyond so many bytes: a full disk, without one.
-FULL_DISK = """
-import resource, sys
-from limo_hog.cli.main import main
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
-sys.exit(main(sys.argv[2:]))
-"""
 
 
 @pytest.mark.parametrize(
@@ -240,10 +188,7 @@ sys.exit(main(sys.argv[2:]))
     ],
 )
 def test_a_full_disk_is_one_line_and_leaves_nothing(option: str, file: str, room: int, tmp_path: Path) -> None:
-    command = ["follow", "--seconds", "3", option, str(tmp_path / file)]
-    done = subprocess.run(
-        [sys.executable, "-c", FULL_DISK, str(room), *command], capture_output=True, text=True, timeout=120
-    )
+    done = on_a_full_disk(room, "follow", "--seconds", "3", option, str(tmp_path / file))
     assert done.returncode == 1
     assert done.stderr == f"limo-hog: {tmp_path / file}: {os.strerror(errno.EFBIG)}\n"
     assert list(tmp_path.iterdir()) == []
@@ -361,12 +306,3 @@ def test_ctrl_c_ends_a_run_that_is_paused_on_its_page() -> None:
     asyncio.run(pause())
     assert process.communicate(timeout=30)[1] == "limo-hog: stopped\n"
     assert process.returncode == 130
-
-
-def test_a_missing_library_is_named_with_what_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "av", None)
-    with (
-        pytest.raises(MissingExtraError, match=r"^a film needs PyAV: pip install 'limo-hog\[video\]'$"),
-        needed(by="a film"),
-    ):
-        import av  # noqa: F401

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from statistics import NormalDist
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,18 +80,30 @@ def fit_of(model: str) -> Fit:
     return Fit(photographs, arena, table["memory_s"], table["false_rate"])
 
 
-class Missing(Protocol):
+class Missing(ABC):
     """When one person is missed."""
+
+    _period = 0
 
     def at(self, period: int, height: float) -> bool:
         """Return whether the person, so high in the image [px], is missed in a period of the camera.
 
         No earlier period than the last one asked for.
         """
-        ...
+        for _ in range(period - self._period):
+            self._advance()
+        self._period = max(period, self._period)
+        return self._is_missed(height)
+
+    @abstractmethod
+    def _advance(self) -> None:
+        """Go on to the next period."""
+
+    @abstractmethod
+    def _is_missed(self, height: float) -> bool: ...
 
 
-class FittedMisses:
+class FittedMisses(Missing):
     """When one person is missed, by a model's fit.
 
     Missed while a standard normal process with correlation exp(-t / memory) is above the quantile of the share kept at
@@ -101,19 +113,17 @@ class FittedMisses:
     def __init__(self, fit: Fit, rate_hz: float, random: np.random.Generator) -> None:
         self._fit, self._random = fit, random
         self._correlation = math.exp(-1.0 / (rate_hz * fit.memory_s))
-        self._period = 0
         self._value = float(random.standard_normal())
 
-    def at(self, period: int, height: float) -> bool:
-        """Return whether the person is missed, see `Missing.at`."""
-        for _ in range(period - self._period):
-            new = math.sqrt(1.0 - self._correlation**2) * self._random.standard_normal()
-            self._value = self._correlation * self._value + new
-        self._period = max(period, self._period)
+    def _advance(self) -> None:
+        new = math.sqrt(1.0 - self._correlation**2) * self._random.standard_normal()
+        self._value = self._correlation * self._value + new
+
+    def _is_missed(self, height: float) -> bool:
         return NormalDist().cdf(self._value) >= self._fit.kept(height)
 
 
-class Misses:
+class Misses(Missing):
     """When one person is missed: a Markov chain of two states, one step for each period of the camera.
 
     A burst is left with probability q = 1 / (its mean length in frames), and begins with q (1 - recall) / recall: the
@@ -126,16 +136,12 @@ class Misses:
         self._begins = self._leaves * (1.0 - faults.recall) / faults.recall if faults.recall > 0 else 1.0
         if faults.recall == 0:
             self._leaves = 0.0
-        self._period = 0
         self._missed = bool(random.random() >= faults.recall)
 
-    def at(self, period: int, height: float) -> bool:
-        """Return whether the person is missed, see `Missing.at`; the height makes no difference."""
-        del height
-        for _ in range(period - self._period):
-            change = self._random.random() < (self._leaves if self._missed else self._begins)
-            self._missed ^= bool(change)
-        self._period = max(period, self._period)
+    def _advance(self) -> None:
+        self._missed ^= bool(self._random.random() < (self._leaves if self._missed else self._begins))
+
+    def _is_missed(self, height: float) -> bool:  # noqa: ARG002 - the same at every height
         return self._missed
 
 

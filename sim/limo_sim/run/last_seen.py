@@ -64,28 +64,15 @@ def state_of(last: LastSeen | None, seen: bool, now: float, odometry: Odometry) 
     the left of the robot. 7, 8: speed and turn rate of the robot. The unit of each is in `Scale`. Before the first
     sighting 1, 2, 5 and 6 are 0, and 3 and 4 are 1.
     """
-    linear = min(max(odometry.linear / SCALE.linear, -1.0), 1.0)
-    angular = min(max(odometry.angular / SCALE.angular, -1.0), 1.0)
+    moves = odometry.linear / SCALE.linear, odometry.angular / SCALE.angular
     if last is None:
-        return np.array((0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, linear, angular), np.float32)
+        return np.clip((0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, *moves), -1.0, 1.0).astype(np.float32)
     dx, dy = last.x - odometry.x, last.y - odometry.y
     distance = math.hypot(dx, dy)
     cos, sin = math.cos(odometry.yaw), math.sin(odometry.yaw)
     ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
     forward, sideways = cos * last.vx + sin * last.vy, cos * last.vy - sin * last.vx
-    age = now - last.stamp
     unit = max(distance, 1e-6)
-    return np.array(
-        (
-            1.0 if seen else 0.0,
-            ahead / unit,
-            left / unit,
-            min(distance / SCALE.range_m, 1.0),
-            min(age / SCALE.age_s, 1.0),
-            min(max(forward / SCALE.person, -1.0), 1.0),
-            min(max(sideways / SCALE.person, -1.0), 1.0),
-            linear,
-            angular,
-        ),
-        np.float32,
-    )
+    place = ahead / unit, left / unit, distance / SCALE.range_m, (now - last.stamp) / SCALE.age_s
+    person = forward / SCALE.person, sideways / SCALE.person
+    return np.clip((float(seen), *place, *person, *moves), -1.0, 1.0).astype(np.float32)

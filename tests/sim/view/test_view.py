@@ -21,7 +21,7 @@ from limo_sim.run.log import Step
 from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 from limo_sim.view.pace import Pace
 from limo_sim.view.reading import depth_colours, depth_picture, figures, followed_person, measured_m
-from limo_sim.view.server import ServeError, View
+from limo_sim.view.server import View
 from limo_sim.view.tuning import Parameter, ParameterError, Tunable
 from limo_sim.world.scenario import Scenario
 
@@ -82,13 +82,6 @@ def test_a_parameter_changes_the_controller_and_keeps_its_kind() -> None:
 def test_a_parameter_that_is_none_or_out_of_bounds_is_refused(name: str, value: float) -> None:
     with pytest.raises(ParameterError, match=name):
         Tunable(controller_named("tracking", None)).set(name, value)
-
-
-def test_a_port_in_use_is_named() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        with pytest.raises(ServeError, match=f"127.0.0.1:{port}.*another port"), View(WORKSHOP, port=port):
-            pass
 
 
 def test_the_page_is_served_on_loopback_alone() -> None:

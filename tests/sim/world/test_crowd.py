@@ -9,28 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.sim.logs import poses_of as poses
 
 from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
-from limo_sim.world.crowd import STEP_S, Crowd
+from limo_sim.world.crowd import STEP_S
 from limo_sim.world.person import Pose
 from limo_sim.world.scenario import Camera, Furniture, Group, Person, Robot, Room, Scenario, Wall
-from limo_sim.world.schema import ScenarioError
 
 YIELDS = Person(route=((-2, 1, 0), (2, 1, 1.0), (2, 3, 0)), behaviour="social_force")
 CORNER = Robot(x=-4.5, y=-4.5)
-
-
-def poses(
-    scenario: Scenario, seconds: float, robot: tuple[float, float, float] = (-4.5, -4.5, 0.0), seed: int = 0
-) -> list[tuple[Pose | None, ...]]:
-    scenario.check()
-    crowd = Crowd(scenario, seed)
-    seen = [crowd.poses]
-    for step in range(1, round(seconds / STEP_S) + 1):
-        crowd.advance(step * STEP_S, robot)
-        seen.append(crowd.poses)
-    return seen
 
 
 def there(pose: Pose | None) -> Pose:
@@ -195,42 +183,6 @@ def test_a_crowd_in_a_furnished_room_stays_inside_and_out_of_the_furniture() -> 
         for pose in step:
             assert max(abs(there(pose).x), abs(there(pose).y)) < 4.9 - 0.1
             assert all(math.dist((there(pose).x, there(pose).y), (f.x, f.y)) > 0.15 + 0.1 for f in furniture)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("behaviour = 'fly'", "people[0].behaviour: got 'fly', want one of route, social_force"),
-        ("reaction = 'flee'", "people[0].reaction: got 'flee', want one of avoid, ignore, approach, block"),
-        ("reaction = 'block'", "people[0].reaction: got 'block', want behaviour = \"social_force\" with it"),
-        ("enters = [4.9, 1]", "people[0].enters: got (4.9, 1.0), want behaviour"),
-        (
-            "behaviour = 'social_force'\nenters = [4.0, 1.0]",
-            "people[0].enters: got [4.0, 1.0], want [x, y] on an outer wall: the one or the other ±4.9",
-        ),
-        ("behaviour = 'social_force'\nenters = [4.9]", "people[0].enters: got [4.9], want [x, y] on an outer wall"),
-        (
-            "behaviour = 'social_force'\n"
-            "[[walls]]\nstart = [0, 2]\nend = [4.9, 2]\n[[walls]]\nstart = [0, 2]\nend = [0, 4.9]",
-            "people[0].route[1]: no way leads there from the first corner, want doors of at least 0.56 m",
-        ),
-        (
-            "behaviour = 'social_force'\n[[furniture]]\nkind = 'pillar'\nx = 3.0\ny = 1.4",
-            "people[0].route[0]: is 0.25 m from furniture[0] (pillar), want at least 0.35 m",
-        ),
-        ("sits = true", "people[0].sits: got true with 2 corners, want a route of one corner"),
-        ("[[groups]]\nx = 1", "groups[0].y: missing"),
-        ("[[groups]]\nx = 1\ny = 4", "groups[0], one of its people.route[0]"),
-        ("[[groups]]\nx = 1\ny = 2\nsize = 40", "groups[0].size: got 40, want a number in 2 … 12"),
-        ("[[groups]]\nx = 1\ny = 2\ncount = 4", "groups[0].count: unknown key, want one of x, y, size"),
-    ],
-)
-def test_what_people_cannot_do_is_refused_by_its_key(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text("[[people]]\nroute = [[3, 1, 0], [3, 3, 0]]\n" + text, encoding="utf-8")
-    with pytest.raises(ScenarioError) as refused:
-        Scenario.load(path)
-    assert str(refused.value).startswith(f"mine.toml: {message}"), str(refused.value)
 
 
 def test_a_group_in_a_file_becomes_people_who_look_at_its_middle(tmp_path: Path) -> None:

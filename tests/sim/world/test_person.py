@@ -26,18 +26,8 @@ def highest(figure: BodyMesh) -> float:
 @pytest.mark.parametrize(
     ("time", "x", "y"),
     [
-        (0.0, -3, -3),
-        (4.0, -3, 0),
-        (8.0, -3, 3),
-        (8.5, -3, 3),
-        (12.5, 0, 3),
-        (16.5, 3, 3),
-        (17.0, 3, 3),
-        (25.0, 3, -3),
-        (33.5, -3, -3),
-        (34.0, -3, -3),
-        (38.0, -3, 0),
-        (34.0 * 100 + 21.0, 3, 0),
+        *((0.0, -3, -3), (4.0, -3, 0), (8.0, -3, 3), (8.5, -3, 3), (12.5, 0, 3), (16.5, 3, 3), (17.0, 3, 3)),
+        *((25.0, 3, -3), (33.5, -3, -3), (34.0, -3, -3), (38.0, -3, 0), (34.0 * 100 + 21.0, 3, 0)),
     ],
 )
 def test_the_patrol_keeps_the_workshops_times(time: float, x: float, y: float) -> None:
@@ -90,12 +80,6 @@ def test_a_person_who_pauses_stands_with_limbs_at_rest() -> None:
     walking = walk.pose(4.0)
     assert walking is not None
     assert walking.swing == 1
-
-
-def test_somebody_late_is_not_there_before() -> None:
-    walk = Walk(Scenario.load("late").people[0])
-    assert walk.pose(19.98) is None
-    assert walk.pose(20.0) is not None
 
 
 def test_a_person_who_left_is_not_there_any_more() -> None:

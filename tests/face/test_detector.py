@@ -56,13 +56,6 @@ def test_grouped_and_at_the_images_own_size_the_boxes_are_opencvs(model: str) ->
     assert assert_opencvs(picture(), model) + assert_opencvs(street(800, 600, 1), model) > 0
 
 
-@pytest.mark.skipif(not PHOTOGRAPHS.exists(), reason="needs ../shared/data/real")
-def test_on_photographs_daimlers_boxes_are_opencvs() -> None:
-    paths = sorted(path for path in PHOTOGRAPHS.iterdir() if path.suffix in (".jpg", ".png"))
-    assert len(paths) == 12
-    assert sum(assert_opencvs(np.asarray(cv2.imread(str(path)), np.uint8), "daimler") for path in paths) > 0
-
-
 # Sizes of people.
 
 

@@ -43,11 +43,14 @@ def test_a_search_works_on_no_more_threads_than_there_are_cores() -> None:
     assert done.stdout.split() == ["True"], done.stdout + done.stderr
 
 
-def test_the_number_of_threads_is_bounded() -> None:
+def test_the_number_of_threads_is_what_was_set_and_bounded() -> None:
     before = limo_hog.get_num_threads()
     try:
-        limo_hog.set_num_threads(10**6)
-        assert 1 <= limo_hog.get_num_threads() <= 1024
+        limo_hog.set_num_threads(3)
+        assert limo_hog.get_num_threads() == 3
+        for any_number in (0, 10**6):
+            limo_hog.set_num_threads(any_number)
+            assert 1 <= limo_hog.get_num_threads() <= 1024
     finally:
         limo_hog.set_num_threads(before)
 

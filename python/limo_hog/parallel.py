@@ -9,7 +9,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -40,15 +43,9 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], threads: int
     waiting: deque[Future[Result]] = deque()
     helpers: list[threading.Thread] = []
 
-    def do(item: Item, done: Future[Result]) -> None:
-        try:
-            done.set_result(work(item))
-        except BaseException as error:
-            done.set_exception(error)
-
     def help_() -> None:
         while (job := jobs.get()) is not None:
-            do(*job)
+            _do(work, *job)
 
     try:
         for item in items:
@@ -64,7 +61,7 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], threads: int
             if helpers:
                 jobs.put(job)
             else:
-                do(*job)
+                _do(work, *job)
             if len(waiting) > 2 * threads:
                 yield waiting.popleft().result()
         while waiting:
@@ -78,3 +75,10 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], threads: int
         patient_until = time.monotonic() + _PATIENCE_S
         for helper in helpers:
             helper.join(max(0.0, patient_until - time.monotonic()))
+
+
+def _do(work: Callable[[Item], Result], item: Item, done: Future[Result]) -> None:
+    try:
+        done.set_result(work(item))
+    except BaseException as error:
+        done.set_exception(error)

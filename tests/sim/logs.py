@@ -35,3 +35,9 @@ def poses_of(
         crowd.advance(step * STEP_S, robot)
         seen.append(crowd.poses)
     return seen
+
+
+def there(pose: Pose | None) -> Pose:
+    """Return the pose of a person who is in the arena."""
+    assert pose is not None
+    return pose

@@ -6,24 +6,20 @@ import dataclasses
 import math
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from tests.sim.logs import poses_of as poses
+from tests.sim.logs import there
 
 from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.world.crowd import STEP_S
-from limo_sim.world.person import Pose
 from limo_sim.world.scenario import Camera, Furniture, Group, Person, Robot, Room, Scenario, Wall
 
 YIELDS = Person(route=((-2, 1, 0), (2, 1, 1.0), (2, 3, 0)), behaviour="social_force")
 CORNER = Robot(x=-4.5, y=-4.5)
-
-
-def there(pose: Pose | None) -> Pose:
-    assert pose is not None
-    return pose
 
 
 def test_the_corners_of_the_route_are_visited_in_order_with_their_pauses() -> None:
@@ -73,11 +69,21 @@ def test_a_person_who_arrives_walks_in_through_a_door_and_who_leaves_walks_out()
             assert math.hypot(pose.y - 2.0, pose.x + 4.9) < 0.65
 
 
-def test_without_a_door_of_their_own_people_take_the_nearest() -> None:
-    person = dataclasses.replace(YIELDS, route=((-3.5, 1, 0), (2, 1, 0)), arrives_s=2.0)
-    seen = [one for (one,) in poses(Scenario(people=(person,), robot=CORNER), 4.0)]
+@pytest.mark.parametrize(
+    ("route", "door", "half", "x", "y"),
+    [
+        # Without a door of their own people take the nearest; a larger room has its doors farther out.
+        (((-3.5, 1, 0), (2, 1, 0)), (), 4.9, -5.4, 1.0),
+        (YIELDS.route, (0.0, -8.0), 8.0, 0.0, -8.5),
+    ],
+)
+def test_people_come_in_by_the_nearest_door_or_their_own(
+    route: tuple[Any, ...], door: tuple[float, ...], half: float, x: float, y: float
+) -> None:
+    person = dataclasses.replace(YIELDS, route=route, arrives_s=0.5, enters=door)
+    seen = [one for (one,) in poses(Scenario(people=(person,), room=Room(half), robot=CORNER), 1.0)]
     first = next(pose for pose in seen if pose is not None)
-    assert (first.x, first.y) == pytest.approx((-5.4, 1.0), abs=0.05)
+    assert (first.x, first.y) == pytest.approx((x, y), abs=0.05)
 
 
 def test_two_who_walk_at_each_other_give_way() -> None:
@@ -137,13 +143,10 @@ def test_nobody_is_drawn_to_a_robot_behind_a_wall() -> None:
     assert math.dist((pose.x, pose.y), (2, 0)) < 0.1
 
 
-def crowd_of(order: tuple[int, ...]) -> Scenario:
-    people = [dataclasses.replace(YIELDS, route=((-3, 0.8 * n, 0), (3, -0.8 * n, 0))) for n in range(4)]
-    return Scenario(people=tuple(people[n] for n in order), robot=CORNER)
-
-
 def test_the_same_seed_gives_the_same_walks_and_another_seed_others() -> None:
-    one, again, other = (poses(crowd_of((0, 1, 2, 3)), 6.0, seed=seed)[-1] for seed in (3, 3, 4))
+    people = tuple(dataclasses.replace(YIELDS, route=((-3, 0.8 * n, 0), (3, -0.8 * n, 0))) for n in range(4))
+    crowd = Scenario(people=people, robot=CORNER)
+    one, again, other = (poses(crowd, 6.0, seed=seed)[-1] for seed in (3, 3, 4))
     assert one == again
     assert one != other
 
@@ -194,10 +197,3 @@ def test_a_group_in_a_file_becomes_people_who_look_at_its_middle(tmp_path: Path)
         x, y, _ = person.route[0]
         assert math.dist((x, y), (-2, 1)) == pytest.approx(0.7)
         assert (x + 0.7 * math.cos(person.facing), y + 0.7 * math.sin(person.facing)) == pytest.approx((-2, 1))
-
-
-def test_a_larger_room_has_its_doors_farther_out() -> None:
-    person = dataclasses.replace(YIELDS, arrives_s=0.5, enters=(0.0, -8.0))
-    seen = [one for (one,) in poses(Scenario(people=(person,), room=Room(8.0), robot=CORNER), 1.0)]
-    first = next(pose for pose in seen if pose is not None)
-    assert (first.x, first.y) == pytest.approx((0.0, -8.5), abs=0.05)

@@ -81,15 +81,6 @@ def test_files_are_opencvs_own_to_the_byte(tmp_path: Path, suffix: str, stem: st
     assert texts[0] == texts[1]
 
 
-def test_the_people_models_survive_every_format(tmp_path: Path) -> None:
-    hog = HOGDescriptor()
-    hog.setSVMDetector(hog.getDefaultPeopleDetector())
-    for suffix in SUFFIXES:
-        hog.save(tmp_path / f"people{suffix}")
-        loaded = HOGDescriptor(tmp_path / f"people{suffix}")
-        np.testing.assert_array_equal(loaded.svmDetector, hog.getDefaultPeopleDetector())
-
-
 def test_an_object_is_found_by_its_name(tmp_path: Path) -> None:
     path = tmp_path / "two.yml"
     first, second = HOGDescriptor(), HOGDescriptor((48, 96), (16, 16), (8, 8), (8, 8), 9)

@@ -172,7 +172,7 @@ def levels_come_in_order_with_their_own_weights_on_any_number_of_threads() -> No
 
 def a_wrong_detector_is_refused_before_it_is_taken() -> None:
     hog = armed()
-    raises(limo_hog.DetectorSizeError, "1764", lambda: hog.setSVMDetector(np.ones(1764)))
+    raises(limo_hog.DetectorSizeError, "1764 coefficients", lambda: hog.setSVMDetector(np.ones(1764)))
     assert hog.checkDetectorSize() and np.array_equal(hog.svmDetector, PEOPLE)
 
 

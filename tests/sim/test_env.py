@@ -28,20 +28,14 @@ STANDING = Scenario(people=(Person(route=((2.5, 0.0, 0.0),)),))
 
 
 @pytest.mark.parametrize("observe", ["state", "gray", "camera"])
-def test_gymnasiums_checker_accepts_it_without_a_warning(observe: str) -> None:
+def test_it_is_made_by_name_and_gymnasiums_checker_accepts_it_without_a_warning(observe: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        made = gymnasium.make("limo_sim.env:LimoFollow-v1", observe=observe, render_mode="rgb_array")
-        check_env(made.unwrapped)
-
-
-@pytest.mark.parametrize("observe", ["state", "gray", "camera"])
-def test_it_is_made_by_name_and_its_observations_are_in_its_space(observe: str) -> None:
-    env = gymnasium.make("limo_sim.env:LimoFollow-v1", scenario="followable", observe=observe)
-    observation, _ = env.reset(seed=0)
+        env = gymnasium.make("limo_sim.env:LimoFollow-v1", observe=observe, render_mode="rgb_array")
+        check_env(env.unwrapped)
+    env.reset(seed=0)
     for action in (AHEAD, -AHEAD, env.action_space.sample()):
-        assert env.observation_space.contains(observation)
-        observation, reward, terminated, truncated, info = env.step(action)
+        _, reward, terminated, truncated, info = env.step(action)
         assert reward == pytest.approx(sum(info["reward"].values()))
         assert not terminated
         assert not truncated

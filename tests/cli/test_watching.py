@@ -227,10 +227,13 @@ def test_a_run_that_is_stopped_leaves_whole_files(name: str, tmp_path: Path) -> 
         assert abs(frames - images) <= 1
 
 
-def _stop_at_random(seed: int, folder: Path) -> None:
-    """Stop a run by one to three signals at moments of its first seconds; what is there afterwards is whole."""
+SLOW = [pytest.param(seed, marks=[pytest.mark.slow, pytest.mark.timeout(1800)]) for seed in range(1, 101)]
+
+
+@pytest.mark.parametrize("seed", [0, *SLOW])
+def test_a_run_stopped_at_any_moment_leaves_whole_files_or_none(seed: int, tmp_path: Path) -> None:
     rng = random.Random(seed)
-    process, film, bag = _started(folder)
+    process, film, bag = _started(tmp_path)
     time.sleep(rng.uniform(0.2, 5.0))
     for _ in range(rng.randint(1, 3)):
         process.send_signal(rng.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
@@ -239,23 +242,12 @@ def _stop_at_random(seed: int, folder: Path) -> None:
         said = process.communicate(timeout=60)[1]
     finally:
         process.kill()
-    assert {path.name for path in folder.iterdir()} <= {"run.mp4", "run.mcap"}, (process.returncode, said)
+    assert {path.name for path in tmp_path.iterdir()} <= {"run.mp4", "run.mcap"}, (process.returncode, said)
     if film.exists():
         with av.open(film) as container:
             assert list(container.decode(video=0))
     if bag.exists():
         assert sum(1 for _ in read_bag(bag)) > 0
-
-
-def test_a_run_stopped_at_any_moment_leaves_whole_files_or_none(tmp_path: Path) -> None:
-    _stop_at_random(0, tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
-@pytest.mark.parametrize("seed", range(1, 101))
-def test_a_hundred_runs_stopped_at_any_moment_leave_whole_files_or_none(seed: int, tmp_path: Path) -> None:
-    _stop_at_random(seed, tmp_path)
 
 
 def test_a_closed_terminal_does_not_stop_what_nohup_started(tmp_path: Path) -> None:

@@ -143,8 +143,12 @@ def test_somebody_late_is_unknown_to_the_truth_until_they_come() -> None:
     assert arena.truth().people[0] is not None
 
 
-def wander(seed: int, seconds: float) -> None:
-    """Drive a scenario with varied people at random; whatever happens, everything stays inside and finite."""
+THOUSAND = [pytest.param(seed, 30.0, marks=[pytest.mark.slow, pytest.mark.timeout(900)]) for seed in range(1000)]
+
+
+@pytest.mark.parametrize(("seed", "seconds"), [*((1000 + seed, 12.0) for seed in range(12)), *THOUSAND])
+def test_nothing_goes_through_a_wall(seed: int, seconds: float) -> None:
+    """A scenario with varied people, driven at random; whatever happens, everything stays inside and finite."""
     names = [name for name in Scenario.names() if Scenario.load(name).room == Room()]
     scenario = dataclasses.replace(Scenario.load(names[seed % len(names)]), vary=Vary(height=0.1, speed=0.5, place=0.3))
     arena, random = Arena(scenario, seed), np.random.default_rng(seed)
@@ -162,19 +166,6 @@ def wander(seed: int, seconds: float) -> None:
             assert (ranges >= 0.12).all()
             for pose in arena._state.people:
                 assert pose is None or max(abs(pose.x), abs(pose.y)) < 4.4
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_nothing_goes_through_a_wall(seed: int) -> None:
-    wander(1_000 + seed, 12.0)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(900)
-@pytest.mark.parametrize("batch", range(10))
-def test_nothing_goes_through_a_wall_in_a_thousand_runs(batch: int) -> None:
-    for seed in range(100 * batch, 100 * batch + 100):
-        wander(seed, 30.0)
 
 
 def peak_mb() -> float:

@@ -164,6 +164,9 @@ def test_a_state_carries_the_last_sighting_along_with_the_robot() -> None:
     seen = sighted(0.0, 2.0, 1.0, Odometry(1.0), None)
     turned = Odometry(3.0, x=1.0, y=0.0, yaw=math.pi / 2, linear=0.35, angular=-0.75)
     np.testing.assert_allclose(state_of(seen, False, 3.0, turned), [0, 0, -1, 1 / 8, 2 / 5, 0, 0, 0.5, -0.5], atol=1e-6)
+    # No number leaves -1 … 1.
+    rushing = Odometry(99.0, x=40.0, linear=9.0, angular=-9.0)
+    assert state_of(seen, False, 99.0, rushing).tolist() == [0, -1, 0, 1, 1, 0, 0, 1, -1]
 
 
 def test_a_persons_velocity_is_that_of_many_sightings() -> None:

@@ -78,12 +78,17 @@ def test_nothing_is_held_out_where_no_object_can_be(bollards: Path, tmp_path: Pa
 
 def test_negatives_of_labelled_pictures_are_clear_of_the_objects(data: TrainingData) -> None:
     (first,) = _train(data, replace(SMALL, rounds=0))
-    negatives = list(Miner(data.negatives, data.shape, SMALL.mining, 0, 2).hard(first.coefficients, {}))
+    miner = Miner(data.negatives, data.shape, SMALL.mining, 0, 2)
+    negatives = list(miner.hard(first.coefficients, {}))
     assert sum(len(mined.boxes) for mined in negatives) > 0
     for mined in negatives:
         objects = data.negatives.objects[data.negatives.paths[mined.picture]]
         overlaps = intersection_over_union(data.shape.object_box.inside(mined.boxes), objects)
         assert (overlaps <= 0.3 + 1e-9).all()
+    # What is known is not found again.
+    known = {mined.picture: set(map(tuple, mined.boxes.tolist())) for mined in negatives}
+    for mined in miner.hard(first.coefficients, known):
+        assert known[mined.picture].isdisjoint(map(tuple, mined.boxes.tolist()))
 
 
 def test_memory_is_bounded_by_leaving_out_the_least_hard_negatives(data: TrainingData) -> None:

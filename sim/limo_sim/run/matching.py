@@ -18,6 +18,8 @@ class Criteria:
     """Thresholds of the score card; only cards of equal criteria can be compared."""
 
     in_view: float = 0.5  #: share of the silhouette from which a person is in view. Chosen: half.
+    #: A robot further from the subject than this has not kept up [m]. Chosen: twice the distance held.
+    kept_up_m: float = 3.0
     #: A subject who was not the target for longer than this was lost [s]. Chosen: five camera frames, more than a
     #: detector's single misses.
     lost_after_s: float = 0.5

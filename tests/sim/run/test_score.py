@@ -122,6 +122,12 @@ def test_without_a_distance_to_hold_there_is_no_distance_error() -> None:
     assert (result.target_m, result.distance_rms_error_m, result.distance_mean_m) == (None, None, 2.0)
 
 
+def test_a_robot_keeps_up_where_the_person_is_in_view_and_at_most_three_metres_away() -> None:
+    near, edge, far, hidden = person(2.0), person(3.0), person(3.01), person(2.0, visible=0.4)
+    result = card(*(step(k, one) for k, one in enumerate((near, edge, far, hidden, far))))
+    assert (result.kept_up, result.in_view) == (0.4, 0.8)
+
+
 def test_a_score_as_the_run_goes_needs_12_bytes_a_frame() -> None:
     scorer = Scorer(Scenario.load("two_people"))
 

@@ -301,13 +301,11 @@ class HOGDescriptor:
             Border around each level (x, y) [px], mirrored.
         scale
             How much each level is smaller than the one before; 1 or less searches the image's own size alone.
-        groupThreshold
+        groupThreshold, finalThreshold
             Similar rectangles must be more than this to count; below 1 every hit is returned. With
-            `useMeanshiftGrouping`, the least weight of a mode.
+            `useMeanshiftGrouping`, the least weight of a mode. The second is the old name; it counts when given.
         useMeanshiftGrouping
             Group by mean-shift instead.
-        finalThreshold
-            The old name of `groupThreshold`; used in its place when given.
 
         Returns
         -------

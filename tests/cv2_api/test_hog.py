@@ -166,6 +166,7 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: untyped.HOGDescriptor(*GEOMETRY, _gammaCorrection="x"), TypeError, "_gammaCorrection is 'x'"),
     (lambda: untyped.HOGDescriptor(*GEOMETRY, _nlevels=True), TypeError, "_nlevels is True"),
     (lambda: untyped.groupRectangles([[0, 0, 1, 1]], True), TypeError, "groupThreshold is True"),
+    (lambda: untyped.groupRectangles(np.ones((3, 4), bool), 1), TypeError, "type bool"),
     (lambda: people().setSVMDetector(np.ones(3781, bool)), TypeError, "coefficients are bool"),
     (lambda: untyped.HOGDescriptor(""), ValueError, "filename is empty"),
     (lambda: people().save(""), ValueError, "filename is empty"),

@@ -121,6 +121,18 @@ def test_bad_data_is_named_in_one_line(
     assert not (tmp_path / "x.json").exists()
 
 
+def test_a_curve_without_misses_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("matplotlib.axes.Axes.text", lambda *at, **_: said.append(at[-1]))
+    write_image(tmp_path / "a.png", street(192, 256, 3))
+    found = PeopleDetector().detect(tmp_path / "a.png").boxes.tolist()
+    for boxes, words in ((found, ["no misses"]), ([*found, [10, 5, 15, 40]], [])):
+        (tmp_path / "boxes.json").write_text(json.dumps({"a.png": boxes}))
+        said.clear()
+        assert main(["evaluate", "limo", str(tmp_path), "--report", str(tmp_path / "report")]) == 0
+        assert said == words
+
+
 def test_boxes_left_out_are_told_as_warnings(streets: Path, capsys: pytest.CaptureFixture[str]) -> None:
     boxes = json.loads((streets / "boxes.json").read_text())
     boxes["0.png"] += [[500, 5, 20, 40], [5, 5, 0, 40]]

@@ -36,21 +36,11 @@ _GROUP_THRESHOLD = 2
 
 
 class Guide(NamedTuple):
-    """What of the levels between two that are searched whole is searched.
+    """What of the levels between two that are searched whole is searched."""
 
-    Attributes
-    ----------
-    halvings
-        How often these levels are halved.
-    margin
-        How much the threshold is lowered for a neighbouring level [SVM margin].
-    reach
-        How far around a place windows are searched, across and down [strides].
-    """
-
-    halvings: int
-    margin: float
-    reach: tuple[float, float]
+    halvings: int  #: how often these levels are halved
+    margin: float  #: how much the threshold is lowered for a neighbouring level [SVM margin]
+    reach: tuple[float, float]  #: how far around a place windows are searched, across and down [strides]
 
 
 #: The guide of each search. docs/simd.md shows others.
@@ -230,19 +220,20 @@ class PeopleDetector:
         image = pixels(image)
         size = self._searched_size(image)
         threshold = self._model.threshold if self.threshold is None else self.threshold
-        members = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
+        members: int | None = None
+        if self.nms == "group":
+            members = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
         hits = [
             hog.detect_multi_scale(
                 image,
-                threshold,
-                self.win_stride,
-                self.padding,
-                self.scale,
-                members if self.nms == "group" else 0,
-                False,
-                size,
-                _GUIDES[self.search],
-                threads,
+                hit_threshold=threshold,
+                win_stride=self.win_stride,
+                padding=self.padding,
+                scale=self.scale,
+                similar=members,
+                first_level=size,
+                guide=_GUIDES[self.search],
+                threads=threads,
             )
             for hog in self._hogs
         ]

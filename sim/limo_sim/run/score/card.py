@@ -26,13 +26,15 @@ class ScoreCard:
     success
         Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
         view for more than 10 s after being first in view; None where no person ever was in the arena. A node that
-        failed, or never gave a command, has no success.
+        failed, or never moved the robot, has no success.
     frames
         Camera frames worked on.
     first_detection_s
         When the subject was first detected [s].
     in_view, detected
         Share of frames with at least half of the subject in view; of those, share in which the subject was detected.
+    kept_up
+        Share of frames with at least half of the subject in view, and the robot's centre at most 3 m from the subject.
     best_box_wrong
         Share of frames with boxes whose best box is on no person.
     longest_gap_s
@@ -93,6 +95,7 @@ class ScoreCard:
     frames: int
     first_detection_s: float | None
     in_view: float | None
+    kept_up: float | None
     detected: float | None
     best_box_wrong: float | None
     longest_gap_s: float | None

@@ -11,7 +11,7 @@ search or a grouping within a second.
 """
 
 from collections.abc import Sequence
-from typing import TypeAlias, final
+from typing import Any, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ __all__ = [
     "group_rectangles",
     "resize",
     "set_num_threads",
+    "skimage_hog",
 ]
 
 _Pair: TypeAlias = tuple[int, int]
@@ -390,6 +391,29 @@ def default_people_detector() -> NDArray[np.float32]:
 
 def daimler_people_detector() -> NDArray[np.float32]:
     """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
+
+def skimage_hog(
+    images: NDArray[Any],
+    parameters: tuple[int, tuple[int, int], tuple[int, int], int],
+    directions: list[tuple[float, float]] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Descriptors of images, and a drawing of the first: what `limo_hog.skimage` calls, after it has checked all.
+
+    Parameters
+    ----------
+    images
+        uint8, float32 or float64 (N, channels, rows, columns), in C order.
+    parameters
+        Orientations; rows and columns of a cell [px] and of a block [cells]; 0 to 3 for L1, L1-sqrt, L2, L2-Hys.
+    directions
+        For each orientation the way from a cell's middle to the end of its line, (rows, columns) [px]; None for no
+        drawing.
+
+    Returns
+    -------
+    descriptors, drawing
+        (N, D) and (rows, columns), or None.
+    """
 
 def set_num_threads(count: int) -> None:
     """Let pyramids be searched by this many threads; 0 for one per core.

@@ -8,7 +8,7 @@
 //! 6. `rescore` takes the hits from either, and lets `exact` decide those that are too close to the threshold.
 //! 7. [`group`] makes one rectangle of many overlapping ones.
 //!
-//! `canvas` draws solids for the arena's camera, and is no part of the detector.
+//! [`skimage`] computes scikit-image's descriptor, which is another. `canvas` draws solids for the arena's camera, and is no part of the detector.
 //!
 //! [`Hog`] composes these stages. Each follows Dalal and Triggs, "Histograms of Oriented Gradients for Human
 //! Detection" (CVPR 2005), with OpenCV's roundings, so that its trained models give the same answers here.
@@ -21,6 +21,7 @@ pub mod image;
 pub mod model;
 pub mod params;
 pub mod pyramid;
+pub mod skimage;
 
 #[cfg_attr(not(feature = "python"), allow(dead_code, unused_imports, reason = "Python alone calls it"))]
 mod canvas;

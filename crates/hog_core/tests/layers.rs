@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 12] = [
     &["params", "group"],
     &["pyramid"],
     &["exact"],
-    &["fast", "separable", "canvas"],
+    &["fast", "separable", "skimage", "canvas"],
     &["rescore", "guided"],
     &["detect"],
     &["describe"],

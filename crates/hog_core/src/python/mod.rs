@@ -3,6 +3,7 @@
 mod arrays;
 mod canvas;
 mod errors;
+mod skimage;
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -291,6 +292,8 @@ mod _core {
     use super::Hog;
     #[pymodule_export]
     use super::canvas::Canvas;
+    #[pymodule_export]
+    use super::skimage::skimage_hog;
 
     #[pyfunction]
     fn group_rectangles<'py>(

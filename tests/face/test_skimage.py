@@ -71,3 +71,80 @@ def test_any_image_and_arguments_give_scikit_images_numbers() -> None:
 @pytest.mark.slow
 def test_two_thousand_drawn_cases_give_scikit_images_numbers() -> None:
     assert differences(range(100, 2100)) == []
+
+
+def test_py_feats_faces_are_described_and_drawn_alike() -> None:
+    # As py-feat's `extract_hog_features` calls it, whose classifiers of facial action units stand on these numbers.
+    arguments = {"orientations": 8, "pixels_per_cell": (8, 8), "cells_per_block": (2, 2), "channel_axis": -1}
+    faces = np.random.default_rng(0).integers(0, 256, (3, 112, 112, 3)) / 255
+    wanted = [skimage.feature.hog(face, visualize=True, **arguments) for face in faces]
+    for face, (descriptor, drawing) in zip(faces, wanted, strict=True):
+        ours = hog(face, visualize=True, **arguments)
+        assert abs(ours[0] - descriptor).max() <= 1e-9 and np.array_equal(ours[1], drawing)
+    assert abs(hogs(faces, **arguments) - [descriptor for descriptor, _ in wanted]).max() <= 1e-9
+
+
+@pytest.mark.parametrize("axis", [None, 1, -1])
+@pytest.mark.parametrize("kind", ["uint8", "float32", "float64"])
+def test_a_batch_is_its_images_one_by_one(kind: str, axis: int | None) -> None:
+    images = np.random.default_rng(1).integers(0, 256, (5, 40, 33, 4)).astype(kind)
+    images = images[..., 0] if axis is None else np.moveaxis(images, -1, axis)
+    own = None if axis is None else axis - (axis > 0)
+    one_by_one = np.stack([hog(image, channel_axis=own) for image in images])
+    found = hogs(images, channel_axis=axis)
+    assert found.dtype == one_by_one.dtype and np.array_equal(found, one_by_one)
+    assert hogs(images[:0], feature_vector=False, channel_axis=axis).shape == (0, 3, 2, 3, 3, 9)
+
+
+@pytest.mark.parametrize(
+    "pixels",
+    [
+        [np.nan, 5.0],
+        [np.inf, 1.0],
+        [1e-200, 1e200],
+        [1e-320, 0.0],  # lengths whose squares are 0
+        [1e39, 0.0],  # more than float32 holds, in which a cell is summed
+        [-1e-20, 1.0],  # an angle that rounds to 180°
+    ],
+    ids=str,
+)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_numbers_at_the_limits_go_the_same_way(pixels: list[float]) -> None:
+    rng = np.random.default_rng(2)
+    for axis, shape in ((None, (24, 24)), (-1, (24, 24, 2))):
+        image = rng.choice([0.0, 1.0, 2.0], shape)
+        image[rng.random(shape) < 0.1] = pixels[0]
+        image[rng.random(shape) < 0.1] = pixels[1]
+        theirs, ours = (function(image, channel_axis=axis) for function in (skimage.feature.hog, hog))
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9)
+
+
+def test_gradients_on_the_bounds_of_bins_vote_as_scikit_image_lets_them() -> None:
+    for bins in range(1, 40):
+        angles = np.pi * np.arange(8 * bins) / (4 * bins)
+        for rows, columns in ((np.sin(angles), np.cos(angles)), (np.round(angles), np.full_like(angles, 2))):
+            image = np.zeros((3, 3 * len(angles)))
+            image[2, 1::3], image[1, 2::3] = rows, columns  # one gradient a cell
+            arguments = {"pixels_per_cell": (3, 3), "cells_per_block": (1, 1), "orientations": bins}
+            theirs, ours = skimage.feature.hog(image, **arguments), hog(image, **arguments)
+            assert abs(theirs - ours).max() <= 1e-9, bins
+
+
+@pytest.mark.parametrize(
+    ("image", "arguments", "says"),
+    [
+        (np.zeros((23, 24)), {}, "image is too small given .* 23 rows and 24 columns, and at least 24 and 24"),
+        (np.zeros((24, 24)), {"block_norm": "Linf"}, "block_norm is 'Linf'; L1, L1-sqrt"),
+        (np.zeros((24, 24, 3)), {}, "3 axes of pixels; 2 are wanted: `channel_axis`"),
+        (np.zeros((24, 24)), {"channel_axis": -1}, "1 axes of pixels"),
+        (np.zeros((24, 24), complex), {}, "complex"),
+        (np.zeros((24, 24)), {"orientations": -1}, "orientations -1"),
+        (np.zeros((24, 24, 3)), {"channel_axis": 5}, "out of bounds"),
+    ],
+)
+def test_what_scikit_image_refuses_is_refused_with_what_is_wanted(
+    image: NDArray[Any], arguments: dict[str, Any], says: str
+) -> None:
+    for function in (skimage.feature.hog, hog):
+        with pytest.raises(ValueError, match=says if function is hog else None):
+            function(image, **arguments)

@@ -5,12 +5,11 @@
 //! 2. The pixel votes with the gradient's magnitude for one of `bins` orientations over 180°, in its own cell alone.
 //! 3. Blocks of cells, one at each cell, are normalised.
 //!
-//! Three details decide the last digits, and all are kept: a cell adds its pixels row by row in float32, whose rounding
-//! depends on the order; an angle is compared in degrees, so that -1e-20° becomes 180° and votes for no bin; and NaN
-//! votes for all bins.
+//! Three details decide the last digits, and all are kept: a cell adds its pixels row by row in float32; an angle of
+//! -1e-20° becomes 180° and votes for no bin; NaN votes for all bins.
 //!
-//! The loops over a row are left to the compiler, which `isa` lets use AVX2. A polynomial tells the bin; pixels within
-//! 0.1 % of a bin's width from a bound, 0.2 % of all, are decided by `atan2` as scikit-image decides them.
+//! The loops over a row are left to the compiler, which `isa` lets use AVX2. A polynomial tells the bin; pixels within a
+//! hundred-thousandth of 180° from a bin's bound are decided by `atan2`, as scikit-image decides them.
 
 use crate::error::{ParameterError, Result};
 use crate::exact::isa;
@@ -84,7 +83,6 @@ impl Pixel for f64 {
 }
 
 impl Layout {
-    /// Rows and columns of whole cells.
     fn cells(&self) -> (usize, usize) {
         (self.size.0 / self.cell.0.max(1), self.size.1 / self.cell.1.max(1))
     }
@@ -95,7 +93,6 @@ impl Layout {
         ((rows + 1).saturating_sub(self.block.0), (columns + 1).saturating_sub(self.block.1))
     }
 
-    /// Numbers of a block.
     fn block_len(&self) -> usize {
         self.block.0 * self.block.1 * self.bins
     }
@@ -140,12 +137,7 @@ impl Layout {
     }
 
     /// Writes the histograms of the cells of one image: row by row, of a cell the mean vote for each bin.
-    pub fn histograms<P: Pixel>(
-        &self,
-        pixels: &[P],
-        interrupt: &Interrupt,
-        out: &mut [f64],
-    ) -> Result<()> {
+    pub fn histograms<P: Pixel>(&self, pixels: &[P], interrupt: &Interrupt, out: &mut [f64]) -> Result<()> {
         let mut row = Row::new(self)?;
         let columns = self.cells().1;
         let mut totals = memory::filled(columns * self.bins, 0.0_f32)?;
@@ -165,16 +157,27 @@ impl Layout {
 
     /// Writes the blocks of the image whose cells are `histograms`.
     pub fn normalised(&self, histograms: &[f64], out: &mut [f64]) {
-        if self.block_len() > 0 {
-            isa::run(Normalise { layout: self, histograms, out });
+        let (row, across) = (self.cells().1 * self.bins, self.blocks().1);
+        for (index, out) in out.chunks_exact_mut(self.block_len().max(1)).enumerate() {
+            let first = index / across * row + index % across * self.bins;
+            for (y, out) in out.chunks_exact_mut(self.block.1 * self.bins).enumerate() {
+                out.copy_from_slice(&histograms[first + y * row..][..out.len()]);
+            }
+            normalise(self.norm, out);
         }
     }
 }
 
-/// Bounds of the bins [°], and what the polynomial's bins become.
+/// Bounds of the bins [°].
 struct Bins {
     bounds: Vec<f64>,
-    /// Bins of 45°, 90° and 135°, which many pixels have exactly.
+    round: Round,
+}
+
+/// The number of bins, and those of 45°, 90° and 135°, which many pixels have exactly.
+#[derive(Clone, Copy)]
+struct Round {
+    count: f64,
     diagonal: f64,
     vertical: f64,
     opposite: f64,
@@ -185,7 +188,8 @@ impl Bins {
         let width = 180.0 / bins as f64;
         let bounds = memory::collect((0..=bins).map(|bin| width * bin as f64))?;
         let of = |degrees: f64| bounds.iter().skip(1).filter(|&&bound| bound <= degrees).count() as f64;
-        Ok(Self { diagonal: of(45.0), vertical: of(90.0), opposite: of(135.0), bounds })
+        let round = Round { count: bins as f64, diagonal: of(45.0), vertical: of(90.0), opposite: of(135.0) };
+        Ok(Self { bounds, round })
     }
 
     /// Adds a pixel's vote as scikit-image does, comparison by comparison.
@@ -204,10 +208,9 @@ impl Bins {
 /// Room for a row of pixels.
 struct Row {
     bins: Bins,
-    /// The gradients; of several channels those of the longest so far, and those of the next.
+    /// Gradients: the longest so far, and those of the next channel.
     across: Vec<f64>,
     down: Vec<f64>,
-    longest: Vec<f64>,
     other_across: Vec<f64>,
     other_down: Vec<f64>,
     magnitudes: Vec<f64>,
@@ -222,7 +225,6 @@ impl Row {
             bins: Bins::new(layout.bins)?,
             across: room()?,
             down: room()?,
-            longest: room()?,
             other_across: room()?,
             other_down: room()?,
             magnitudes: room()?,
@@ -231,15 +233,14 @@ impl Row {
     }
 
     /// Puts the next channel's gradients where they are longer. Of equal ones the first stays; NaN is longest.
-    #[inline(always)]
-    fn keep_longer(&mut self) {
-        let others = self.other_across.iter().zip(&self.other_down).zip(&self.magnitudes);
-        let kept = self.across.iter_mut().zip(&mut self.down).zip(&mut self.longest);
-        for (((across, down), longest), ((&other_across, &other_down), &length)) in kept.zip(others) {
-            let is_longer = length > *longest || (length.is_nan() && !longest.is_nan());
-            *across = if is_longer { other_across } else { *across };
-            *down = if is_longer { other_down } else { *down };
-            *longest = if is_longer { length } else { *longest };
+    fn keep_longer<P: Pixel>(&mut self) {
+        let others = self.other_across.iter().zip(&self.other_down);
+        for ((across, down), other) in self.across.iter_mut().zip(&mut self.down).zip(others) {
+            let length = P::rounded(across.hypot(*down));
+            let next = P::rounded(other.0.hypot(*other.1));
+            if next > length || (next.is_nan() && !length.is_nan()) {
+                (*across, *down) = (*other.0, *other.1);
+            }
         }
     }
 }
@@ -261,19 +262,17 @@ impl<P: Pixel> isa::Work for VoteRow<'_, P> {
         let Self { layout, pixels, y, row, totals } = self;
         let plane = layout.size.0 * layout.size.1;
         differences(layout, &pixels[..plane], y, &mut row.across, &mut row.down);
-        if layout.channels > 1 {
-            lengths::<P>(&row.across, &row.down, &mut row.longest);
-            for channel in 1..layout.channels {
-                let pixels = &pixels[channel * plane..][..plane];
-                differences(layout, pixels, y, &mut row.other_across, &mut row.other_down);
-                lengths::<P>(&row.other_across, &row.other_down, &mut row.magnitudes);
-                row.keep_longer();
-            }
+        for channel in 1..layout.channels {
+            let pixels = &pixels[channel * plane..][..plane];
+            differences(layout, pixels, y, &mut row.other_across, &mut row.other_down);
+            row.keep_longer::<P>();
         }
         let Row { bins, across, down, magnitudes, votes, .. } = row;
-        for (((&x, &y), magnitude), vote) in across.iter().zip(&*down).zip(&mut *magnitudes).zip(&mut *votes) {
+        let round = bins.round; // a copy, as the loop could not be vectorised if its stores might change it
+        for (((&x, &y), magnitude), vote) in across.iter().zip(&*down).zip(&mut *magnitudes).zip(&mut *votes)
+        {
             *magnitude = hypot(x, y);
-            *vote = nearest(x, y, bins);
+            *vote = nearest(x, y, round);
         }
         let width = layout.cell.1;
         // Neighbouring pixels mostly vote for one bin, and each addition would wait for the one before: cells in turn.
@@ -302,23 +301,11 @@ fn differences<P: Pixel>(layout: &Layout, pixels: &[P], y: usize, across: &mut [
         }
     }
     across.fill(0.0);
-    let here = row(y);
-    for ((across, &right), &left) in across.iter_mut().skip(1).zip(here.iter().skip(2)).zip(here) {
-        *across = right.minus(left);
-    }
-}
-
-/// The lengths by which channels are compared.
-#[inline(always)]
-fn lengths<P: Pixel>(across: &[f64], down: &[f64], lengths: &mut [f64]) {
-    for ((&x, &y), length) in across.iter().zip(down).zip(&mut *lengths) {
-        *length = hypot(x, y);
-    }
-    for ((&x, &y), length) in across.iter().zip(down).zip(lengths) {
-        if !RANGE.contains(length) && (x != 0.0 || y != 0.0) {
-            *length = x.hypot(y);
+    if columns > 2 {
+        let (left, right) = (&row(y)[..columns - 2], &row(y)[2..]);
+        for ((across, &right), &left) in across[1..columns - 1].iter_mut().zip(right).zip(left) {
+            *across = right.minus(left);
         }
-        *length = P::rounded(*length);
     }
 }
 
@@ -340,9 +327,9 @@ fn hypot(x: f64, y: f64) -> f64 {
     if root > 0.0 { root - excess / (2.0 * root) } else { 0.0 }
 }
 
-/// The bin of the gradient (x, y), or `u32::MAX` within 0.1 % of a bin from a bound, and outside `RANGE`.
+/// The bin of the gradient (x, y), or `u32::MAX` close to a bound and outside `RANGE`.
 #[inline(always)]
-fn nearest(x: f64, y: f64, bins: &Bins) -> u32 {
+fn nearest(x: f64, y: f64, round: Round) -> u32 {
     /// atan(√z) / √z for z from 0 to 1, ±4e-6.
     const ATAN: [f64; 6] =
         [0.999_995_507, -0.332_988_631, 0.195_589_051, -0.121_109_461, 0.057_330_552, -0.013_422_18];
@@ -357,53 +344,26 @@ fn nearest(x: f64, y: f64, bins: &Bins) -> u32 {
     let half = std::f64::consts::FRAC_PI_2;
     let angle = if b > a { half - angle } else { angle };
     let angle = if (x < 0.0) != (y < 0.0) { 2.0 * half - angle } else { angle };
-    let count = (bins.bounds.len() - 1) as f64;
-    let place = angle * (count / (2.0 * half));
+    let place = angle * (round.count / (2.0 * half));
     let bound = (place + ROUND) - ROUND;
     let bin = if place < bound { bound - 1.0 } else { bound };
-    let is_near = (place - bound).abs() < count * 1e-5;
+    let is_near = (place - bound).abs() < round.count * 1e-5;
     // What lies exactly on an axis or a diagonal is no close call.
     let is_diagonal = a == b;
-    let diagonal = if (x < 0.0) == (y < 0.0) { bins.diagonal } else { bins.opposite };
+    let diagonal = if (x < 0.0) == (y < 0.0) { round.diagonal } else { round.opposite };
     let bin = if is_diagonal { diagonal } else { bin };
-    let bin = if a == 0.0 { bins.vertical } else { bin };
+    let bin = if a == 0.0 { round.vertical } else { bin };
     let bin = if b == 0.0 { 0.0 } else { bin };
-    let is_exact = is_diagonal || a == 0.0 || b == 0.0;
-    let is_inside = long >= RANGE.start && a + b < RANGE.end;
-    let is_told = (is_exact || !is_near) && (is_inside || a + b == 0.0);
+    let is_exact = is_diagonal | (a == 0.0) | (b == 0.0);
+    let is_inside = ((long >= RANGE.start) & (a + b < RANGE.end)) | (a + b == 0.0);
+    let is_told = (is_exact | !is_near) & is_inside;
     let told = if is_told { bin } else { f64::from(u32::MAX) };
     (told + ROUND).to_bits() as u32
-}
-
-/// The blocks of an image, normalised.
-struct Normalise<'a> {
-    layout: &'a Layout,
-    histograms: &'a [f64],
-    out: &'a mut [f64],
-}
-
-impl isa::Work for Normalise<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<M: isa::MulAdd>(self) {
-        let Self { layout, histograms, out } = self;
-        let (columns, bins) = (layout.cells().1, layout.bins);
-        let across = layout.blocks().1;
-        for (index, out) in out.chunks_exact_mut(layout.block_len()).enumerate() {
-            let first = (index / across * columns + index % across) * bins;
-            for (row, out) in out.chunks_exact_mut(layout.block.1 * bins).enumerate() {
-                out.copy_from_slice(&histograms[first + row * columns * bins..][..out.len()]);
-            }
-            normalise(layout.norm, out);
-        }
-    }
 }
 
 /// Added to a norm, so that a block without gradients is 0.
 const EPSILON: f64 = 1e-5;
 
-#[inline(always)]
 fn normalise(norm: Norm, block: &mut [f64]) {
     match norm {
         Norm::L1 | Norm::L1Sqrt => {
@@ -414,9 +374,7 @@ fn normalise(norm: Norm, block: &mut [f64]) {
             }
         }
         Norm::L2 | Norm::L2Hys => {
-            let scale = |block: &[f64]| {
-                1.0 / (sum(block, |value| value * value) + EPSILON * EPSILON).sqrt()
-            };
+            let scale = |block: &[f64]| 1.0 / (sum(block, |value| value * value) + EPSILON * EPSILON).sqrt();
             let factor = scale(block);
             block.iter_mut().for_each(|value| *value *= factor);
             if norm == Norm::L2Hys {
@@ -440,51 +398,4 @@ fn sum(block: &[f64], of: impl Fn(f64) -> f64) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + rest.iter().map(|&value| of(value)).sum::<f64>()
-}
-
-/// Draws the histograms of an image's cells: a line for each bin through the cell's middle, as bright as the bin is high.
-///
-/// `directions` has for each bin how far its line reaches from the middle, rows and columns [px]; less than half a cell.
-/// `rounded` is applied to each sum.
-pub fn draw(
-    layout: &Layout,
-    histograms: &[f64],
-    directions: &[(f64, f64)],
-    rounded: fn(f64) -> f64,
-    out: &mut [f64],
-) {
-    let ((_, columns), (height, width)) = (layout.cells(), layout.cell);
-    for (cell, histogram) in histograms.chunks_exact(layout.bins.max(1)).enumerate() {
-        let row = (cell / columns * height + height / 2) as f64;
-        let column = (cell % columns * width + width / 2) as f64;
-        for (&value, &(down, across)) in histogram.iter().zip(directions) {
-            let from = ((row - across) as i64, (column + down) as i64);
-            let to = ((row + across) as i64, (column - down) as i64);
-            line(from, to, |row, column| {
-                // (Lines of cells of one pixel leave the image: there scikit-image fails.)
-                if (0..layout.size.1 as i64).contains(&column)
-                    && let Some(pixel) = out.get_mut((row * layout.size.1 as i64 + column) as usize)
-                {
-                    *pixel = rounded(*pixel + value);
-                }
-            });
-        }
-    }
-}
-
-/// The pixels of a line, after Bresenham.
-fn line(from: (i64, i64), to: (i64, i64), mut visit: impl FnMut(i64, i64)) {
-    let (down, across) = ((to.0 - from.0).abs(), (to.1 - from.1).abs());
-    let (steps, rises) = (down.max(across), down.min(across));
-    let step = ((to.0 - from.0).signum(), (to.1 - from.1).signum());
-    let (mut row, mut column) = from;
-    let mut lag = 2 * rises - steps;
-    for _ in 0..steps {
-        visit(row, column);
-        let is_due = lag >= 0;
-        lag += 2 * rises - if is_due { 2 * steps } else { 0 };
-        row += if is_due || down > across { step.0 } else { 0 };
-        column += if is_due || down <= across { step.1 } else { 0 };
-    }
-    visit(to.0, to.1);
 }

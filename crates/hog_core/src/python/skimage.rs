@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use super::arrays::empty;
 use super::{at_work, detached, threads};
-use crate::skimage::{Layout, Norm, Pixel, draw};
+use crate::skimage::{Layout, Norm, Pixel};
 
 type Array2<'py> = Bound<'py, PyArray2<f64>>;
 
@@ -63,4 +63,52 @@ fn of<'py, P: Pixel + Element>(
         Ok(())
     })?;
     Ok((descriptors, Some(drawing)))
+}
+
+/// Draws the histograms of an image's cells: a line for each bin through the cell's middle, as bright as the bin is high.
+///
+/// `directions` has for each bin how far its line reaches from the middle, rows and columns [px]; less than half a cell.
+/// `rounded` is applied to each sum.
+fn draw(
+    layout: &Layout,
+    histograms: &[f64],
+    directions: &[(f64, f64)],
+    rounded: fn(f64) -> f64,
+    out: &mut [f64],
+) {
+    let ((_, columns), (height, width)) = (layout.size, layout.cell);
+    let cells = columns / width;
+    for (cell, histogram) in histograms.chunks_exact(layout.bins.max(1)).enumerate() {
+        let row = (cell / cells * height + height / 2) as f64;
+        let column = (cell % cells * width + width / 2) as f64;
+        for (&value, &(down, across)) in histogram.iter().zip(directions) {
+            let from = ((row - across) as i64, (column + down) as i64);
+            let to = ((row + across) as i64, (column - down) as i64);
+            line(from, to, |row, column| {
+                // (Lines of cells of one pixel leave the image: there scikit-image fails.)
+                if (0..columns as i64).contains(&column)
+                    && let Some(pixel) = out.get_mut((row * columns as i64 + column) as usize)
+                {
+                    *pixel = rounded(*pixel + value);
+                }
+            });
+        }
+    }
+}
+
+/// The pixels of a line, after Bresenham.
+fn line(from: (i64, i64), to: (i64, i64), mut visit: impl FnMut(i64, i64)) {
+    let (down, across) = ((to.0 - from.0).abs(), (to.1 - from.1).abs());
+    let (steps, rises) = (down.max(across), down.min(across));
+    let step = ((to.0 - from.0).signum(), (to.1 - from.1).signum());
+    let (mut row, mut column) = from;
+    let mut lag = 2 * rises - steps;
+    for _ in 0..steps {
+        visit(row, column);
+        let is_due = lag >= 0;
+        lag += 2 * rises - if is_due { 2 * steps } else { 0 };
+        row += if is_due || down > across { step.0 } else { 0 };
+        column += if is_due || down <= across { step.1 } else { 0 };
+    }
+    visit(to.0, to.1);
 }

@@ -55,7 +55,12 @@ def main() -> None:
         ("512 × 512, uint8", "scikit-image", lambda: theirs(coarse), lambda: hog(coarse)),
         ("one crop of 64 × 128", "scikit-image", lambda: theirs(crop), lambda: hog(crop)),
         ("100 crops of 64 × 128", "scikit-image", lambda: [theirs(one) for one in crops], lambda: hogs(crops)),
-        ("10 faces, RGB", "scikit-image", lambda: [theirs(one, **of_faces) for one in faces], lambda: hogs(faces, **of_faces)),
+        (
+            "10 faces, RGB",
+            "scikit-image",
+            lambda: [theirs(one, **of_faces) for one in faces],
+            lambda: hogs(faces, **of_faces),
+        ),
     ]
     rivals: dict[str, Callable[[Any], Any]] = {
         "fasthog": lambda image: importlib.import_module("fasthog").hog(image, signed=False),
@@ -64,7 +69,12 @@ def main() -> None:
     for name, rival in rivals.items():
         if importlib.util.find_spec(name):
             rows += [
-                (f"{image.shape[1]} × {image.shape[0]}, blocks of 2 × 2", name, lambda r=rival, i=image: r(i), lambda i=image: hog(i, **small))
+                (
+                    f"{image.shape[1]} × {image.shape[0]}, blocks of 2 × 2",
+                    name,
+                    lambda r=rival, i=image: r(i),
+                    lambda i=image: hog(i, **small),
+                )
                 for image in (large, crop)
             ]
     print("| image | rival | rival [ms] | limo-hog [ms] | times as fast |\n|---|---|---|---|---|")

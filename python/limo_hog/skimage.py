@@ -124,7 +124,9 @@ def _described(
         raise ImageError(f"the image has {axes} axes of pixels; 2 are wanted: `channel_axis` names that of colours")
     (bins, cell, block, norm), (rows, columns) = layout, images.shape[-2:]
     if min(bins, *cell, *block) < 1:
-        raise GeometryError(f"orientations {bins}, pixels_per_cell {cell} and cells_per_block {block} must be at least 1")
+        raise GeometryError(
+            f"orientations {bins}, pixels_per_cell {cell} and cells_per_block {block} must be at least 1"
+        )
     if norm not in _NORMS:
         raise ParameterError(f"block_norm is {norm!r}; {', '.join(_NORMS)} are known")
     cells = (rows // cell[0], columns // cell[1])
@@ -136,10 +138,15 @@ def _described(
     kind = np.float32 if images.dtype.char in "ef" else np.float64
     pixels = images if images.dtype == np.uint8 and not transform_sqrt else images.astype(kind, copy=False)
     pixels = np.ascontiguousarray(np.sqrt(pixels) if transform_sqrt else pixels)
-    middles = np.pi * (np.arange(bins) + 0.5) / bins
-    reach = (min(cell) // 2 - 1) * np.stack([np.sin(middles), np.cos(middles)])
     stack = pixels if has_channels else pixels[:, np.newaxis]
     parameters = (bins, tuple(cell), tuple(block), _NORMS.index(norm))
-    found, drawing = _core.skimage_hog(stack, parameters, list(zip(*reach.tolist(), strict=True)) if visualize else None)
+    found, drawing = _core.skimage_hog(stack, parameters, _directions(bins, cell) if visualize else None)
     shape = (len(images), cells[0] - block[0] + 1, cells[1] - block[1] + 1, *block, bins)
     return found.reshape(shape).astype(kind, copy=False), None if drawing is None else drawing.astype(kind, copy=False)
+
+
+def _directions(bins: int, cell: tuple[int, int]) -> list[tuple[float, float]]:
+    """Down and right from a cell's middle along each bin's gradient [px]; the lines are drawn across it."""
+    middles = np.pi * (np.arange(bins) + 0.5) / bins
+    reach = min(cell) // 2 - 1
+    return list(zip((reach * np.sin(middles)).tolist(), (reach * np.cos(middles)).tolist(), strict=True))

@@ -17,7 +17,7 @@ use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::threads::for_each;
 
-/// How a block's numbers are brought to a common size; each adds 1e-5 to the norm.
+/// How a block is normalised; each adds 1e-5 to the norm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Norm {
     /// Divided by the sum.
@@ -58,25 +58,21 @@ pub trait Pixel: Copy + Sync {
 }
 
 impl Pixel for u8 {
-    #[inline(always)]
     fn minus(self, other: Self) -> f64 {
         f64::from(i32::from(self) - i32::from(other))
     }
 }
 
 impl Pixel for f32 {
-    #[inline(always)]
     fn minus(self, other: Self) -> f64 {
         f64::from(self - other)
     }
-    #[inline(always)]
     fn rounded(magnitude: f64) -> f64 {
         f64::from(magnitude as f32)
     }
 }
 
 impl Pixel for f64 {
-    #[inline(always)]
     fn minus(self, other: Self) -> f64 {
         self - other
     }
@@ -109,8 +105,7 @@ impl Layout {
         rows * columns * self.block_len()
     }
 
-    /// Writes the descriptors of the images in `pixels`, one after the other, into `out`: of each its blocks row by row,
-    /// of a block its cells row by row, of a cell its bins.
+    /// Writes the descriptors of the images in `pixels`, one after the other: blocks, their cells, bins; all row by row.
     pub fn describe<P: Pixel>(
         &self,
         pixels: &[P],
@@ -138,14 +133,23 @@ impl Layout {
 
     /// Writes the histograms of the cells of one image: row by row, of a cell the mean vote for each bin.
     pub fn histograms<P: Pixel>(&self, pixels: &[P], interrupt: &Interrupt, out: &mut [f64]) -> Result<()> {
-        let mut row = Row::new(self)?;
-        let columns = self.cells().1;
+        let (bins, columns) = (Bins::new(self.bins)?, self.cells().1);
+        let mut gradients = [Gradients::new(self.size.1)?, Gradients::new(self.size.1)?];
+        let mut votes = memory::filled(self.size.1, 0)?;
         let mut totals = memory::filled(columns * self.bins, 0.0_f32)?;
         for (cells, out) in out.chunks_exact_mut(totals.len().max(1)).enumerate() {
             interrupt.check()?;
             totals.fill(0.0);
             for y in cells * self.cell.0..(cells + 1) * self.cell.0 {
-                isa::run(VoteRow { layout: self, pixels, y, row: &mut row, totals: &mut totals });
+                isa::run(VoteRow {
+                    layout: self,
+                    pixels,
+                    y,
+                    bins: &bins,
+                    gradients: &mut gradients,
+                    votes: &mut votes,
+                    totals: &mut totals,
+                });
             }
             let area = (self.cell.0 * self.cell.1) as f32;
             for (out, total) in out.iter_mut().zip(&totals) {
@@ -194,53 +198,69 @@ impl Bins {
 
     /// Adds a pixel's vote as scikit-image does, comparison by comparison.
     #[inline(never)]
-    fn vote(&self, (across, down): (f64, f64), totals: &mut [f32]) {
-        let (magnitude, degrees) = (across.hypot(down), down.atan2(across).to_degrees() % 180.0);
+    fn vote(&self, across: f64, down: f64, length: f64, totals: &mut [f32]) {
+        let degrees = down.atan2(across).to_degrees() % 180.0;
         let degrees = if degrees < 0.0 { degrees + 180.0 } else { degrees };
         for (total, bound) in totals.iter_mut().zip(self.bounds.windows(2)) {
             if !(degrees >= bound[1] || degrees < bound[0]) {
-                *total = (f64::from(*total) + magnitude) as f32;
+                *total = (f64::from(*total) + length) as f32;
             }
         }
     }
 }
 
-/// Room for a row of pixels.
-struct Row {
-    bins: Bins,
-    /// Gradients: the longest so far, and those of the next channel.
+/// Gradients of a row of pixels.
+struct Gradients {
     across: Vec<f64>,
     down: Vec<f64>,
-    other_across: Vec<f64>,
-    other_down: Vec<f64>,
-    magnitudes: Vec<f64>,
-    /// The bin a pixel votes for; `u32::MAX` where the polynomial cannot tell.
-    votes: Vec<u32>,
+    lengths: Vec<f64>,
 }
 
-impl Row {
-    fn new(layout: &Layout) -> Result<Self> {
-        let room = || memory::filled(layout.size.1, 0.0);
-        Ok(Self {
-            bins: Bins::new(layout.bins)?,
-            across: room()?,
-            down: room()?,
-            other_across: room()?,
-            other_down: room()?,
-            magnitudes: room()?,
-            votes: memory::filled(layout.size.1, 0)?,
-        })
+impl Gradients {
+    fn new(columns: usize) -> Result<Self> {
+        let room = || memory::filled(columns, 0.0);
+        Ok(Self { across: room()?, down: room()?, lengths: room()? })
     }
 
-    /// Puts the next channel's gradients where they are longer. Of equal ones the first stays; NaN is longest.
-    fn keep_longer<P: Pixel>(&mut self) {
-        let others = self.other_across.iter().zip(&self.other_down);
-        for ((across, down), other) in self.across.iter_mut().zip(&mut self.down).zip(others) {
-            let length = P::rounded(across.hypot(*down));
-            let next = P::rounded(other.0.hypot(*other.1));
-            if next > length || (next.is_nan() && !length.is_nan()) {
-                (*across, *down) = (*other.0, *other.1);
+    /// Takes the gradients of row `y` of one channel.
+    #[inline(always)]
+    fn fill<P: Pixel>(&mut self, layout: &Layout, pixels: &[P], y: usize) {
+        let (rows, columns) = layout.size;
+        let row = |y: usize| &pixels[y * columns..][..columns];
+        if y == 0 || y + 1 == rows {
+            self.down.fill(0.0);
+        } else {
+            for ((down, &below), &above) in self.down.iter_mut().zip(row(y + 1)).zip(row(y - 1)) {
+                *down = below.minus(above);
             }
+        }
+        if columns > 2 {
+            let (left, right) = (&row(y)[..columns - 2], &row(y)[2..]);
+            for ((across, &right), &left) in self.across[1..columns - 1].iter_mut().zip(right).zip(left) {
+                *across = right.minus(left);
+            }
+        }
+        for ((&x, &y), length) in self.across.iter().zip(&self.down).zip(&mut self.lengths) {
+            *length = hypot(x, y);
+        }
+        for ((&x, &y), length) in self.across.iter().zip(&self.down).zip(&mut self.lengths) {
+            if !RANGE.contains(length) && (x != 0.0 || y != 0.0) {
+                *length = x.hypot(y);
+            }
+        }
+    }
+
+    /// Takes the gradients of another channel where they are longer. Of equal ones the first stays; NaN is longest.
+    #[inline(always)]
+    fn keep_longer<P: Pixel>(&mut self, others: &Self) {
+        let own = self.across.iter_mut().zip(&mut self.down).zip(&mut self.lengths);
+        let others = others.across.iter().zip(&others.down).zip(&others.lengths);
+        for (((across, down), length), ((&other_across, &other_down), &other)) in own.zip(others) {
+            let (ours, theirs) = (P::rounded(*length), P::rounded(other));
+            let is_longer = (theirs > ours) | (theirs.is_nan() & !ours.is_nan());
+            *across = if is_longer { other_across } else { *across };
+            *down = if is_longer { other_down } else { *down };
+            *length = if is_longer { other } else { *length };
         }
     }
 }
@@ -250,7 +270,11 @@ struct VoteRow<'a, P> {
     layout: &'a Layout,
     pixels: &'a [P],
     y: usize,
-    row: &'a mut Row,
+    bins: &'a Bins,
+    /// Room for the gradients: the longest, and the next channel's.
+    gradients: &'a mut [Gradients; 2],
+    /// Room for the bin that each pixel votes for, `u32::MAX` where the polynomial cannot tell.
+    votes: &'a mut [u32],
     totals: &'a mut [f32],
 }
 
@@ -259,19 +283,18 @@ impl<P: Pixel> isa::Work for VoteRow<'_, P> {
 
     #[inline(always)]
     fn run<M: isa::MulAdd>(self) {
-        let Self { layout, pixels, y, row, totals } = self;
-        let plane = layout.size.0 * layout.size.1;
-        differences(layout, &pixels[..plane], y, &mut row.across, &mut row.down);
-        for channel in 1..layout.channels {
-            let pixels = &pixels[channel * plane..][..plane];
-            differences(layout, pixels, y, &mut row.other_across, &mut row.other_down);
-            row.keep_longer::<P>();
+        let Self { layout, pixels, y, bins, gradients: [longest, next], votes, totals } = self;
+        for (channel, pixels) in pixels.chunks_exact(layout.size.0 * layout.size.1).enumerate() {
+            if channel == 0 {
+                longest.fill(layout, pixels, y);
+            } else {
+                next.fill(layout, pixels, y);
+                longest.keep_longer::<P>(next);
+            }
         }
-        let Row { bins, across, down, magnitudes, votes, .. } = row;
+        let Gradients { across, down, lengths } = longest;
         let round = bins.round; // a copy, as the loop could not be vectorised if its stores might change it
-        for (((&x, &y), magnitude), vote) in across.iter().zip(&*down).zip(&mut *magnitudes).zip(&mut *votes)
-        {
-            *magnitude = hypot(x, y);
+        for ((&x, &y), vote) in across.iter().zip(&*down).zip(&mut *votes) {
             *vote = nearest(x, y, round);
         }
         let width = layout.cell.1;
@@ -280,31 +303,10 @@ impl<P: Pixel> isa::Work for VoteRow<'_, P> {
             for (cell, totals) in totals.chunks_exact_mut(layout.bins.max(1)).enumerate() {
                 let x = cell * width + offset;
                 match totals.get_mut(votes[x] as usize) {
-                    Some(total) => *total = (f64::from(*total) + magnitudes[x]) as f32,
-                    None => bins.vote((across[x], down[x]), totals),
+                    Some(total) => *total = (f64::from(*total) + lengths[x]) as f32,
+                    None => bins.vote(across[x], down[x], lengths[x], totals),
                 }
             }
-        }
-    }
-}
-
-/// The gradients of row `y` of one channel.
-#[inline(always)]
-fn differences<P: Pixel>(layout: &Layout, pixels: &[P], y: usize, across: &mut [f64], down: &mut [f64]) {
-    let (rows, columns) = layout.size;
-    let row = |y: usize| &pixels[y * columns..][..columns];
-    if y == 0 || y + 1 == rows {
-        down.fill(0.0);
-    } else {
-        for ((down, &below), &above) in down.iter_mut().zip(row(y + 1)).zip(row(y - 1)) {
-            *down = below.minus(above);
-        }
-    }
-    across.fill(0.0);
-    if columns > 2 {
-        let (left, right) = (&row(y)[..columns - 2], &row(y)[2..]);
-        for ((across, &right), &left) in across[1..columns - 1].iter_mut().zip(right).zip(left) {
-            *across = right.minus(left);
         }
     }
 }
@@ -323,8 +325,7 @@ fn hypot(x: f64, y: f64) -> f64 {
     let rest = root - if is_steep { short } else { long };
     let steep = long * (2.0 * rest - long) + (rest - 2.0 * (long - short)) * rest;
     let flat = 2.0 * rest * (long - 2.0 * short) + ((4.0 * rest - short) * short + rest * rest);
-    let excess = if is_steep { steep } else { flat };
-    if root > 0.0 { root - excess / (2.0 * root) } else { 0.0 }
+    if root > 0.0 { root - if is_steep { steep } else { flat } / (2.0 * root) } else { 0.0 }
 }
 
 /// The bin of the gradient (x, y), or `u32::MAX` close to a bound and outside `RANGE`.
@@ -339,8 +340,7 @@ fn nearest(x: f64, y: f64, round: Round) -> u32 {
     let (long, short) = if a > b { (a, b) } else { (b, a) };
     let ratio = short / long;
     let z = ratio * ratio;
-    let series = ATAN.iter().rev().fold(0.0, |sum, &factor| sum * z + factor);
-    let angle = ratio * series;
+    let angle = ratio * ATAN.iter().rev().fold(0.0, |sum, &factor| sum * z + factor);
     let half = std::f64::consts::FRAC_PI_2;
     let angle = if b > a { half - angle } else { angle };
     let angle = if (x < 0.0) != (y < 0.0) { 2.0 * half - angle } else { angle };
@@ -357,8 +357,7 @@ fn nearest(x: f64, y: f64, round: Round) -> u32 {
     let is_exact = is_diagonal | (a == 0.0) | (b == 0.0);
     let is_inside = ((long >= RANGE.start) & (a + b < RANGE.end)) | (a + b == 0.0);
     let is_told = (is_exact | !is_near) & is_inside;
-    let told = if is_told { bin } else { f64::from(u32::MAX) };
-    (told + ROUND).to_bits() as u32
+    (ROUND + if is_told { bin } else { f64::from(u32::MAX) }).to_bits() as u32
 }
 
 /// Added to a norm, so that a block without gradients is 0.

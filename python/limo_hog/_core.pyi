@@ -397,22 +397,11 @@ def skimage_hog(
     parameters: tuple[int, tuple[int, int], tuple[int, int], int],
     directions: list[tuple[float, float]] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """Descriptors of images, and a drawing of the first: what `limo_hog.skimage` calls, after it has checked all.
+    """Compute scikit-image's HOG of images, and with `directions` a drawing of the first.
 
-    Parameters
-    ----------
-    images
-        uint8, float32 or float64 (N, channels, rows, columns), in C order.
-    parameters
-        Orientations; rows and columns of a cell [px] and of a block [cells]; 0 to 3 for L1, L1-sqrt, L2, L2-Hys.
-    directions
-        For each orientation the way from a cell's middle to the end of its line, (rows, columns) [px]; None for no
-        drawing.
-
-    Returns
-    -------
-    descriptors, drawing
-        (N, D) and (rows, columns), or None.
+    `limo_hog.skimage` checks all and names it: images are uint8, float32 or float64 (N, channels, rows, columns) in C
+    order; parameters the orientations, the cell [px], the block [cells] and the norm, 0 to 3; directions the way from
+    a cell's middle along each bin's gradient [px]. Returned are (N, D) and (rows, columns) or None.
     """
 
 def set_num_threads(count: int) -> None:

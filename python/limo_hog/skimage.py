@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -99,14 +100,12 @@ def hogs(
     Returns
     -------
     descriptors
-        What `hog` returns for each image, as (N, D) or (N, …).
-
-    Other parameters, errors and number types are those of `hog`.
+        What `hog` returns for each image, as (N, D) or (N, …). All else is as there.
     """
     array = np.asarray(images) if channel_axis is None else np.moveaxis(np.asarray(images), channel_axis, 1)
     layout = (orientations, pixels_per_cell, cells_per_block, block_norm)
     blocks, _ = _described(array, channel_axis is not None, layout, transform_sqrt, False)
-    return blocks.reshape(len(blocks), -1) if feature_vector else blocks
+    return blocks.reshape(len(blocks), math.prod(blocks.shape[1:])) if feature_vector else blocks
 
 
 def _described(
@@ -124,9 +123,7 @@ def _described(
         raise ImageError(f"the image has {axes} axes of pixels; 2 are wanted: `channel_axis` names that of colours")
     (bins, cell, block, norm), (rows, columns) = layout, images.shape[-2:]
     if min(bins, *cell, *block) < 1:
-        raise GeometryError(
-            f"orientations {bins}, pixels_per_cell {cell} and cells_per_block {block} must be at least 1"
-        )
+        raise GeometryError(f"orientations {bins}, cell {cell} px and block {block} cells must be at least 1")
     if norm not in _NORMS:
         raise ParameterError(f"block_norm is {norm!r}; {', '.join(_NORMS)} are known")
     cells = (rows // cell[0], columns // cell[1])
@@ -139,14 +136,11 @@ def _described(
     pixels = images if images.dtype == np.uint8 and not transform_sqrt else images.astype(kind, copy=False)
     pixels = np.ascontiguousarray(np.sqrt(pixels) if transform_sqrt else pixels)
     stack = pixels if has_channels else pixels[:, np.newaxis]
-    parameters = (bins, tuple(cell), tuple(block), _NORMS.index(norm))
-    found, drawing = _core.skimage_hog(stack, parameters, _directions(bins, cell) if visualize else None)
+    parameters = (bins, (cell[0], cell[1]), (block[0], block[1]), _NORMS.index(norm))
+    directions = None
+    if visualize:
+        middles, reach = np.pi * (np.arange(bins) + 0.5) / bins, min(cell) // 2 - 1
+        directions = list(zip((reach * np.sin(middles)).tolist(), (reach * np.cos(middles)).tolist(), strict=True))
+    found, drawing = _core.skimage_hog(stack, parameters, directions)
     shape = (len(images), cells[0] - block[0] + 1, cells[1] - block[1] + 1, *block, bins)
     return found.reshape(shape).astype(kind, copy=False), None if drawing is None else drawing.astype(kind, copy=False)
-
-
-def _directions(bins: int, cell: tuple[int, int]) -> list[tuple[float, float]]:
-    """Down and right from a cell's middle along each bin's gradient [px]; the lines are drawn across it."""
-    middles = np.pi * (np.arange(bins) + 0.5) / bins
-    reach = min(cell) // 2 - 1
-    return list(zip((reach * np.sin(middles)).tolist(), (reach * np.cos(middles)).tolist(), strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ def drawn_case(seed: int) -> tuple[NDArray[Any], dict[str, Any]]:
     shape = tuple(cell * (block + rng.integers(0, 5, 2)) + rng.integers(0, cell))
     channels = (int(rng.integers(1, 5)),) if rng.random() < 0.4 else ()
     kind = KINDS[rng.integers(len(KINDS))]
-    looks = [
+    looks: list[Callable[[], Any]] = [
         lambda: rng.integers(0, 256, shape + channels),
         lambda: rng.integers(0, 3, shape + channels),  # flat areas, axes and diagonals
         lambda: rng.random(shape + channels) * 255,
@@ -75,7 +76,12 @@ def test_two_thousand_drawn_cases_give_scikit_images_numbers() -> None:
 
 def test_py_feats_faces_are_described_and_drawn_alike() -> None:
     # As py-feat's `extract_hog_features` calls it, whose classifiers of facial action units stand on these numbers.
-    arguments = {"orientations": 8, "pixels_per_cell": (8, 8), "cells_per_block": (2, 2), "channel_axis": -1}
+    arguments: dict[str, Any] = {
+        "orientations": 8,
+        "pixels_per_cell": (8, 8),
+        "cells_per_block": (2, 2),
+        "channel_axis": -1,
+    }
     faces = np.random.default_rng(0).integers(0, 256, (3, 112, 112, 3)) / 255
     wanted = [skimage.feature.hog(face, visualize=True, **arguments) for face in faces]
     for face, (descriptor, drawing) in zip(faces, wanted, strict=True):
@@ -93,7 +99,7 @@ def test_a_batch_is_its_images_one_by_one(kind: str, axis: int | None) -> None:
     one_by_one = np.stack([hog(image, channel_axis=own) for image in images])
     found = hogs(images, channel_axis=axis)
     assert found.dtype == one_by_one.dtype and np.array_equal(found, one_by_one)
-    assert hogs(images[:0], feature_vector=False, channel_axis=axis).shape == (0, 3, 2, 3, 3, 9)
+    assert hogs(images[:0], channel_axis=axis).shape == (0, 3 * 2 * 3 * 3 * 9)
 
 
 @pytest.mark.parametrize(
@@ -125,7 +131,7 @@ def test_gradients_on_the_bounds_of_bins_vote_as_scikit_image_lets_them() -> Non
         for rows, columns in ((np.sin(angles), np.cos(angles)), (np.round(angles), np.full_like(angles, 2))):
             image = np.zeros((3, 3 * len(angles)))
             image[2, 1::3], image[1, 2::3] = rows, columns  # one gradient a cell
-            arguments = {"pixels_per_cell": (3, 3), "cells_per_block": (1, 1), "orientations": bins}
+            arguments: dict[str, Any] = {"pixels_per_cell": (3, 3), "cells_per_block": (1, 1), "orientations": bins}
             theirs, ours = skimage.feature.hog(image, **arguments), hog(image, **arguments)
             assert abs(theirs - ours).max() <= 1e-9, bins
 

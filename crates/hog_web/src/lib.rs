@@ -11,8 +11,7 @@
 use std::cell::RefCell;
 
 use hog_core::exact::RowVotes;
-use hog_core::pyramid::Pyramid;
-use hog_core::{Grouping, Hog, HogParams, ImageView, Interrupt, Search, model};
+use hog_core::{Grouping, Hog, HogParams, ImageView, Interrupt, Search, SearchOptions, model};
 
 /// What stays between calls: the room for input, the detector, and what the last call found.
 #[derive(Default)]
@@ -122,10 +121,10 @@ pub extern "C" fn search(
 ) -> i32 {
     let (win_stride, padding) = ((stride_x.into(), stride_y.into()), (padding_x.into(), padding_y.into()));
     let search = Search { hit_threshold, win_stride, padding };
-    let pyramid = Pyramid { first: None, scale };
     let grouping = if mean_shift != 0 { Grouping::MeanShift(group) } else { Grouping::Similar(group as i32) };
+    let options = SearchOptions { search, scale, grouping, ..SearchOptions::default() };
     on_image((width, height, channels), |hog, view, results| {
-        let found = hog.detect_multi_scale(view, &search, &pyramid, grouping, None, 1, &Interrupt::NEVER)?;
+        let found = hog.detect(view, &options, &Interrupt::NEVER)?;
         for (rect, weight) in found {
             results.extend([rect.x, rect.y, rect.width, rect.height].map(f64::from));
             results.push(weight);

@@ -1,14 +1,13 @@
 //! `skimage_hog`: the numbers of scikit-image's HOG, for images of any of three number types.
 
-use numpy::{Element, PyArray2, PyArrayMethods, PyReadonlyArray4, PyUntypedArrayMethods};
+use numpy::{Element, PyArrayMethods, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use super::arrays::empty;
-use super::{at_work, detached, threads};
-use crate::skimage::{Layout, Norm, Pixel};
+use hog_core::skimage::{Layout, Norm, Pixel};
 
-type Array2<'py> = Bound<'py, PyArray2<f64>>;
+use crate::arrays::{Array2, collect, empty};
+use crate::calls::{at_work, detached, threads};
 
 /// Orientations, rows and columns of a cell and of a block, and the normalisation as its number.
 type Parameters = (usize, (usize, usize), (usize, usize), usize);
@@ -16,11 +15,11 @@ type Parameters = (usize, (usize, usize), (usize, usize), usize);
 /// The descriptors of `images` and, with `directions` (see [`draw`]), the drawing of the first.
 #[pyfunction]
 #[pyo3(signature = (images, parameters, directions))]
-pub(super) fn skimage_hog<'py>(
+pub(crate) fn skimage_hog<'py>(
     images: &Bound<'py, PyAny>,
     parameters: Parameters,
     directions: Option<Vec<(f64, f64)>>,
-) -> PyResult<(Array2<'py>, Option<Array2<'py>>)> {
+) -> PyResult<(Array2<'py, f64>, Option<Array2<'py, f64>>)> {
     let directions = directions.as_deref();
     if let Ok(images) = images.extract::<PyReadonlyArray4<'py, u8>>() {
         of(&images, parameters, directions, |value| value)
@@ -38,7 +37,7 @@ fn of<'py, P: Pixel + Element>(
     (bins, cell, block, norm): Parameters,
     directions: Option<&[(f64, f64)]>,
     rounded: fn(f64) -> f64,
-) -> PyResult<(Array2<'py>, Option<Array2<'py>>)> {
+) -> PyResult<(Array2<'py, f64>, Option<Array2<'py, f64>>)> {
     let py = images.py();
     let [count, channels, rows, columns] = *images.shape() else { unreachable!("it has four axes") };
     let norm = [Norm::L1, Norm::L1Sqrt, Norm::L2, Norm::L2Hys][norm.min(3)];
@@ -55,7 +54,7 @@ fn of<'py, P: Pixel + Element>(
     let mut drawn = drawing.readwrite();
     let drawn = drawn.as_slice_mut()?;
     detached(py, |interrupt| {
-        let mut histograms = crate::memory::filled(layout.histograms_len(), 0.0)?;
+        let mut histograms = collect(std::iter::repeat_n(0.0, layout.histograms_len()))?;
         layout.histograms(pixels, interrupt, &mut histograms)?;
         layout.normalised(&histograms, out);
         drawn.fill(0.0);

@@ -25,7 +25,7 @@ function search() {
   const image = pixels(context);
   const begun = performance.now();
   performance.mark("search-begins");
-  state.people = engine.search(image, { ...settings(), padding: 8 });
+  state.people = engine.search(image, { ...settings(), padding: 16 });
   performance.measure("search", "search-begins");
   const ms = performance.now() - begun;
   state.people.sort((a, b) => b.weight - a.weight);
@@ -33,7 +33,9 @@ function search() {
   const size = `${picture.width} × ${picture.height}`;
   at("found").textContent = say("found", { count: state.people.length, ms: ms.toFixed(0), size });
   listPeople();
-  if (!state.camera) lesson(image);
+  performance.mark("picture-shown");
+  clearTimeout(state.lesson);
+  if (!state.camera) state.lesson = setTimeout(lesson, 0, image); // people first
 }
 
 function listPeople() {
@@ -67,7 +69,7 @@ function lesson(image) {
   const { scale } = settings();
   const levels = panels.drawPyramid(at("pyramid"), picture, scale, engine.model);
   at("pyramid-says").textContent = say("pyramid-says", { levels, scale });
-  state.hits = engine.search(image, { ...settings(), padding: 8, group: 0 });
+  state.hits = engine.search(image, { ...settings(), padding: 16, group: 0 });
   panels.drawRects(at("hits"), picture, state.hits, -1, 0.5);
   panels.drawRects(at("merged"), picture, state.people);
   at("hits-says").textContent = say("hits-says", { hits: state.hits.length, people: state.people.length });
@@ -248,13 +250,13 @@ function sample() {
 }
 
 async function begin() {
-  [engine, texts] = await Promise.all([load(), fetch(new URL("en.json", import.meta.url)).then((file) => file.json())]);
+  const words = fetch(new URL("en.json", import.meta.url)).then((file) => file.json());
+  engine = await load();
+  [texts] = await Promise.all([words, engine.choose("limo")]);
   document.querySelectorAll("[data-text]").forEach((element) => (element.textContent = texts[element.dataset.text]));
   document.querySelectorAll("[data-label]").forEach((element) => element.setAttribute("aria-label", texts[element.dataset.label]));
-  await engine.choose("limo");
   wire();
   sample();
-  performance.mark("first-picture");
   window.lab = engine; // for the tests, and for the curious
   document.body.dataset.ready = "yes";
   if ("serviceWorker" in navigator && location.protocol.startsWith("http")) navigator.serviceWorker.register("sw.js");

@@ -97,7 +97,8 @@ function lessonOnWindow() {
   const sum = state.shares.reduce((total, share) => total + share, 0);
   const [numbers, margin] = [descriptor.length, (sum + bias).toFixed(2)];
   at("margin-says").textContent = say("margin-says", { numbers, sum: sum.toFixed(2), bias: bias.toFixed(2), margin });
-  state.cell = Math.min(state.cell || Math.floor(state.sums.length * 0.4), state.sums.length - 1);
+  const heights = state.sums.map((sum) => Math.max(...sum));
+  state.cell = heights.indexOf(Math.max(...heights));
   state.block = state.shares.indexOf(Math.max(...state.shares));
   showCell(state.cell);
   showBlock(state.block);

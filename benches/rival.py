@@ -113,6 +113,10 @@ def descriptor(name):
         from skimage.feature import hog
 
         return lambda image: hog(image, 9, (8, 8), (2, 2), block_norm="L2-Hys")
+    if name == "limo_hog.skimage":
+        from limo_hog.skimage import hog as ours
+
+        return lambda image: ours(image, 9, (8, 8), (2, 2), block_norm="L2-Hys")
     if name == "hogpp":
         import hogpp
 

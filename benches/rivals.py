@@ -66,6 +66,7 @@ def finders(min_height: int) -> list[Entry]:
 #: Who describes images.
 DESCRIBERS = [
     Entry("limo-hog, `HOGDescriptor.compute`", (), ("describe", "limo_hog")),
+    Entry("limo-hog, `skimage.hog`", (), ("describe", "limo_hog.skimage")),
     Entry("OpenCV", (OPENCV,), ("describe", "cv2")),
     Entry("scikit-image", ("scikit-image",), ("describe", "skimage")),
     Entry("hogpp", ("hogpp",), ("describe", "hogpp")),

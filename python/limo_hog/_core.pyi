@@ -11,7 +11,7 @@ search or a grouping within a second.
 """
 
 from collections.abc import Sequence
-from typing import TypeAlias, final
+from typing import Any, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ __all__ = [
     "group_rectangles",
     "resize",
     "set_num_threads",
+    "skimage_hog",
 ]
 
 _Pair: TypeAlias = tuple[int, int]
@@ -391,6 +392,18 @@ def default_people_detector() -> NDArray[np.float32]:
 
 def daimler_people_detector() -> NDArray[np.float32]:
     """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
+
+def skimage_hog(
+    images: NDArray[Any],
+    parameters: tuple[int, tuple[int, int], tuple[int, int], int],
+    directions: list[tuple[float, float]] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Compute scikit-image's HOG of images, and with `directions` a drawing of the first.
+
+    `limo_hog.skimage` checks all and names it: images are uint8, float32 or float64 (N, channels, rows, columns) in C
+    order; parameters the orientations, the cell [px], the block [cells] and the norm, 0 to 3; directions the way from
+    a cell's middle along each bin's gradient [px]. Returned are (N, D) and (rows, columns) or None.
+    """
 
 def set_num_threads(count: int) -> None:
     """Let pyramids be searched by this many threads; 0 for one per core.

@@ -9,6 +9,8 @@
 //! 6. `rescore` takes the hits from either, and lets `exact` decide those that are too close to the threshold.
 //! 7. [`group`] makes one rectangle of many overlapping ones.
 //!
+//! [`skimage`] is no part of the detector: scikit-image's descriptor, which is another.
+//!
 //! [`Hog`] composes these stages. Each follows Dalal and Triggs, "Histograms of Oriented Gradients for Human
 //! Detection" (CVPR 2005), with OpenCV's roundings, so that its trained models give the same answers here.
 
@@ -21,6 +23,7 @@ pub mod image;
 pub mod model;
 pub mod params;
 pub mod pyramid;
+pub mod skimage;
 
 mod describe;
 mod detect;

@@ -12,7 +12,7 @@ const LAYERS: [&[&str]; 12] = [
     &["params", "group"],
     &["pyramid"],
     &["exact"],
-    &["fast", "separable"],
+    &["fast", "separable", "skimage"],
     &["rescore", "guided"],
     &["options"],
     &["detect"],

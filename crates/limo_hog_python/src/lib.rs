@@ -5,6 +5,7 @@ mod calls;
 mod canvas;
 mod errors;
 mod hog;
+mod skimage;
 
 use std::sync::atomic::Ordering;
 
@@ -26,6 +27,8 @@ mod _core {
     use crate::canvas::Canvas;
     #[pymodule_export]
     use crate::hog::Hog;
+    #[pymodule_export]
+    use crate::skimage::skimage_hog;
 
     #[pyfunction]
     fn group_rectangles<'py>(

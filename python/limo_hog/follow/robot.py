@@ -20,7 +20,7 @@ class RobotError(LimoHogError, ValueError):
 
 
 def _within(default: float, low: float, high: float) -> Any:
-    return field(default=default, metadata={"limits": (low, high)})
+    return field(default=default, metadata={"range": (low, high)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +71,11 @@ class RobotGeometry:
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
-            if "limits" not in one.metadata:
+            if "range" not in one.metadata:
                 if not isinstance(value, bool):
                     raise RobotError(f"{one.name}: got {value!r}, want true or false")
                 continue
-            low, high = one.metadata["limits"]
+            low, high = one.metadata["range"]
             if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
                 raise RobotError(f"{one.name}: got {value!r}, want a number in {low:g} … {high:g}")
 

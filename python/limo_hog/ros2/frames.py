@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.ros2 import messages
 
@@ -24,15 +24,16 @@ def odometry_transform(reading: Odometry) -> Any:
     return _message([one])
 
 
-def static_transforms(stamp: float) -> Any:
-    """Return the TFMessage of the frames that do not move on the robot, a Limo; `stamp` in [s]."""
+def static_transforms(stamp: float, robot: RobotGeometry) -> Any:
+    """Return the TFMessage of the frames that do not move on a robot; `stamp` in [s]."""
     base, level = messages.BASE_FRAME, (0.0, 0.0, 0.0, 1.0)
-    camera = (LIMO.camera_x, 0.0, LIMO.camera_z)
+    camera, lidar = (robot.camera_x, 0.0, robot.camera_z), (robot.lidar_x, 0.0, robot.lidar_z)
+    turned = (0.0, 0.0, math.sin(robot.lidar_yaw / 2), math.cos(robot.lidar_yaw / 2))
     return _message(
         [
             _transform(stamp, base, messages.CAMERA_FRAME, camera, level),
             _transform(stamp, messages.CAMERA_FRAME, OPTICAL_FRAME, (0.0, 0.0, 0.0), _OPTICAL),
-            _transform(stamp, base, messages.LIDAR_FRAME, (LIMO.lidar_x, 0.0, LIMO.lidar_z), level),
+            _transform(stamp, base, messages.LIDAR_FRAME, lidar, turned),
             _transform(stamp, base, messages.IMU_FRAME, (0.0, 0.0, 0.0), level),
         ]
     )

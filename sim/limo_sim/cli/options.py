@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 
-from limo_hog.cli.support.arguments import output_file, seconds, seed
+from limo_hog.cli.support.arguments import add_robot, output_file, seconds, seed
 
 
 def add_scenario(parser: ArgumentParser, default_seconds: float, seconds_help: str) -> None:
-    """Add --scenario, --seconds and --seed."""
+    """Add --scenario, --robot, --seconds and --seed."""
     parser.add_argument(
         "--scenario", default="workshop", metavar="NAME|FILE.toml", help="the scenario to run (%(default)s)"
     )
+    add_robot(parser)
     parser.add_argument("--seconds", type=seconds, default=default_seconds, metavar="S", help=seconds_help)
     parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
 

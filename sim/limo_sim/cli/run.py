@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     with needed(by="limo-hog run"):
         from limo_sim.ros.runner import Limits, run_node
         from limo_sim.ros.stage import Stage, score_of
-    scenario = of_run(Scenario.load(args.scenario), args.seed)
+    scenario = of_run(Scenario.load(args.scenario, args.robot), args.seed)
     with contextlib.ExitStack() as stack:
         if args.json == STDOUT:
             # What the node prints must not mix with the JSON.

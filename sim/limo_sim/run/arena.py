@@ -14,11 +14,11 @@ from functools import partial
 import numpy as np
 import pymunk
 
-from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.signals import held
 from limo_sim.sensing import imu, lidar
-from limo_sim.sensing.camera import FOCAL_PX, CameraPose, TrueFrame
+from limo_sim.sensing.camera import WIDTH, CameraPose, TrueFrame
 from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Earlier, Renderer, Seen
 from limo_sim.world.crowd import STEP_S, Crowd
@@ -91,8 +91,10 @@ class Arena:
         self.scenario = scenario = of_run(scenario, seed)
         self.seed = seed
         self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario.movers)
-        robot = scenario.robot
-        self._drive = Drive(robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
+        robot, self.robot = scenario.robot, scenario.robot.geometry
+        self._drive = Drive(
+            robot.geometry.wheel_separation, robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s
+        )
         self._slip = self._stream(SLIP_STREAM)
         self._touched = {_OBSTACLE: -STEPS_PER_SECOND, _PERSON: -STEPS_PER_SECOND}
         self._contacts = {_OBSTACLE: 0, _PERSON: 0}
@@ -171,10 +173,10 @@ class Arena:
             body.angular_velocity = math.remainder(piece.yaw - body.angle, math.tau) / STEP_S
         with held():  # an exception in one of pymunk's callbacks would be printed and lost
             self._space.step(STEP_S)
-        robot = self._robot
-        twist, wheels = self._drive.twist, before.odometry
+        robot, drive = self._robot, self._drive
+        twist, wheels = drive.twist, before.odometry
         left, right = STEP_S * (1.0 + self.scenario.odometry.slip * self._slip.standard_normal(2))
-        rolled = twist_of(float(left) * self._drive.left, float(right) * self._drive.right)
+        rolled = twist_of(float(left) * drive.left, float(right) * drive.right, drive.separation)
         x, y, yaw = integrate(wheels.x, wheels.y, wheels.yaw, rolled.linear, rolled.angular)
         self._before = before
         self._state = _State(
@@ -197,7 +199,7 @@ class Arena:
         exposure = self._camera.newest
         if self._frame is None or self._frame.stamp != exposure.state.time:
             image, depth, seen = self._render().render(
-                _camera_at(exposure.state),
+                self._camera_at(exposure.state),
                 exposure.state.people,
                 self._stream(CAMERA_STREAM, exposure),
                 self._movers.at(exposure.state.time),
@@ -205,7 +207,7 @@ class Arena:
                 past=Earlier(partial(self._earlier, exposure.state), exposure.state.turn_rate),
             )
             truth = self._truth_at(exposure.state, seen)
-            self._frame = TrueFrame(exposure.state.time, image, FOCAL_PX, depth, truth)
+            self._frame = TrueFrame(exposure.state.time, image, self.robot.focal_px(WIDTH), depth, truth)
         return self._frame
 
     def scan(self) -> Scan:
@@ -217,11 +219,11 @@ class Arena:
             shapes += _scanned(self._movers.at(state.time))
             for person, pose in zip(self.scenario.people, state.people, strict=True):
                 if pose is not None:
-                    shapes += legs_at(person, pose, lidar.MOUNT_HEIGHT)
-            x = state.x + lidar.MOUNT_AHEAD * math.cos(state.yaw)
-            y = state.y + lidar.MOUNT_AHEAD * math.sin(state.yaw)
+                    shapes += legs_at(person, pose, self.robot.lidar_z)
+            x = state.x + self.robot.lidar_x * math.cos(state.yaw)
+            y = state.y + self.robot.lidar_x * math.sin(state.yaw)
             ranges = lidar.measure(
-                lidar.cast(x, y, state.yaw, shapes, self.scenario.room.half),
+                lidar.cast(x, y, state.yaw + self.robot.lidar_yaw, shapes, self.scenario.room.half),
                 self.scenario.lidar.noise_m,
                 self._stream(LIDAR_STREAM, exposure),
             )
@@ -249,13 +251,13 @@ class Arena:
         """Return the truth now (`TrueFrame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
-        seen = self._render().look(_camera_at(self._state), self._state.people, self._movers.at(self.time))
+        seen = self._render().look(self._camera_at(self._state), self._state.people, self._movers.at(self.time))
         return self._truth_at(self._state, seen)
 
     def furniture_in_frame(self) -> list[Seen]:
         """Return the visible share and the box [px] of each piece of furniture in the newest frame; movers last."""
         state = self._camera.newest.state
-        return self._render().look_at_furniture(_camera_at(state), state.people, self._movers.at(state.time))
+        return self._render().look_at_furniture(self._camera_at(state), state.people, self._movers.at(state.time))
 
     def plan(self, *, of_frame: bool = False) -> Plan:
         """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
@@ -271,16 +273,19 @@ class Arena:
         """Return what there was some seconds before a state, within a step or a few of it."""
         (speed_x, speed_y), share = state.velocity, age / STEP_S
         camera = CameraPose.on_robot(
-            state.x - age * speed_x, state.y - age * speed_y, state.yaw - age * state.turn_rate
+            self.robot, state.x - age * speed_x, state.y - age * speed_y, state.yaw - age * state.turn_rate
         )
         people = [earlier(was, now, share) for was, now in zip(state.people_before, state.people, strict=True)]
         return camera, people, self._movers.at(max(state.time - age, 0.0))
+
+    def _camera_at(self, state: _State) -> CameraPose:
+        return CameraPose.on_robot(self.robot, state.x, state.y, state.yaw)
 
     def _stream(self, sensor: int, exposure: Exposure[_State] | None = None) -> np.random.Generator:
         return np.random.default_rng([self.seed, sensor, exposure.index if exposure else 0])
 
     def _truth_at(self, state: _State, seen: list[Seen]) -> Truth:
-        camera = _camera_at(state)
+        camera = self._camera_at(state)
         people: list[PersonTruth | None] = []
         for person, pose, (visible, box) in zip(self.scenario.people, state.people, seen, strict=True):
             if pose is None:
@@ -295,7 +300,7 @@ class Arena:
 
     def _add_robot(self) -> pymunk.Body:
         settings = self.scenario.robot
-        size = (2 * LIMO.half_length, 2 * LIMO.half_width)
+        size = (2 * self.robot.half_length, 2 * self.robot.half_width)
         robot = pymunk.Body(mass=_MASS, moment=pymunk.moment_for_box(_MASS, size))
         robot.position = settings.x, settings.y
         robot.angle = settings.yaw
@@ -368,7 +373,3 @@ def _obstacle(body: pymunk.Body, footprint: Disc | Rectangle) -> pymunk.Shape:
 def _scanned(pieces: Iterable[Furniture]) -> list[Disc | Rectangle]:
     """Return what the lidar sees of furniture."""
     return [placed(shape, piece.x, piece.y, piece.yaw) for piece in pieces for shape in KINDS[piece.kind].scanned]
-
-
-def _camera_at(state: _State) -> CameraPose:
-    return CameraPose.on_robot(state.x, state.y, state.yaw)

@@ -98,7 +98,7 @@ def run_episode(
     search: Search = detect_in
     if scenario.detector != DetectorFaults():
         search = FaultySearch(arena.scenario, seed, lambda: arena.frame().truth)
-    follower = Follower(controller, detector, search=search)
+    follower = Follower(controller, detector, scenario.robot.geometry, search=search)
     passed: list[Passed] = []
     while arena.time < seconds:
         passed.append(Passed(arena.time, arena.odometry(), arena.imu()))

@@ -11,9 +11,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from limo_hog.follow.robot import LIMO, RobotGeometry, load_robot
 from limo_sim.world.furniture import Disc, Furniture, Rectangle, distance_to
 from limo_sim.world.movers import Mover
-from limo_sim.world.people import ROBOT_RADIUS, Group, Person, Surroundings, Vary, check_person
+from limo_sim.world.people import Group, Person, Surroundings, Vary, check_person
 from limo_sim.world.schema import WIDEST, ScenarioError, build, check_fields, one_of, required, within
 
 if sys.version_info >= (3, 11):
@@ -110,14 +111,20 @@ class Wall:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """The Limo's start [m, m, rad], its wheels' limits [m/s, m/s²], and the watchdog's time [s]."""
+    """The robot's start [m, m, rad], its wheels' limits [m/s, m/s²], and the watchdog's time [s]; a Limo by default."""
 
     x: float = within(0.0, -WIDEST, WIDEST)
     y: float = within(0.0, -WIDEST, WIDEST)
     yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
-    wheel_speed: float = within(1.0, 0.05, 3.0)
-    wheel_acceleration: float = within(1.0, 0.1, 10.0)
+    wheel_speed: float = within(1.0, 0.01, 10.0)
+    wheel_acceleration: float = within(1.0, 0.05, 20.0)
     watchdog_s: float = within(0.5, 0.05, 60.0)
+    geometry: RobotGeometry = LIMO
+
+    @property
+    def radius(self) -> float:
+        """The circle about the base centre that holds the body [m]; at least what a Limo has been given, 0.19 m."""
+        return max(0.19, math.hypot(self.geometry.half_length, self.geometry.half_width))
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,7 +279,7 @@ class Scenario:
     @property
     def surroundings(self) -> Surroundings:
         """What the people have to fit between."""
-        return Surroundings(self.room.half, (self.robot.x, self.robot.y), self._obstacles())
+        return Surroundings(self.room.half, (self.robot.x, self.robot.y), self.robot.radius, self._obstacles())
 
     @property
     def footprints(self) -> tuple[Disc | Rectangle, ...]:
@@ -285,12 +292,12 @@ class Scenario:
         return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
 
     @staticmethod
-    def load(name_or_path: str | Path) -> Scenario:
-        """Read one of `Scenario.names()`, or a TOML file.
+    def load(name_or_path: str | Path, robot: str | Path | None = None) -> Scenario:
+        """Read one of `Scenario.names()`, or a TOML file; `robot` is the file of another than the Limo.
 
         Raises
         ------
-        ScenarioError
+        ScenarioError, RobotError
             With the file, the key and what is allowed there.
         """
         path = Path(name_or_path)
@@ -311,6 +318,8 @@ class Scenario:
         where = f"{path.name}: "
         groups = build(_Groups, {"groups": table.pop("groups", [])}, where).groups
         scenario = build(Scenario, {"name": path.stem, **table}, where)
+        if robot is not None:
+            scenario = scenario._with_robot(load_robot(robot))
         scenario.check(where)
         return scenario._with_groups(groups, where) if groups else scenario
 
@@ -323,7 +332,8 @@ class Scenario:
         if math.hypot(*self.light.sun) < 0.1:
             raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
         self.detector.check(self.camera.rate_hz, f"{where}detector.")
-        self._check_inside((self.robot.x, self.robot.y), _ROBOT_DISTANCE, (f"{where}robot.x", f"{where}robot.y"))
+        distance = max(_ROBOT_DISTANCE, self.robot.radius)
+        self._check_inside((self.robot.x, self.robot.y), distance, (f"{where}robot.x", f"{where}robot.y"))
         for index, piece in enumerate(self.furniture):
             names = f"{where}furniture[{index}].x", f"{where}furniture[{index}].y"
             self._check_inside((piece.x, piece.y), _FURNITURE_DISTANCE, names)
@@ -337,16 +347,22 @@ class Scenario:
                 )
         for name, footprint in self._obstacles():
             distance = distance_to(footprint, self.robot.x, self.robot.y)
-            if distance < ROBOT_RADIUS:
+            if distance < self.robot.radius:
                 raise ScenarioError(
                     f"{where}{name.split(' ')[0]}: is {max(distance, 0.0):.2f} m from the robot's centre, "
-                    f"want at least {ROBOT_RADIUS} m"
+                    f"want at least {self.robot.radius:.2f} m"
                 )
         around = self.surroundings
         for index, person in enumerate(self.people):
             check_person(person, around, f"{where}people[{index}]")
         for index, mover in enumerate(self.movers):
             check_person(mover.timetable, around, f"{where}movers[{index}]")
+
+    def _with_robot(self, geometry: RobotGeometry) -> Scenario:
+        """Return this scenario with a robot whose wheels do what its file says."""
+        speed, acceleration = geometry.max_speed, geometry.acceleration
+        robot = dataclasses.replace(self.robot, geometry=geometry, wheel_speed=speed, wheel_acceleration=acceleration)
+        return dataclasses.replace(self, robot=robot)
 
     def _with_groups(self, groups: tuple[Group, ...], where: str) -> Scenario:
         """Return this scenario with the members of groups among its people; refuse groups that do not fit."""

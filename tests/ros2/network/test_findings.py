@@ -19,7 +19,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.decision import Believed, Mode
 from limo_hog.follow.pipeline import FrameLog
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.ros2 import dds, findings, follower, frames, messages, names
 from limo_hog.ros2.bag import to_detections
@@ -38,7 +38,7 @@ MESSAGES = {
     "pose": findings.person_pose(12.5, PERSON),
     "people": findings.people_message(12.5, [PERSON, OTHER]),
     "frames": findings.person_frames(12.5, [PERSON, OTHER], 7),
-    "robot": frames.static_transforms(12.5),
+    "robot": frames.static_transforms(12.5, LIMO),
     "command": findings.stamped_twist(12.5, Twist(0.5, -0.25)),
 }
 

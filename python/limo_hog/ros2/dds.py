@@ -33,11 +33,15 @@ _PREFIX = "rt"
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """A topic as others offer it: its ROS type, and how many publish and subscribe."""
+    """A topic as others offer it: of each that publishes and that subscribes its ROS type and quality of service."""
 
-    type_name: str
-    publishers: int
-    subscriptions: int
+    publishers: tuple[tuple[str, str], ...] = ()
+    subscriptions: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def types(self) -> list[str]:
+        """All ROS types; there should be one."""
+        return sorted({kind for kind, _ in (*self.publishers, *self.subscriptions)})
 
 
 @cache
@@ -303,16 +307,22 @@ class Bus:
         }
 
     def _endpoints(self, readers: list[Any]) -> dict[str, Endpoints]:
-        counts: dict[str, tuple[str, list[int]]] = {}
+        found: dict[str, Endpoints] = {}
         for index, reader in enumerate(readers):
             for sample in reader.read(1000):
                 alive = sample.sample_info.instance_state == Instance.Alive
                 if not alive or not sample.topic_name.startswith(f"{_PREFIX}/"):
                     continue
-                name, kind = sample.topic_name.removeprefix(_PREFIX), _ros_type(sample.type_name)
-                known = counts.setdefault(name, (kind, [0, 0]))
-                known[1][index] += 1
-        return {name: Endpoints(kind, *numbers) for name, (kind, numbers) in sorted(counts.items())}
+                name, qos = sample.topic_name.removeprefix(_PREFIX), sample.qos
+                quality = f"{type(qos[Policy.Reliability]).__name__}, {type(qos[Policy.Durability]).__name__}"
+                one = (_ros_type(sample.type_name), quality)
+                known = found.get(name, Endpoints())
+                found[name] = (
+                    Endpoints(known.publishers, (*known.subscriptions, one))
+                    if index
+                    else Endpoints((*known.publishers, one), known.subscriptions)
+                )
+        return dict(sorted(found.items()))
 
 
 def _ros_type(type_name: str) -> str:

@@ -12,7 +12,7 @@ import pytest
 from tests.sim.ros.scripts import Run, said
 
 NODE = "import threading, time\nrclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\n"
-SERVICE = "from std_srvs.srv import Trigger\n"
+SERVICE = "from rclpy.callback_groups import ReentrantCallbackGroup\nfrom std_srvs.srv import Trigger\n"
 
 
 def test_main_sleeps_while_a_thread_spins(run: Run) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,8 @@ class Reader(Protocol):
     topic: str
     keeps: bool
 
-    def offer(self, message: Message) -> None:
-        """Queue a message, which is the reader's own."""
+    def offer(self, message: Message, offered: Any = None) -> None:
+        """Queue a message, which is the reader's own; `offered` is the script's writer's quality of service."""
         ...
 
 

@@ -154,7 +154,7 @@ class World:
             for message in [m for topic, messages in self.kept if topic == reader.topic for m in messages]:
                 reader.offer(copy.deepcopy(message))
 
-    def publish(self, topic: str, message: Message) -> None:
+    def publish(self, topic: str, message: Message, qos: Any = None) -> None:
         """Take a message from the script: a command drives the robot, and the script's own subscriptions get it.
 
         Raises
@@ -169,7 +169,7 @@ class World:
             self._drive(message.twist if message._type_name == names.STAMPED_COMMAND_TYPE else message)  # type: ignore[attr-defined]
         for reader in self.readers:
             if reader.topic == topic:
-                reader.offer(copy.deepcopy(message))
+                reader.offer(copy.deepcopy(message), qos)
 
     def _drive(self, message: Any) -> None:
         parts = {

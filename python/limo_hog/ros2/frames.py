@@ -99,7 +99,9 @@ class Mounts:
                 raise RobotError(f"/tf_static: the lidar, {lidar}, is not level, or upside down")
             yaw = math.atan2(scans[1, 0], scans[0, 0])
             found |= {"lidar_x": scans[0, 3], "lidar_z": scans[2, 3], "lidar_yaw": yaw}
-        new = {name: float(value) for name, value in found.items() if getattr(robot, name) == getattr(LIMO, name)}
+        new: dict[str, Any] = {
+            name: float(value) for name, value in found.items() if getattr(robot, name) == getattr(LIMO, name)
+        }
         return replace(robot, **new), looks is not None and scans is not None
 
 

@@ -12,7 +12,7 @@ import pytest
 from tests.sim.ros.scripts import Run, said
 
 NODE = "import threading, time\nrclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\n"
-SERVICE = "from rclpy.callback_groups import ReentrantCallbackGroup\nfrom std_srvs.srv import Trigger\n"
+SERVICE = "from std_srvs.srv import Trigger\n"
 
 
 def test_main_sleeps_while_a_thread_spins(run: Run) -> None:
@@ -154,11 +154,12 @@ def answer(request, response):
     return response
 n.create_service(Trigger, 'go', answer)
 client = n.create_client(Trigger, 'go')
+from rclpy.callback_groups import ReentrantCallbackGroup
 async def ask():
     response = await client.call_async(Trigger.Request())
     n.get_logger().info(response.message)
     pub.publish(Twist())
-n.create_timer(1.0, ask)
+n.create_timer(1.0, ask, callback_group=ReentrantCallbackGroup())
 rclpy.spin(n)
 """
     )

@@ -39,7 +39,7 @@ _WITHOUT_EFFECT = tuple(
 
 #: Names of rclpy's `Node` that are not offered.
 _MISSING = tuple(
-    "ParameterInput create_guard_condition destroy_guard_condition guards handle context wait_for_node waitables add_waitable "
+    "create_guard_condition destroy_guard_condition guards handle context wait_for_node waitables add_waitable "
     "remove_waitable set_descriptor describe_parameter describe_parameters list_parameters get_parameter_types "
     "get_parameter_type set_parameters_atomically PARAM_REL_TOL get_service_names_and_types get_node_names "
     "count_clients count_services get_publishers_info_by_topic get_subscriptions_info_by_topic "
@@ -47,7 +47,8 @@ _MISSING = tuple(
     "get_subscriber_names_and_types_by_node get_service_names_and_types_by_node "
     "get_client_names_and_types_by_node get_node_names_and_namespaces "
     "get_node_names_and_namespaces_with_enclaves add_pre_set_parameters_callback "
-    "remove_pre_set_parameters_callback add_post_set_parameters_callback remove_post_set_parameters_callback".split()
+    "remove_pre_set_parameters_callback add_post_set_parameters_callback remove_post_set_parameters_callback "
+    "ParameterInput".split()
 )
 
 

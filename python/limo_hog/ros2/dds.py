@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -35,8 +35,8 @@ _PREFIX = "rt"
 class Endpoints:
     """A topic as others offer it: of each that publishes and that subscribes its ROS type and quality of service."""
 
-    publishers: tuple[tuple[str, str], ...] = ()
-    subscriptions: tuple[tuple[str, str], ...] = ()
+    publishers: list[tuple[str, str]] = field(default_factory=list)
+    subscriptions: list[tuple[str, str]] = field(default_factory=list)
 
     @property
     def types(self) -> list[str]:
@@ -314,14 +314,10 @@ class Bus:
                 if not alive or not sample.topic_name.startswith(f"{_PREFIX}/"):
                     continue
                 name, qos = sample.topic_name.removeprefix(_PREFIX), sample.qos
-                quality = f"{type(qos[Policy.Reliability]).__name__}, {type(qos[Policy.Durability]).__name__}"
-                one = (_ros_type(sample.type_name), quality)
-                known = found.get(name, Endpoints())
-                found[name] = (
-                    Endpoints(known.publishers, (*known.subscriptions, one))
-                    if index
-                    else Endpoints((*known.publishers, one), known.subscriptions)
-                )
+                kinds = (type(qos[policy]).__name__ for policy in (Policy.Reliability, Policy.Durability))
+                one = _ros_type(sample.type_name), ", ".join(kind.rpartition(".")[2] for kind in kinds)
+                ends = found.setdefault(name, Endpoints())
+                (ends.publishers, ends.subscriptions)[index].append(one)
         return dict(sorted(found.items()))
 
 

@@ -61,7 +61,7 @@ class RobotGeometry:
     field_of_view: float = _within(1.23918, 0.2, 3.0)
     lidar_x: float = _within(0.103, -2.0, 2.0)
     lidar_z: float = _within(0.111, 0.01, 2.0)
-    lidar_yaw: float = _within(0.0, -math.pi, math.pi)
+    lidar_yaw: float = _within(0.0, -math.tau, math.tau)
     wheel_separation: float = _within(0.172, 0.02, 4.0)
     max_speed: float = _within(1.0, 0.01, 10.0)
     max_turn: float = _within(11.6, 0.01, 100.0)

@@ -15,25 +15,25 @@ from limo_hog import PeopleDetector
 from limo_hog.follow import Follower, TrackingController, load_robot
 from limo_hog.ros2.senses import Senses, picture_of, stamp_of
 
-rclpy.init()
+rclpy.init(signal_handler_options=rclpy.SignalHandlerOptions.NO)
 node = rclpy.create_node("person_follower")
 robot = load_robot(node.declare_parameter("robot", "robot.toml").value)
 senses, follower = Senses(robot), Follower(TrackingController(), PeopleDetector(), robot)
-commands, frames = node.create_publisher(Twist, "cmd_vel", 10), [None]
+commands, frames, reason = node.create_publisher(Twist, "cmd_vel", 10), [None], ""
 quality = 10 if node.declare_parameter("reliable", False).value else qos_profile_sensor_data
-inputs = {"camera_info": CameraInfo, "depth": Image, "scan": LaserScan, "odom": Odometry}
-for topic, kind in inputs.items():
+for topic, kind in {"camera_info": CameraInfo, "depth": Image, "scan": LaserScan, "odom": Odometry}.items():
     node.create_subscription(kind, topic, senses.take, quality)
 see = lambda message: frames.append(senses.frame(stamp_of(message), picture_of(message)))  # noqa: E731
 node.create_subscription(Image, "image", see, quality)
-reason = ""
-while rclpy.ok():
-    rclpy.spin_once(node, timeout_sec=0.05)
-    log = follower.tick(time.monotonic(), frames[-1], senses.sensors)
-    del frames[:-1]
-    if log is not None:
-        command = Twist()
-        command.linear.x, command.angular.z = log.decision.twist.linear, log.decision.twist.angular
-        commands.publish(command)
-        if log.decision.reason != reason:
-            node.get_logger().info(reason := log.decision.reason)
+try:
+    while True:
+        rclpy.spin_once(node, timeout_sec=0.05)
+        del frames[:-1]
+        if log := follower.tick(time.monotonic(), frames[-1], senses.sensors):
+            command = Twist()
+            command.linear.x, command.angular.z = log.decision.twist.linear, log.decision.twist.angular
+            commands.publish(command)
+            if log.decision.reason != reason:
+                node.get_logger().info(reason := log.decision.reason)
+finally:  # Ctrl-C: the last command is to stand
+    commands.publish(Twist())

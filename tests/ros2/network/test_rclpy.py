@@ -103,13 +103,14 @@ def test_the_example_on_rclpy_follows_and_stops_at_ctrl_c(tmp_path: Path) -> Non
     renamed = {"image": "/limo_camera/image", "camera_info": "/limo_camera/camera_info", "depth": names.DEPTH}
     rules = [word for old, new in renamed.items() for word in ("-r", f"{old}:={new}")]
     settings = ["-p", f"robot:={tmp_path / 'limo.toml'}", "-p", "reliable:=true"]
-    said, log = "", (tmp_path / "log.txt").open("w")
+    said = ""
     words = ["--ros-args", *settings, *rules]
-    node = subprocess.Popen(
-        [str(PYTHON), str(ROOT / "examples" / "rclpy_follower.py"), *words],
-        stderr=log,
-        env={**os.environ, "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", "PYTHONPATH": path},
-    )
+    with (tmp_path / "log.txt").open("w") as log:
+        node = subprocess.Popen(
+            [str(PYTHON), str(ROOT / "examples" / "rclpy_follower.py"), *words],
+            stderr=log,
+            env={**os.environ, "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", "PYTHONPATH": path},
+        )
     try:
         until = time.monotonic() + 60
         while "following a person" not in said and time.monotonic() < until:

@@ -37,3 +37,4 @@ try:
                 node.get_logger().info(reason := log.decision.reason)
 finally:  # Ctrl-C: the last command is to stand
     commands.publish(Twist())
+    rclpy.shutdown()

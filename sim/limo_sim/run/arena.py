@@ -92,9 +92,7 @@ class Arena:
         self.seed = seed
         self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario.movers)
         robot, self.robot = scenario.robot, scenario.robot.geometry
-        self._drive = Drive(
-            robot.geometry.wheel_separation, robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s
-        )
+        self._drive = Drive(self.robot.wheel_separation, robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
         self._slip = self._stream(SLIP_STREAM)
         self._touched = {_OBSTACLE: -STEPS_PER_SECOND, _PERSON: -STEPS_PER_SECOND}
         self._contacts = {_OBSTACLE: 0, _PERSON: 0}

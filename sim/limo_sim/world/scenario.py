@@ -53,8 +53,6 @@ _FURNITURE_DISTANCE, _ROBOT_DISTANCE = 0.2, 0.3
 # Inner walls are at least this long [m]: shorter than thick they would have no direction to speak of.
 _SHORTEST_WALL = 0.05
 _FOLDER = Path(__file__).parents[1] / "scenarios"
-
-
 #: How many of each a scenario may have: 64 people take some seconds for one of the arena.
 _MOST = {"people": 64, "movers": 64, "furniture": 256, "walls": 256}
 
@@ -319,7 +317,11 @@ class Scenario:
         groups = build(_Groups, {"groups": table.pop("groups", [])}, where).groups
         scenario = build(Scenario, {"name": path.stem, **table}, where)
         if robot is not None:
-            scenario = scenario._with_robot(load_robot(robot))
+            geometry = load_robot(robot)
+            limits = {"wheel_speed": geometry.max_speed, "wheel_acceleration": geometry.acceleration}
+            scenario = dataclasses.replace(
+                scenario, robot=dataclasses.replace(scenario.robot, geometry=geometry, **limits)
+            )
         scenario.check(where)
         return scenario._with_groups(groups, where) if groups else scenario
 
@@ -332,8 +334,8 @@ class Scenario:
         if math.hypot(*self.light.sun) < 0.1:
             raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
         self.detector.check(self.camera.rate_hz, f"{where}detector.")
-        distance = max(_ROBOT_DISTANCE, self.robot.radius)
-        self._check_inside((self.robot.x, self.robot.y), distance, (f"{where}robot.x", f"{where}robot.y"))
+        far = max(_ROBOT_DISTANCE, self.robot.radius)
+        self._check_inside((self.robot.x, self.robot.y), far, (f"{where}robot.x", f"{where}robot.y"))
         for index, piece in enumerate(self.furniture):
             names = f"{where}furniture[{index}].x", f"{where}furniture[{index}].y"
             self._check_inside((piece.x, piece.y), _FURNITURE_DISTANCE, names)
@@ -357,12 +359,6 @@ class Scenario:
             check_person(person, around, f"{where}people[{index}]")
         for index, mover in enumerate(self.movers):
             check_person(mover.timetable, around, f"{where}movers[{index}]")
-
-    def _with_robot(self, geometry: RobotGeometry) -> Scenario:
-        """Return this scenario with a robot whose wheels do what its file says."""
-        speed, acceleration = geometry.max_speed, geometry.acceleration
-        robot = dataclasses.replace(self.robot, geometry=geometry, wheel_speed=speed, wheel_acceleration=acceleration)
-        return dataclasses.replace(self, robot=robot)
 
     def _with_groups(self, groups: tuple[Group, ...], where: str) -> Scenario:
         """Return this scenario with the members of groups among its people; refuse groups that do not fit."""

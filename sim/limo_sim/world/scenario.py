@@ -44,10 +44,8 @@ __all__ = [
     "Wheels",
 ]
 
-ROOM_HALF = 4.9
-"""Without `room.half` the walls' inner faces stand at ± this [m]: 0.2 m thick, on ± 5 m, as in `hri_world.world`."""
-WALL_HEIGHT = 1.0
-"""Of the walls [m], as in `hri_world.world`."""
+#: Where the walls' inner faces stand without `room.half`, ± this, and how high they are [m]; as in `hri_world.world`.
+ROOM_HALF, WALL_HEIGHT = 4.9, 1.0
 # The middle of a piece of furniture, and of the robot at the start, keep these distances from the outer walls [m].
 _FURNITURE_DISTANCE, _ROBOT_DISTANCE = 0.2, 0.3
 # Inner walls are at least this long [m]: shorter than thick they would have no direction to speak of.

@@ -39,7 +39,6 @@ def pixels(image: Any) -> NDArray[np.uint8]:
         raise ImageTypeError("the image is None: did imread find no file, or is the video over?")
     if not isinstance(image, np.ndarray):
         hint = "; detect_many takes a list" if isinstance(image, (list, tuple)) else ""
-        hint = "; did imread fail, or is the video over?" if image is None else hint
         raise ImageTypeError(
             f"an image is a uint8 numpy array, for PeopleDetector also a file's name or a PIL image; this is a "
             f"{type(image).__name__}{hint}"

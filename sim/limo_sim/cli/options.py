@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 
-from limo_hog.cli.support.arguments import add_robot, output_file, seconds, seed
+from limo_hog.cli.support.arguments import add_robot, seconds, seed
 
 
 def add_scenario(parser: ArgumentParser, default_seconds: float, seconds_help: str) -> None:
@@ -15,8 +15,3 @@ def add_scenario(parser: ArgumentParser, default_seconds: float, seconds_help: s
     add_robot(parser)
     parser.add_argument("--seconds", type=seconds, default=default_seconds, metavar="S", help=seconds_help)
     parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
-
-
-def add_json(parser: ArgumentParser, what: str = "the score card") -> None:
-    """Add --json."""
-    parser.add_argument("--json", type=output_file, metavar="FILE", help=f"write {what} as JSON; - is standard output")

@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import add_ros_arguments
+from limo_hog.cli.support.arguments import add_json, add_ros_arguments
 from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
-from limo_sim.cli.options import add_json, add_scenario
+from limo_sim.cli.options import add_scenario
 from limo_sim.cli.watching import add_watching, finish, observing
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("node", metavar="NODE.py", type=Path, help="the script")
     add_scenario(parser, 60.0, "simulated time (60)")
-    add_json(parser)
+    add_json(parser, "the score card as JSON")
     add_watching(parser)
     add_ros_arguments(parser)
 

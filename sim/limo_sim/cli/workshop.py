@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limo_hog.atomic import whole_file, write_text
-from limo_hog.cli.support.arguments import count, output_file, seconds
+from limo_hog.cli.support.arguments import add_json, count, output_file, seconds
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
@@ -52,12 +52,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                 metavar="N",
                 help="show N hints for the first checkpoint that does not hold (1)",
             )
-            one.add_argument(
-                "--json",
-                type=output_file,
-                metavar="FILE",
-                help="write points and evidence as JSON; - is standard output",
-            )
+            add_json(one, "points and evidence as JSON")
             one.add_argument("--html", metavar="FILE", help="write a report with the node's pictures as one page")
             one.add_argument("--stretch", choices=tuple("abcde"), help="a stretch task instead of tasks 1 to 4")
             one.add_argument(

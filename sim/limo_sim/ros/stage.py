@@ -341,8 +341,8 @@ def score_of(outcome: Ended) -> ScoreCard:
     Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
     """
     card, driving = score(outcome.episode), outcome.episode.scorer.driving
-    if outcome.failure:
-        card = replace(card, success=False, failure=outcome.failure)
+    if failure := outcome.failure or ("" if driving or not card.success else "the node never moved the robot"):
+        card = replace(card, success=False, failure=failure)
     if outcome.used_hog:
         return card
     return replace(

@@ -106,25 +106,17 @@ class Policy:
 
     The state is the last sighting.
 
-    Attributes
-    ----------
-    path
-        An .npz file with the arrays `w0`, `b0`, `w1`, `b1`, …: float32 weights (inputs, outputs) and biases of layers
-        with tanh between them, from the 9 numbers of `state_of` to the 2 of an action.
-    target_distance
-        The distance that the environment's reward holds best [m].
-    robot
-        Where its camera sits.
-
     Raises
     ------
     ControllerError
         The file cannot be read, or is no such network.
     """
 
+    #: An .npz file with the arrays `w0`, `b0`, `w1`, `b1`, …: float32 weights (inputs, outputs) and biases of layers
+    #: with tanh between them, from the 9 numbers of `state_of` to the 2 of an action.
     path: Path
-    target_distance: float = 1.5
-    robot: RobotGeometry = LIMO
+    target_distance: float = 1.5  #: the distance that the environment's reward holds best [m]
+    robot: RobotGeometry = LIMO  #: where its camera sits
 
     def __post_init__(self) -> None:
         # A wrong file is an error before the robot starts.

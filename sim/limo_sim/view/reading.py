@@ -102,15 +102,10 @@ def hits(scan: Scan | None, robot: RobotGeometry, poses: list[tuple[float, float
     angles = yaw + robot.lidar_yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
     hit = np.isfinite(ranges)
     hit[1::2] = False
-    points = np.stack(
-        [
-            x + robot.lidar_x * math.cos(yaw) + ranges[hit] * np.cos(angles[hit]),
-            y + robot.lidar_x * math.sin(yaw) + ranges[hit] * np.sin(angles[hit]),
-        ],
-        axis=1,
-    )
-    rounded: list[list[float]] = np.round(points, 2).tolist()
-    return rounded
+    ahead = x + robot.lidar_x * math.cos(yaw) + ranges[hit] * np.cos(angles[hit])
+    left = y + robot.lidar_x * math.sin(yaw) + ranges[hit] * np.sin(angles[hit])
+    points: list[list[float]] = np.round(np.stack([ahead, left], axis=1), 2).tolist()
+    return points
 
 
 def believed(step: Step) -> list[list[float | None]]:

@@ -167,22 +167,12 @@ _SHIRTS = ((34, 52, 128), (150, 44, 40), (52, 104, 58), (196, 150, 52), (98, 60,
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What people have to fit between.
+    """What people have to fit between."""
 
-    Attributes
-    ----------
-    half
-        The outer walls stand at ± this [m].
-    robot, robot_radius
-        Where the robot starts, x, y, and the circle that holds it [m].
-    obstacles
-        What stands in the room, by the name that a message gives it.
-    """
-
-    half: float
-    robot: tuple[float, float]
-    robot_radius: float
-    obstacles: Sequence[tuple[str, Disc | Rectangle]]
+    half: float  #: the outer walls stand at ± this [m]
+    robot: tuple[float, float]  #: where the robot starts, x, y [m]
+    robot_radius: float  #: of the circle that holds it [m]
+    obstacles: Sequence[tuple[str, Disc | Rectangle]]  #: what stands in the room, by the name that a message gives it
 
     @cached_property
     def _plans(self) -> dict[float, FloorPlan]:

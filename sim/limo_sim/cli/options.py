@@ -7,10 +7,10 @@ from argparse import ArgumentParser
 from limo_hog.cli.support.arguments import add_robot, seconds, seed
 
 
-def add_scenario(parser: ArgumentParser, default_seconds: float, seconds_help: str) -> None:
+def add_scenario(parser: ArgumentParser, default_seconds: float | None, seconds_help: str, more: str = "") -> None:
     """Add --scenario, --robot, --seconds and --seed."""
     parser.add_argument(
-        "--scenario", default="workshop", metavar="NAME|FILE.toml", help="the scenario to run (%(default)s)"
+        "--scenario", default="workshop", metavar="NAME|FILE.toml", help=f"the scenario to run{more} (%(default)s)"
     )
     add_robot(parser)
     parser.add_argument("--seconds", type=seconds, default=default_seconds, metavar="S", help=seconds_help)

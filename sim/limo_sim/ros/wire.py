@@ -13,7 +13,7 @@ HEAD = struct.Struct("<II")
 FORKS = sys.platform == "linux"
 
 
-def packed(content: Any, data: bytes = b"") -> bytes:
-    """Return a message: JSON, and bytes that are none."""
+def packed(content: Any, data: bytes = b"", more: int = 0) -> bytes:
+    """Return a message: JSON, and bytes that are none; as many as `more` says are to follow it."""
     said = json.dumps(content).encode()
-    return HEAD.pack(len(said), len(data)) + said + data
+    return HEAD.pack(len(said), len(data) + more) + said + data

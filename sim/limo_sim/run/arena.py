@@ -51,9 +51,10 @@ _FRICTION = 0.3  # of every surface; chosen, the outcome of a contact hardly dep
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """The end of a step: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
+    """The end of a step [s]: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
 
     step: int
+    time: float
     x: float
     y: float
     yaw: float
@@ -63,10 +64,6 @@ class _State:
     turn_rate: float = 0.0
     odometry: Odometry = Odometry()  # noqa: RUF009 - frozen
     contacts: Contacts = Contacts()  # noqa: RUF009
-
-    @property
-    def time(self) -> float:
-        return self.step / STEPS_PER_SECOND
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +103,7 @@ class Arena:
         self._moving = [self._add_mover(piece) for piece in self._movers.at(0.0)]
         for other in (_OBSTACLE, _PERSON):
             self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
-        self._state = self._before = _State(0, robot.x, robot.y, robot.yaw, self._crowd.poses, self._crowd.poses)
+        self._state = self._before = _State(0, 0.0, robot.x, robot.y, robot.yaw, self._crowd.poses, self._crowd.poses)
         drops = {"drop_probability": scenario.camera.drop_probability, "drops": self._stream(DROP_STREAM)}
         self._camera = self._channel(scenario.camera, **drops)
         self._lidar, self._wheels = self._channel(scenario.lidar), self._channel(scenario.odometry)
@@ -144,9 +141,10 @@ class Arena:
         before = self._state
         self._drive.advance(before.time, STEP_S)
         step = before.step + 1
-        self._crowd.advance(step / STEPS_PER_SECOND, (before.x, before.y, before.yaw))
+        now = step / STEPS_PER_SECOND
+        self._crowd.advance(now, (before.x, before.y, before.yaw))
         self._place_people()
-        for body, piece in zip(self._moving, self._movers.at(step / STEPS_PER_SECOND), strict=True):
+        for body, piece in zip(self._moving, self._movers.at(now), strict=True):
             body.velocity = (piece.x - body.position.x) / STEP_S, (piece.y - body.position.y) / STEP_S
             body.angular_velocity = math.remainder(piece.yaw - body.angle, math.tau) / STEP_S
         with held():  # an exception in one of pymunk's callbacks would be printed and lost
@@ -159,12 +157,13 @@ class Arena:
         self._before = before
         self._state = _State(
             step=step,
+            time=now,
             x=robot.position.x,
             y=robot.position.y,
             yaw=robot.angle,
             velocity=(robot.velocity.x, robot.velocity.y),
             turn_rate=robot.angular_velocity,
-            odometry=Odometry(step / STEPS_PER_SECOND, x, y, yaw, twist.linear, twist.angular),
+            odometry=Odometry(now, x, y, yaw, twist.linear, twist.angular),
             contacts=self.contacts,
             people=self._crowd.poses,
             people_before=before.people,

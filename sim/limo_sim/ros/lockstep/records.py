@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +23,15 @@ class StubError(LimoHogError):
 
 
 class Reader(Protocol):
-    """A subscription; one that `keeps` is given what was published before it."""
+    """A subscription; one that `keeps` is given what was published before it; `reliable`: what it asks for."""
 
     topic: str
+    msg_type: type[Message]
     keeps: bool
+    reliable: bool
 
-    def offer(self, message: Message, offered: Any = None) -> None:
-        """Queue a message, which is the reader's own; `offered` is the script's writer's quality of service."""
+    def offer(self, message: Message) -> None:
+        """Queue a message, which is the reader's own."""
         ...
 
 

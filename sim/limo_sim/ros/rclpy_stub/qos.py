@@ -88,14 +88,6 @@ class QoSProfile(PartialApi, missing=("get_c_qos_profile",)):
         self.depth = 10 if self.depth is None else self.depth
         self.history = HistoryPolicy.KEEP_LAST if self.history == HistoryPolicy.UNKNOWN else self.history
 
-    def serves(self, asked: QoSProfile) -> bool:
-        """Whether a reader that asks for a profile hears a writer of this one: it asks for no more than is offered."""
-        lossy = self.reliability == ReliabilityPolicy.BEST_EFFORT
-        forgets = self.durability == DurabilityPolicy.VOLATILE
-        return not (lossy and asked.reliability == ReliabilityPolicy.RELIABLE) and not (
-            forgets and asked.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        )
-
 
 def to_profile(given: QoSProfile | int) -> QoSProfile:
     """Return a profile; a number is the depth of the default one.

@@ -140,7 +140,8 @@ def _read_parameters(path: Path, into: RosArguments) -> None:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise RosArgumentError(f"--params-file {path}: cannot be read: {error}") from error
+        why = getattr(error, "strerror", None) or str(error)
+        raise RosArgumentError(f"--params-file {path}: cannot be read: {why.lower()}") from error
     _add(_yaml(text, f"--params-file {path}"), "", path, into)
 
 

@@ -22,10 +22,11 @@ from tests.sim.view.browser import CHROMIUM, chromium
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.robot import LIMO
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
-from limo_sim.sensing.camera import FIELD, CameraPose
+from limo_sim.sensing.camera import CameraPose
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.view.pace import Pace
 from limo_sim.view.reading import annotated, depth_picture
@@ -117,7 +118,10 @@ def map_of(steps: list[Step], scenario: Scenario) -> NDArray[np.uint8]:
         cv2.polylines(picture, [np.array([at(*place) for place in places])], False, colour, 2, cv2.LINE_AA)
 
     x, y, yaw = steps[-1].truth.robot
-    view = [at(x + 3 * math.cos(yaw + turn), y + 3 * math.sin(yaw + turn)) for turn in (FIELD / 2, -FIELD / 2)]
+    view = [
+        at(x + 3 * math.cos(yaw + turn), y + 3 * math.sin(yaw + turn))
+        for turn in (LIMO.field_of_view / 2, -LIMO.field_of_view / 2)
+    ]
     cv2.fillPoly(picture, [np.array([at(x, y), *view])], (222, 214, 206), cv2.LINE_AA)
     way([step.truth.robot[:2] for step in steps], ROBOT)
     for i, person in enumerate(steps[-1].truth.people):

@@ -19,7 +19,7 @@ from limo_sim.run.detector_faults import Missing, misses_of
 from limo_sim.run.last_seen import SCALE, SIZE, LastSeen, sighted, state_of
 from limo_sim.run.matching import CRITERIA
 from limo_sim.sensing import lidar
-from limo_sim.sensing.camera import FOCAL_PX, HEIGHT, MOUNT_AHEAD, MOUNT_HEIGHT, WIDTH
+from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.paths import FloorPlan
 from limo_sim.world.person import trunk_radius
 from limo_sim.world.scenario import DetectorFaults, Scenario
@@ -309,24 +309,24 @@ def glimpse(plan: Plan, scenario: Scenario, index: int, walls: FloorPlan) -> Gli
     pose = plan.people[index] if index < len(plan.people) else None
     if pose is None:
         return None
-    person = scenario.people[index]
+    person, robot = scenario.people[index], scenario.robot.geometry
     x, y, yaw = plan.robot
     dx, dy = pose.x - x, pose.y - y
     cos, sin = math.cos(yaw), math.sin(yaw)
     left, ahead = cos * dy - sin * dx, cos * dx + sin * dy
     bearing, distance = math.atan2(left, ahead), math.hypot(dx, dy)
-    depth = ahead - MOUNT_AHEAD
+    depth = ahead - robot.camera_x
     towards = yaw + math.atan2(left, depth)
     surface = math.hypot(depth, left) - trunk_radius(person, pose, towards)
     if depth < _NEAR:
         return Glimpse(bearing, distance, surface, 0.0, 0.0, False)
-    scale = FOCAL_PX / depth
+    scale = robot.focal_px(WIDTH) / depth
     column, half = -left * scale, _HALF_BREADTH * person.height * scale
-    height, head = person.height * scale, (person.height - MOUNT_HEIGHT) * scale
+    height, head = person.height * scale, (person.height - robot.camera_z) * scale
     across = min(column + half, WIDTH / 2) - max(column - half, -WIDTH / 2)
-    upright = min(head, HEIGHT / 2) + min(MOUNT_HEIGHT * scale, HEIGHT / 2)
+    upright = min(head, HEIGHT / 2) + min(robot.camera_z * scale, HEIGHT / 2)
     visible = max(across, 0.0) / (2 * half) * upright / height
-    camera = x + MOUNT_AHEAD * cos, y + MOUNT_AHEAD * sin
+    camera = x + robot.camera_x * cos, y + robot.camera_x * sin
     if visible > 0.0 and walls.hidden(np.array([camera]), np.array([(pose.x, pose.y)]))[0]:
         visible = 0.0
     found = visible >= CRITERIA.in_view and height >= _LEAST_PX and head <= HEIGHT / 2

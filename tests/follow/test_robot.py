@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,6 +35,14 @@ def driven(robot: RobotGeometry, wanted: Twist, sensors: Sensors) -> tuple[Twist
     log = Follower(Headstrong(wanted), Loop(), robot).tick(0.0, Frame(0.0, IMAGE, FOCAL_PX, DEPTH), sensors)
     assert log is not None
     return log.decision.twist, log.decision.reason
+
+
+@pytest.mark.parametrize("page", ["docs/own-robot.md", "docs/follower.md", "examples/robot/robot.toml"])
+def test_the_robots_of_the_pages_are_robots(page: str, tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / page).read_text(encoding="utf-8")
+    robots = re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if page.endswith(".md") else [text]
+    (tmp_path / "robot.toml").write_text("".join(robots))
+    assert load_robot(tmp_path / "robot.toml").camera_z == 0.25
 
 
 def test_a_file_names_what_differs_from_the_limo(tmp_path: Path) -> None:

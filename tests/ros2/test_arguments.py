@@ -80,6 +80,23 @@ def test_malformed_arguments_are_refused_and_named(words: str) -> None:
         parse_ros_arguments(["--ros-args", *words.split()])
 
 
+@pytest.mark.timeout(10)
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (b"n: {ros__parameters: {a: " + 5000 * b"[" + 5000 * b"]" + b"}}", "nested more than 50 deep"),
+        (b"".join(b" " * depth + b"a:\n" for depth in range(2000)), "nested more than 50 deep"),
+        (b"n: {ros__parameters: &x {a: *x}}", "an alias"),
+        (b"n: {ros__parameters: {a: \xe9}}", "cannot be read"),
+    ],
+    ids=["deep lists", "deep maps", "itself", "not UTF-8"],
+)
+def test_a_hostile_parameter_file_is_refused_at_once(text: bytes, why: str, tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_bytes(text)
+    with pytest.raises(RosArgumentError, match=why):
+        parse_ros_arguments(["--ros-args", "--params-file", str(tmp_path / "p.yaml")])
+
+
 @needs_rclpy
 def test_rclpy_reads_the_same_arguments_alike(file: Path) -> None:
     told = [words.replace("FILE", str(file)).split() for words in [case[0] for case in CASES] + WRONG]

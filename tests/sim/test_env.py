@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry
 from limo_sim.env import SHAPING, Glimpse, LimoFollowV1, _reward, glimpse, hiding
 from limo_sim.run.arena import Arena, Plan
 from limo_sim.run.last_seen import sighted, state_of
-from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.world.person import Pose
 from limo_sim.world.scenario import Depth, DetectorFaults, Furniture, Person, Robot, Scenario, Wall
@@ -217,7 +217,7 @@ def test_a_glimpse_is_the_same_wherever_robot_and_person_are_together(
 
     here = seen(0.0, 0.0, 0.0)
     # A pinhole's image of a height is focal length × height / depth.
-    assert here.height_px == pytest.approx(FOCAL_PX * 1.7 / (place[0] - MOUNT_AHEAD))
+    assert here.height_px == pytest.approx(LIMO.focal_px(640) * 1.7 / (place[0] - LIMO.camera_x))
     assert (here.visible > 0) == (not blocked)
     for robot in ((1.0, -2.0, 0.9), (-2.5, 0.7, -2.0)):
         assert astuple(seen(*robot)) == pytest.approx(astuple(here))
@@ -258,7 +258,7 @@ def test_what_hog_cannot_find_is_not_found(ahead: float, found: bool) -> None:
 )
 def test_a_person_near_a_side_of_the_image_is_seen_and_not_found(column: float, found: bool) -> None:
     # 320 px from the middle to a side, of which the last 60 are too near to it.
-    seen = seen_at(2.5, -column * (2.5 - MOUNT_AHEAD) / FOCAL_PX)
+    seen = seen_at(2.5, -column * (2.5 - LIMO.camera_x) / LIMO.focal_px(640))
     assert seen.visible == pytest.approx(1.0)
     assert seen.found == found
 

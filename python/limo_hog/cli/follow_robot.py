@@ -18,7 +18,15 @@ from typing import IO, Any
 import numpy as np
 from rich.progress import Progress
 
-from limo_hog.cli.support.arguments import add_follower, add_ros_arguments, node_of, number, output_file, seconds
+from limo_hog.cli.support.arguments import (
+    add_follower,
+    add_robot,
+    add_ros_arguments,
+    node_of,
+    number,
+    output_file,
+    seconds,
+)
 from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
@@ -56,7 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--no-drive", action="store_true", help="publish what is found and no commands: a planner, such as Nav2, drives"
     )
-    parser.add_argument("--robot", metavar="FILE.toml", help="what differs from a Limo (see `RobotGeometry`)")
+    add_robot(parser)
     parser.add_argument(
         "--without-lidar", action="store_true", help="drive by depth alone where no scan comes: slowly, never backwards"
     )

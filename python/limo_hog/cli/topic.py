@@ -32,7 +32,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     listing = actions.add_parser("list", help="names of all topics")
     listing.add_argument("-t", "--show-types", action="store_true", help="with their types")
     for action, words in (
-        ("info", "a topic's type, and how many publish and subscribe"),
+        ("info", "a topic's types, who publishes and subscribes, and with which quality of service"),
         ("hz", "how often its messages come"),
         ("echo", "what its messages say, as YAML"),
     ):
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         if not topics:
             print(f"no topics in {bus.network}", file=sys.stderr)
         for name, ends in topics.items():
-            print(printable(f"{name} [{ends.type_name}]" if args.show_types else name))
+            print(printable(f"{name} [{', '.join(ends.types)}]" if args.show_types else name))
         return 0
     topic = args.topic if args.topic.startswith("/") else f"/{args.topic}"
     found = bus.topics(2.0, enough=lambda topics: topic in topics and args.action != "info")
@@ -65,11 +65,13 @@ def run(args: argparse.Namespace) -> int:
         raise LimoHogError(f"topic {topic} is not there in {bus.network}; there are: {known}")
     if args.action == "info":
         ends = found[topic]
-        print(printable(f"Type: {ends.type_name}"))
-        print(f"Publisher count: {ends.publishers}")
-        print(f"Subscription count: {ends.subscriptions}")
+        print(printable(f"Type: {', '.join(ends.types)}"))
+        for what, those in (("Publisher", ends.publishers), ("Subscription", ends.subscriptions)):
+            print(f"{what} count: {len(those)}")
+            for kind, quality in those:
+                print(printable(f"  {kind}: {quality}"))
         return 0
-    subscription = bus.subscription(topic, found[topic].type_name)
+    subscription = bus.subscription(topic, found[topic].types[0])
     (_hz if args.action == "hz" else _echo)(bus, subscription, topic, args)
     return 0
 

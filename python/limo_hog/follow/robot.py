@@ -20,7 +20,7 @@ class RobotError(LimoHogError, ValueError):
 
 
 def _within(default: float, low: float, high: float) -> Any:
-    return field(default=default, metadata={"limits": (low, high)})
+    return field(default=default, metadata={"range": (low, high)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class RobotGeometry:
     lidar_x: float = _within(0.103, -2.0, 2.0)
     lidar_z: float = _within(0.111, 0.01, 2.0)
     #: Which way the lidar's angle 0 looks [rad], counter-clockwise from straight ahead.
-    lidar_yaw: float = _within(0.0, -math.pi, math.pi)
+    lidar_yaw: float = _within(0.0, -math.tau, math.tau)
     #: Between the left and the right wheels, as the differential drive counts it [m].
     wheel_separation: float = _within(0.172, 0.02, 4.0)
     max_speed: float = _within(1.0, 0.01, 10.0)  #: The most that it is told to drive and to turn [m/s, rad/s].
@@ -51,11 +51,11 @@ class RobotGeometry:
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
-            if "limits" not in one.metadata:
+            if "range" not in one.metadata:
                 if not isinstance(value, bool):
                     raise RobotError(f"{one.name}: got {value!r}, want true or false")
                 continue
-            low, high = one.metadata["limits"]
+            low, high = one.metadata["range"]
             if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
                 raise RobotError(f"{one.name}: got {value!r}, want a number in {low:g} … {high:g}")
 

@@ -16,6 +16,8 @@ from limo_hog.exceptions import LimoHogError
 _FLAG = re.compile(r"--(en|dis)able-(rosout|stdout|external-lib)-logs")
 #: Options of ROS 2 with a value that change nothing here.
 _WITHOUT_EFFECT = ("--log-level", "--log-config-file", "--log-file-name", "-e", "--enclave")
+#: Parameters are nested no deeper: namespaces, node and the dots of a name.
+_DEEPEST = 50
 _NAME = r"(?:~/|/)?[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*"
 #: A remap rule: "node:from:=to", the node left out for every node; a namespace is absolute.
 _RULE = re.compile(
@@ -135,9 +137,12 @@ def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
 
 def _read_parameters(path: Path, into: RosArguments) -> None:
     """Add the content of a parameter file."""
-    if not path.is_file():
-        raise RosArgumentError(f"--params-file {path}: no such file")
-    _add(_yaml(path.read_text(encoding="utf-8"), f"--params-file {path}"), "", path, into)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise RosArgumentError(f"--params-file {path}: cannot be read: {why.lower()}") from error
+    _add(_yaml(text, f"--params-file {path}"), "", path, into)
 
 
 def _add(section: Any, node: str, path: Path, into: RosArguments) -> None:
@@ -162,7 +167,7 @@ def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _yaml(text: str, where: str) -> Any:
-    """Return what a text in YAML says; `where` names it in the error."""
+    """Return what a text in YAML says; `where` names it in the error. As in ROS 2, there are no aliases."""
     # rosbags brings ruamel.yaml along
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MantissaNoDotYAML1_1Warning, YAMLError
@@ -173,6 +178,13 @@ def _yaml(text: str, where: str) -> Any:
         with warnings.catch_warnings():
             # ROS 2 reads 1e3 as a number, though YAML 1.1 wants 1.0e3.
             warnings.simplefilter("ignore", MantissaNoDotYAML1_1Warning)
+            depth = 0
+            for token in yaml.scan(io.StringIO(text)):
+                kind = type(token).__name__
+                depth += ("Start" in kind) - ("End" in kind)
+                if kind == "AliasToken" or depth > _DEEPEST:
+                    why = "an alias (*name)" if kind == "AliasToken" else f"nested more than {_DEEPEST} deep"
+                    raise RosArgumentError(f"{where}: {why}, which is not read")
             return yaml.load(io.StringIO(text))
     except YAMLError as error:
         raise RosArgumentError(f"{where}: not YAML: {str(error).splitlines()[0]}") from error

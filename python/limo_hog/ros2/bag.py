@@ -33,8 +33,8 @@ with needed(by="a recording"):
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
     from rosbags.typesys.store import Typestore
 
-#: The longest record and the largest chunk that are read [bytes]: ten 4K images as they come from a camera.
-MAX_RECORD = 1 << 28
+#: The longest record and the largest chunk that are read [bytes]: five 4K images as they come from a camera.
+MAX_RECORD = 1 << 27
 #: The longest message definition that is read [bytes]; the longest of ROS 2's own has 12 000.
 MAX_DEFINITION = 1 << 17
 #: Types whose fields are read: a recording must mean by them what ROS 2 Humble and Jazzy mean.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -33,11 +33,15 @@ _PREFIX = "rt"
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """A topic as others offer it: its ROS type, and how many publish and subscribe."""
+    """A topic as others offer it: of each that publishes and that subscribes its ROS type and quality of service."""
 
-    type_name: str
-    publishers: int
-    subscriptions: int
+    publishers: list[tuple[str, str]] = field(default_factory=list)
+    subscriptions: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def types(self) -> list[str]:
+        """All ROS types; there should be one."""
+        return sorted({kind for kind, _ in (*self.publishers, *self.subscriptions)})
 
 
 @cache
@@ -303,16 +307,18 @@ class Bus:
         }
 
     def _endpoints(self, readers: list[Any]) -> dict[str, Endpoints]:
-        counts: dict[str, tuple[str, list[int]]] = {}
+        found: dict[str, Endpoints] = {}
         for index, reader in enumerate(readers):
             for sample in reader.read(1000):
                 alive = sample.sample_info.instance_state == Instance.Alive
                 if not alive or not sample.topic_name.startswith(f"{_PREFIX}/"):
                     continue
-                name, kind = sample.topic_name.removeprefix(_PREFIX), _ros_type(sample.type_name)
-                known = counts.setdefault(name, (kind, [0, 0]))
-                known[1][index] += 1
-        return {name: Endpoints(kind, *numbers) for name, (kind, numbers) in sorted(counts.items())}
+                name, qos = sample.topic_name.removeprefix(_PREFIX), sample.qos
+                kinds = (type(qos[policy]).__name__ for policy in (Policy.Reliability, Policy.Durability))
+                one = _ros_type(sample.type_name), ", ".join(kind.rpartition(".")[2] for kind in kinds)
+                ends = found.setdefault(name, Endpoints())
+                (ends.publishers, ends.subscriptions)[index].append(one)
+        return dict(sorted(found.items()))
 
 
 def _ros_type(type_name: str) -> str:

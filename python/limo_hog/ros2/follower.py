@@ -16,9 +16,10 @@ from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.dds import Bus, Endpoints
+from limo_hog.ros2.frames import Mounts
 from limo_hog.ros2.messages import MessageError
 from limo_hog.ros2.network import BusError
-from limo_hog.ros2.outputs import Commands, Findings
+from limo_hog.ros2.outputs import Commands, Findings, frame_named
 from limo_hog.ros2.senses import Senses, picture_of
 
 S = TypeVar("S")
@@ -78,7 +79,7 @@ def camera_topic(bus: Bus, *, compressed: bool = False) -> str:
     names_here = {topic: names.resolved(bus.node, topic) for topic in wanted}
 
     def offered(topic: str, found: dict[str, Endpoints]) -> bool:
-        return names_here[topic] in found and found[names_here[topic]].publishers > 0
+        return names_here[topic] in found and bool(found[names_here[topic]].publishers)
 
     found = bus.topics(SILENT_AFTER, enough=lambda found: any(offered(topic, found) for topic in wanted))
     if not any(offered(topic, found) for topic in wanted):
@@ -94,7 +95,7 @@ def camera_topic(bus: Bus, *, compressed: bool = False) -> str:
 def _images_in(found: dict[str, Endpoints]) -> str:
     """Say which images there are, and how one is chosen."""
     kinds = (names.TYPES[names.IMAGE], names.TYPES[names.IMAGE_COMPRESSED])
-    images = [topic for topic, ends in found.items() if ends.type_name in kinds and ends.publishers]
+    images = [topic for topic, ends in found.items() if ends.publishers and ends.publishers[0][0] in kinds]
     if images:
         own = names.IMAGE.lstrip("/")
         return f"images are on {', '.join(images)}: choose one by --ros-args -r {own}:=TOPIC"
@@ -110,29 +111,34 @@ class Inputs:
         The other sensors' newest readings.
     complaint
         Why the last message that was not read was not; "" while all were.
+    frames
+        The frame that the newest message of each topic names.
     """
 
     def __init__(self, bus: Bus, camera: str, robot: RobotGeometry = LIMO) -> None:
         self.senses = Senses(robot)
         self.complaint, self._unreadable = "", 0
-        self._camera = bus.subscription(camera, names.TYPES[camera], depth=5)
-        self._others = [
-            bus.subscription(topic, names.TYPES[topic], depth=5)
+        self.frames: dict[str, str] = {}
+        self._topic, self._camera = camera, bus.subscription(camera, names.TYPES[camera], depth=5)
+        self._others = {
+            topic: bus.subscription(topic, names.TYPES[topic], depth=5)
             for topic in (names.CAMERA_INFO, names.DEPTH, names.SCAN, names.ODOMETRY)
-        ]
+        }
 
     @property
     def dropped(self) -> int:
         """How many messages could not be read, or contradicted themselves."""
-        return self._unreadable + sum(reader.dropped for reader in (self._camera, *self._others))
+        return self._unreadable + sum(reader.dropped for reader in (self._camera, *self._others.values()))
 
     def newest(self) -> Frame | None:
         """Take in what has come; returns the newest camera image, if there is a new one."""
-        for reader in self._others:
+        for topic, reader in self._others.items():
             for message in reader.take():
+                self.frames[topic] = message.header.frame_id
                 self._read(self.senses.take, message)
         # Older images are passed over: the robot acts on the newest.
         for message in reversed(self._camera.take()):
+            self.frames[self._topic] = message.header.frame_id
             picture = self._read(picture_of, message)
             if picture is not None:
                 return self.senses.frame(messages.to_seconds(message.header.stamp), picture)
@@ -145,6 +151,37 @@ class Inputs:
         except MessageError as error:
             self.complaint, self._unreadable = str(error), self._unreadable + 1
             return None
+
+
+def mounted(bus: Bus, inputs: Inputs, camera: str, robot: RobotGeometry) -> tuple[RobotGeometry, str]:
+    """Return the robot with its sensors where /tf_static has them, and a line that says where they sit.
+
+    Waits some seconds for the frames, where somebody publishes some; `camera` is the topic of its images.
+
+    Raises
+    ------
+    RobotError
+        /tf_static has a sensor where none of this robot can be.
+    """
+    mounts, whole = Mounts(), False
+    static = names.resolved(bus.node, names.TF_STATIC)
+    found = bus.topics(0.5, enough=lambda found: static in found and bool(found[static].publishers))
+    if static in found and found[static].publishers:
+        frames = bus.subscription(names.TF_STATIC, names.TYPES[names.TF_STATIC], depth=100, kept=True)
+        until, base, file = time.monotonic() + SETTLED, frame_named(bus, "base_frame"), robot
+        while not whole and time.monotonic() < until:
+            bus.wait(CONTROL_PERIOD / 2)
+            inputs.newest()
+            for message in frames.take():
+                mounts.take(message)
+            own = inputs.frames.get(camera, ""), inputs.frames.get(names.SCAN, "")
+            robot, whole = mounts.applied(file, base, *own)
+    turned = f"turned by {math.degrees(robot.lidar_yaw):.0f}°"
+    camera_at = f"camera {robot.camera_x:.2f} m ahead, {robot.camera_z:.2f} m high"
+    return (
+        robot,
+        f"{camera_at} · lidar {robot.lidar_x:.2f} m ahead, {turned} ({'by' if whole else 'not in'} /tf_static)",
+    )
 
 
 def drive(
@@ -171,10 +208,14 @@ def drive(
     ------
     BusError
         If there is no camera, or no image comes for 10 s.
+    RobotError
+        As `mounted` has it.
     """
     camera = camera_topic(bus, compressed=compressed)
     inputs = Inputs(bus, camera, robot)
     commands, findings = Commands(bus) if moves else None, Findings(bus)
+    robot, line = mounted(bus, inputs, camera, robot)
+    say(line)
     follower = Follower(controller, detector, robot, without_lidar=without_lidar)
     report = Report() if report is None else report
     first, said = math.inf, ""

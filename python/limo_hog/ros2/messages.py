@@ -172,6 +172,12 @@ def to_time(stamp: float) -> Time:
     return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
+def type_of(message: Any) -> str:
+    """Return the ROS type of a message, one of ours or of rclpy's."""
+    kind = type(message)
+    return getattr(message, "__msgtype__", None) or f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+
+
 def to_seconds(time: Any) -> float:
     """Return a stamp in seconds."""
     return cast(float, time.sec + time.nanosec * 1e-9)

@@ -28,7 +28,7 @@ CAMERA_ENCODINGS = ("bgr8", "rgb8", "bgra8", "rgba8", "mono8", "mono16", "yuv422
 
 
 class Senses:
-    """Takes in sensor messages and tells what was known when a camera image was taken.
+    """Takes in sensor messages, ours or rclpy's, and tells what was known when a camera image was taken.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Senses:
         MessageError
             The message contradicts itself, or an Image is not a depth image.
         """
-        kind = message.__msgtype__
+        kind = messages.type_of(message)
         if kind == "sensor_msgs/msg/CameraInfo":
             focal_px = float(message.k[0])
             # An uncalibrated driver publishes zeros.
@@ -64,7 +64,7 @@ class Senses:
         elif kind == "nav_msgs/msg/Odometry":
             self.odometry = messages.to_odometry(message)
         elif kind == "sensor_msgs/msg/Image":
-            self._depths.append((messages.to_seconds(message.header.stamp), _metres(message)))
+            self._depths.append((stamp_of(message), _metres(message)))
 
     def newest(self, stamp: float) -> float:
         """Return the newest of the stamps of an image, of the scan and of the odometry [s]."""
@@ -105,6 +105,11 @@ class Senses:
         return Frame(stamp, image, focal_px, depth if gap <= SLOP else None)
 
 
+def stamp_of(message: Any) -> float:
+    """Return when a message was taken, by its header [s]."""
+    return messages.to_seconds(message.header.stamp)
+
+
 def picture_of(message: Any) -> NDArray[np.uint8]:
     """Return the pixels of a camera's Image or CompressedImage, uint8 (H, W, 3) BGR; gray is given three channels.
 
@@ -113,7 +118,7 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
     MessageError
         The message contradicts itself, or its encoding is none of a camera's.
     """
-    if message.__msgtype__ == "sensor_msgs/msg/CompressedImage":
+    if messages.type_of(message) == "sensor_msgs/msg/CompressedImage":
         pixels: NDArray[Any] = messages.decompressed(message)
     else:
         pixels = messages.pixels_of(message)

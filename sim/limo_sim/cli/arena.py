@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     from limo_sim.ros.live import run_live, second_publishers
     from limo_sim.world.scenario import Scenario
 
-    scenario = Scenario.load(args.scenario)
+    scenario = Scenario.load(args.scenario, args.robot)
     bus: Bus | None = None
     if args.ros2:
         from limo_hog.ros2.dds import Bus

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limo_hog.cli.support.arguments import add_json, add_ros_arguments
-from limo_hog.cli.support.output import STDOUT
+from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
@@ -86,6 +86,8 @@ def _scene(args: argparse.Namespace) -> tuple[Scenario, float, list[str]]:
     from limo_sim.world.variants import of_run
 
     if args.scenario.startswith("check:"):
+        if args.robot:
+            raise UsageError(f"--robot {args.robot}: a scene of the checker has a Limo; give another --scenario")
         scene = scene_named(args.scenario.removeprefix("check:"))
         return scene.scenario, args.seconds or scene.seconds, [*scene.arguments, *args.ros_args]
-    return of_run(Scenario.load(args.scenario), args.seed), args.seconds or 60.0, args.ros_args
+    return of_run(Scenario.load(args.scenario, args.robot), args.seed), args.seconds or 60.0, args.ros_args

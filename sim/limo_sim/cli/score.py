@@ -14,7 +14,15 @@ from rich.table import Table
 from rich.text import Text
 
 from limo_hog.atomic import about, whole_file
-from limo_hog.cli.support.arguments import add_json, add_target_and_detector, count, file_ending, seconds, seed
+from limo_hog.cli.support.arguments import (
+    add_json,
+    add_robot,
+    add_target_and_detector,
+    count,
+    file_ending,
+    seconds,
+    seed,
+)
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
@@ -65,6 +73,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default=CONTROLLERS,
         help="only these, of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)",
     )
+    add_robot(parser)
     parser.add_argument("--against", metavar="NAME", help="compare the others with this controller, run by run")
     parser.add_argument("--seeds", type=count, default=20, metavar="N", help="how many of each (%(default)s)")
     parser.add_argument("--seed-start", type=seed, default=0, metavar="N", help="the first of the seeds (%(default)s)")
@@ -158,7 +167,7 @@ def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
     # The table and the score cards know a scenario by the name it gives itself.
     called: dict[str, str] = {}
     for name in scenarios:
-        title = Scenario.load(name).name
+        title = Scenario.load(name, args.robot).name
         if title in called:
             raise UsageError(f"{name}: is called {title!r}, as {called[title]} is; give it another name")
         called[title] = name
@@ -167,7 +176,7 @@ def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
         controller_of(name, args.target)
     duration = suite.seconds if suite is not None else args.seconds or _SECONDS
     return [
-        Run(scenario, controller, args.detector, number, duration, args.target)
+        Run(scenario, controller, args.detector, number, duration, args.target, args.robot)
         for scenario in scenarios
         for controller in args.controller
         for number in range(args.seed_start, args.seed_start + args.seeds)

@@ -146,7 +146,7 @@ def observing(
         if args.record is not None:
             from limo_sim.view.record import recorded
 
-            observers.keepers.append(stack.enter_context(recorded(args.record, scenario.camera)))
+            observers.keepers.append(stack.enter_context(recorded(args.record, scenario)))
         if args.view:
             from limo_sim.view.server import View
 

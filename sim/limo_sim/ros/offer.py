@@ -15,6 +15,7 @@ from limo_sim.ros.rclpy_stub import (
     future,
     groups,
     logger,
+    naming,
     node,
     parameters,
     qos,
@@ -43,7 +44,7 @@ def _of(module: Any, names: str) -> dict[str, Any]:
 
 
 def _rclpy() -> dict[str, dict[str, Any]]:
-    context = {"ok": _ok, "shutdown": _shutdown, "try_shutdown": _shutdown}
+    context = {"ok": _ok, "shutdown": _shutdown, "try_shutdown": _try_shutdown}
     return {
         "rclpy": {
             **context,
@@ -69,8 +70,10 @@ def _rclpy() -> dict[str, dict[str, Any]]:
         "rclpy.parameter": _of(parameters, "Parameter ParameterType ParameterValue"),
         "rclpy.exceptions": {
             **_of(parameters, "ParameterException ParameterNotDeclaredException ParameterAlreadyDeclaredException"),
-            **_of(parameters, "InvalidParameterTypeException"),
+            **_of(parameters, "InvalidParameterTypeException InvalidParameterValueException"),
             **_of(node, "NotInitializedException"),
+            **_of(naming, "NameValidationException InvalidNodeNameException InvalidNamespaceException"),
+            **_of(naming, "InvalidTopicNameException InvalidServiceNameException"),
         },
         "rclpy.executors": {
             **_of(executors, "Executor SingleThreadedExecutor MultiThreadedExecutor"),
@@ -120,12 +123,17 @@ def _init(
     run = _current()
     run.init(args)
     ended = contextlib.ExitStack()
-    ended.callback(run.shutdown)
+    ended.callback(_try_shutdown)
     return ended
 
 
 def _shutdown(*, context: Any = None, uninstall_handlers: bool | None = None) -> None:  # noqa: ARG001
     _current().shutdown()
+
+
+def _try_shutdown(*, context: Any = None, uninstall_handlers: bool | None = None) -> None:  # noqa: ARG001
+    if _current().is_initialized:
+        _current().shutdown()
 
 
 def _ok(*, context: Any = None) -> bool:  # noqa: ARG001 — rclpy's signature

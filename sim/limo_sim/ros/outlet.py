@@ -9,7 +9,7 @@ from typing import Any
 
 from limo_hog.ros2 import frames, messages, names
 from limo_sim.run.arena import Arena
-from limo_sim.sensing.camera import FOCAL_PX, HEIGHT, WIDTH
+from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.sensing.imu import ImuReading
 
 #: A topic, and a function that makes its message: called only where the topic has readers.
@@ -30,7 +30,7 @@ class Outlet:
         out: list[Outgoing] = [(names.CLOCK, lambda: messages.clock(arena.time))]
         if not self._began:
             self._began = True
-            out.append((names.TF_STATIC, lambda: frames.static_transforms(arena.time)))
+            out.append((names.TF_STATIC, lambda: frames.static_transforms(arena.time, arena.robot)))
         out += [(names.IMU, partial(_imu, reading)) for reading in arena.imu()]
         odometry, scan, frame = arena.odometry(), arena.scan(), arena.frame()
         if odometry.stamp > self._wheels:
@@ -45,8 +45,8 @@ class Outlet:
             self._camera = stamp = frame.stamp
             bent = arena.scenario.camera.k1, arena.scenario.camera.k2
             out += [
-                (names.CAMERA_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX, bent)),
-                (names.DEPTH_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, FOCAL_PX, bent)),
+                (names.CAMERA_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, frame.focal_px, bent)),
+                (names.DEPTH_INFO, lambda: messages.camera_info(stamp, WIDTH, HEIGHT, frame.focal_px, bent)),
                 (names.DEPTH, lambda: messages.image(stamp, frame.depth)),
                 (names.DEPTH_LCAS, lambda: messages.image(stamp, frame.depth)),
                 (names.IMAGE, lambda: messages.image(stamp, frame.image)),

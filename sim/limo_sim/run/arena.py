@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pymunk
 
-from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.signals import held
 from limo_sim.sensing import imu, lidar
-from limo_sim.sensing.camera import FOCAL_PX, CameraPose, TrueFrame
+from limo_sim.sensing.camera import WIDTH, CameraPose, TrueFrame
 from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Earlier, Renderer, Seen
 from limo_sim.world.crowd import STEP_S, Crowd
@@ -89,8 +89,8 @@ class Arena:
         self.scenario = scenario = of_run(scenario, seed)
         self.seed = seed
         self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario.movers)
-        robot = scenario.robot
-        self._drive = Drive(robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
+        robot, self.robot = scenario.robot, scenario.robot.geometry
+        self._drive = Drive(self.robot.wheel_separation, robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
         self._slip = self._stream(SLIP_STREAM)
         self._touched = {_OBSTACLE: -STEPS_PER_SECOND, _PERSON: -STEPS_PER_SECOND}
         self._contacts = {_OBSTACLE: 0, _PERSON: 0}
@@ -149,10 +149,10 @@ class Arena:
             body.angular_velocity = math.remainder(piece.yaw - body.angle, math.tau) / STEP_S
         with held():  # an exception in one of pymunk's callbacks would be printed and lost
             self._space.step(STEP_S)
-        robot = self._robot
-        twist, wheels = self._drive.twist, before.odometry
+        robot, drive = self._robot, self._drive
+        twist, wheels = drive.twist, before.odometry
         left, right = STEP_S * (1.0 + self.scenario.odometry.slip * self._slip.standard_normal(2))
-        rolled = twist_of(float(left) * self._drive.left, float(right) * self._drive.right)
+        rolled = twist_of(float(left) * drive.left, float(right) * drive.right, drive.separation)
         x, y, yaw = integrate(wheels.x, wheels.y, wheels.yaw, rolled.linear, rolled.angular)
         self._before = before
         self._state = _State(
@@ -177,14 +177,15 @@ class Arena:
         state = exposure.state
         if self._frame is None or self._frame.stamp != state.time:
             image, depth, seen = self._render().render(
-                _camera_at(state),
+                self._camera_at(state),
                 state.people,
                 self._stream(CAMERA_STREAM, exposure),
                 self._movers.at(state.time),
                 time=state.time,
                 past=Earlier(partial(self._earlier, state), state.turn_rate),
             )
-            self._frame = TrueFrame(state.time, image, FOCAL_PX, depth, self._truth_at(state, seen))
+            focal_px = self.robot.focal_px(WIDTH)
+            self._frame = TrueFrame(state.time, image, focal_px, depth, self._truth_at(state, seen))
         return self._frame
 
     def scan(self) -> Scan:
@@ -196,11 +197,11 @@ class Arena:
             shapes += _scanned(self._movers.at(state.time))
             for person, pose in zip(self.scenario.people, state.people, strict=True):
                 if pose is not None:
-                    shapes += legs_at(person, pose, lidar.MOUNT_HEIGHT)
-            x = state.x + lidar.MOUNT_AHEAD * math.cos(state.yaw)
-            y = state.y + lidar.MOUNT_AHEAD * math.sin(state.yaw)
+                    shapes += legs_at(person, pose, self.robot.lidar_z)
+            x = state.x + self.robot.lidar_x * math.cos(state.yaw)
+            y = state.y + self.robot.lidar_x * math.sin(state.yaw)
             ranges = lidar.measure(
-                lidar.cast(x, y, state.yaw, shapes, self.scenario.room.half),
+                lidar.cast(x, y, state.yaw + self.robot.lidar_yaw, shapes, self.scenario.room.half),
                 self.scenario.lidar.noise_m,
                 self._stream(LIDAR_STREAM, exposure),
             )
@@ -228,13 +229,13 @@ class Arena:
         """Return the truth now (`TrueFrame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
-        seen = self._render().look(_camera_at(self._state), self._state.people, self._movers.at(self.time))
+        seen = self._render().look(self._camera_at(self._state), self._state.people, self._movers.at(self.time))
         return self._truth_at(self._state, seen)
 
     def furniture_in_frame(self) -> list[Seen]:
         """Return the visible share and the box [px] of each piece of furniture in the newest frame; movers last."""
         state = self._camera.newest.state
-        return self._render().look_at_furniture(_camera_at(state), state.people, self._movers.at(state.time))
+        return self._render().look_at_furniture(self._camera_at(state), state.people, self._movers.at(state.time))
 
     def plan(self, *, of_frame: bool = False) -> Plan:
         """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
@@ -250,7 +251,7 @@ class Arena:
         """Return what there was some seconds before a state, within a step or a few of it."""
         (speed_x, speed_y), share = state.velocity, age / STEP_S
         camera = CameraPose.on_robot(
-            state.x - age * speed_x, state.y - age * speed_y, state.yaw - age * state.turn_rate
+            self.robot, state.x - age * speed_x, state.y - age * speed_y, state.yaw - age * state.turn_rate
         )
         people = [earlier(was, now, share) for was, now in zip(state.people_before, state.people, strict=True)]
         return camera, people, self._movers.at(max(state.time - age, 0.0))
@@ -258,11 +259,14 @@ class Arena:
     def _channel(self, sensor: Camera | Lidar | Wheels, **drops: Any) -> Channel[_State]:
         return Channel(sensor.rate_hz, STEPS_PER_SECOND, self._state, latency_s=sensor.latency_s, **drops)
 
+    def _camera_at(self, state: _State) -> CameraPose:
+        return CameraPose.on_robot(self.robot, state.x, state.y, state.yaw)
+
     def _stream(self, sensor: int, exposure: Exposure[_State] | None = None) -> np.random.Generator:
         return np.random.default_rng([self.seed, sensor, exposure.index if exposure else 0])
 
     def _truth_at(self, state: _State, seen: list[Seen]) -> Truth:
-        camera = _camera_at(state)
+        camera = self._camera_at(state)
         people: list[PersonTruth | None] = []
         for person, pose, (visible, box) in zip(self.scenario.people, state.people, seen, strict=True):
             if pose is None:
@@ -277,7 +281,7 @@ class Arena:
 
     def _add_robot(self) -> pymunk.Body:
         settings = self.scenario.robot
-        size = (2 * LIMO.half_length, 2 * LIMO.half_width)
+        size = (2 * self.robot.half_length, 2 * self.robot.half_width)
         robot = pymunk.Body(mass=_MASS, moment=pymunk.moment_for_box(_MASS, size))
         robot.position = settings.x, settings.y
         robot.angle = settings.yaw
@@ -350,7 +354,3 @@ def _obstacle(body: pymunk.Body, footprint: Disc | Rectangle) -> pymunk.Shape:
 def _scanned(pieces: Iterable[Furniture]) -> list[Disc | Rectangle]:
     """Return what the lidar sees of furniture."""
     return [placed(shape, piece.x, piece.y, piece.yaw) for piece in pieces for shape in KINDS[piece.kind].scanned]
-
-
-def _camera_at(state: _State) -> CameraPose:
-    return CameraPose.on_robot(state.x, state.y, state.yaw)

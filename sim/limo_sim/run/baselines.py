@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from limo_hog.follow.control.naming import CONTROLLERS, ControllerError, controller_named
 from limo_hog.follow.decision import Controller, Decision, Mode
 from limo_hog.follow.parameters import param
-from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.measurement import measure
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_sim.run.last_seen import SCALE, SIZE, LastSeen, sighted, state_of
@@ -67,6 +67,7 @@ class PurePursuit:
     linear_gain: float = param(0.8, "1/s", "Speed for each metre of error.", 0, 5)
     max_linear: float = param(0.7, "m/s", "Limit of the speed; it never drives backwards.", 0, 1)
     max_angular: float = param(1.5, "rad/s", "Limit of the turn rate, either way.", 0, 3)
+    robot: RobotGeometry = LIMO  #: where its camera sits
 
     def start(self) -> LastSeen | None:
         """Return the state before the first observation."""
@@ -75,12 +76,12 @@ class PurePursuit:
     def step(self, observation: Observation, state: LastSeen | None) -> Decision[LastSeen | None]:
         """Drive towards the last sighting; stand where there was none."""
         odometry = observation.odometry or Odometry()
-        target, state = _look(observation, odometry, state)
+        target, state = _look(observation, self.robot, odometry, state)
         if state is None:
             return Decision(Twist(), None, Mode.SEARCH, "no person detected")
         dx, dy = state.x - odometry.x, state.y - odometry.y
         bearing, distance = math.atan2(dy, dx) - odometry.yaw, math.hypot(dx, dy)
-        error = distance - LIMO.camera_x - self.target_distance
+        error = distance - self.robot.camera_x - self.target_distance
         linear = min(max(self.linear_gain * error, 0.0), self.max_linear)
         angular = 2.0 * linear * math.sin(bearing) / max(distance, 0.1)
         twist = Twist(linear, min(max(angular, -self.max_angular), self.max_angular))
@@ -104,6 +105,7 @@ class Policy:
     #: with tanh between them, from the 9 numbers of `state_of` to the 2 of an action.
     path: Path
     target_distance: float = 1.5  #: the distance that the environment's reward holds best [m]
+    robot: RobotGeometry = LIMO  #: where its camera sits
 
     def __post_init__(self) -> None:
         # A wrong file is an error before the robot starts.
@@ -116,7 +118,7 @@ class Policy:
     def step(self, observation: Observation, state: LastSeen | None) -> Decision[LastSeen | None]:
         """Do what the network says."""
         odometry = observation.odometry or Odometry()
-        target, state = _look(observation, odometry, state)
+        target, state = _look(observation, self.robot, odometry, state)
         values = state_of(state, target is not None, observation.now, odometry)
         linear, angular = self.act(values).tolist()
         mode = Mode.FOLLOW if target is not None else Mode.SEARCH if state is None else Mode.LOST
@@ -145,14 +147,16 @@ class Policy:
         return layers
 
 
-def _look(observation: Observation, odometry: Odometry, before: LastSeen | None) -> tuple[int | None, LastSeen | None]:
+def _look(
+    observation: Observation, robot: RobotGeometry, odometry: Odometry, before: LastSeen | None
+) -> tuple[int | None, LastSeen | None]:
     """Return the box that is the person's, and the newest sighting.
 
     The first person is the one with the highest score; then the box nearest to where that person would be now.
     """
     seen = [
         (index, sighted(found.bearing, found.range, observation.stamp, odometry, before))
-        for index, found in enumerate(measure(observation, LIMO))
+        for index, found in enumerate(measure(observation, robot))
         if found.range is not None
     ]
     if not seen:

@@ -96,7 +96,8 @@ def run_episode(
     search: Search = detect_in
     if scenario.detector != DetectorFaults():
         search = FaultySearch(arena.scenario, seed, lambda: arena.frame().truth)
-    episode = play(arena, Follower(controller, detector, search=search), seconds, names=names, watch=watch)
+    follower = Follower(controller, detector, scenario.robot.geometry, search=search)
+    episode = play(arena, follower, seconds, names=names, watch=watch)
     return replace(episode, target_distance=getattr(controller, "target_distance", None))
 
 

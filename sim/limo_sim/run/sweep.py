@@ -42,6 +42,7 @@ class Run:
     seed: int
     seconds: float
     target: float | None = None
+    robot: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +104,7 @@ def play(run: Run) -> ScoreCard:
     cv2.setNumThreads(1)
     controller = controller_of(run.controller, run.target)
     names = (run.controller, run.detector)
-    scenario, detector = Scenario.load(run.scenario), detector_named(run.detector)
+    scenario, detector = Scenario.load(run.scenario, run.robot), detector_named(run.detector)
     return score(run_episode(scenario, controller, detector, run.seconds, run.seed, names=names))
 
 

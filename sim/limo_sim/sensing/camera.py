@@ -12,31 +12,38 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.observation import Frame
 from limo_sim.world.truth import Truth
 
 WIDTH, HEIGHT = 640, 480
-FIELD = LIMO.field_of_view
-"""Horizontal field of view [rad]."""
-FOCAL_PX = LIMO.focal_px(WIDTH)
 CENTRE_X, CENTRE_Y = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
-MOUNT_AHEAD, MOUNT_HEIGHT = LIMO.camera_x, LIMO.camera_z
-"""Where the camera sits: ahead of the base centre and above the floor [m]; it looks level, straight ahead."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraPose:
-    """Where the camera is in the arena's frame and which way it looks [m, m, rad]."""
+    """Where the camera is in the arena's frame and which way it looks, level [m, m, rad]; by default a Limo's.
+
+    Attributes
+    ----------
+    height
+        Above the floor [m].
+    focal_px
+        Its focal length [px].
+    """
 
     x: float
     y: float
     yaw: float
+    height: float = LIMO.camera_z
+    focal_px: float = LIMO.focal_px(WIDTH)
 
     @classmethod
-    def on_robot(cls, x: float, y: float, yaw: float) -> CameraPose:
-        """Return the pose of the camera on a robot whose base centre is at (x, y, yaw)."""
-        return cls(x + MOUNT_AHEAD * math.cos(yaw), y + MOUNT_AHEAD * math.sin(yaw), yaw)
+    def on_robot(cls, robot: RobotGeometry, x: float, y: float, yaw: float) -> CameraPose:
+        """Return the camera of a robot whose base centre is at (x, y, yaw)."""
+        ahead = robot.camera_x
+        place = x + ahead * math.cos(yaw), y + ahead * math.sin(yaw)
+        return cls(*place, yaw, robot.camera_z, robot.focal_px(WIDTH))
 
     @property
     def rotation(self) -> NDArray[np.float64]:
@@ -52,7 +59,7 @@ class CameraPose:
 
     def to_camera(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Take points (N, 3) from the arena's frame to the camera's [m]."""
-        offset: NDArray[np.float64] = (points - np.array([self.x, self.y, MOUNT_HEIGHT])) @ self.rotation.T
+        offset: NDArray[np.float64] = (points - np.array([self.x, self.y, self.height])) @ self.rotation.T
         return offset
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import LIMO
 from limo_sim.world.furniture import Disc, Rectangle
 from limo_sim.world.rays import meet
 from limo_sim.world.scenario import ROOM_HALF
@@ -16,8 +15,6 @@ BEAMS = 292
 ANGLE_MAX = 2.0
 """First and last beam [rad], right and left of straight ahead."""
 RANGE_MIN, RANGE_MAX = 0.12, 8.0
-MOUNT_AHEAD, MOUNT_HEIGHT = LIMO.lidar_x, LIMO.lidar_z
-"""Where it sits: ahead of the base centre and above the floor [m]."""
 
 _ANGLES = np.linspace(-ANGLE_MAX, ANGLE_MAX, BEAMS)
 

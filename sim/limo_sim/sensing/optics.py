@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.extras import needed
-from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, WIDTH
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, HEIGHT, WIDTH
 from limo_sim.world.scenario import Camera
 
 with needed(by="the arena's camera"):
@@ -24,8 +24,8 @@ Box = tuple[int, int, int, int]
 # The scene moves by no more than this from one picture of an exposure to the next [px], and is drawn no more often than
 # that. Chosen: the edge of a person is two pixels wide as it is.
 _MOST_SHIFT, _MOST_PICTURES = 1.5, 12
-# How fast a person's silhouette moves across the image, beside the robot's own turn [px/s]: 0.75 m/s at 2 m.
-_PERSON_SHIFT = 0.75 / 2.0 * FOCAL_PX
+# How fast a person turns about the camera, beside the robot's own turn [rad/s]: 0.75 m/s at 2 m.
+_PERSON_TURN = 0.75 / 2.0
 _ALONG_BOX = 9  # places on each side of a box whose images tell the box of its image
 
 
@@ -33,11 +33,11 @@ class Lens:
     """Radial distortion after Brown and Conrady, as OpenCV's `distortPoints` has it: r' = r (1 + k1 r² + k2 r⁴).
 
     r is the distance from the optical axis at 1 m. Where the lens sees beyond the pinhole's image, the image is
-    mirrored at its edge.
+    mirrored at its edge. The focal length is in pixels.
     """
 
-    def __init__(self, k1: float, k2: float) -> None:
-        self._k1, self._k2 = k1, k2
+    def __init__(self, k1: float, k2: float, focal_px: float) -> None:
+        self._k1, self._k2, self._focal = k1, k2, focal_px
 
     @property
     def is_plain(self) -> bool:
@@ -47,16 +47,16 @@ class Lens:
     @cached_property
     def _maps(self) -> tuple[F32, F32]:
         """For every pixel the column and the row of the pinhole's image: float32 (480, 640) each."""
-        x = (np.arange(WIDTH) - CENTRE_X)[None, :] / FOCAL_PX
-        y = (np.arange(HEIGHT) - CENTRE_Y)[:, None] / FOCAL_PX
+        x = (np.arange(WIDTH) - CENTRE_X)[None, :] / self._focal
+        y = (np.arange(HEIGHT) - CENTRE_Y)[:, None] / self._focal
         bent = np.hypot(x, y)
         radii = np.linspace(0.0, 2.0, 20_001)
         images = self._bent(radii)
         rising = int(np.argmax(np.diff(images) <= 0)) or len(radii)
         shrink = np.interp(bent, images[:rising], radii[:rising]) / np.maximum(bent, 1e-12)
         return (
-            (CENTRE_X + FOCAL_PX * x * shrink).astype(np.float32),
-            (CENTRE_Y + FOCAL_PX * y * shrink).astype(np.float32),
+            (CENTRE_X + self._focal * x * shrink).astype(np.float32),
+            (CENTRE_Y + self._focal * y * shrink).astype(np.float32),
         )
 
     def image(self, picture: U8) -> U8:
@@ -76,10 +76,10 @@ class Lens:
         across, along = left - 0.5 + width * share, top - 0.5 + height * share
         columns = np.concatenate([across, across, np.full(_ALONG_BOX, across[0]), np.full(_ALONG_BOX, across[-1])])
         rows = np.concatenate([np.full(_ALONG_BOX, along[0]), np.full(_ALONG_BOX, along[-1]), along, along])
-        x, y = (columns - CENTRE_X) / FOCAL_PX, (rows - CENTRE_Y) / FOCAL_PX
+        x, y = (columns - CENTRE_X) / self._focal, (rows - CENTRE_Y) / self._focal
         radius = np.hypot(x, y)
         stretch = self._bent(radius) / np.maximum(radius, 1e-12)
-        u, v = CENTRE_X + FOCAL_PX * x * stretch, CENTRE_Y + FOCAL_PX * y * stretch
+        u, v = CENTRE_X + self._focal * x * stretch, CENTRE_Y + self._focal * y * stretch
         left, top = max(0, math.floor(float(u.min()) + 0.5)), max(0, math.floor(float(v.min()) + 0.5))
         right, foot = min(WIDTH, math.ceil(float(u.max()) + 0.5)), min(HEIGHT, math.ceil(float(v.max()) + 0.5))
         return (left, top, right - left, foot - top) if left < right and top < foot else None
@@ -91,11 +91,12 @@ class Lens:
 class Shutter:
     """Rows read one after the other, each exposed for a time; the last row's exposure ends at the stamp.
 
-    A frame is the mean of pictures taken at several instants, each row of those within its own exposure.
+    A frame is the mean of pictures taken at several instants, each row of those within its own exposure. The focal
+    length is in pixels.
     """
 
-    def __init__(self, settings: Camera) -> None:
-        self._exposure, self._readout = settings.exposure_s, settings.readout_s
+    def __init__(self, settings: Camera, focal_px: float) -> None:
+        self._exposure, self._readout, self._focal = settings.exposure_s, settings.readout_s, focal_px
 
     @property
     def is_instant(self) -> bool:
@@ -113,7 +114,7 @@ class Shutter:
             Of the camera [rad/s].
         """
         time = self._exposure + self._readout
-        shift = time * (abs(turn_rate) * FOCAL_PX + _PERSON_SHIFT)
+        shift = time * (abs(turn_rate) * self._focal + _PERSON_TURN * self._focal)
         count = min(max(2, math.ceil(shift / _MOST_SHIFT)), _MOST_PICTURES)
         shares = self._shares(count)
         frame = np.zeros(())

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.extras import needed
-from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, MOUNT_HEIGHT, WIDTH, CameraPose
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, WIDTH, CameraPose
 from limo_sim.world.furniture import Rectangle
 from limo_sim.world.people import door_of
 from limo_sim.world.scenario import WALL_HEIGHT, Scenario
@@ -129,14 +129,14 @@ class Paint:
                 continue
             # Of the picture's sizes the one that has at least as many pixels as the camera where the wall is nearest.
             pictures = self._picture(number)
-            size = math.log2(max(_FINE * float(depth[first:end].min()) / FOCAL_PX, 1.0))
+            size = math.log2(max(_FINE * float(depth[first:end].min()) / camera.focal_px, 1.0))
             level = min(int(size), len(pictures) - 1)
             scale = _FINE / 2**level
             to_wall = _to_wall(self._sides[number], camera, first)
             to_picture = np.array([[scale, 0.0, -0.5], [0.0, scale, -0.5], [0.0, 0.0, 1.0]]) @ to_wall
             near = float(depth[first:end].min())
-            top = max(0, math.floor(CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) / near))
-            foot = min(image.shape[0], math.ceil(CENTRE_Y + FOCAL_PX * MOUNT_HEIGHT / near) + 1)
+            top = max(0, math.floor(CENTRE_Y - camera.focal_px * (WALL_HEIGHT - camera.height) / near))
+            foot = min(image.shape[0], math.ceil(CENTRE_Y + camera.focal_px * camera.height / near) + 1)
             to_picture = to_picture @ np.array([[1.0, 0.0, 0.0], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
             there = np.ascontiguousarray(image[top:foot, first:end])
             cv2.warpPerspective(
@@ -200,15 +200,15 @@ def _to_wall(side: Side, camera: CameraPose, first: int) -> F64:
 
     def linear(x: float, y: float) -> F64:
         """Return the product of a vector with a column's ray, as a linear function of column, row and 1."""
-        slope = (x * right_x + y * right_y) / FOCAL_PX
+        slope = (x * right_x + y * right_y) / camera.focal_px
         return np.array([slope, 0.0, x * look_x + y * look_y + slope * (first - CENTRE_X)])
 
     away = -(normal_x * from_x + normal_y * from_y)
     towards = linear(normal_x, normal_y)
     start = side.along[0] * from_x + side.along[1] * from_y
-    down = np.array([0.0, 1.0 / FOCAL_PX, -CENTRE_Y / FOCAL_PX])
+    down = np.array([0.0, 1.0 / camera.focal_px, -CENTRE_Y / camera.focal_px])
     return np.stack(
-        [start * towards + away * linear(*side.along), (WALL_HEIGHT - MOUNT_HEIGHT) * towards + away * down, towards]
+        [start * towards + away * linear(*side.along), (WALL_HEIGHT - camera.height) * towards + away * down, towards]
     )
 
 

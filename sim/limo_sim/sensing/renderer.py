@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from limo_hog._core import Canvas
 from limo_hog.extras import needed
-from limo_sim.sensing.camera import CENTRE_Y, FOCAL_PX, HEIGHT, MOUNT_HEIGHT, WIDTH, CameraPose
+from limo_sim.sensing.camera import CENTRE_Y, HEIGHT, WIDTH, CameraPose
 from limo_sim.sensing.optics import Lens, Shutter
-from limo_sim.sensing.room import COLUMNS, FLOOR_DEPTH, Room
+from limo_sim.sensing.room import Room
 from limo_sim.sensing.solids import (
     F32,
     TONES,
@@ -82,16 +82,17 @@ class Renderer:
         self._room = Room(scenario)
         self._palettes = [_palette(body(person, Pose(0, 0, 0)).colours.tolist()) for person in scenario.people]
         self._models = {piece: _model(piece) for piece in scenario.furniture}
-        self._lens, self._shutter = Lens(scenario.camera.k1, scenario.camera.k2), Shutter(scenario.camera)
+        settings, focal = scenario.camera, scenario.robot.geometry.focal_px(WIDTH)
+        self._lens, self._shutter = Lens(settings.k1, settings.k2, focal), Shutter(settings, focal)
         shape = (HEIGHT + _BANK_MARGIN, WIDTH + _BANK_MARGIN)
         unit = noise.standard_normal(shape, dtype=np.float32)
-        grey = np.rint(unit * np.float32(scenario.camera.noise))
+        grey = np.rint(unit * np.float32(settings.noise))
         self._brighter, self._darker = (
             cv2.cvtColor(np.clip(part, 0, 255).astype(np.uint8), cv2.COLOR_GRAY2BGR) for part in (grey, -grey)
         )
         self._stretch = 1 + np.float32(scenario.depth.noise) * noise.standard_normal(shape, dtype=np.float32)
         self._colours = np.empty((HEIGHT, WIDTH), np.uint32)
-        self._canvas = Canvas(HEIGHT, WIDTH, FOCAL_PX)
+        self._canvas = Canvas(HEIGHT, WIDTH, focal)
         self._owner = np.empty((HEIGHT, WIDTH), np.int16)
         self._dead = round(scenario.depth.invalid * WIDTH * HEIGHT)
 
@@ -192,14 +193,14 @@ class Renderer:
             if pose is None:
                 continue
             if room is not None:
-                self._shade_floor(room, depth, camera.ahead_of(pose.x, pose.y), 0.25 * person.height)
+                self._shade_floor(room, depth, camera, (pose.x, pose.y), 0.25 * person.height)
             if shape := outline(body(person, pose), camera):
                 outlines[index] = shape
                 order.append((math.hypot(pose.x - camera.x, pose.y - camera.y), index))
         for piece in (*scenario.furniture, *movers):
             order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), piece))
             if room is not None:
-                self._shade_floor(room, depth, camera.ahead_of(piece.x, piece.y), 0.25)
+                self._shade_floor(room, depth, camera, (piece.x, piece.y), 0.25)
         if image is not None and room is not None:
             cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=_bytes(image))
             self._room.decorate(_bytes(image), columns, camera)
@@ -222,16 +223,19 @@ class Renderer:
             seen[index] = self._through_lens(share, box)
         return depth, seen
 
-    def _shade_floor(self, room: U8, depth: F32, at: tuple[float, float], radius: float) -> None:
-        """Darken the floor softly around something that stands on it, to the right of and ahead of the camera [m]."""
+    def _shade_floor(self, room: U8, depth: F32, camera: CameraPose, place: tuple[float, float], radius: float) -> None:
+        """Darken the floor softly around something that stands on it, at a place in the arena [m]."""
+        at = camera.ahead_of(*place)
         # the nearest floor that the camera sees lies at the image's lower edge
-        bounds = upright_bounds(*at, radius, 0.0, 0.0, near=MOUNT_HEIGHT * FOCAL_PX / (HEIGHT - CENTRE_Y))
+        near = camera.height * camera.focal_px / (HEIGHT - CENTRE_Y)
+        bounds = upright_bounds(camera, at, radius, (0.0, 0.0), near)
         if window := _window(bounds):
             left, top, right, bottom = window
             top = max(top, HEIGHT // 2)
             if top < bottom:
                 within = left, top, right, bottom
-                self._canvas.shade_floor(room, depth, FLOOR_DEPTH[:, 0], COLUMNS, within, at, radius, _SHADOW)
+                floor, columns = self._room.floor_depth[:, 0], self._room.columns
+                self._canvas.shade_floor(room, depth, floor, columns, within, at, radius, _SHADOW)
 
     def _draw_furniture(
         self, image: U32 | None, depth: F32, camera: CameraPose, piece: Furniture, sun: Sun, *, hides: bool
@@ -269,7 +273,7 @@ class _Model(NamedTuple):
 
 def _bounds(model: _Model, camera: CameraPose, piece: Furniture) -> Bounds | None:
     radius, height = model.extent
-    return upright_bounds(*camera.ahead_of(piece.x, piece.y), radius, 0.0, height)
+    return upright_bounds(camera, camera.ahead_of(piece.x, piece.y), radius, (0.0, height))
 
 
 def _model(piece: Furniture) -> _Model:

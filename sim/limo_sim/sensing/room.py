@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.extras import needed
-from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, MOUNT_HEIGHT, WIDTH, CameraPose
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, HEIGHT, WIDTH, CameraPose
 from limo_sim.sensing.paint import Paint, sides_of
 from limo_sim.sensing.solids import F32, Sun
 from limo_sim.world.rays import meet
@@ -22,17 +22,27 @@ U8 = NDArray[np.uint8]
 Columns = tuple[F32, NDArray[np.int64]]
 """For every column of the image the depth of the wall [m] and the number of the wall's side."""
 
-COLUMNS = ((np.arange(WIDTH) - CENTRE_X) / FOCAL_PX).astype(np.float32)
-_ROWS = ((np.arange(HEIGHT) - CENTRE_Y) / FOCAL_PX).astype(np.float32)[:, None]
-with np.errstate(divide="ignore"):
-    FLOOR_DEPTH = np.where(_ROWS > 0, MOUNT_HEIGHT / _ROWS, np.inf).astype(np.float32)
-
 
 class Room:
-    """The room of one scenario."""
+    """The room of one scenario, as its robot's camera sees it.
+
+    Attributes
+    ----------
+    columns
+        float32 (640,): how far to the right of straight ahead each column looks [m at 1 m].
+    floor_depth
+        float32 (480, 1): depth of the bare floor in each row [m]; inf above the horizon.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
+        geometry = scenario.robot.geometry
+        focal, self._height = geometry.focal_px(WIDTH), geometry.camera_z
+        self._focal = focal
+        self.columns = ((np.arange(WIDTH) - CENTRE_X) / focal).astype(np.float32)
+        rows = ((np.arange(HEIGHT) - CENTRE_Y) / focal).astype(np.float32)[:, None]
+        with np.errstate(divide="ignore"):
+            self.floor_depth: F32 = np.where(rows > 0, self._height / rows, np.inf).astype(np.float32)
         self._backdrop = self._make_backdrop()
         self._walls = [wall.footprint for wall in scenario.walls]
         greys = self._make_wall_greys()
@@ -42,7 +52,7 @@ class Room:
     def cast(self, camera: CameraPose) -> tuple[F32, Columns]:
         """Return the depth of sky, floor and walls, float32 (480, 640) [m], and what each column shows of the walls."""
         look = math.cos(camera.yaw), math.sin(camera.yaw)
-        ahead_x, ahead_y = look[0] + look[1] * COLUMNS, look[1] - look[0] * COLUMNS
+        ahead_x, ahead_y = look[0] + look[1] * self.columns, look[1] - look[0] * self.columns
         half = np.float32(self._scenario.room.half)
         with np.errstate(divide="ignore"):
             to_x = (np.copysign(half, ahead_x) - camera.x) / ahead_x
@@ -54,8 +64,8 @@ class Room:
             enters, face = meet(shape, camera.x, camera.y, ahead_x, ahead_y)
             nearer = enters < wall
             wall, faces = np.where(nearer, enters, wall), np.where(nearer, 4 * number + face, faces)
-        depth: F32 = np.minimum(FLOOR_DEPTH, wall)
-        top = CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) / wall
+        depth: F32 = np.minimum(self.floor_depth, wall)
+        top = CENTRE_Y - self._focal * (WALL_HEIGHT - self._height) / wall
         sky, end = (max(0, math.ceil(float(edge))) for edge in (top.min(), top.max()))
         depth[:sky] = np.inf
         depth[sky:end][np.arange(sky, end, dtype=np.float32)[:, None] < top] = np.inf
@@ -64,6 +74,7 @@ class Room:
     def paint(self, columns: Columns) -> U8:
         """Return the room in its plain greys: uint8 (480, 640)."""
         room: U8 = self._backdrop.copy()
+        above, below = self._focal * (WALL_HEIGHT - self._height), self._focal * self._height
         wall, faces = columns
         edges = [0, *(np.flatnonzero(np.diff(faces)) + 1).tolist(), WIDTH]
         for start, stop in pairwise(edges):
@@ -73,10 +84,10 @@ class Room:
             step = (inverse[1] - inverse[0]) / max(stop - 1 - start, 1)
             left, right = inverse[0] - step / 2, inverse[1] + step / 2
             corners = [
-                (start - 0.5, CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) * left),
-                (stop - 0.5, CENTRE_Y - FOCAL_PX * (WALL_HEIGHT - MOUNT_HEIGHT) * right),
-                (stop - 0.5, CENTRE_Y + FOCAL_PX * MOUNT_HEIGHT * right),
-                (start - 0.5, CENTRE_Y + FOCAL_PX * MOUNT_HEIGHT * left),
+                (start - 0.5, CENTRE_Y - above * left),
+                (stop - 0.5, CENTRE_Y - above * right),
+                (stop - 0.5, CENTRE_Y + below * right),
+                (start - 0.5, CENTRE_Y + below * left),
             ]
             quad = np.clip(np.rint(np.array(corners) * 16), -(2**20), 2**20).astype(np.int32)
             grey = self._wall_greys[int(faces[start])]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog._core import Canvas
-from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, MOUNT_HEIGHT, CameraPose
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, CameraPose
 from limo_sim.world.furniture import Box, Frustum
 from limo_sim.world.person import BodyMesh
 from limo_sim.world.scenario import Light
@@ -84,12 +84,13 @@ def outline(body: BodyMesh, camera: CameraPose) -> Outline | None:
     z0, z1, zc = start[:, 2], end[:, 2], centre[:, 2]
     strip_ok, ellipse_ok = np.minimum(z0, z1) > NEAR + 0.05, zc > NEAR + 0.1
     z0, z1, zc = np.maximum(z0, NEAR), np.maximum(z1, NEAR), np.maximum(zc, NEAR)
-    u0, v0 = CENTRE_X + FOCAL_PX * start[:, 0] / z0, CENTRE_Y + FOCAL_PX * start[:, 1] / z0
-    u1, v1 = CENTRE_X + FOCAL_PX * end[:, 0] / z1, CENTRE_Y + FOCAL_PX * end[:, 1] / z1
-    r0, r1 = FOCAL_PX * body.start_radius / z0 + 0.5, FOCAL_PX * body.end_radius / z1 + 0.5
+    focal = camera.focal_px
+    u0, v0 = CENTRE_X + focal * start[:, 0] / z0, CENTRE_Y + focal * start[:, 1] / z0
+    u1, v1 = CENTRE_X + focal * end[:, 0] / z1, CENTRE_Y + focal * end[:, 1] / z1
+    r0, r1 = focal * body.start_radius / z0 + 0.5, focal * body.end_radius / z1 + 0.5
     length = np.maximum(np.hypot(u1 - u0, v1 - v0), 1e-3)
     axis_u, axis_v = (u1 - u0) / length, (v1 - v0) / length
-    metre = (z0 + z1) / (2 * FOCAL_PX)
+    metre = (z0 + z1) / (2 * focal)
     lean = (z1 - z0) / np.hypot(z1 - z0, length * metre)
     metre *= 1.0 - 1.0 / (r0 + r1)  # the half pixel by which it is too wide adds no depth
     parts, taper, slope = np.arange(len(z0)), (r1 - r0) / length, (z1 - z0) / length
@@ -97,7 +98,7 @@ def outline(body: BodyMesh, camera: CameraPose) -> Outline | None:
 
     axes = camera.rotation @ body.axes
     spread = axes @ axes.transpose(0, 2, 1)
-    pixels = FOCAL_PX / zc
+    pixels = focal / zc
     a, b, c = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
     l00 = np.sqrt(a)
     l10 = b / l00
@@ -106,7 +107,7 @@ def outline(body: BodyMesh, camera: CameraPose) -> Outline | None:
     slope_y = (spread[:, 1, 2] - l10 * slope_x) / l11
     bulge = np.sqrt(np.maximum(spread[:, 2, 2] - slope_x**2 - slope_y**2, 1e-9))
     l00, l10, l11 = pixels * l00 + 0.5, pixels * l10, pixels * l11 + 0.5
-    uc, vc = CENTRE_X + FOCAL_PX * centre[:, 0] / zc, CENTRE_Y + FOCAL_PX * centre[:, 1] / zc
+    uc, vc = CENTRE_X + focal * centre[:, 0] / zc, CENTRE_Y + focal * centre[:, 1] / zc
     half_w, half_h = l00, np.hypot(l10, l11)
     parts, w10 = len(z0) + np.arange(len(zc)), -l10 / (l00 * l11)
     ellipses = np.stack([parts, uc, vc, 1 / l00, w10, 1 / l11, half_h, half_w, zc, slope_x, slope_y, bulge], axis=1)
@@ -146,22 +147,21 @@ def covers(shape: Outline, x: F32, y: F32) -> NDArray[np.bool_]:
 def cast_frustum(canvas: Canvas, solid: Frustum, camera: CameraPose, sun: Sun, part: int) -> None:
     """Cast an upright cone or cylinder that stands in the arena's frame; `sun` in the camera's frame."""
     x, z = camera.ahead_of(solid.x, solid.y)
-    bounds = upright_bounds(x, z, max(solid.r0, solid.r1), solid.z0, solid.z1)
+    bounds = upright_bounds(camera, (x, z), max(solid.r0, solid.r1), (solid.z0, solid.z1))
     if bounds is None:
         return
     taper = (solid.r1 - solid.r0) / (solid.z1 - solid.z0)
-    half_pixel = 0.5 * max(z, NEAR) / FOCAL_PX
-    level = solid.r0 + taper * (MOUNT_HEIGHT - solid.z0) + half_pixel  # radius at the camera's height
+    half_pixel = 0.5 * max(z, NEAR) / camera.focal_px
+    level = solid.r0 + taper * (camera.height - solid.z0) + half_pixel  # radius at the camera's height
     offset = x * x + z * z - level * level
-    ends = solid.z1 - MOUNT_HEIGHT, MOUNT_HEIGHT - solid.z0
+    ends = solid.z1 - camera.height, camera.height - solid.z0
     canvas.frustum((part, *bounds, x, z, taper, level, half_pixel, offset, *ends), sun.light)
 
 
 def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int) -> None:
     """Cast an upright box that stands in the arena's frame; `sun` in the arena's frame."""
-    bounds = upright_bounds(
-        *camera.ahead_of(solid.x, solid.y), math.hypot(solid.half_x, solid.half_y), solid.z0, solid.z1
-    )
+    radius = math.hypot(solid.half_x, solid.half_y)
+    bounds = upright_bounds(camera, camera.ahead_of(solid.x, solid.y), radius, (solid.z0, solid.z1))
     if bounds is None:
         return
     cos, sin = math.cos(solid.yaw), math.sin(solid.yaw)
@@ -169,7 +169,7 @@ def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int
     dx, dy = camera.x - solid.x, camera.y - solid.y
     middle = (solid.z0 + solid.z1) / 2
     # the camera and the sun in the box's frame, whose origin is in its middle
-    at = cos * dx + sin * dy, cos * dy - sin * dx, MOUNT_HEIGHT - middle
+    at = cos * dx + sin * dy, cos * dy - sin * dx, camera.height - middle
     x, y, z = sun.towards
     shines = cos * x + sin * y, cos * y - sin * x, z
     half = solid.half_x, solid.half_y, (solid.z1 - solid.z0) / 2
@@ -179,11 +179,17 @@ def cast_box(canvas: Canvas, solid: Box, camera: CameraPose, sun: Sun, part: int
     canvas.slab((*bounds, *sides, look_cos, look_sin, look_sin, -look_cos, *tones))
 
 
-def upright_bounds(x: float, z: float, radius: float, low: float, high: float, near: float = NEAR) -> Bounds | None:
-    """Image box that holds what of an upright cylinder is beyond `near` [m]; None if nothing is."""
+def upright_bounds(
+    camera: CameraPose, at: tuple[float, float], radius: float, ends: tuple[float, float], near: float = NEAR
+) -> Bounds | None:
+    """Return the image box that holds what of an upright cylinder is beyond `near` [m]; None if nothing is.
+
+    It stands `at` so far to the right of the camera and ahead of it, and has its `ends` so high above the floor [m].
+    """
+    (x, z), focal = at, camera.focal_px
     near, far = max(z - radius, near), z + radius
     if far < near:
         return None
-    sides = [CENTRE_X + FOCAL_PX * (x + side) / depth for side in (-radius, radius) for depth in (near, far)]
-    ends = [CENTRE_Y + FOCAL_PX * (MOUNT_HEIGHT - end) / depth for end in (low, high) for depth in (near, far)]
-    return min(sides) - 1, min(ends) - 1, max(sides) + 1, max(ends) + 1
+    sides = [CENTRE_X + focal * (x + side) / depth for side in (-radius, radius) for depth in (near, far)]
+    rows = [CENTRE_Y + focal * (camera.height - end) / depth for end in ends for depth in (near, far)]
+    return min(sides) - 1, min(rows) - 1, max(sides) + 1, max(rows) + 1

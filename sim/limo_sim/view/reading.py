@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.pipeline import FrameLog
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.measurement import box_centre, person_depth, zone_of
 from limo_hog.follow.sense.observation import Scan
 from limo_hog.imaging.drawing import annotate
 from limo_sim.run.log import Step
 from limo_sim.sensing.camera import WIDTH
-from limo_sim.sensing.lidar import MOUNT_AHEAD
 
 
 def figures(step: Step) -> dict[str, float | None]:
@@ -92,18 +92,18 @@ def depth_colours(far: float, count: int = 17) -> list[str]:
     return [f"#{red:02x}{green:02x}{blue:02x}" for blue, green, red in scale.tolist()]
 
 
-def hits(scan: Scan | None, poses: list[tuple[float, float, float, float]]) -> list[list[float]]:
+def hits(scan: Scan | None, robot: RobotGeometry, poses: list[tuple[float, float, float, float]]) -> list[list[float]]:
     """Return every second lidar hit in the arena's frame [m], to the centimetre, by the pose at the scan's time."""
     if scan is None:
         return []
     times, *pose = np.array(poses).T
     x, y, yaw = (float(np.interp(scan.stamp, times, values)) for values in (*pose[:2], np.unwrap(pose[2])))
     ranges: NDArray[np.float64] = scan.ranges.astype(np.float64)
-    angles = yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
+    angles = yaw + robot.lidar_yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
     hit = np.isfinite(ranges)
     hit[1::2] = False
-    ahead = x + MOUNT_AHEAD * math.cos(yaw) + ranges[hit] * np.cos(angles[hit])
-    left = y + MOUNT_AHEAD * math.sin(yaw) + ranges[hit] * np.sin(angles[hit])
+    ahead = x + robot.lidar_x * math.cos(yaw) + ranges[hit] * np.cos(angles[hit])
+    left = y + robot.lidar_x * math.sin(yaw) + ranges[hit] * np.sin(angles[hit])
     points: list[list[float]] = np.round(np.stack([ahead, left], axis=1), 2).tolist()
     return points
 

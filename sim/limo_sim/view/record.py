@@ -25,15 +25,12 @@ from limo_hog.ros2.names import (
     TF_STATIC,
 )
 from limo_sim.run.log import Step, Watch
-from limo_sim.world.scenario import Camera
+from limo_sim.world.scenario import Scenario
 
 
 @contextmanager
-def recorded(path: Path, camera: Camera) -> Iterator[Watch]:
-    """Give a function that records a step: what was sensed, what was found in it, and then the command.
-
-    `camera` says how the lens bends.
-    """
+def recorded(path: Path, scenario: Scenario) -> Iterator[Watch]:
+    """Give a function that records a step of a run: what was sensed, what was found in it, and then the command."""
     with bag_writer(path) as write:
         scanned = read = -math.inf
         began = False
@@ -46,7 +43,7 @@ def recorded(path: Path, camera: Camera) -> Iterator[Watch]:
                 write(CLOCK, time, messages.clock(time))
                 if not began:
                     began = True
-                    write(TF_STATIC, time, static_transforms(time))
+                    write(TF_STATIC, time, static_transforms(time, scenario.robot.geometry))
                 for reading in imu:
                     write(IMU, time, messages.imu(reading.stamp, reading.angular_velocity, reading.acceleration))
                 if odometry.stamp > read:
@@ -58,11 +55,8 @@ def recorded(path: Path, camera: Camera) -> Iterator[Watch]:
                 write(SCAN, now, messages.laser_scan(scan))
             if frame is not None and frame.depth is not None:
                 height, width = frame.image.shape[:2]
-                write(
-                    CAMERA_INFO,
-                    now,
-                    messages.camera_info(frame.stamp, width, height, frame.focal_px, (camera.k1, camera.k2)),
-                )
+                bent = scenario.camera.k1, scenario.camera.k2
+                write(CAMERA_INFO, now, messages.camera_info(frame.stamp, width, height, frame.focal_px, bent))
                 write(DEPTH, now, messages.image(frame.stamp, frame.depth))
                 write(IMAGE, now, messages.image(frame.stamp, frame.image))
                 found = detections_message(frame.stamp, log.detections, messages.CAMERA_FRAME)

@@ -27,7 +27,6 @@ from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.measurement import ZONE_ENDS
 from limo_hog.imaging.writing import jpeg
 from limo_sim.run.log import Step
-from limo_sim.sensing.camera import FIELD
 from limo_sim.view.access import HEADERS, Access, QuietLogger
 from limo_sim.view.controls import MAX_BYTES, apply
 from limo_sim.view.pace import Pace
@@ -266,10 +265,12 @@ class View:
         return client
 
     def _welcome(self) -> dict[str, Any]:
+        robot = self._scenario.robot.geometry
         return {
             "scenario": self._scenario.name,
             "room": self._scenario.room.half,
-            "field": FIELD,
+            "field": robot.field_of_view,
+            "body": [robot.half_length, robot.half_width],
             "furniture": [
                 [f.x, f.y, f.radius] if isinstance(f, Disc) else [f.x, f.y, f.half_x, f.half_y, f.yaw]
                 for f in self._scenario.footprints
@@ -333,7 +334,7 @@ class View:
             "followed": self._followed,
             "believed": believed(step),
             "measured_m": measured_m(log),
-            "scan": hits(log.sensors.scan, list(self._poses)),
+            "scan": hits(log.sensors.scan, self._scenario.robot.geometry, list(self._poses)),
             "detect_ms": log.detect_ms or None,
             "boxes": len(log.detections),
             "contacts": asdict(step.truth.contacts),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from limo_sim.world.furniture import KINDS, reach
 from limo_sim.world.movers import Movers
 from limo_sim.world.paths import FloorPlan
-from limo_sim.world.people import ROBOT_RADIUS, Person, before_door, door_of
+from limo_sim.world.people import Person, before_door, door_of
 from limo_sim.world.person import STRIDE, Pose, Walk, smooth
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.social_force import People, SocialForce, acceleration
@@ -285,7 +285,7 @@ class Crowd:
         before = self._robot or robot
         speed = (robot[0] - before[0]) / STEP_S, (robot[1] - before[1]) / STEP_S
         self._robot = robot
-        return [*there, (*robot[:2], *speed, ROBOT_RADIUS)]
+        return [*there, (*robot[:2], *speed, self._scenario.robot.radius)]
 
     def _away(self, walkers: list[Walker], people: People) -> F64:
         """Return the ways to some people from outer walls, obstacles, movers and the robot, as `acceleration` wants."""

@@ -11,8 +11,6 @@ from limo_sim.world.furniture import Disc, Rectangle, distance_to
 from limo_sim.world.paths import FloorPlan
 from limo_sim.world.schema import WIDEST, ScenarioError, one_of, required, within
 
-ROBOT_RADIUS = 0.19
-"""The circle about the base centre that holds the robot's 0.29 × 0.22 m body [m]."""
 # Corners of routes keep this distance from the walls [m]: the first, or a person's radius and the second, if that is
 # more. Chosen: the robot's diagonal is 0.364 m, so that a person does not press the robot against a wall.
 _WALL_DISTANCE, _WALL_GAP = 0.6, 0.37
@@ -173,6 +171,7 @@ class Surroundings:
 
     half: float  #: the outer walls stand at ± this [m]
     robot: tuple[float, float]  #: where the robot starts, x, y [m]
+    robot_radius: float  #: of the circle that holds it [m]
     obstacles: Sequence[tuple[str, Disc | Rectangle]]  #: what stands in the room, by the name that a message gives it
 
     @cached_property
@@ -209,9 +208,10 @@ def check_person(person: Person, around: Surroundings, where: str) -> None:
     x, y, _ = person.route[0]
     if person.arrives_s == 0 and not person.walks_in:
         free = math.dist((x, y), around.robot) - person.radius
-        if free < ROBOT_RADIUS:
+        if free < around.robot_radius:
             raise ScenarioError(
-                f"{where}.route[0]: is {max(free, 0.0):.2f} m from the robot's centre, want at least {ROBOT_RADIUS} m"
+                f"{where}.route[0]: is {max(free, 0.0):.2f} m from the robot's centre, "
+                f"want at least {around.robot_radius:.2f} m"
             )
     if person.yields:
         _check_yielding(person, around, where)

@@ -1,17 +1,18 @@
-"""The Limo's differential drive: limits of its wheels' speed and acceleration, and a watchdog that stops it."""
+"""A differential drive: limits of its wheels' speed and acceleration, and a watchdog that stops it."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
 
-from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.robot import Twist
 
 
 @dataclass(slots=True)
 class Drive:
     """Commands in, wheel speeds out."""
 
+    separation: float  #: between the left and the right wheels [m]
     #: wheel_speed, wheel_acceleration: limits of each wheel [m/s, m/s²]
     wheel_speed: float
     wheel_acceleration: float
@@ -38,7 +39,7 @@ class Drive:
             self._wanted = Twist()
             self._commanded_at = None
             self.watchdog_stops += 1
-        turn = self._wanted.angular * LIMO.wheel_separation / 2
+        turn = self._wanted.angular * self.separation / 2
         wanted_left, wanted_right = self._wanted.linear - turn, self._wanted.linear + turn
         # a command too fast for one wheel is slowed as a whole, so that the robot keeps to its curve
         excess = max(abs(wanted_left), abs(wanted_right)) / self.wheel_speed
@@ -51,7 +52,7 @@ class Drive:
     @property
     def twist(self) -> Twist:
         """The robot's speeds while the wheels do not slip."""
-        return twist_of(self.left, self.right)
+        return twist_of(self.left, self.right, self.separation)
 
 
 def is_finite(twist: Twist) -> bool:
@@ -59,14 +60,9 @@ def is_finite(twist: Twist) -> bool:
     return math.isfinite(twist.linear) and math.isfinite(twist.angular)
 
 
-def twist_of(left: float, right: float) -> Twist:
+def twist_of(left: float, right: float, separation: float) -> Twist:
     """Return the motion of the robot from that of its wheels' rims, as speeds [m/s] or as distances [m]."""
-    return Twist((left + right) / 2, (right - left) / LIMO.wheel_separation)
-
-
-def max_turn_rate(wheel_speed: float) -> float:
-    """Return how fast wheels of a top speed [m/s], one forward and one backward, turn the robot [rad/s]."""
-    return twist_of(-wheel_speed, wheel_speed).angular
+    return Twist((left + right) / 2, (right - left) / separation)
 
 
 def integrate(x: float, y: float, yaw: float, forward: float, turn: float) -> tuple[float, float, float]:

@@ -11,9 +11,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from limo_hog.follow.robot import LIMO, RobotGeometry, load_robot
 from limo_sim.world.furniture import Disc, Furniture, Rectangle, distance_to
 from limo_sim.world.movers import Mover
-from limo_sim.world.people import ROBOT_RADIUS, Group, Person, Surroundings, Vary, check_person
+from limo_sim.world.people import Group, Person, Surroundings, Vary, check_person
 from limo_sim.world.schema import WIDEST, ScenarioError, build, check_fields, one_of, required, within
 
 if sys.version_info >= (3, 11):
@@ -43,17 +44,13 @@ __all__ = [
     "Wheels",
 ]
 
-ROOM_HALF = 4.9
-"""Without `room.half` the walls' inner faces stand at ± this [m]: 0.2 m thick, on ± 5 m, as in `hri_world.world`."""
-WALL_HEIGHT = 1.0
-"""Of the walls [m], as in `hri_world.world`."""
+#: Where the walls' inner faces stand without `room.half`, ± this, and how high they are [m]; as in `hri_world.world`.
+ROOM_HALF, WALL_HEIGHT = 4.9, 1.0
 # The middle of a piece of furniture, and of the robot at the start, keep these distances from the outer walls [m].
 _FURNITURE_DISTANCE, _ROBOT_DISTANCE = 0.2, 0.3
 # Inner walls are at least this long [m]: shorter than thick they would have no direction to speak of.
 _SHORTEST_WALL = 0.05
 _FOLDER = Path(__file__).parents[1] / "scenarios"
-
-
 #: How many of each a scenario may have: 64 people take some seconds for one of the arena.
 _MOST = {"people": 64, "movers": 64, "furniture": 256, "walls": 256}
 
@@ -110,14 +107,20 @@ class Wall:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """The Limo's start [m, m, rad], its wheels' limits [m/s, m/s²], and the watchdog's time [s]."""
+    """The robot's start [m, m, rad], its wheels' limits [m/s, m/s²], and the watchdog's time [s]; a Limo by default."""
 
     x: float = within(0.0, -WIDEST, WIDEST)
     y: float = within(0.0, -WIDEST, WIDEST)
     yaw: float = within(0.0, -2 * math.pi, 2 * math.pi)
-    wheel_speed: float = within(1.0, 0.05, 3.0)
-    wheel_acceleration: float = within(1.0, 0.1, 10.0)
+    wheel_speed: float = within(1.0, 0.01, 10.0)
+    wheel_acceleration: float = within(1.0, 0.05, 20.0)
     watchdog_s: float = within(0.5, 0.05, 60.0)
+    geometry: RobotGeometry = LIMO
+
+    @property
+    def radius(self) -> float:
+        """The circle about the base centre that holds the body [m]; at least what a Limo has been given, 0.19 m."""
+        return max(0.19, math.hypot(self.geometry.half_length, self.geometry.half_width))
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,7 +275,7 @@ class Scenario:
     @property
     def surroundings(self) -> Surroundings:
         """What the people have to fit between."""
-        return Surroundings(self.room.half, (self.robot.x, self.robot.y), self._obstacles())
+        return Surroundings(self.room.half, (self.robot.x, self.robot.y), self.robot.radius, self._obstacles())
 
     @property
     def footprints(self) -> tuple[Disc | Rectangle, ...]:
@@ -285,12 +288,12 @@ class Scenario:
         return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
 
     @staticmethod
-    def load(name_or_path: str | Path) -> Scenario:
-        """Read one of `Scenario.names()`, or a TOML file.
+    def load(name_or_path: str | Path, robot: str | Path | None = None) -> Scenario:
+        """Read one of `Scenario.names()`, or a TOML file; `robot` is the file of another than the Limo.
 
         Raises
         ------
-        ScenarioError
+        ScenarioError, RobotError
             With the file, the key and what is allowed there.
         """
         path = Path(name_or_path)
@@ -311,6 +314,12 @@ class Scenario:
         where = f"{path.name}: "
         groups = build(_Groups, {"groups": table.pop("groups", [])}, where).groups
         scenario = build(Scenario, {"name": path.stem, **table}, where)
+        if robot is not None:
+            geometry = load_robot(robot)
+            limits = {"wheel_speed": geometry.max_speed, "wheel_acceleration": geometry.acceleration}
+            scenario = dataclasses.replace(
+                scenario, robot=dataclasses.replace(scenario.robot, geometry=geometry, **limits)
+            )
         scenario.check(where)
         return scenario._with_groups(groups, where) if groups else scenario
 
@@ -323,7 +332,8 @@ class Scenario:
         if math.hypot(*self.light.sun) < 0.1:
             raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
         self.detector.check(self.camera.rate_hz, f"{where}detector.")
-        self._check_inside((self.robot.x, self.robot.y), _ROBOT_DISTANCE, (f"{where}robot.x", f"{where}robot.y"))
+        far = max(_ROBOT_DISTANCE, self.robot.radius)
+        self._check_inside((self.robot.x, self.robot.y), far, (f"{where}robot.x", f"{where}robot.y"))
         for index, piece in enumerate(self.furniture):
             names = f"{where}furniture[{index}].x", f"{where}furniture[{index}].y"
             self._check_inside((piece.x, piece.y), _FURNITURE_DISTANCE, names)
@@ -337,10 +347,10 @@ class Scenario:
                 )
         for name, footprint in self._obstacles():
             distance = distance_to(footprint, self.robot.x, self.robot.y)
-            if distance < ROBOT_RADIUS:
+            if distance < self.robot.radius:
                 raise ScenarioError(
                     f"{where}{name.split(' ')[0]}: is {max(distance, 0.0):.2f} m from the robot's centre, "
-                    f"want at least {ROBOT_RADIUS} m"
+                    f"want at least {self.robot.radius:.2f} m"
                 )
         around = self.surroundings
         for index, person in enumerate(self.people):

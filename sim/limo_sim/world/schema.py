@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from limo_hog.exceptions import LimoHogError
+from limo_hog.follow.robot import RobotError
 
 T = TypeVar("T")
 
@@ -88,7 +89,11 @@ def build(kind: type[T], table: Any, where: str) -> T:
         required = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if required and name not in table:
             raise ScenarioError(f"{where}{name}: missing")
-    return kind(**{key: _convert(hints[key], value, f"{where}{key}") for key, value in table.items()})
+    values = {key: _convert(hints[key], value, f"{where}{key}") for key, value in table.items()}
+    try:
+        return kind(**values)
+    except RobotError as error:
+        raise ScenarioError(f"{where}{error}") from None
 
 
 def _convert(hint: Any, value: Any, where: str) -> Any:

@@ -25,9 +25,9 @@ from cyclonedds.topic import Topic
 
 from limo_hog.cli.main import main
 from limo_hog.cli.topic import as_yaml
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Scan
-from limo_hog.ros2 import dds, follower, messages, names
+from limo_hog.ros2 import dds, follower, frames, messages, names
 from limo_sim.ros.live import second_publishers
 from limo_sim.run.arena import Arena
 from limo_sim.world.scenario import Scenario
@@ -35,10 +35,13 @@ from limo_sim.world.scenario import Scenario
 TWIST = "geometry_msgs/msg/Twist"
 
 
+LIMO_SITS = "camera 0.08 m ahead, 0.17 m high · lidar 0.10 m ahead, turned by 0°"
+
+
 @contextmanager
 def publishing(topic: str, message: Any, hertz: float = 10.0) -> Iterator[dds.Publisher]:
     """Publish a message again and again from a thread."""
-    publisher = dds.Bus().publisher(topic, message.__msgtype__)
+    publisher = dds.Bus().publisher(topic, message.__msgtype__, kept=topic == names.TF_STATIC)
     over = threading.Event()
 
     def work() -> None:
@@ -105,7 +108,7 @@ def test_names_types_and_hashes_are_what_ros_2_looks_for() -> None:
 RECEIVER = """
 import sys, time
 import numpy as np
-from limo_hog.ros2 import dds, messages, names
+from limo_hog.ros2 import dds, follower, frames, messages, names
 bus = dds.Bus()
 images = bus.subscription(names.IMAGE, names.TYPES[names.IMAGE], depth=50)
 print("ready", flush=True)
@@ -209,11 +212,28 @@ def test_topic_list_info_and_echo_print_as_ros2_topic_does(capsys: pytest.Captur
         assert main(["topic", "list", "-t"]) == 0
         assert "/cmd_vel [geometry_msgs/msg/Twist]\n" in capsys.readouterr().out
         assert main(["topic", "info", "/cmd_vel"]) == 0
-        assert capsys.readouterr().out == "Type: geometry_msgs/msg/Twist\nPublisher count: 1\nSubscription count: 0\n"
+        assert capsys.readouterr().out == (
+            "Type: geometry_msgs/msg/Twist\nPublisher count: 1\n  geometry_msgs/msg/Twist: Reliable, Volatile\n"
+            "Subscription count: 0\n"
+        )
         assert main(["topic", "echo", "--once", "/cmd_vel"]) == 0
     assert capsys.readouterr().out == (
         "linear:\n  x: 0.2\n  y: 0.0\n  z: 0.0\nangular:\n  x: 0.0\n  y: 0.0\n  z: 0.0\n---\n"
     )
+
+
+def test_the_follower_takes_its_sensors_places_from_tf_static() -> None:
+    own = RobotGeometry(camera_x=0.2, camera_z=0.25, lidar_x=-0.1, lidar_yaw=3.0)
+    scan = messages.laser_scan(Scan(0.0, np.ones(9, np.float32), -2.0, 2.0, 0.12, 8.0))
+    image = messages.image(0.0, np.zeros((4, 4, 3), np.uint8))
+    with publishing(names.SCAN, scan), publishing(names.IMAGE, image):
+        bus = dds.Bus()
+        inputs = follower.Inputs(bus, names.IMAGE)
+        assert follower.mounted(bus, inputs, names.IMAGE, LIMO) == (LIMO, f"{LIMO_SITS} (not in /tf_static)")
+        with publishing(names.TF_STATIC, frames.static_transforms(0.0, own)):
+            robot, line = follower.mounted(bus, inputs, names.IMAGE, LIMO)
+    assert [robot.camera_x, robot.camera_z, robot.lidar_x, robot.lidar_yaw] == pytest.approx([0.2, 0.25, -0.1, 3.0])
+    assert line == "camera 0.20 m ahead, 0.25 m high · lidar -0.10 m ahead, turned by 172° (by /tf_static)"
 
 
 def test_topic_hz_measures_the_rate(capsys: pytest.CaptureFixture[str]) -> None:

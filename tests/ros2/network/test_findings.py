@@ -19,7 +19,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.decision import Believed, Mode
 from limo_hog.follow.pipeline import FrameLog
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.ros2 import dds, findings, follower, frames, messages, names
 from limo_hog.ros2.bag import to_detections
@@ -38,7 +38,7 @@ MESSAGES = {
     "pose": findings.person_pose(12.5, PERSON),
     "people": findings.people_message(12.5, [PERSON, OTHER]),
     "frames": findings.person_frames(12.5, [PERSON, OTHER], 7),
-    "robot": frames.static_transforms(12.5),
+    "robot": frames.static_transforms(12.5, LIMO),
     "command": findings.stamped_twist(12.5, Twist(0.5, -0.25)),
 }
 
@@ -151,7 +151,8 @@ def test_a_robot_that_publishes_images_alone_is_told_what_is_missing_and_stands(
     finally:
         done.set()
         camera.join()
-    assert said == ["camera yes · camera_info no, 71° wide is assumed · depth no · scan NO · odom no"]
+    assert said[0].endswith("(not in /tf_static)")
+    assert said[1:] == ["camera yes · camera_info no, 71° wide is assumed · depth no · scan NO · odom no"]
     assert {log.decision.reason for log in logs} == {"no depth image has come; no scan has come; no odometry has come"}
     sent = [messages.to_twist(message) for message in commands.take()]
     assert len(sent) > 20

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import sysconfig
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
 
-from tests.ros2.real import needs_rclpy, start
+from tests.ros2.real import PYTHON, needs_rclpy, start
 
 from limo_hog.ros2 import names
 
@@ -93,3 +94,32 @@ def test_the_follower_drives_a_robot_in_a_namespace_with_names_of_its_own(tmp_pa
     events = [json.loads(line) for line in log.read_text().splitlines()]
     assert {"follow"} <= {event.get("mode") for event in events}
     assert events[-1]["frames"] > 50
+
+
+def test_the_example_on_rclpy_follows_and_stops_at_ctrl_c(tmp_path: Path) -> None:
+    (tmp_path / "limo.toml").write_text("")
+    arena = subprocess.Popen([*COMMAND, "arena", "--ros2", "--scenario", "followable"], stderr=subprocess.DEVNULL)
+    path = os.pathsep.join([str(ROOT / "python"), sysconfig.get_path("purelib")])
+    renamed = {"image": "/limo_camera/image", "camera_info": "/limo_camera/camera_info", "depth": names.DEPTH}
+    rules = [word for old, new in renamed.items() for word in ("-r", f"{old}:={new}")]
+    settings = ["-p", f"robot:={tmp_path / 'limo.toml'}", "-p", "reliable:=true"]
+    said = ""
+    words = ["--ros-args", *settings, *rules]
+    with (tmp_path / "log.txt").open("w") as log:
+        node = subprocess.Popen(
+            [str(PYTHON), str(ROOT / "examples" / "rclpy_follower.py"), *words],
+            stderr=log,
+            env={**os.environ, "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", "PYTHONPATH": path},
+        )
+    try:
+        until = time.monotonic() + 60
+        while "following a person" not in said and time.monotonic() < until:
+            time.sleep(0.5)
+            said = (tmp_path / "log.txt").read_text()
+        node.send_signal(2)
+        assert node.wait(20) != 0
+    finally:
+        node.kill()
+        arena.terminate()
+        arena.wait(20)
+    assert "following a person" in said

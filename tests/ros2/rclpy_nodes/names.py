@@ -6,6 +6,7 @@ To record those of an installed rclpy: target/rclpy/bin/python tests/ros2/rclpy_
 import importlib
 import importlib.metadata
 import inspect
+import re
 
 MODULES = (
     *("", ".callback_groups", ".client", ".clock", ".clock_type", ".duration", ".exceptions", ".executors", ".logging"),
@@ -54,6 +55,7 @@ for module_name in MODULES:
             lines.append(f"{where} {name}{parameters(thing)}")
         elif type(thing).__name__ != "TypeVar":
             lines.append(f"{where} {name}")
-version = importlib.metadata.version("ros-jazzy-rclpy")
+distributions = (one.metadata["Name"] or "" for one in importlib.metadata.distributions())
+version = importlib.metadata.version(next(name for name in distributions if re.fullmatch(r"ros-\w+-rclpy", name)))
 print(f"# Public names and parameters of rclpy {version}, as it is installed: module, name, parameters.")
 print("\n".join(lines))

@@ -55,15 +55,16 @@ def run_script(
     *,
     arguments: Sequence[str] = (),
     patience: float = 20.0,
+    said: Callable[[str, str], None] | None = None,
     **watching: Any,
 ) -> Ended:
-    """Run a script against the arena as `limo-hog run` does; what it prints is printed."""
+    """Run a script against the arena as `limo-hog run` does; what it prints is printed, or given to `said`."""
 
-    def said(name: str, text: str) -> None:
+    def printed(name: str, text: str) -> None:
         (sys.stdout if name == "stdout" else sys.stderr).write(text)
 
     stage = Stage(script, scenario, seconds, seed, **watching)
-    return run_node(stage, arguments, limits=Limits(patience), said=said)
+    return run_node(stage, arguments, limits=Limits(patience), said=said or printed)
 
 
 def said(run: Run, text: str, **options: Any) -> list[str]:

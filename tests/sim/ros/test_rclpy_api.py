@@ -73,7 +73,7 @@ for line in pathlib.Path('RECORD').read_text().splitlines()[1:]:
 """
 
 
-@pytest.mark.parametrize("branch", ["humble", "jazzy"])
+@pytest.mark.parametrize("branch", ["humble", "jazzy", "kilted"])
 def test_every_name_of_rclpy_is_there_or_is_refused_by_name(run: Run, branch: str) -> None:
     said: list[str] = []
     text = PROBE.replace("RECORD", str(RECORDS / f"{branch}.txt")).replace("MADE", MADE_BY_RCLPY)

@@ -154,11 +154,12 @@ def answer(request, response):
     return response
 n.create_service(Trigger, 'go', answer)
 client = n.create_client(Trigger, 'go')
+from rclpy.callback_groups import ReentrantCallbackGroup
 async def ask():
     response = await client.call_async(Trigger.Request())
     n.get_logger().info(response.message)
     pub.publish(Twist())
-n.create_timer(1.0, ask)
+n.create_timer(1.0, ask, callback_group=ReentrantCallbackGroup())
 rclpy.spin(n)
 """
     )

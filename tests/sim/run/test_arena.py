@@ -20,7 +20,7 @@ from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.measurement import person_depth
 from limo_hog.signals import Stopped, stopping
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
-from limo_sim.sensing.camera import CENTRE_X, FOCAL_PX, CameraPose
+from limo_sim.sensing.camera import CENTRE_X, CameraPose
 from limo_sim.world.scenario import ROOM_HALF, Camera, Lidar, Person, Robot, Room, Scenario, Vary, Wall, Wheels
 from limo_sim.world.truth import Contacts
 
@@ -209,7 +209,7 @@ def test_the_surface_distance_is_the_depth_in_the_middle_of_a_person(facing: flo
             depth = person_depth(frame.depth, found.windows[0])
             if depth is not None:
                 # depth is along the optical axis, the distance along the ray
-                aside = (found.windows[0][0] + found.windows[0][2] / 2 - CENTRE_X) / FOCAL_PX
+                aside = (found.windows[0][0] + found.windows[0][2] / 2 - CENTRE_X) / LIMO.focal_px(640)
                 errors.append(person.surface_distance - depth * math.hypot(1.0, aside))
         for _ in range(5):
             arena.step()
@@ -289,7 +289,7 @@ def test_what_there_was_a_step_ago_is_where_everything_was_a_step_ago() -> None:
         before = arena.plan().robot
         arena.step()
     camera, *_ = arena._earlier(arena._state, 1 / STEPS_PER_SECOND)
-    expected = CameraPose.on_robot(*before)
+    expected = CameraPose.on_robot(LIMO, *before)
     assert (camera.x, camera.y, camera.yaw) == pytest.approx((expected.x, expected.y, expected.yaw), abs=1e-3)
 
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from limo_hog.detections import Detections
 from limo_hog.follow.control.naming import ControllerError
 from limo_hog.follow.decision import Mode
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Observation, Odometry
 from limo_sim.env import LimoFollowV1
 from limo_sim.run.baselines import PPO_FILE, Policy, PurePursuit, controller_of
 from limo_sim.run.last_seen import SIZE, LastSeen
-from limo_sim.sensing.camera import FOCAL_PX
 
 
 def seeing(*places: tuple[float, float], stamp: float = 1.0, odometry: Odometry | None = None) -> Observation:
@@ -26,11 +26,11 @@ def seeing(*places: tuple[float, float], stamp: float = 1.0, odometry: Odometry 
     boxes = []
     for x, y in places:
         ahead = x - 0.084
-        column = round(320 - FOCAL_PX * y / ahead)
+        column = round(320 - LIMO.focal_px(640) * y / ahead)
         boxes.append([column - 40, 120, 80, 160])
         depth[:, column - 40 : column + 40] = ahead
     found = Detections(np.array(boxes, np.int32).reshape(-1, 4), np.arange(len(boxes), 0.0, -1.0))
-    return Observation(stamp, 640, 480, FOCAL_PX, found, depth=depth, odometry=odometry or Odometry(stamp))
+    return Observation(stamp, 640, 480, LIMO.focal_px(640), found, depth=depth, odometry=odometry or Odometry(stamp))
 
 
 def test_pure_pursuit_drives_the_circle_through_the_person() -> None:

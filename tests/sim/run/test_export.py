@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from limo_hog.cli.main import main
+from limo_hog.follow.robot import LIMO
 from limo_hog.learn.formats import read_labels
 from limo_sim.run.arena import Arena
 from limo_sim.run.export import labelled_frames
-from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD, MOUNT_HEIGHT
 from limo_sim.world.scenario import Furniture, Person, Scenario
 
 PILLAR = Furniture("pillar", 2.0, 0.3)
@@ -32,11 +32,11 @@ def test_a_pillars_box_is_the_projection_of_its_cylinder() -> None:
     [(visible, box)] = arena_after_a_frame(PILLAR).furniture_in_frame()
     assert visible == pytest.approx(1.0, abs=0.02)
     assert box is not None
-    ahead = PILLAR.x - MOUNT_AHEAD
+    ahead = PILLAR.x - LIMO.camera_x
     distance = math.hypot(ahead, PILLAR.y)
     half = math.asin(0.15 / distance)
-    left, right = (319.5 - FOCAL_PX * math.tan(math.atan2(PILLAR.y, ahead) + side) for side in (half, -half))
-    top = 239.5 - FOCAL_PX * (1.1 - MOUNT_HEIGHT) / (distance - 0.15)  # of the edge nearest to the camera
+    left, right = (319.5 - LIMO.focal_px(640) * math.tan(math.atan2(PILLAR.y, ahead) + side) for side in (half, -half))
+    top = 239.5 - LIMO.focal_px(640) * (1.1 - LIMO.camera_z) / (distance - 0.15)  # of the edge nearest to the camera
     assert box[0] == pytest.approx(left, abs=2)
     assert box[0] + box[2] == pytest.approx(right, abs=2)
     assert box[1] == pytest.approx(top, abs=3)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.run.arena import Arena
 from limo_sim.run.baselines import controller_of
 from limo_sim.run.episode import run_episode, score
-from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 from limo_sim.world.scenario import Scenario
 
 SCENARIOS = ("flat", "gathering", "poster_wall", "side_door", "tall")
@@ -52,6 +52,6 @@ def test_the_adult_is_as_tall_in_the_image_as_at_that_distance_and_found() -> No
         _, top, _, height = person.box
         assert top > 0
         # A foot may be nearer than the trunk by half a step.
-        assert height == pytest.approx(FOCAL_PX * 1.85 / (person.x - MOUNT_AHEAD), rel=0.1)
+        assert height == pytest.approx(LIMO.focal_px(640) * 1.85 / (person.x - LIMO.camera_x), rel=0.1)
         found += len(detector.detect(frame.image)) > 0
     assert found >= 4

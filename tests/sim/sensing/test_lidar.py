@@ -8,6 +8,7 @@ import numpy as np
 import pymunk
 import pytest
 
+from limo_hog.follow.robot import LIMO
 from limo_sim.run.arena import Arena
 from limo_sim.sensing import lidar
 from limo_sim.world.furniture import Disc, Rectangle
@@ -58,7 +59,7 @@ def test_an_axis_aligned_beam_is_not_a_division_by_zero() -> None:
 
 def test_a_walking_person_shows_two_shins_of_a_shins_width() -> None:
     person = Person(route=((2, 0, 0),))
-    shins = legs_at(person, Pose(2, 0, 0.3, 1.2, 1.0), lidar.MOUNT_HEIGHT)
+    shins = legs_at(person, Pose(2, 0, 0.3, 1.2, 1.0), LIMO.lidar_z)
     assert len(shins) == 2
     for shin in shins:
         assert 0.02 < shin.radius < 0.05
@@ -69,10 +70,10 @@ def test_a_walking_person_shows_two_shins_of_a_shins_width() -> None:
 @pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4, 5.6])
 def test_the_legs_are_all_that_the_plane_cuts_of_a_body(phase: float, height: float) -> None:
     person, pose = Person(route=((2, 0, 0),), height=height, girth=1.3), Pose(2, -1, 0.8, phase, 1.0)
-    cut = legs_at(person, pose, lidar.MOUNT_HEIGHT)
+    cut = legs_at(person, pose, LIMO.lidar_z)
     whole = body(person, pose)
     x, y = np.mgrid[1.6:2.4:0.005, -1.4:-0.6:0.005]
-    flat = np.stack([x, y, np.full_like(x, lidar.MOUNT_HEIGHT)], axis=-1)
+    flat = np.stack([x, y, np.full_like(x, LIMO.lidar_z)], axis=-1)
     inside = np.zeros(x.shape, bool)
     for start, end, radius, end_radius in zip(
         whole.start, whole.end, whole.start_radius, whole.end_radius, strict=True

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, Twist
 from limo_sim.run.arena import Arena
-from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, HEIGHT, WIDTH, TrueFrame
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, HEIGHT, WIDTH, TrueFrame
 from limo_sim.sensing.optics import Lens, Shutter
 from limo_sim.world.scenario import Camera, Depth, Furniture, Light, Person, Scenario
 
-MATRIX = np.array([[FOCAL_PX, 0, CENTRE_X], [0, FOCAL_PX, CENTRE_Y], [0, 0, 1.0]])
+MATRIX = np.array([[LIMO.focal_px(640), 0, CENTRE_X], [0, LIMO.focal_px(640), CENTRE_Y], [0, 0, 1.0]])
 # A dark pillar in the middle of the image, nothing else.
 POST = Scenario(furniture=(Furniture("coat_rack", 1.5, 0.0, math.pi / 2),), camera=Camera(noise=0.0))
 
@@ -27,8 +27,10 @@ def test_a_place_in_the_image_moves_as_opencvs_camera_model_says(k1: float, k2: 
     places = [(320, 240), (150, 100), (500, 380), (330, 60), (60, 300)]
     for column, row in places:
         cv2.circle(picture, (column, row), 6, (255, 255, 255), -1)
-    bent = Lens(k1, k2).image(picture)[..., 0].astype(float)
-    rays = np.array([[(u - CENTRE_X) / FOCAL_PX, (v - CENTRE_Y) / FOCAL_PX, 1.0] for u, v in places])
+    bent = Lens(k1, k2, LIMO.focal_px(640)).image(picture)[..., 0].astype(float)
+    rays = np.array(
+        [[(u - CENTRE_X) / LIMO.focal_px(640), (v - CENTRE_Y) / LIMO.focal_px(640), 1.0] for u, v in places]
+    )
     expected = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), MATRIX, np.array([k1, k2, 0.0, 0.0]))[0].reshape(-1, 2)
     for u, v in expected:
         if not (12 < u < WIDTH - 12 and 12 < v < HEIGHT - 12):
@@ -104,8 +106,8 @@ def test_what_moves_while_the_shutter_is_open_is_blurred_by_that_much() -> None:
     sharp, blurred = turned(Camera(), rate), turned(Camera(exposure_s=exposure), rate)
     # The pole at the height of the horizon: a box filter as long as the turn, to the side it came from.
     (at, wide), (moved, wider) = (spread(darkness(frame, 215)) for frame in (sharp, blurred))
-    ahead = (at - CENTRE_X) / FOCAL_PX
-    length = rate * exposure * FOCAL_PX * (1 + ahead**2)
+    ahead = (at - CENTRE_X) / LIMO.focal_px(640)
+    length = rate * exposure * LIMO.focal_px(640) * (1 + ahead**2)
     assert moved - at == pytest.approx(-length / 2, abs=1.0)
     assert wider == pytest.approx(math.sqrt(wide**2 + length**2 / 12), rel=0.1)
     at_rest = turned(Camera(), 0.0).image, turned(Camera(exposure_s=exposure), 0.0).image
@@ -120,15 +122,15 @@ def test_a_rolling_shutter_leans_what_moves() -> None:
     lean = [spread(darkness(rolling, row))[0] - place for row, place in zip(rows, places, strict=True)]
     for row, place, moved in zip(rows, places, lean, strict=True):
         age = readout * (1 - (row + 0.5) / HEIGHT)
-        ahead = (place - CENTRE_X) / FOCAL_PX
-        assert moved == pytest.approx(-rate * age * FOCAL_PX * (1 + ahead**2), abs=1.5)
+        ahead = (place - CENTRE_X) / LIMO.focal_px(640)
+        assert moved == pytest.approx(-rate * age * LIMO.focal_px(640) * (1 + ahead**2), abs=1.5)
     assert abs(lean[0]) > abs(lean[1]) + 1.0
 
 
 def test_every_row_gets_all_of_its_light() -> None:
     grey = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
     for camera in (Camera(exposure_s=0.03), Camera(readout_s=0.03), Camera(exposure_s=0.02, readout_s=0.1)):
-        frame = Shutter(camera).expose(lambda _: grey, 1.5)
+        frame = Shutter(camera, LIMO.focal_px(640)).expose(lambda _: grey, 1.5)
         assert (frame == 200).all()
 
 

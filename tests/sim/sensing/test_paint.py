@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.detectors import detector_named
-from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, MOUNT_HEIGHT, CameraPose
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, CameraPose
 from limo_sim.sensing.renderer import Renderer
 from limo_sim.world.scenario import Camera, Person, Scenario, Wall, WallsTexture
 
@@ -30,8 +31,8 @@ def test_a_door_is_drawn_where_the_pinhole_sees_it(yaw: float, x: float, y: floa
     along = np.array([0.0, 1.0]) if abs(x) == 4.9 else np.array([1.0, 0.0])
     edges = np.array([[*(np.array([x, y]) + side * 0.34 * 0.9 * along), 0.5] for side in (-1, 1)])
     right, down, ahead = camera.to_camera(edges).T
-    left, end = sorted((CENTRE_X + FOCAL_PX * right / ahead).tolist())
-    row = round(float((CENTRE_Y + FOCAL_PX * down / ahead).mean()))
+    left, end = sorted((CENTRE_X + LIMO.focal_px(640) * right / ahead).tolist())
+    row = round(float((CENTRE_Y + LIMO.focal_px(640) * down / ahead).mean()))
     dark = np.flatnonzero(image[row].max(axis=1) < 60)
     assert dark[0] == pytest.approx(left, abs=1.0)
     assert dark[-1] == pytest.approx(end, abs=1.0)
@@ -44,7 +45,9 @@ def test_bricks_lie_at_their_height_on_every_side_of_an_inner_wall() -> None:
         distance = 1.85
         assert depth[240, 320] == pytest.approx(distance, rel=0.02)
         # From the wall's top down, a joint every 0.0625 m (ten of the picture's pixels).
-        rows = [CENTRE_Y - FOCAL_PX * (1.0 - 0.0625 * n - 0.006 - MOUNT_HEIGHT) / distance for n in range(3, 14)]
+        rows = [
+            CENTRE_Y - LIMO.focal_px(640) * (1.0 - 0.0625 * n - 0.006 - LIMO.camera_z) / distance for n in range(3, 14)
+        ]
         profile = image[:, 250:390].mean(axis=(1, 2))
         joints = np.mean([profile[round(row)] for row in rows])
         bricks = np.mean([profile[round(row) + 8] for row in rows])
@@ -59,8 +62,8 @@ def test_paint_changes_neither_depth_nor_sky_nor_floor() -> None:
     changed = (before != after).any(axis=2)
     assert 0.1 < changed.mean() < 0.5
     on_wall = np.flatnonzero(changed.any(axis=1))
-    assert on_wall[0] > CENTRE_Y - FOCAL_PX * 0.83 / 2.5
-    assert on_wall[-1] < CENTRE_Y + FOCAL_PX * 0.18 / 2.5
+    assert on_wall[0] > CENTRE_Y - LIMO.focal_px(640) * 0.83 / 2.5
+    assert on_wall[-1] < CENTRE_Y + LIMO.focal_px(640) * 0.18 / 2.5
 
 
 def test_the_same_seed_paints_the_same_and_another_seed_something_else() -> None:

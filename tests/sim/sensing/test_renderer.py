@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, FOCAL_PX, CameraPose
+from limo_hog.follow.robot import LIMO
+from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, CameraPose
 from limo_sim.sensing.renderer import Renderer, Seen
 from limo_sim.world.furniture import KINDS, Box
 from limo_sim.world.person import BodyMesh, Pose, body
@@ -36,7 +37,10 @@ def picture(
 
 def rays(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
     """Directions in the arena's frame of pixels seen by a camera at `HERE`, one metre deep."""
-    return np.stack([np.ones(len(columns)), -(columns - CENTRE_X) / FOCAL_PX, -(rows - CENTRE_Y) / FOCAL_PX], axis=1)
+    return np.stack(
+        [np.ones(len(columns)), -(columns - CENTRE_X) / LIMO.focal_px(640), -(rows - CENTRE_Y) / LIMO.focal_px(640)],
+        axis=1,
+    )
 
 
 def first_hit(figure: BodyMesh, directions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -131,7 +135,7 @@ def test_furniture_has_the_depth_that_marching_along_the_rays_finds(kind: str) -
 def test_the_room_has_the_depth_of_its_planes(camera: CameraPose) -> None:
     _, depth, _ = picture(camera=camera)
     for row, column in ((470, 10), (300, 320), (238, 5), (239, 600), (240, 320), (100, 320), (5, 5)):
-        right, down = (column - CENTRE_X) / FOCAL_PX, (row - CENTRE_Y) / FOCAL_PX
+        right, down = (column - CENTRE_X) / LIMO.focal_px(640), (row - CENTRE_Y) / LIMO.focal_px(640)
         look = math.cos(camera.yaw), math.sin(camera.yaw)
         ahead = look[0] + right * look[1], look[1] - right * look[0]
         walls = [
@@ -157,7 +161,7 @@ def test_inner_walls_have_the_depth_that_marching_along_the_rays_finds(camera: C
     kinds = set()
     for row in (120, 200, 230, 250, 300):
         for column in range(7, 640, 48):
-            right, down = (column - CENTRE_X) / FOCAL_PX, (row - CENTRE_Y) / FOCAL_PX
+            right, down = (column - CENTRE_X) / LIMO.focal_px(640), (row - CENTRE_Y) / LIMO.focal_px(640)
             x = camera.x + steps * (look[0] + right * look[1])
             y = camera.y + steps * (look[1] - right * look[0])
             z = 0.175 - steps * down
@@ -248,12 +252,15 @@ def test_an_adult_is_as_high_in_the_image_as_a_pinhole_camera_makes_them(height:
     crown = max(float((figure.centre[:, 2] + np.linalg.norm(figure.axes[:, 2], axis=1)).max()), 0.0)
     assert crown == pytest.approx(height, rel=0.025)
     assert box is not None
-    head, feet = CENTRE_Y - FOCAL_PX * (crown - 0.175) / distance, CENTRE_Y + FOCAL_PX * 0.175 / distance
+    head, feet = (
+        CENTRE_Y - LIMO.focal_px(640) * (crown - 0.175) / distance,
+        CENTRE_Y + LIMO.focal_px(640) * 0.175 / distance,
+    )
     assert visible == pytest.approx(1.0, abs=0.01)
     assert box[1] == pytest.approx(max(head, 0.0), abs=2.5)
     # the toes stand before the axis, lower in the image
-    assert 0.0 <= box[1] + box[3] - feet < 0.2 * FOCAL_PX * height / distance * 0.175 / (distance - 0.2) + 3.0
-    trunk = depth[round(CENTRE_Y - FOCAL_PX * (0.65 * height - 0.175) / distance), 320]
+    assert 0.0 <= box[1] + box[3] - feet < 0.2 * LIMO.focal_px(640) * height / distance * 0.175 / (distance - 0.2) + 3.0
+    trunk = depth[round(CENTRE_Y - LIMO.focal_px(640) * (0.65 * height - 0.175) / distance), 320]
     assert trunk == pytest.approx(distance - 0.06 * height, abs=0.03 * height)
 
 
@@ -317,6 +324,6 @@ def test_depth_has_limits_noise_and_unknown_pixels() -> None:
 
 def test_shadow_falls_on_the_floor_beneath() -> None:
     lit, shaded = picture(None)[0], picture(Pose(2.0, 0.0, 0.0))[0]
-    row = round(CENTRE_Y + FOCAL_PX * 0.175 / 1.88)
+    row = round(CENTRE_Y + LIMO.focal_px(640) * 0.175 / 1.88)
     assert shaded[row, 320, 0] < lit[row, 320, 0] - 10
     assert shaded[470, 320, 0] == lit[470, 320, 0]

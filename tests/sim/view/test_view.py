@@ -16,9 +16,9 @@ from tests.sim.logs import steps_of
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
+from limo_hog.follow.robot import LIMO
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
-from limo_sim.sensing.camera import FOCAL_PX, MOUNT_AHEAD
 from limo_sim.view.pace import Pace
 from limo_sim.view.reading import depth_colours, depth_picture, figures, followed_person, measured_m
 from limo_sim.view.server import View
@@ -97,9 +97,9 @@ def test_map_and_distance_are_of_the_person_that_the_followed_box_is_on() -> Non
             assert error_px is not None
             assert person is not None
             # A pinhole camera 8.4 cm ahead of the robot's centre sees them there, give or take an arm.
-            ahead = person.distance * math.cos(person.bearing) - MOUNT_AHEAD
-            left = FOCAL_PX * person.distance * math.sin(person.bearing) / ahead
-            assert left == pytest.approx(error_px, abs=FOCAL_PX * 0.3 / ahead)
+            ahead = person.distance * math.cos(person.bearing) - LIMO.camera_x
+            left = LIMO.focal_px(640) * person.distance * math.sin(person.bearing) / ahead
+            assert left == pytest.approx(error_px, abs=LIMO.focal_px(640) * 0.3 / ahead)
             if (measured := measured_m(step.log)) is not None:
                 seen.append(person.distance - measured)
 

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, Twist
 from limo_sim.run.arena import Arena
 from limo_sim.world.robot import Drive, integrate
 from limo_sim.world.scenario import Person, Robot, Scenario, Wheels
@@ -163,7 +163,7 @@ def test_the_imu_feels_gravity_turns_and_speeding_up() -> None:
 
 
 def test_a_drive_that_was_never_told_anything_stands_still() -> None:
-    idle = Drive(1.0, 1.0, 0.5)
+    idle = Drive(LIMO.wheel_separation, 1.0, 1.0, 0.5)
     for step in range(100):
         idle.advance(step / 50, 0.02)
     assert idle.twist == Twist()

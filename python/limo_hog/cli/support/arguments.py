@@ -141,6 +141,11 @@ def add_detector(parser: ArgumentParser) -> None:
     )
 
 
+def add_robot(parser: ArgumentParser) -> None:
+    """Add --robot."""
+    parser.add_argument("--robot", metavar="FILE.toml", help="what differs from a Limo (see docs/own-robot.md)")
+
+
 def add_ros_arguments(parser: ArgumentParser, more: str = "") -> None:
     """Add --ros-args; `more` ends its help."""
     parser.add_argument(

@@ -159,10 +159,11 @@ class World:
             for message in [m for topic, messages in self.kept if topic == reader.topic for m in messages]:
                 reader.offer(copy.deepcopy(message))
 
-    def publish(self, topic: str, message: Message, *, reliable: bool = True) -> None:
+    def publish(self, topic: str, message: Message, *, reliable: bool = True, kept: bool = False) -> None:
         """Take a message from the script: a command drives the robot, and the script's own subscriptions get it.
 
-        The robot, and subscriptions that ask for reliable delivery, get none from a publisher that is not.
+        The robot, and subscriptions that ask for reliable delivery, get none from a publisher that is not; those that
+        ask for what was kept get none from a publisher that keeps none.
 
         Raises
         ------
@@ -175,7 +176,7 @@ class World:
         if topic == names.COMMAND and reliable:
             self._drive(message.twist if message._type_name == names.STAMPED_COMMAND_TYPE else message)  # type: ignore[attr-defined]
         for reader in self.readers:
-            if reader.topic == topic and (reliable or not reader.reliable):
+            if reader.topic == topic and (reliable or not reader.reliable) and (kept or not reader.keeps):
                 reader.offer(copy.deepcopy(message))
 
     def _drive(self, message: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
+from functools import total_ordering
 from typing import Any
 
 from limo_sim.ros.interfaces import message_class
@@ -22,6 +23,7 @@ class ClockType(IntEnum):
     STEADY_TIME = 3
 
 
+@total_ordering
 class Duration(PartialApi, missing=("get_c_duration",)):
     """A difference of times; `nanoseconds` holds it exactly."""
 
@@ -42,16 +44,7 @@ class Duration(PartialApi, missing=("get_c_duration",)):
         return self.nanoseconds == other.nanoseconds if isinstance(other, Duration) else NotImplemented
 
     def __lt__(self, other: Duration) -> bool:
-        return self.nanoseconds < other.nanoseconds
-
-    def __le__(self, other: Duration) -> bool:
-        return self.nanoseconds <= other.nanoseconds
-
-    def __gt__(self, other: Duration) -> bool:
-        return self.nanoseconds > other.nanoseconds
-
-    def __ge__(self, other: Duration) -> bool:
-        return self.nanoseconds >= other.nanoseconds
+        return self.nanoseconds < other.nanoseconds if isinstance(other, Duration) else NotImplemented
 
     def __hash__(self) -> int:
         return hash(self.nanoseconds)
@@ -59,7 +52,11 @@ class Duration(PartialApi, missing=("get_c_duration",)):
     def __repr__(self) -> str:
         return f"Duration(nanoseconds={self.nanoseconds})"
 
+    def __str__(self) -> str:
+        return f"{self.nanoseconds} nanoseconds"
 
+
+@total_ordering
 class Time:
     """A point in time; `nanoseconds` since the run began."""
 
@@ -67,6 +64,8 @@ class Time:
         self, *, seconds: float = 0, nanoseconds: int = 0, clock_type: ClockType = ClockType.SYSTEM_TIME
     ) -> None:
         self.nanoseconds = int(seconds * 1e9) + int(nanoseconds)
+        if self.nanoseconds < 0:
+            raise ValueError(f"a time is not negative, came {self.nanoseconds} ns")
         self.clock_type = clock_type
 
     def seconds_nanoseconds(self) -> tuple[int, int]:
@@ -84,6 +83,8 @@ class Time:
         return cls(nanoseconds=msg.sec * 10**9 + msg.nanosec, clock_type=clock_type)
 
     def __add__(self, other: Duration) -> Time:
+        if not isinstance(other, Duration):
+            return NotImplemented
         return Time(nanoseconds=self.nanoseconds + other.nanoseconds, clock_type=self.clock_type)
 
     def __sub__(self, other: Time | Duration) -> Any:
@@ -98,23 +99,16 @@ class Time:
             raise TypeError("times of different clocks cannot be compared or subtracted")
 
     def __eq__(self, other: object) -> bool:
-        return self.nanoseconds == other.nanoseconds if isinstance(other, Time) else NotImplemented
+        if not isinstance(other, Time):
+            return NotImplemented
+        self._comparable(other)
+        return self.nanoseconds == other.nanoseconds
 
     def __lt__(self, other: Time) -> bool:
+        if not isinstance(other, Time):
+            return NotImplemented
         self._comparable(other)
         return self.nanoseconds < other.nanoseconds
-
-    def __le__(self, other: Time) -> bool:
-        self._comparable(other)
-        return self.nanoseconds <= other.nanoseconds
-
-    def __gt__(self, other: Time) -> bool:
-        self._comparable(other)
-        return self.nanoseconds > other.nanoseconds
-
-    def __ge__(self, other: Time) -> bool:
-        self._comparable(other)
-        return self.nanoseconds >= other.nanoseconds
 
     def __hash__(self) -> int:
         return hash(self.nanoseconds)

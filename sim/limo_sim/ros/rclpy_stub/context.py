@@ -28,7 +28,15 @@ class Context:
         self.is_initialized = True
 
     def shutdown(self) -> None:
-        """End."""
+        """End.
+
+        Raises
+        ------
+        RuntimeError
+            If it has not begun, or has ended.
+        """
+        if not self.is_initialized:
+            raise RuntimeError("rclpy.shutdown() has been called before, or rclpy.init() was not")
         self.is_initialized = False
         self.executor = None
 

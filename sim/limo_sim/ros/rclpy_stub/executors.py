@@ -1,10 +1,10 @@
-"""Executors: they run what is due, timers first, then subscriptions, services and answers, as they were made."""
+"""Executors: they run what is due node by node, timers first, then subscriptions, answers and requests, as made."""
 
 from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from limo_sim.ros.lockstep.turns import ExternalShutdownException
@@ -22,8 +22,28 @@ _THREADS = 4
 #: Names of rclpy's `Executor` that are not offered.
 _MISSING = tuple(
     "wait_for_ready_callbacks spin_once_until_future_complete can_execute create_timer add_to_context "
-    "guard_condition".split()
+    "guard_condition create_future".split()
 )
+
+
+#: A callback's group, and what has it: a timer, subscription, client, service or task.
+_Due = tuple[CallbackGroup | None, Any]
+
+
+def _may_run(group: CallbackGroup | None, entity: Any) -> bool:
+    return entity.is_ready() and (group is None or group.can_execute(entity))
+
+
+def _ended(future: Future) -> bool:
+    return future.done() or future.cancelled()
+
+
+async def _holding(group: CallbackGroup | None, coroutine: Any) -> None:
+    try:
+        await coroutine
+    finally:
+        if group is not None:
+            group.running -= 1
 
 
 class Executor(PartialApi, missing=_MISSING):
@@ -34,6 +54,7 @@ class Executor(PartialApi, missing=_MISSING):
         self._nodes: list[Node] = []
         self._tasks: list[Task] = []
         self._is_shutdown = self._spins = False
+        self._round: list[_Due] = []
 
     def add_node(self, node: Node) -> bool:
         """Add a node, which leaves the executor it had; False if it was added before."""
@@ -61,7 +82,7 @@ class Executor(PartialApi, missing=_MISSING):
         self._tasks.append(task)
         return task
 
-    def shutdown(self, timeout_sec: float | None = None) -> bool:  # noqa: ARG002 — rclpy's signature
+    def shutdown(self, timeout_sec: float | None = None, *, wait_for_threads: bool = True) -> bool:  # noqa: ARG002 — rclpy's signature
         """End `spin`."""
         self._is_shutdown = True
         return True
@@ -87,8 +108,8 @@ class Executor(PartialApi, missing=_MISSING):
         """Run callbacks until a future is done, or simulated time is up."""
         world = self.context.world
         until = math.inf if timeout_sec is None or timeout_sec < 0 else world.time + timeout_sec
-        while self.context.ok() and not self._is_shutdown and not future.done() and world.time < until - 1e-9:
-            self._once(until - world.time, future.done)
+        while self.context.ok() and not self._is_shutdown and not _ended(future) and world.time < until - 1e-9:
+            self._once(until - world.time, lambda: _ended(future))
 
     def _once(self, timeout: float, enough: Callable[[], bool] = lambda: False) -> None:
         """Wait for something that is due, and run it."""
@@ -105,7 +126,7 @@ class Executor(PartialApi, missing=_MISSING):
 
             def wanted() -> bool:
                 ended = world.over or not context.ok() or self._is_shutdown
-                return ended or enough() or next(self._due(), None) is not None or self._failed() is not None
+                return ended or enough() or bool(self._ready()) or self._failed() is not None
 
             polls, before = timeout <= 0 and not wanted(), world.advances
             until = math.inf if polls else world.time + timeout
@@ -113,42 +134,48 @@ class Executor(PartialApi, missing=_MISSING):
             failure = self._failed()
             if failure is not None:
                 raise failure
-            due = next(self._due(), None)
-            if due is not None and not world.over:
-                group, take = due
-                self._run(group, take())
+            due = None if world.over else self._next()
+            if due is not None:
+                self._run(due[0], due[1].take())
         finally:
             self._spins = False
 
     def _run(self, group: CallbackGroup | None, work: Callable[[], Any]) -> None:
-        """Run a callback; one written as a coroutine becomes a task."""
+        """Run a callback; one written as a coroutine becomes a task, which holds its group to the end, as in ROS."""
+        made: list[Any] = []
         if group is not None:
             group.running += 1
         try:
-            made: list[Any] = []
             self.context.world.call(lambda: made.append(work()))
-            if made and hasattr(made[0], "send"):
-                self.create_task(made[0])
         finally:
-            if group is not None:
+            if group is not None and not (made and hasattr(made[0], "send")):
                 group.running -= 1
+        if made and hasattr(made[0], "send"):
+            self.context.world.call(self.create_task(_holding(group, made[0])).take())
 
     def _failed(self) -> BaseException | None:
         """Return what a callback in a thread has raised."""
         return None
 
-    def _due(self) -> Iterator[tuple[CallbackGroup | None, Callable[[], Callable[[], Any]]]]:
-        """Yield what may run now, with its group."""
-        for kind in ("timers", "subscriptions", "services", "clients"):
-            for node in self._nodes:
-                for entity in getattr(node, kind):
-                    group = entity.callback_group
-                    if entity.is_ready() and (group is None or group.can_execute(entity)):
-                        yield group, entity.take
-        self._tasks = [task for task in self._tasks if not task.done()]
-        for task in self._tasks:
-            if task.is_ready():
-                yield None, task.take
+    def _ready(self) -> list[_Due]:
+        """Return what may run now, with its group: tasks first, the newest of them before the others."""
+        self._tasks = [task for task in self._tasks if not _ended(task)]
+        due: list[_Due] = [(None, task) for task in reversed(self._tasks) if task.is_ready()]
+        for node in self._nodes:
+            for kind in ("timers", "subscriptions", "clients", "services"):
+                due += [(one.callback_group, one) for one in getattr(node, kind) if _may_run(one.callback_group, one)]
+        return due
+
+    def _next(self) -> _Due | None:
+        """Return what runs next: as in ROS, what is due together runs once each before any of it runs again."""
+        for _ in range(2):
+            while self._round:
+                group, entity = self._round.pop(0)
+                if _may_run(group, entity):
+                    entity.executor = self
+                    return group, entity
+            self._round = self._ready()
+        return None
 
 
 class SingleThreadedExecutor(Executor):
@@ -164,26 +191,26 @@ class MultiThreadedExecutor(Executor):
         self._running = 0
         self._failure: BaseException | None = None
 
-    def _due(self) -> Iterator[tuple[CallbackGroup | None, Callable[[], Callable[[], Any]]]]:
-        return super()._due() if self._running < self._threads else iter(())
+    def _ready(self) -> list[_Due]:
+        return super()._ready() if self._running < self._threads else []
 
     def _failed(self) -> BaseException | None:
         return self._failure
 
     def _run(self, group: CallbackGroup | None, work: Callable[[], Any]) -> None:
-        if group is not None:
-            group.running += 1
         self._running += 1
+        if group is not None:
+            group.running += 1  # before the thread has its first turn
 
         def run() -> None:
             try:
-                super(MultiThreadedExecutor, self)._run(None, work)
+                if group is not None:
+                    group.running -= 1
+                super(MultiThreadedExecutor, self)._run(group, work)
             except Exception as error:
                 self._failure = error
             finally:
                 self._running -= 1
-                if group is not None:
-                    group.running -= 1
 
         threading.Thread(target=run, daemon=True).start()
 

@@ -11,20 +11,22 @@ from limo_sim.ros.lockstep.records import StubError
 class Future:
     """An answer that may not be there yet."""
 
-    def __init__(self, *, executor: Any = None) -> None:  # noqa: ARG002 — rclpy's signature
+    def __init__(self, *, executor: Any = None) -> None:
+        #: What runs the done callbacks as tasks; None runs them at once.
+        self.executor = executor
         self._done = self._cancelled = False
         self._result: Any = None
         self._exception: BaseException | None = None
         self._callbacks: list[Callable[[Any], Any]] = []
 
     def __await__(self) -> Generator[Future, None, Any]:
-        while not self.done():
+        while not (self._done or self._cancelled):
             yield self
         return self.result()
 
     def done(self) -> bool:
-        """Whether the answer is there, or will never come."""
-        return self._done or self._cancelled
+        """Whether the answer is there; as in rclpy, it is not where it was cancelled."""
+        return self._done
 
     def cancelled(self) -> bool:
         """Whether it was cancelled."""
@@ -57,11 +59,10 @@ class Future:
         self._call_back()
 
     def add_done_callback(self, callback: Callable[[Any], Any]) -> None:
-        """Call back with the future when it is done; at once where it is."""
-        if self.done():
-            callback(self)
-        else:
-            self._callbacks.append(callback)
+        """Call back with the future when it is done or cancelled; at once where it is."""
+        self._callbacks.append(callback)
+        if self._done or self._cancelled:
+            self._call_back()
 
     def remove_done_callback(self, callback: Callable[[Any], Any]) -> bool:
         """Forget a callback; returns whether it was there."""
@@ -73,7 +74,10 @@ class Future:
     def _call_back(self) -> None:
         callbacks, self._callbacks = self._callbacks, []
         for callback in callbacks:
-            callback(self)
+            if self.executor is None:
+                callback(self)
+            else:
+                self.executor.create_task(callback, self)
 
 
 class Task(Future):
@@ -93,13 +97,21 @@ class Task(Future):
 
     def is_ready(self) -> bool:
         """Whether it can go on."""
-        return not self.done() and (self._awaits is None or self._awaits.done())
+        awaits = self._awaits
+        return not self._done and not self._cancelled and (awaits is None or awaits.done() or awaits.cancelled())
 
     def take(self) -> Callable[[], None]:
         """Return the work that can be done now."""
         return self._step
 
     def _step(self) -> None:
+        try:
+            self._go_on()
+        except Exception as error:
+            self.set_exception(error)
+            raise
+
+    def _go_on(self) -> None:
         if self._coroutine is None:
             made = self._handler(*self._args, **self._kwargs)
             if not hasattr(made, "send"):

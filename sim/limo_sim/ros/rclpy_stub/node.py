@@ -13,6 +13,13 @@ from limo_sim.ros.rclpy_stub.clock import Clock, ClockType, Rate, Timer
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from limo_sim.ros.rclpy_stub.logger import Logger
+from limo_sim.ros.rclpy_stub.naming import (
+    InvalidNamespaceException,
+    InvalidNodeNameException,
+    InvalidServiceNameException,
+    InvalidTopicNameException,
+    checked,
+)
 from limo_sim.ros.rclpy_stub.parameters import Parameter, Parameters, SetParametersResult
 from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import QoSProfile, qos_profile_services_default, to_profile
@@ -40,7 +47,8 @@ _MISSING = tuple(
     "get_subscriber_names_and_types_by_node get_service_names_and_types_by_node "
     "get_client_names_and_types_by_node get_node_names_and_namespaces "
     "get_node_names_and_namespaces_with_enclaves add_pre_set_parameters_callback "
-    "remove_pre_set_parameters_callback add_post_set_parameters_callback remove_post_set_parameters_callback".split()
+    "remove_pre_set_parameters_callback add_post_set_parameters_callback remove_post_set_parameters_callback "
+    "ParameterInput".split()
 )
 
 
@@ -69,6 +77,8 @@ class Node(PartialApi, missing=_MISSING):
             raise StubError("limo-hog run does not offer Node(cli_args=...): give the arguments after --ros-args")
         arguments = context.arguments
         self._names = (arguments if use_global_arguments else RosArguments()).named(node_name, namespace or "")
+        checked(self._names.name, InvalidNodeNameException)
+        checked(self._names.namespace, InvalidNamespaceException)
         overrides = self._names.parameters
         overrides = {p.name: p.value for p in parameter_overrides or ()} | overrides
         context.world.called("nodes", self._names.name)
@@ -138,11 +148,12 @@ class Node(PartialApi, missing=_MISSING):
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         """Return a topic's full name, after the command line's remaps unless `only_expand`."""
+        checked(topic, InvalidTopicNameException)
         return self._names.expand(topic) if only_expand else self._names.resolve(topic)
 
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
         """Return a service's full name, after the command line's remaps unless `only_expand`."""
-        return self.resolve_topic_name(service, only_expand=only_expand)
+        return self.resolve_topic_name(checked(service, InvalidServiceNameException), only_expand=only_expand)
 
     def create_publisher(
         self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int, **_: Any
@@ -173,6 +184,7 @@ class Node(PartialApi, missing=_MISSING):
         subscription = Subscription(msg_type, self.resolve_topic_name(topic), callback, to_profile(qos_profile), group)
         check_topic(subscription.topic, msg_type)
         self._subscriptions.append(subscription)
+        group.add_entity(subscription)
         current().world.subscribe(subscription)
         return subscription
 
@@ -186,7 +198,9 @@ class Node(PartialApi, missing=_MISSING):
     ) -> Timer:
         """Call back every so many seconds."""
         nanoseconds = int(float(timer_period_sec) * 1e9)
-        timer = Timer(callback, self._group(callback_group), nanoseconds, clock or self._clock, autostart=autostart)
+        group = self._group(callback_group)
+        timer = Timer(callback, group, nanoseconds, clock or self._clock, autostart=autostart)
+        group.add_entity(timer)
         self._timers.append(timer)
         return timer
 
@@ -207,8 +221,9 @@ class Node(PartialApi, missing=_MISSING):
     ) -> Service:
         """Answer requests by `callback(request, response)`, which returns the response."""
         _check_service(srv_type)
-        name = self.resolve_service_name(srv_name)
-        service = Service(srv_type, name, callback, self._group(callback_group), qos_profile)
+        name, group = self.resolve_service_name(srv_name), self._group(callback_group)
+        service = Service(srv_type, (srv_name, name), callback, group, qos_profile)
+        group.add_entity(service)
         self._services.append(service)
         current().world.services[name] = service
         current().world.called("services", name)
@@ -224,9 +239,11 @@ class Node(PartialApi, missing=_MISSING):
     ) -> Client:
         """Return what sends requests to a service."""
         _check_service(srv_type)
-        client = Client(srv_type, self.resolve_service_name(srv_name), qos_profile, self._group(callback_group))
+        name, group = self.resolve_service_name(srv_name), self._group(callback_group)
+        client = Client(srv_type, (srv_name, name), qos_profile, group)
+        group.add_entity(client)
         self._clients.append(client)
-        current().world.called("clients", client.srv_name)
+        current().world.called("clients", name)
         return client
 
     def _group(self, given: CallbackGroup | None) -> CallbackGroup:
@@ -234,6 +251,7 @@ class Node(PartialApi, missing=_MISSING):
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """End a publisher."""
+        publisher.destroy()
         return _take_out(self._publishers, publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
@@ -262,10 +280,8 @@ class Node(PartialApi, missing=_MISSING):
 
     def destroy_node(self) -> None:
         """End everything the node has."""
-        for subscription in self._subscriptions:
-            subscription.destroy()
-        for service in self._services:
-            service.destroy()
+        for entity in (*self._publishers, *self._subscriptions, *self._services):
+            entity.destroy()
         self._publishers, self._subscriptions, self._timers = [], [], []
         self._services, self._clients = [], []
         if self.executor is not None:

@@ -32,6 +32,10 @@ class InvalidParameterTypeException(ParameterException):
     """A parameter was given a value of another type."""
 
 
+class InvalidParameterValueException(ParameterException):
+    """A callback refused a parameter's first value."""
+
+
 class ParameterType(IntEnum):
     """What a parameter holds."""
 
@@ -52,10 +56,9 @@ class ParameterType(IntEnum):
         single = {type(None): cls.NOT_SET, bool: cls.BOOL, int: cls.INTEGER, float: cls.DOUBLE, str: cls.STRING}
         if type(value) in single:
             return single[type(value)]
-        if isinstance(value, bytes):
-            return cls.BYTE_ARRAY
         if isinstance(value, list | tuple):
             arrays = {bool: cls.BOOL_ARRAY, int: cls.INTEGER_ARRAY, float: cls.DOUBLE_ARRAY, str: cls.STRING_ARRAY}
+            arrays[bytes] = cls.BYTE_ARRAY
             kinds = {type(item) for item in value}
             if not kinds:
                 return cls.BYTE_ARRAY
@@ -87,7 +90,9 @@ class Parameter(PartialApi, missing=("to_parameter_msg", "from_parameter_msg")):
 
     def __init__(self, name: str, type_: ParameterType | None = None, value: Any = None) -> None:
         self.name = name
-        self.type_ = ParameterType.from_parameter_value(value) if type_ is None else type_
+        self.type_ = ParameterType.from_parameter_value(value)
+        if type_ not in (None, self.type_):
+            raise ValueError(f"parameter {name!r}: {value!r} is not of the type {ParameterType(type_).name}")
         self.value = value
 
     def get_parameter_value(self) -> ParameterValue:
@@ -129,6 +134,7 @@ class Parameters:
         self._overrides = overrides
         self._noted = noted
         self._values: dict[str, Parameter] = {}
+        self._described: dict[str, Any] = {}
         self.callbacks: list[Callable[[list[Parameter]], Any]] = []
         if declares_overrides:
             for name, value in overrides.items():
@@ -154,7 +160,11 @@ class Parameters:
                     f"parameter {name!r} is {wanted.name}, came {came.name} {value!r} from the command line"
                     + (f": write {name}:={float(value)}" if (wanted.name, came.name) == ("DOUBLE", "INTEGER") else "")
                 )
+        refusal = self._refusal(Parameter(name, value=value))
+        if refusal is not None:
+            raise InvalidParameterValueException(f"parameter {name!r}: a callback refused {value!r}: {refusal.reason}")
         self._values[name] = Parameter(name, value=value)
+        self._described[name] = descriptor or ParameterDescriptor()
         self._noted[name] = value
         return self._values[name]
 
@@ -184,23 +194,28 @@ class Parameters:
         """Change parameters one by one, each if every callback agrees and its type stays."""
         results = []
         for change in changes:
-            before = self.get(change.name)
-            if before.type_ not in (ParameterType.NOT_SET, change.type_):
-                reason = f"{change.name} is {before.type_.name}, came {change.type_.name}"
-                results.append(SetParametersResult(False, reason))
+            before, described = self.get(change.name), self._described.get(change.name, ParameterDescriptor())
+            other = before.type_ not in (ParameterType.NOT_SET, change.type_) and not described.dynamic_typing
+            if other or described.read_only:
+                wrong = "is read-only" if described.read_only else f"is {before.type_.name}, came {change.type_.name}"
+                results.append(SetParametersResult(False, f"{change.name} {wrong}"))
                 continue
-            answers = [callback([change]) for callback in self.callbacks]
-            refused = next((answer for answer in answers if not answer.successful), None)
+            refused = self._refusal(change)
             results.append(SetParametersResult() if refused is None else refused)
             if refused is None:
                 self._values[change.name] = change
                 self._noted[change.name] = change.value
         return results
 
+    def _refusal(self, change: Parameter) -> SetParametersResult | None:
+        """Ask every callback; return the answer of the first that refuses."""
+        answers = [callback([change]) for callback in self.callbacks]
+        return next((answer for answer in answers if not answer.successful), None)
+
 
 @dataclass
 class ParameterDescriptor:
-    """The description of a parameter; only `dynamic_typing` has an effect."""
+    """The description of a parameter; only `read_only` and `dynamic_typing` have an effect."""
 
     name: str = ""
     type: int = 0

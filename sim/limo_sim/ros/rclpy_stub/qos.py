@@ -64,12 +64,16 @@ class LivelinessPolicy(IntEnum):
     RMW_QOS_POLICY_DURABILITY_UNKNOWN = UNKNOWN
 
 
+class InvalidQoSProfileException(Exception):  # noqa: N818 — rclpy's name
+    """A profile says neither how many messages wait nor that all do."""
+
+
 @dataclass
 class QoSProfile(PartialApi, missing=("get_c_qos_profile",)):
     """What a writer offers and a reader asks for; lifespan, deadline and lease are taken and change nothing here."""
 
-    depth: int = 10
-    history: HistoryPolicy = HistoryPolicy.KEEP_LAST
+    depth: Any = None
+    history: HistoryPolicy = HistoryPolicy.UNKNOWN
     reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE
     durability: DurabilityPolicy = DurabilityPolicy.VOLATILE
     liveliness: LivelinessPolicy = LivelinessPolicy.SYSTEM_DEFAULT
@@ -77,6 +81,12 @@ class QoSProfile(PartialApi, missing=("get_c_qos_profile",)):
     deadline: Any = None
     liveliness_lease_duration: Any = None
     avoid_ros_namespace_conventions: bool = False
+
+    def __post_init__(self) -> None:
+        if self.depth is None and self.history in (HistoryPolicy.UNKNOWN, HistoryPolicy.KEEP_LAST):
+            raise InvalidQoSProfileException("a QoSProfile needs a depth, or the history KEEP_ALL")
+        self.depth = 10 if self.depth is None else self.depth
+        self.history = HistoryPolicy.KEEP_LAST if self.history == HistoryPolicy.UNKNOWN else self.history
 
 
 def to_profile(given: QoSProfile | int) -> QoSProfile:
@@ -96,25 +106,26 @@ def to_profile(given: QoSProfile | int) -> QoSProfile:
     return QoSProfile(depth=given)
 
 
-qos_profile_default = QoSProfile()
-qos_profile_system_default = QoSProfile()
+qos_profile_default = QoSProfile(depth=10)
+qos_profile_system_default = QoSProfile(depth=10)
 qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-qos_profile_services_default = QoSProfile()
+qos_profile_services_default = QoSProfile(depth=10)
 qos_profile_parameters = QoSProfile(depth=1000)
 
 
 class QoSPresetProfiles(Enum):
     """The profiles by name."""
 
-    UNKNOWN = QoSProfile(reliability=ReliabilityPolicy.UNKNOWN)
+    UNKNOWN = QoSProfile(depth=10, reliability=ReliabilityPolicy.UNKNOWN)
     DEFAULT = qos_profile_default
     SYSTEM_DEFAULT = qos_profile_system_default
     SENSOR_DATA = qos_profile_sensor_data
     SERVICES_DEFAULT = qos_profile_services_default
     PARAMETERS = qos_profile_parameters
     PARAMETER_EVENTS = QoSProfile(depth=1000)
+    ROSOUT_DEFAULT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     ACTION_STATUS_DEFAULT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    BEST_AVAILABLE = QoSProfile(reliability=ReliabilityPolicy.BEST_AVAILABLE)
+    BEST_AVAILABLE = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_AVAILABLE)
 
     @classmethod
     def short_keys(cls) -> list[str]:
@@ -131,6 +142,7 @@ class QoSPresetProfiles(Enum):
 #: What `rclpy.qos` holds.
 OFFERED = {
     "QoSProfile": QoSProfile,
+    "InvalidQoSProfileException": InvalidQoSProfileException,
     "QoSPresetProfiles": QoSPresetProfiles,
     **{kind.__name__: kind for kind in (ReliabilityPolicy, DurabilityPolicy, HistoryPolicy, LivelinessPolicy)},
     **{f"QoS{kind.__name__}": kind for kind in (ReliabilityPolicy, DurabilityPolicy, HistoryPolicy, LivelinessPolicy)},

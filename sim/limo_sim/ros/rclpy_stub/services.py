@@ -26,12 +26,12 @@ class Service(PartialApi, missing=("send_response", "configure_introspection", "
     def __init__(
         self,
         srv_type: Any,
-        srv_name: str,
+        names: tuple[str, str],
         callback: Callable[[Any, Any], Any],
         callback_group: CallbackGroup,
         qos_profile: QoSProfile,
     ) -> None:
-        self.srv_type, self.srv_name, self.service_name = srv_type, srv_name, srv_name
+        self.srv_type, (self.srv_name, self.service_name) = srv_type, names
         self.callback, self.callback_group, self.qos_profile = callback, callback_group, qos_profile
         self._requests: deque[tuple[Any, Client, Future]] = deque()
 
@@ -69,20 +69,24 @@ class Service(PartialApi, missing=("send_response", "configure_introspection", "
 
     def destroy(self) -> None:
         """End the service."""
-        current().world.services.pop(self.srv_name, None)
+        current().world.services.pop(self.service_name, None)
 
 
 class Client(PartialApi, missing=("configure_introspection", "handle", "logger_name", "get_pending_request")):
     """Sends requests."""
 
-    def __init__(self, srv_type: Any, srv_name: str, qos_profile: QoSProfile, callback_group: CallbackGroup) -> None:
-        self.srv_type, self.srv_name, self.service_name = srv_type, srv_name, srv_name
+    def __init__(
+        self, srv_type: Any, names: tuple[str, str], qos_profile: QoSProfile, callback_group: CallbackGroup
+    ) -> None:
+        self.srv_type, (self.srv_name, self.service_name) = srv_type, names
+        #: The executor that last served it: it runs the done callbacks of its futures.
+        self.executor: Any = None
         self.qos_profile, self.callback_group = qos_profile, callback_group
         self._responses: deque[tuple[Any, Future]] = deque()
 
     def service_is_ready(self) -> bool:
         """Whether a node offers the service."""
-        return self.srv_name in current().world.services
+        return self.service_name in current().world.services
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until a node offers the service; False when simulated time is up before."""
@@ -97,7 +101,7 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
                 f"the service {self.srv_name!r} takes a {self.srv_type.__name__}.Request, came {type(request).__name__}"
             )
         future = Future()
-        server = current().world.services.get(self.srv_name)
+        server = current().world.services.get(self.service_name)
         if server is not None:
             server.request(copy.deepcopy(request), self, future)
         return future
@@ -138,6 +142,7 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
     def take(self) -> Callable[[], Any]:
         """Return the work of giving the oldest answer to its future."""
         response, future = self._responses.popleft()
+        future.executor = self.executor
         return lambda: None if future.cancelled() else future.set_result(response)
 
     def destroy(self) -> None:

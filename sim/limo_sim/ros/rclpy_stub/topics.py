@@ -18,6 +18,10 @@ from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 
+class InvalidHandle(Exception):  # noqa: N818 — rclpy's name
+    """Something is used that was destroyed."""
+
+
 class Publisher(
     PartialApi, missing=("assert_liveliness", "wait_for_all_acked", "handle", "event_handlers", "logger_name")
 ):
@@ -28,6 +32,7 @@ class Publisher(
         self.topic_name = self.topic = topic
         self.qos_profile = qos
         self._kept: deque[Message] | None = None
+        self._destroyed = False
         world = current().world
         if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
             self._kept = deque(maxlen=max(qos.depth, 1))
@@ -45,6 +50,8 @@ class Publisher(
         ------
         TypeError
             If it is of another type.
+        InvalidHandle
+            If the publisher was destroyed.
         StubError
             If it is a command that is not a number.
         """
@@ -53,9 +60,11 @@ class Publisher(
                 f"{self.topic} carries {self.msg_type.__name__}, came {type(msg).__name__}: "
                 f"publish a {self.msg_type.__name__}"
             )
+        if self._destroyed:
+            raise InvalidHandle(f"the publisher of {self.topic} was destroyed")
         if self._kept is not None:
             self._kept.append(copy.deepcopy(msg))
-        current().world.publish(self.topic, msg, reliable=self._reliable)
+        current().world.publish(self.topic, msg, reliable=self._reliable, kept=self._kept is not None)
 
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions; the robot is one to /cmd_vel."""
@@ -64,12 +73,19 @@ class Publisher(
 
     def destroy(self) -> None:
         """End the publisher."""
-        writers = current().world.writers
-        if self.topic in writers:
-            writers.remove(self.topic)
+        self._destroyed = True
+        world = current().world
+        world.kept = [one for one in world.kept if one[1] is not self._kept]
+        if self.topic in world.writers:
+            world.writers.remove(self.topic)
 
 
-class Subscription(PartialApi, missing=("handle", "event_handlers", "raw", "logger_name", "CallbackType")):
+_CONTENT_FILTER = ("is_cft_enabled", "set_content_filter", "get_content_filter")
+
+
+class Subscription(
+    PartialApi, missing=("handle", "event_handlers", "raw", "logger_name", "CallbackType", *_CONTENT_FILTER)
+):
     """Calls back with each message of a topic; the newest `depth` wait for a slow callback."""
 
     def __init__(

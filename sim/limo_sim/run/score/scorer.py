@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from limo_hog.follow.decision import Mode
-from limo_hog.follow.robot import LIMO
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.measurement import Zone, zone_of
 from limo_sim.run.log import Step
 from limo_sim.run.matching import CRITERIA, NO_PERSON, Criteria, person_of
@@ -23,7 +23,7 @@ from limo_sim.run.provenance import code_version, scenario_hash
 from limo_sim.run.score.card import ScoreCard
 from limo_sim.run.score.subject import Mean, Subject
 from limo_sim.world.furniture import Rectangle, distance_to
-from limo_sim.world.robot import max_turn_rate
+from limo_sim.world.robot import twist_of
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Contacts, Truth
 
@@ -42,7 +42,8 @@ class Scorer:
     def __init__(self, scenario: Scenario, criteria: Criteria = CRITERIA) -> None:
         self._scenario, self._criteria = scenario, criteria
         self._radii = [person.radius for person in scenario.people]
-        self._motion = _Motion(max_turn_rate(scenario.robot.wheel_speed))
+        robot, fastest = scenario.robot.geometry, scenario.robot.wheel_speed
+        self._motion = _Motion(twist_of(-fastest, fastest, robot.wheel_separation).angular)
         # Everybody, until one of them is the target: then that one.
         self._subjects = [Subject(index, criteria) for index in range(max(len(scenario.people), 1))]
         self._steps = self._frames = self._boxed = self._wrong = self._targets = self._switches = 0
@@ -79,7 +80,7 @@ class Scorer:
         self._modes[step.log.decision.mode.value] += 1
         self._reasons[step.log.decision.reason] += 1
         self._motion.add(step, target)
-        self._clearance = min(self._clearance, _clearance(step.truth, self._radii))
+        self._clearance = min(self._clearance, _clearance(self._scenario.robot.geometry, step.truth, self._radii))
         distances = [person.distance for person in people if person]
         self._anybody = self._anybody or bool(distances)
         if distances:
@@ -231,13 +232,13 @@ def _jerk(poses: Sequence[tuple[float, float, float, float]]) -> float:
     return float(values[0])
 
 
-def _clearance(truth: Truth, radii: Sequence[float]) -> float:
+def _clearance(robot: RobotGeometry, truth: Truth, radii: Sequence[float]) -> float:
     """Return the smallest gap between the robot's rectangle and a person's cylinder [m]; infinite without people."""
     x, y, yaw = truth.robot
-    robot, least = Rectangle(x, y, LIMO.half_length, LIMO.half_width, yaw), math.inf
+    body, least = Rectangle(x, y, robot.half_length, robot.half_width, yaw), math.inf
     for person, radius in zip(truth.people, radii, strict=False):
         if person is not None:
-            least = min(least, distance_to(robot, person.x, person.y) - radius)
+            least = min(least, distance_to(body, person.x, person.y) - radius)
     return least
 
 

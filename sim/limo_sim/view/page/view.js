@@ -335,10 +335,11 @@ function drawMap() {
   pen.rotate(-yaw);
   pen.fillStyle = colours.robot;
   pen.beginPath();
-  pen.roundRect(-0.145 * scale, -0.11 * scale, 0.29 * scale, 0.22 * scale, 3);
+  const [long, wide] = scene.body.map((half) => half * scale);
+  pen.roundRect(-long, -wide, 2 * long, 2 * wide, 3);
   pen.fill();
   pen.fillStyle = colours.card;
-  pen.fillRect(0.06 * scale, -0.07 * scale, 0.05 * scale, 0.14 * scale);
+  pen.fillRect(0.4 * long, -0.64 * wide, 0.35 * long, 1.28 * wide);
   pen.restore();
 }
 

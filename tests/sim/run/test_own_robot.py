@@ -1,0 +1,126 @@
+"""The arena's robot is the one of a file: its camera, its lidar, its outline, its wheels."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from limo_hog import PeopleDetector
+from limo_hog.follow import LIMO, Decision, Follower, Mode, RobotError, Twist
+from limo_hog.follow.sense.observation import Sensors
+from limo_sim.run.arena import Arena
+from limo_sim.run.provenance import scenario_hash
+from limo_sim.world.scenario import Camera, Depth, Lidar, Room, Scenario, Wall, Wheels
+from limo_sim.world.schema import ScenarioError
+
+OWN = """
+half_length = 0.25
+half_width = 0.18
+camera_x = 0.2
+camera_z = 0.25
+field_of_view = 1.0472
+lidar_x = -0.1
+lidar_yaw = 3.14159265
+wheel_separation = 0.3
+max_speed = 0.6
+acceleration = 0.5
+"""
+
+
+def own(tmp_path: Path, text: str = OWN, scenario: str = "empty") -> Scenario:
+    (tmp_path / "robot.toml").write_text(text)
+    return Scenario.load(scenario, tmp_path / "robot.toml")
+
+
+def quiet(scenario: Scenario) -> Scenario:
+    exact = Depth(noise=0.0, invalid=0.0, far_m=20.0)
+    return dataclasses.replace(
+        scenario,
+        depth=exact,
+        camera=Camera(noise=0.0),
+        lidar=Lidar(noise_m=0.0),
+        odometry=Wheels(slip=0.0),
+        room=Room(3.0),
+    )
+
+
+def test_the_camera_sees_from_where_it_sits_and_as_wide_as_it_is(tmp_path: Path) -> None:
+    frame = Arena(quiet(own(tmp_path))).frame()
+    assert frame.focal_px == pytest.approx(320 / math.tan(math.radians(30)), rel=1e-4)
+    assert frame.depth[479, 320] == pytest.approx(0.25 * frame.focal_px / 239.5, rel=1e-4)
+    assert frame.depth[240, 320] == pytest.approx(3.0 - 0.2, abs=1e-3)
+
+
+def test_the_lidar_looks_where_it_is_turned_and_the_follower_turns_it_back(tmp_path: Path) -> None:
+    scenario = dataclasses.replace(quiet(own(tmp_path)), walls=(Wall((-1.5, -2.9), (-1.5, 2.9), 0.02),))
+    arena = Arena(scenario)
+    ranges = arena.scan().ranges
+    assert ranges[len(ranges) // 2] == pytest.approx(1.49 - 0.1, abs=5e-3)
+    told = arena.scan().turned(scenario.robot.geometry.lidar_yaw)
+    assert math.cos((told.angle_min + told.angle_max) / 2) == pytest.approx(-1.0)
+
+
+def test_wheels_do_what_the_file_says(tmp_path: Path) -> None:
+    arena = Arena(quiet(own(tmp_path)))
+    for _ in range(60):
+        arena.command(Twist(1.0, 0.0))
+        arena.step()
+        if arena.time == pytest.approx(0.5):
+            assert arena.odometry().linear == pytest.approx(0.25, abs=0.011)
+    arena.command(Twist(0.0, 5.0))
+    for _ in range(150):
+        arena.command(Twist(0.0, 5.0))
+        arena.step()
+    assert arena.odometry().angular == pytest.approx(2 * 0.6 / 0.3, abs=1e-6)
+
+
+class Ahead:
+    """Drives ahead, whatever there is."""
+
+    robot = LIMO
+
+    def start(self) -> None:
+        return None
+
+    def step(self, _: Any, state: None) -> Decision[None]:
+        return Decision(Twist(0.6, 0.0), state, Mode.FOLLOW, "ahead")
+
+
+@pytest.mark.parametrize("text", ["", OWN], ids=["limo", "own"])
+def test_the_outline_keeps_its_distance_from_a_wall(text: str, tmp_path: Path) -> None:
+    arena = Arena(quiet(own(tmp_path, text)))
+    controller: Any = dataclasses.make_dataclass("Ahead", [("robot", Any, LIMO)], bases=(Ahead,), frozen=True)()
+    follower = Follower(controller, PeopleDetector(), arena.robot)
+    while arena.time < 14.0:
+        log = follower.tick(arena.time, arena.frame(), Sensors(arena.scan(), arena.odometry()))
+        if log is not None:
+            arena.command(log.decision.twist)
+        arena.step()
+    gap = 3.0 - arena.plan().robot[0] - arena.robot.half_length
+    assert arena.contacts.wall == 0
+    assert gap == pytest.approx(0.6, abs=0.01)  # `Margin.ahead`
+    assert np.hypot(*arena.plan().robot[:2]) > 1.5
+
+
+def test_a_scenario_may_bring_its_robot_and_a_wrong_one_is_named(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text("[robot.geometry]\ncamera_z = 0.25\n")
+    scenario = Scenario.load(tmp_path / "own.toml")
+    assert scenario.robot.geometry == dataclasses.replace(LIMO, camera_z=0.25)
+    assert scenario_hash(scenario) != scenario_hash(Scenario()) == scenario_hash(own(tmp_path, ""))
+    (tmp_path / "wrong.toml").write_text("[robot.geometry]\ncamera_z = 5.0\n")
+    with pytest.raises(
+        ScenarioError, match=r"wrong\.toml: robot\.geometry\.camera_z: got 5\.0, want a number in 0\.02"
+    ):
+        Scenario.load(tmp_path / "wrong.toml")
+    with pytest.raises(RobotError, match=r"robot\.toml: wings: unknown key"):
+        own(tmp_path, "wings = 2")
+    (tmp_path / "cone.toml").write_text('[[furniture]]\nkind = "cone"\nx = 1.0\ny = 0.0\n')
+    with pytest.raises(
+        ScenarioError, match=r"furniture\[0\]: is 0\.80 m from the robot's centre, want at least 1\.41 m"
+    ):
+        own(tmp_path, "half_length = 1.0\nhalf_width = 1.0", str(tmp_path / "cone.toml"))

@@ -12,7 +12,7 @@ from pathlib import Path
 from limo_hog.atomic import is_stream
 from limo_hog.cli.support.arguments import MODEL, count, number, output_file, threads
 from limo_hog.cli.support.output import STDOUT, UsageError
-from limo_hog.cli.support.results import json_lines, refuse_to_overwrite, write_coco, write_csv
+from limo_hog.cli.support.results import json_lines, write_coco, write_csv
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
 
@@ -107,15 +107,10 @@ def run(args: argparse.Namespace) -> int:
     except ParameterError as error:
         raise UsageError(str(error)) from error
     tables = {Path(name): write for name, write in ((args.csv, write_csv), (args.coco, write_coco)) if name}
-    files = [Path(name).resolve() for name in (args.json, args.csv, args.coco) if name not in (None, STDOUT)]
-    if len(set(files)) < len(files):
-        raise UsageError("--json, --csv and --coco name the same file twice: give each a file of its own")
     if any(name == STDOUT for name in (args.csv, args.coco)):
         raise UsageError("--csv and --coco want a file's name; standard output is for --json -")
     if args.resume and tables and not kept:
         raise UsageError("--resume with --csv or --coco takes the earlier results from --json FILE: give it")
-    if not args.resume and not args.overwrite:
-        refuse_to_overwrite(tables)
     parameters = {name: getattr(args, name) for name in PARAMETERS}
     # The error names a broken file in one line; the decoders' own lines are switched off.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")

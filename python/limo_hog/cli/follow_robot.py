@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import re
 import statistics
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from limo_hog.atomic import json_text
 from limo_hog.cli.support.arguments import add_follower, add_ros_arguments, node_of, number, output_file, seconds
 from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
                 bar.console.print(f"{at:.1f} s {mode}: {reason}", markup=False, highlight=False, soft_wrap=True)
             if lines is not None:
                 event = {"seconds": round(at, 3), "stamp": log.time, "mode": mode, "reason": reason}
-                print(json.dumps(event), file=lines, flush=True)
+                print(json_text(event), file=lines, flush=True)
 
         try:
             drive(
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
             stopped = error
         card = _card(args, report, time.monotonic() - began)
         if lines is not None:
-            print(json.dumps(card), file=lines, flush=True)
+            print(json_text(card), file=lines, flush=True)
     if args.json != STDOUT:
         modes = ", ".join(f"{mode} {count}" for mode, count in report.modes.items())
         print(f"{report.frames} images, a person in {report.found}; commands: {modes}")

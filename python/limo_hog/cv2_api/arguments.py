@@ -35,11 +35,12 @@ def pixels(image: Any) -> NDArray[np.uint8]:
         It is anything else, or empty.
     """
     image = _downloaded(image)
+    if hasattr(image, "mask") and isinstance(image, np.ndarray):
+        raise ImageTypeError("the image is a masked array, whose mask would be lost; give image.filled(0)")
     if image is None:
         raise ImageTypeError("the image is None: did imread find no file, or is the video over?")
     if not isinstance(image, np.ndarray):
         hint = "; detect_many takes a list" if isinstance(image, (list, tuple)) else ""
-        hint = "; did imread fail, or is the video over?" if image is None else hint
         raise ImageTypeError(
             f"an image is a uint8 numpy array, for PeopleDetector also a file's name or a PIL image; this is a "
             f"{type(image).__name__}{hint}"

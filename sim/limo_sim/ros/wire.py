@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import struct
 import sys
 from typing import Any
+
+from limo_hog.atomic import json_text
 
 #: Of a message: how long its JSON and its bytes are.
 HEAD = struct.Struct("<II")
@@ -15,5 +16,5 @@ FORKS = sys.platform == "linux"
 
 def packed(content: Any, data: bytes = b"") -> bytes:
     """Return a message: JSON, and bytes that are none."""
-    said = json.dumps(content).encode()
+    said = json_text(content).encode()
     return HEAD.pack(len(said), len(data)) + said + data

@@ -14,6 +14,7 @@ import time
 import zlib
 from pathlib import Path
 
+import cv2
 import pytest
 from tests.cli.material import PICTURE, film_of, lines_of
 
@@ -166,6 +167,20 @@ def test_control_characters_and_markup_of_a_file_do_not_reach_the_terminal(tmp_p
     done = ended("follow", "--scenario", tmp_path / "evil.toml", "--seconds", 1)
     assert (done.returncode, done.stderr) == (0, "")
     assert "[/]\\x1b[2J" in done.stdout and "\x1b" not in done.stdout
+
+
+def test_films_that_are_none_are_named_and_their_bytes_do_not_reach_the_terminal(tmp_path: Path) -> None:
+    # OpenCV's own reader of AVI prints what stands where LIST is wanted.
+    (tmp_path / "evil.avi").write_bytes(b"RIFF\x10\0\0\0AVI \x1b[2J\x10\0\0\0hdrl" + bytes(99))
+    film = cv2.VideoWriter(str(tmp_path / "cut.mkv"), cv2.VideoWriter.fourcc(*"MJPG"), 10, PICTURE.shape[1::-1])
+    film.write(PICTURE)
+    film.release()
+    with (tmp_path / "cut.mkv").open("r+b") as file:
+        file.truncate(736)  # its header
+    done = ended("detect", tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    named = [line.rpartition("/")[2] for line in done.stderr.splitlines()[:-1]]
+    assert named == ["cut.mkv: no frame of it could be read", "evil.avi: not a video that OpenCV can read"]
 
 
 def test_a_table_escapes_what_a_terminal_would_obey() -> None:

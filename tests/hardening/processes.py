@@ -204,7 +204,7 @@ def kills(count: int, folder: Path) -> tuple[Counter[str], list[str]]:
             start_new_session=True,
         )
         with suppress(subprocess.TimeoutExpired):
-            child.wait(draw.uniform(0.2, 6.0))
+            child.wait(draw.uniform(0.2, 5.0))
         told = "ended before" if child.returncode is not None else sent.name
         if child.returncode is None:
             (os.killpg if draw.random() < 0.5 else os.kill)(child.pid, sent)

@@ -23,7 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 
 # As `detect` sets them before OpenCV is imported.
-os.environ |= {"OPENCV_LOG_LEVEL": "SILENT", "OPENCV_FFMPEG_LOGLEVEL": "-8"}
+os.environ |= {"OPENCV_LOG_LEVEL": "SILENT", "OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_VIDEOIO_PRIORITY_CV_MJPEG": "0"}
 
 from tests.cli.material import PICTURE, film_of
 from tests.hardening.files import damaged
@@ -106,7 +106,7 @@ def _inputs(kind: str, folder: Path) -> tuple[list[bytes], str, Callable[[Path],
         one = {"id": 1, "image_id": 1, "category_id": 1, "bbox": [20, 20, 50, 120], "area": 6000, "iscrowd": 0}
         coco = {"images": [image], "annotations": [one], "categories": [{"id": 1, "name": "person"}]}
         return [json.dumps(coco).encode()], ".json", lambda path: ["evaluate", "opencv", str(path)]
-    _answer(["follow", "--seconds", "0.3", "--record", "r.mcap"], folder)
+    _answer(["follow", "--seconds", "0.2", "--record", "r.mcap"], folder)
     _without_checksums(folder / "r.mcap", folder / "open.mcap")
     whole = [(folder / name).read_bytes() for name in ("r.mcap", "open.mcap")]
     return whole, ".mcap", lambda path: ["replay", str(path)]

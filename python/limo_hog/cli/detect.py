@@ -115,6 +115,8 @@ def run(args: argparse.Namespace) -> int:
     # The error names a broken file in one line; the decoders' own lines are switched off.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    # OpenCV's second reader of AVI prints bytes of a file that it cannot read; FFmpeg reads the others.
+    os.environ.setdefault("OPENCV_VIDEOIO_PRIORITY_CV_MJPEG", "0")
     from limo_hog.cli.support.pictures import Run
 
     with ExitStack() as stack:

@@ -63,7 +63,7 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
     """
     if target is None or target == STDOUT:
         # Flushed line by line for a reader at the other end of a pipe.
-        show = (lambda result: emit(json_text(result | {"parameters": parameters}))) if target else _drop
+        show = (lambda result: emit(json_text(result | {"parameters": parameters}))) if target else lambda _: None
         yield Results(show, None)
         return
     path = Path(target)
@@ -94,10 +94,6 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
                 # A full disk may have taken half a line.
                 file.truncate(whole)
                 part.replace(path)
-
-
-def _drop(_: Result) -> None:
-    """Keep no result."""
 
 
 def _continue(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result]:

@@ -140,7 +140,7 @@ def json_text(value: object, **options: Any) -> str:
     ValueError
         A number is infinite or NaN, which JSON does not know.
     """
-    return json.dumps(value, allow_nan=False, **options)
+    return json.dumps(value, allow_nan=False, **options)  # noqa: TID251
 
 
 def write_text(path: Path, text: str) -> None:

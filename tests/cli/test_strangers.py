@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import json
+import math
 import os
 import signal
 import struct
@@ -18,7 +19,7 @@ import cv2
 import pytest
 from tests.cli.material import PICTURE, film_of, lines_of
 
-from limo_hog.atomic import alone, whole_file
+from limo_hog.atomic import alone, json_text, whole_file
 from limo_hog.cli.main import main
 from limo_hog.cli.support import output
 from limo_hog.cli.support.console import console
@@ -337,6 +338,12 @@ def test_two_runs_of_one_command_do_not_write_one_file(
     with alone(Path(typed.split()[-1])):
         assert main(typed.split()) == 1
     assert "another run is writing it, and holds .m.lock." in capsys.readouterr().err
+
+
+def test_json_holds_no_number_that_json_does_not_know() -> None:
+    for value in (math.nan, math.inf, -math.inf):
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            json_text({"ms": [1.0, value]})
 
 
 def test_an_unknown_backend_is_named_in_one_line() -> None:

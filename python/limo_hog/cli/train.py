@@ -84,8 +84,6 @@ def run(args: argparse.Namespace) -> int:
     with warnings_in_one_line(), progress("pictures") as bar:
         bar.add_task("reading", total=None)
         data = gather(wanted)
-        # A folder that cannot be made is told before the work, not after.
-        args.out.parent.mkdir(parents=True, exist_ok=True)
         tasks = {bar.task_ids[0]: "reading"}
 
         def step(stage: str, steps: int | None) -> None:

@@ -187,6 +187,9 @@ def _running(mark: str) -> list[int]:
 
 def kills(count: int, folder: Path) -> tuple[Counter[str], list[str]]:
     """Kill a command at a random time, alone or with its group; look at what is left."""
+    # What ignores these, as a shell's background job or nohup does, hands that on, and rightly nothing ends.
+    for one in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(one, signal.SIG_DFL)
     ends: Counter[str] = Counter()
     findings = []
     slowest = 0.0
@@ -204,7 +207,7 @@ def kills(count: int, folder: Path) -> tuple[Counter[str], list[str]]:
             start_new_session=True,
         )
         with suppress(subprocess.TimeoutExpired):
-            child.wait(draw.uniform(0.2, 5.0))
+            child.wait(draw.uniform(0.2, 4.0))
         told = "ended before" if child.returncode is not None else sent.name
         if child.returncode is None:
             (os.killpg if draw.random() < 0.5 else os.kill)(child.pid, sent)

@@ -26,6 +26,8 @@ from limo_sim.run.sweep import Comparison, Estimate, Run, Summary, compare, play
 from limo_sim.view.sweep_plot import plot
 
 DOCS = Path(__file__).parents[1] / "docs"
+#: The part of the page that `follow_bench` writes begins so.
+OTHER = "## Follow-Bench"
 BASELINES = ("approach", "proxemic", "pursuit", "ppo", "tracking")
 #: Figures of the page: name, heading, factor, style.
 FIGURES = (
@@ -161,8 +163,11 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
         f"| `{entry.name}` | {Scenario.load(suite.path(entry)).summary} | `{entry.sha256[:16]}` |"
         for entry in suite.scenarios
     ]
-    with whole_file(DOCS / "benchmark.md") as part:
-        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    page = DOCS / "benchmark.md"
+    old = page.read_text(encoding="utf-8")
+    other = [old[old.index(OTHER) :]] if OTHER in old else []
+    with whole_file(page) as part:
+        part.write_text("\n".join([*lines, "", *other]), encoding="utf-8")
 
 
 def shown_for(seeds: int) -> str:

@@ -189,12 +189,13 @@ class Hog:
     def detect_multi_scale(
         self,
         image: NDArray[np.uint8],
-        hit_threshold: float,
-        win_stride: _Pair,
-        padding: _Pair,
-        scale: float,
-        group_threshold: float,
-        mean_shift: bool,
+        *,
+        hit_threshold: float = 0.0,
+        win_stride: _Pair = ...,
+        padding: _Pair = ...,
+        scale: float = 1.05,
+        similar: float | None = None,
+        mean_shift: float | None = None,
         first_level: _Pair | None = None,
         guide: tuple[int, float, tuple[float, float]] | None = None,
         threads: int | None = None,
@@ -211,11 +212,11 @@ class Hog:
             As of `compute`, in pixels of each level.
         scale
             1 or less, and what is no number, leaves the image's own size alone.
-        group_threshold
-            Truncated to an integer: similar rectangles must be more than this; below 1 every hit is returned. With
-            `mean_shift`: the least density of a mode.
+        similar
+            Group: similar rectangles must be more than this, truncated to an integer; below 1 every hit is returned.
         mean_shift
-            Group by the modes of the hits' density over place and scale (Dalal's thesis, 2006, chapter 5).
+            Group by the modes of the hits' density over place and scale (Dalal's thesis, 2006, chapter 5): the least
+            density of a mode. With neither of the two every hit is returned.
         first_level
             Width and height [px]: the image is resized to this before all else, as `resize` does; boxes are in its
             pixels.
@@ -236,7 +237,7 @@ class Hog:
         Raises
         ------
         ImageError, ParameterError
-            As `compute`.
+            As `compute`; both ways to group are asked for.
         """
 
 @final

@@ -230,19 +230,20 @@ class PeopleDetector:
         image = pixels(image)
         size = self._searched_size(image)
         threshold = self._model.threshold if self.threshold is None else self.threshold
-        members = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
+        members: int | None = None
+        if self.nms == "group":
+            members = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
         hits = [
             hog.detect_multi_scale(
                 image,
-                threshold,
-                self.win_stride,
-                self.padding,
-                self.scale,
-                members if self.nms == "group" else 0,
-                False,
-                size,
-                _GUIDES[self.search],
-                threads,
+                hit_threshold=threshold,
+                win_stride=self.win_stride,
+                padding=self.padding,
+                scale=self.scale,
+                similar=members,
+                first_level=size,
+                guide=_GUIDES[self.search],
+                threads=threads,
             )
             for hog in self._hogs
         ]

@@ -46,7 +46,7 @@ def outcome(call: str, timeout: float = 120, limits: dict[int, int] = FOUR_GB) -
         "armed().compute(people(64, 128), (8, 8), (3000, 3000))",
         "_core.Hog((64, 128), (16, 16), (8, 8), (8, 8), 9, -1.0, 0.2, True, 2**31 - 1, False, "
         "_core.default_people_detector()).detect_multi_scale("
-        "people(640, 480), 0.0, (0, 0), (0, 0), 1.0000000000000002, 2.0, False)",
+        "people(640, 480), scale=1.0000000000000002, similar=2)",
         "limo_hog.HOGDescriptor((32768, 1000), (1, 1), (1, 1), (1, 1), 64).compute("
         "people(64, 64), (1, 1), (16384, 480), [(-16384, -480)])",
     ],

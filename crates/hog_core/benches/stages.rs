@@ -9,8 +9,9 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hog_core::exact::RowVotes;
-use hog_core::pyramid::Pyramid;
-use hog_core::{Backend, Grouping, Hog, HogParams, ImageView, Interrupt, Search, Size, model, pyramid};
+use hog_core::{
+    Backend, Grouping, Hog, HogParams, ImageView, Interrupt, Search, SearchOptions, Size, model, pyramid,
+};
 
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
@@ -61,18 +62,14 @@ fn fast_path(criterion: &mut Criterion) {
             let mut group = criterion.benchmark_group(format!("{}/{kind}", backend.name()));
             group.throughput(Throughput::Elements((WIDTH * HEIGHT) as u64));
             group.bench_function("level", |b| {
-                b.iter(|| hog.detect(black_box(image), &SEARCH, None, &Interrupt::NEVER))
+                b.iter(|| hog.detect_windows(black_box(image), &SEARCH, None, &Interrupt::NEVER))
             });
             let grouping = Grouping::Similar(2);
             group.bench_function("pyramid", |b| {
                 b.iter(|| {
-                    hog.detect_multi_scale(
+                    hog.detect(
                         black_box(image),
-                        &SEARCH,
-                        &Pyramid { first: None, scale: 1.05 },
-                        grouping,
-                        None,
-                        1,
+                        &SearchOptions { search: SEARCH, scale: 1.05, grouping, ..SearchOptions::default() },
                         &Interrupt::NEVER,
                     )
                 });

@@ -1,29 +1,39 @@
 //! Composes the stages: descriptors and hits of one image, and of a whole pyramid on several threads.
 
-use std::sync::Arc;
-
 use crate::error::{BackendError, ParameterError, Result};
 use crate::exact::{self, RowVotes, Svm, Tables};
-use crate::fast::{self, Backend, Found, Plan, Planes, Region, Thresholds};
+use crate::fast::{self, Backend, Found, Plan, Planes, Thresholds};
 use crate::geometry::{Padding, Rect, Size};
 use crate::group::{Candidate, clip, group_candidates, mean_shift};
-use crate::guided::Guide;
 use crate::image::{Image, ImageView};
 use crate::interrupt::Interrupt;
 use crate::memory::{self, Pool};
+use crate::options::{Grouping, Search, SearchOptions};
 use crate::params::{HogParams, HogSpec};
-use crate::pyramid::{Grid, Level, Pyramid, Steps, check, levels, resize, to_image};
+use crate::pyramid::{Grid, Level, Steps, check, levels, resize, to_image};
 use crate::rescore::{Hit, LevelWindows, Scorer};
 use crate::separable;
 use crate::threads::in_order;
 
 /// A detector: a geometry and, for finding things, a linear SVM. Immutable, so threads may share it.
-#[derive(Debug, Clone)]
+///
+/// ```
+/// # #[cfg(feature = "models")] {
+/// use hog_core::{Hog, HogParams, ImageView, Interrupt, SearchOptions, model};
+/// let people = Hog::new(&HogParams::default(), Some(model::default_people()))?;
+/// let grey = vec![128; 320 * 240];
+/// let image = ImageView::new(&grey, 320, 240, 1, 320)?;
+/// let found = people.detect(image, &SearchOptions::default(), &Interrupt::NEVER)?;
+/// assert!(found.is_empty());
+/// # }
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
+#[derive(Debug)]
 pub struct Hog {
-    pub(crate) exact: Arc<Exact>,
+    pub(crate) exact: Exact,
     /// The fast path, where the geometry has one, and the search by it, where the SVM has one too.
     pub(crate) geometry: Option<fast::Geometry>,
-    plan: Option<Arc<Plan>>,
+    plan: Option<Plan>,
     pub(crate) backend: Backend,
 }
 
@@ -42,26 +52,6 @@ static PLANES: Pool<Planes> = Pool::new();
 
 /// Where the fast path's scores may be further off than this, it only finds the hits: the exact path weighs them all.
 const SCORE_ERROR_MAX: f64 = 1e-4;
-
-/// Where and how densely to look.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Search {
-    /// A window whose score is at least this is a hit.
-    pub hit_threshold: f64,
-    /// Distance of neighbouring windows (x, y) [px of the level]; (0, 0): the default of the method.
-    pub win_stride: (i64, i64),
-    /// Border around the image (x, y) [px of the level], mirrored.
-    pub padding: (i64, i64),
-}
-
-/// How hits become the rectangles that are returned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Grouping {
-    /// Groups of more than this many similar rectangles; below 1 every hit is returned.
-    Similar(i32),
-    /// Modes of the hits' density with more than this weight.
-    MeanShift(f64),
-}
 
 impl Hog {
     /// A detector of this geometry; `coefficients` of the SVM, if any, must fit it.
@@ -82,7 +72,7 @@ impl Hog {
         let separable = svm.as_ref().map(|svm| separable::Plan::new(&spec, svm)).transpose()?.flatten();
         let exact =
             Exact { tables: Tables::with_kernel(&spec, fast::row_kernel(backend))?, spec, svm, separable };
-        Ok(Self { exact: Arc::new(exact), geometry, plan: plan.map(Arc::new), backend })
+        Ok(Self { exact, geometry, plan, backend })
     }
 
     /// The checked geometry.
@@ -174,21 +164,21 @@ impl Hog {
     /// The windows that are hits, of those at `locations` (of all, if none are given), in their order.
     ///
     /// A location whose window leaves the padded image is passed over. The stride (0, 0) is the cell size.
-    pub fn detect(
+    pub fn detect_windows(
         &self,
         image: ImageView,
         search: &Search,
         locations: Option<&[(i64, i64)]>,
         interrupt: &Interrupt,
     ) -> Result<Vec<Hit>> {
-        let Exact { spec, tables, svm, .. } = &*self.exact;
+        let Exact { spec, tables, svm, .. } = &self.exact;
         let steps = self.steps(search, spec.cell)?;
         let grid = steps.grid(image.size(), spec);
         let Some(svm) = svm else { return Ok(Vec::new()) };
         let Some(locations) = locations else {
             let level = memory::collect([Level { scale: 1.0, size: image.size() }])?;
-            let how = How { search: *search, exact_weights: false, guide: None, threads: 1 };
-            let mut hits = self.hits(image, &level, &steps, svm, &how, interrupt)?;
+            let options = SearchOptions { search: *search, ..SearchOptions::default() };
+            let mut hits = self.hits(image, &level, &steps, svm, &options, interrupt)?;
             return Ok(hits.pop().unwrap_or_default());
         };
         let inside = memory::collect(locations.iter().filter_map(|&at| grid.to_padded(at, spec)))?;
@@ -204,37 +194,31 @@ impl Hog {
         Ok(hits)
     }
 
-    /// Rectangles of all hits of the pyramid, grouped and clipped to its first level, in whose pixels they are.
+    /// Rectangles of all hits of the pyramid with their scores, grouped and clipped to its first level, in whose pixels
+    /// they are.
     ///
-    /// The work is shared among `threads` threads; hits are in level order, whatever their number. The stride (0, 0)
-    /// is the block stride. With a `guide`, some hits may be missed; a geometry without a fast path is searched whole.
-    #[allow(clippy::too_many_arguments, reason = "they are OpenCV's, and how the work is done")]
-    pub fn detect_multi_scale(
+    /// Hits are in the order of the levels, whatever the number of threads. The stride (0, 0) is the block stride. With a
+    /// guide, some hits may be missed; a geometry without a fast path is searched whole.
+    pub fn detect(
         &self,
         image: ImageView,
-        search: &Search,
-        pyramid: &Pyramid,
-        grouping: Grouping,
-        guide: Option<Guide>,
-        threads: usize,
+        options: &SearchOptions,
         interrupt: &Interrupt,
     ) -> Result<Vec<(Rect, f64)>> {
         let spec = self.spec();
-        let steps = self.steps(search, spec.stride)?;
+        let steps = self.steps(&options.search, spec.stride)?;
         let Some(svm) = &self.exact.svm else { return Ok(Vec::new()) };
-        let first = pyramid.first.unwrap_or(image.size());
+        let first = options.first_level.unwrap_or(image.size());
         check(first)?;
-        let levels = levels(first, pyramid.scale, spec, interrupt)?;
-        // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
-        let exact_weights = matches!(grouping, Grouping::MeanShift(_));
-        let how = How { search: *search, exact_weights, guide, threads };
-        let hits = self.hits(image, &levels, &steps, svm, &how, interrupt)?;
+        let levels = levels(first, options.scale, spec, interrupt)?;
+        let hits = self.hits(image, &levels, &steps, svm, options, interrupt)?;
         let mut candidates = memory::with_room(hits.iter().map(Vec::len).sum())?;
         for (level, hits) in levels.iter().zip(&hits) {
             candidates.extend(hits.iter().map(|hit| self.candidate(level, hit)));
         }
         let win = spec.win;
-        let found = match grouping {
+        let found = match options.grouping {
+            Grouping::None => memory::collect(candidates.iter().map(|c| (c.rect, c.weight)))?,
             Grouping::Similar(threshold) => group_candidates(&candidates, threshold, interrupt)?,
             Grouping::MeanShift(threshold) => {
                 mean_shift(&candidates, threshold, (win.width as i32, win.height as i32), interrupt)?
@@ -252,102 +236,85 @@ impl Hog {
         Candidate { rect, weight: hit.weight, scale: level.scale }
     }
 
-    /// The hits of each of `levels` of the image at the size of the first one: by the fast path, where the geometry has
-    /// one.
+    /// The hits of each of `levels` of the image at the size of the first one.
     fn hits(
         &self,
         image: ImageView,
         levels: &[Level],
         steps: &Steps,
         svm: &Svm,
-        how: &How,
+        options: &SearchOptions,
         interrupt: &Interrupt,
     ) -> Result<Vec<Vec<Hit>>> {
-        let How { threads, exact_weights, .. } = *how;
-        let hit_threshold = how.search.hit_threshold;
-        let first = levels.first().map_or(image.size(), |level| level.size);
-        let grids =
-            memory::collect(levels.iter().map(|level| (level.size, steps.grid(level.size, self.spec()))))?;
+        let Exact { spec, tables, separable, .. } = &self.exact;
+        let separable = separable.as_ref();
+        let grids = memory::collect(levels.iter().map(|level| (level.size, steps.grid(level.size, spec))))?;
         let mut windows =
             memory::collect(grids.iter().map(|&(size, grid)| LevelWindows { size, grid, found: None }))?;
         let fast = self.plan.as_ref().filter(|_| grids.iter().all(|(_, grid)| fast::serves(grid)));
-        let separable = self.exact.separable.as_ref();
-        let error = fast.map(|plan| plan.score_error_bound());
-        let error = error.or(separable.map(separable::Plan::score_error_bound));
-        let error = error.filter(|&error| !exact_weights && error <= SCORE_ERROR_MAX);
-        let margin = error.unwrap_or(f64::INFINITY);
         if let Some(plan) = fast {
-            let mut planes = PLANES.take();
-            fast::fill_planes(self.backend, &mut planes, image)?;
-            if first != image.size() {
-                let mut resized = PLANES.take();
-                fast::resize_planes(self.backend, &planes, &mut resized, first)?;
-                PLANES.give(std::mem::replace(&mut planes, resized));
-            }
-            let planes = Arc::new(planes);
-            let found = self.find(&planes, plan, levels, Arc::new(grids), how, interrupt);
-            if let Ok(planes) = Arc::try_unwrap(planes) {
-                PLANES.give(planes);
-            }
-            PLANES.trim();
-            fast::trim();
-            for (level, found) in windows.iter_mut().zip(found?) {
+            let found = self.find(image, plan, levels, &grids, options, interrupt)?;
+            for (level, found) in windows.iter_mut().zip(found) {
                 level.found = Some(found);
             }
         }
-        let Exact { spec, tables, .. } = &*self.exact;
-        let scorer = Scorer { spec, tables, svm, separable, hit_threshold, margin };
-        let is_needed = windows.iter().any(|level| scorer.is_needed(level));
-        let resized = if is_needed && first != image.size() {
-            Some(Image { data: resize(image, first)?, size: first, channels: image.channels() })
-        } else {
-            None
+        let error = fast.map(Plan::score_error_bound).or(separable.map(separable::Plan::score_error_bound));
+        // Mean-shift truncates to whole pixels: there the last bit of a weight can move a rectangle.
+        let exact_weights = matches!(options.grouping, Grouping::MeanShift(_));
+        let margin = error.filter(|&error| !exact_weights && error <= SCORE_ERROR_MAX);
+        let scorer = Scorer {
+            spec,
+            tables,
+            svm,
+            separable,
+            hit_threshold: options.search.hit_threshold,
+            margin: margin.unwrap_or(f64::INFINITY),
         };
-        let image = resized.as_ref().map_or(Ok(image), Image::view)?;
-        if threads == 1 || !is_needed {
-            let mut hits = memory::with_room(windows.len())?;
-            for level in &windows {
-                interrupt.check()?;
-                hits.push(scorer.hits(image, level, interrupt)?);
-            }
-            return Ok(hits);
-        }
-        // Other threads may not borrow what is the caller's.
-        let (exact, image) = (Arc::clone(&self.exact), Image::new(image)?);
-        in_order(windows, threads, interrupt, move |level, interrupt| {
-            let Exact { spec, tables, svm, separable } = &*exact;
-            let Some(svm) = svm else { return Ok(Vec::new()) };
-            let scorer = Scorer { spec, tables, svm, separable: separable.as_ref(), hit_threshold, margin };
-            scorer.hits(image.view()?, level, interrupt)
-        })
+        rescored(image, &scorer, &windows, options.threads, interrupt)
     }
 
     /// What the fast path finds on each of `levels`.
     fn find(
         &self,
-        planes: &Arc<Planes>,
-        plan: &Arc<Plan>,
+        image: ImageView,
+        plan: &Plan,
         levels: &[Level],
-        grids: Arc<Vec<(Size, Grid)>>,
-        how: &How,
+        grids: &[(Size, Grid)],
+        options: &SearchOptions,
         interrupt: &Interrupt,
     ) -> Result<Vec<Vec<Found>>> {
-        let threshold = how.search.hit_threshold;
-        let task = |regions: Vec<Region>, guide: f64| fast::Task {
-            backend: self.backend,
-            plan: Arc::clone(plan),
-            planes: Arc::clone(planes),
-            levels: Arc::clone(&grids),
-            regions,
-            thresholds: Thresholds { hit: threshold, guide },
-        };
-        let guide = how.guide.unwrap_or_default();
+        let mut planes = PLANES.take();
+        fast::fill_planes(self.backend, &mut planes, image)?;
+        if let Some((first, _)) = grids.first().filter(|(first, _)| *first != image.size()) {
+            let mut resized = PLANES.take();
+            fast::resize_planes(self.backend, &planes, &mut resized, *first)?;
+            PLANES.give(std::mem::replace(&mut planes, resized));
+        }
+        let found = self.find_in(&planes, plan, levels, grids, options, interrupt);
+        PLANES.give(planes);
+        PLANES.trim();
+        fast::trim();
+        found
+    }
+
+    /// What the fast path finds on each of `levels` of an image in planes: on all, or by steps that a guide leads.
+    fn find_in(
+        &self,
+        planes: &Planes,
+        plan: &Plan,
+        levels: &[Level],
+        grids: &[(Size, Grid)],
+        options: &SearchOptions,
+        interrupt: &Interrupt,
+    ) -> Result<Vec<Vec<Found>>> {
+        let (hit, guide) = (options.search.hit_threshold, options.guide.unwrap_or_default());
         let mut found = memory::filled(grids.len(), Vec::new())?;
         for step in guide.steps() {
-            let regions = guide.regions(step, levels, &grids, &found, threshold, self.spec())?;
+            let regions = guide.regions(step, levels, grids, &found, hit, self.spec())?;
             // What is found here guides levels half as far off, those of the last step none.
-            let least = threshold - guide.lowered(step / 2);
-            let here = fast::search(task(regions, least), how.threads, interrupt)?;
+            let thresholds = Thresholds { hit, guide: hit - guide.lowered(step / 2) };
+            let task = fast::Task { backend: self.backend, plan, planes, levels: grids, regions, thresholds };
+            let here = fast::search(task, options.threads, interrupt)?;
             for (found, mut here) in found.iter_mut().zip(here) {
                 // Regions may share windows; their scores differ by the order of their sums.
                 here.dedup_by_key(|&mut (x, y, _)| (x, y));
@@ -360,11 +327,22 @@ impl Hog {
     }
 }
 
-/// How hits are looked for.
-struct How {
-    search: Search,
-    /// Whether every hit's weight is to be the exact path's.
-    exact_weights: bool,
-    guide: Option<Guide>,
+/// The hits of `levels`, close calls decided by the exact path on the image at the size of the first level.
+fn rescored(
+    image: ImageView,
+    scorer: &Scorer,
+    levels: &[LevelWindows],
     threads: usize,
+    interrupt: &Interrupt,
+) -> Result<Vec<Vec<Hit>>> {
+    let is_needed = levels.iter().any(|level| scorer.is_needed(level));
+    let first = levels.first().map_or(image.size(), |level| level.size);
+    let resized = if is_needed && first != image.size() {
+        Some(Image { data: resize(image, first)?, size: first, channels: image.channels() })
+    } else {
+        None
+    };
+    let image = resized.as_ref().map_or(Ok(image), Image::view)?;
+    let threads = if is_needed { threads } else { 1 };
+    in_order(levels, threads, interrupt, |level, interrupt| scorer.hits(image, level, interrupt))
 }

@@ -48,11 +48,11 @@ pub enum GeometryError {
     Side {
         /// The argument, in OpenCV's words.
         name: &'static str,
-        /// Side along x [px].
+        /// Side along x \[px\].
         x: i64,
-        /// Side along y [px].
+        /// Side along y \[px\].
         y: i64,
-        /// The largest side allowed [px].
+        /// The largest side allowed \[px\].
         most: i64,
     },
     /// The number of orientation bins is out of range.
@@ -64,9 +64,9 @@ pub enum GeometryError {
     /// The block does not hold a whole number of cells.
     #[error("blockSize ({}, {}) must be a multiple of cellSize ({}, {})", block.width, block.height, cell.width, cell.height)]
     Cells {
-        /// Block [px].
+        /// Block \[px\].
         block: Size,
-        /// Cell [px].
+        /// Cell \[px\].
         cell: Size,
     },
     /// The number of levels is not positive.
@@ -80,11 +80,11 @@ pub enum GeometryError {
     Stride {
         /// "width" or "height".
         axis: &'static str,
-        /// Window along the axis [px].
+        /// Window along the axis \[px\].
         window: usize,
-        /// Block along the axis [px].
+        /// Block along the axis \[px\].
         block: usize,
-        /// Block stride along the axis [px].
+        /// Block stride along the axis \[px\].
         stride: usize,
     },
     /// A descriptor has more elements than an array of OpenCV can hold.
@@ -113,17 +113,17 @@ pub enum ImageError {
     /// No pixels.
     #[error("the image is empty: {width} x {height} pixels")]
     Empty {
-        /// Width [px].
+        /// Width \[px\].
         width: usize,
-        /// Height [px].
+        /// Height \[px\].
         height: usize,
     },
     /// Coordinates would overflow.
     #[error("the image is too large: {width} x {height} pixels")]
     TooLarge {
-        /// Width [px].
+        /// Width \[px\].
         width: usize,
-        /// Height [px].
+        /// Height \[px\].
         height: usize,
     },
     /// The pixels leave the data.
@@ -135,9 +135,9 @@ pub enum ImageError {
         len: usize,
         /// Bytes from row to row.
         row_stride: usize,
-        /// Width [px].
+        /// Width \[px\].
         width: usize,
-        /// Height [px].
+        /// Height \[px\].
         height: usize,
         /// Channels of the image.
         channels: usize,
@@ -145,9 +145,9 @@ pub enum ImageError {
     /// A level without pixels.
     #[error("cannot resize to {width} x {height} pixels")]
     Resize {
-        /// Wanted width [px].
+        /// Wanted width \[px\].
         width: usize,
-        /// Wanted height [px].
+        /// Wanted height \[px\].
         height: usize,
     },
 }
@@ -158,17 +158,17 @@ pub enum ParameterError {
     /// The window stride does not move forward.
     #[error("winStride is ({x}, {y}); both must be 1 pixel or more")]
     WinStride {
-        /// Stride along x [px].
+        /// Stride along x \[px\].
         x: i64,
-        /// Stride along y [px].
+        /// Stride along y \[px\].
         y: i64,
     },
     /// More padding than allowed.
     #[error("padding is {got}; at most {most} pixels are allowed")]
     Padding {
-        /// Padding along one axis [px].
+        /// Padding along one axis \[px\].
         got: i64,
-        /// The most allowed [px].
+        /// The most allowed \[px\].
         most: i64,
     },
     /// A crop leaves no pixels, or a side overflows.
@@ -176,15 +176,15 @@ pub enum ParameterError {
     PaddedSide {
         /// "width" or "height".
         axis: &'static str,
-        /// Side of the padded image [px].
+        /// Side of the padded image \[px\].
         got: i64,
     },
     /// The padded image has more pixels than an array of OpenCV can hold.
     #[error("the padded image would have {width} x {height} pixels; at most 2^31 - 1 are allowed")]
     PaddedArea {
-        /// Width of the padded image [px].
+        /// Width of the padded image \[px\].
         width: usize,
-        /// Height of the padded image [px].
+        /// Height of the padded image \[px\].
         height: usize,
     },
     /// All descriptors together have more elements than an array of OpenCV can hold.

@@ -1,6 +1,6 @@
 //! Sizes, rectangles and parts of an image.
 
-/// Width and height [px] (or a stride or padding along x and y).
+/// Width and height \[px\] (or a stride or padding along x and y).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Size {
     /// Along x.
@@ -21,7 +21,7 @@ impl Size {
     }
 }
 
-/// A rectangle [px]: top left corner and size.
+/// A rectangle \[px\]: top left corner and size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Rect {
     /// Left edge.
@@ -47,7 +47,7 @@ pub struct Region {
     pub height: usize,
 }
 
-/// How far the padded image reaches beyond the image [px]; may be negative (a crop).
+/// How far the padded image reaches beyond the image \[px\]; may be negative (a crop).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Padding {
     /// Columns before the first.

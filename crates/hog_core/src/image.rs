@@ -2,7 +2,6 @@
 
 use crate::error::{ImageError, Result};
 use crate::geometry::Size;
-use crate::memory;
 
 /// The longest side of an image [px]: with its padding it is an `i32`, as OpenCV's.
 pub(crate) const SIDE_MAX: usize = i32::MAX as usize / 4;
@@ -43,17 +42,17 @@ impl<'a> ImageView<'a> {
         Ok(Self { data, width, height, channels, row_stride })
     }
 
-    /// Width [px].
+    /// Width \[px\].
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height [px].
+    /// Height \[px\].
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Width and height [px].
+    /// Width and height \[px\].
     pub fn size(&self) -> Size {
         Size::new(self.width, self.height)
     }
@@ -78,16 +77,6 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    /// A copy of `view`.
-    pub(crate) fn new(view: ImageView) -> Result<Self> {
-        let row = view.width() * view.channels();
-        let mut data = memory::with_room(row * view.height())?;
-        for y in 0..view.height() {
-            data.extend_from_slice(&view.row(y)[..row]);
-        }
-        Ok(Self { data, size: view.size(), channels: view.channels() })
-    }
-
     pub(crate) fn view(&self) -> Result<ImageView<'_>> {
         let Size { width, height } = self.size;
         ImageView::new(&self.data, width, height, self.channels, width * self.channels)

@@ -1,4 +1,5 @@
-//! OpenCV's HOG people detector: the same rectangles as `cv2.HOGDescriptor` 4.14.
+#![doc = include_str!("../README.md")]
+//! # Stages
 //!
 //! 1. [`params`] checks what the user asks for, once.
 //! 2. [`pyramid`] shrinks the image to levels, and lists the windows of each level.
@@ -8,8 +9,6 @@
 //! 6. `rescore` takes the hits from either, and lets `exact` decide those that are too close to the threshold.
 //! 7. [`group`] makes one rectangle of many overlapping ones.
 //!
-//! `canvas` draws solids for the arena's camera, and is no part of the detector.
-//!
 //! [`Hog`] composes these stages. Each follows Dalal and Triggs, "Histograms of Oriented Gradients for Human
 //! Detection" (CVPR 2005), with OpenCV's roundings, so that its trained models give the same answers here.
 
@@ -18,26 +17,23 @@ pub mod exact;
 pub mod geometry;
 pub mod group;
 pub mod image;
+#[cfg(feature = "models")]
 pub mod model;
 pub mod params;
 pub mod pyramid;
 
-#[cfg_attr(not(feature = "python"), allow(dead_code, unused_imports, reason = "Python alone calls it"))]
-mod canvas;
 mod describe;
 mod detect;
 mod fast;
 mod guided;
 mod interrupt;
 mod memory;
+mod options;
 mod rescore;
 mod separable;
 mod threads;
 
-#[cfg(feature = "python")]
-mod python;
-
-pub use detect::{Grouping, Hog, Search};
+pub use detect::Hog;
 pub use error::{HogError, Result};
 pub use fast::Backend;
 pub use geometry::{Rect, Size};
@@ -45,5 +41,6 @@ pub use group::Candidate;
 pub use guided::Guide;
 pub use image::ImageView;
 pub use interrupt::Interrupt;
+pub use options::{Grouping, Search, SearchOptions};
 pub use params::{HogParams, HogSpec};
 pub use rescore::Hit;

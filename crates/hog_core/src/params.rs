@@ -3,7 +3,7 @@
 use crate::error::{GeometryError, Result};
 use crate::geometry::Size;
 
-/// The constructor arguments of `cv2.HOGDescriptor`, unchecked; sizes are (x, y) [px].
+/// The constructor arguments of `cv2.HOGDescriptor`, unchecked; sizes are (x, y) \[px\].
 #[derive(Debug, Clone, PartialEq)]
 pub struct HogParams {
     /// Detection window.
@@ -16,7 +16,7 @@ pub struct HogParams {
     pub cell_size: (i64, i64),
     /// Orientation bins of a cell.
     pub nbins: i64,
-    /// Gaussian window of a block [px]; not positive: (block width + block height) / 8.
+    /// Gaussian window of a block \[px\]; not positive: (block width + block height) / 8.
     pub win_sigma: f64,
     /// Clipping value of L2-Hys.
     pub l2_hys_threshold: f64,
@@ -47,7 +47,7 @@ impl Default for HogParams {
 }
 
 impl HogParams {
-    /// The Gaussian's sigma [px] in force: the given one, or the default where none is given.
+    /// The Gaussian's sigma \[px\] in force: the given one, or the default where none is given.
     pub fn effective_win_sigma(&self) -> f64 {
         if self.win_sigma > 0.0 {
             self.win_sigma
@@ -60,13 +60,13 @@ impl HogParams {
 /// A checked geometry with its derived counts. Functions that take a `HogSpec` cannot fail on geometry.
 #[derive(Debug, Clone)]
 pub struct HogSpec {
-    /// Detection window [px].
+    /// Detection window \[px\].
     pub win: Size,
-    /// Block [px].
+    /// Block \[px\].
     pub block: Size,
-    /// Block stride [px].
+    /// Block stride \[px\].
     pub stride: Size,
-    /// Cell [px].
+    /// Cell \[px\].
     pub cell: Size,
     /// Orientation bins, 1..=256.
     pub nbins: usize,
@@ -82,7 +82,7 @@ pub struct HogSpec {
     pub nlevels: usize,
     /// Bins over 2π instead of π.
     pub signed_gradient: bool,
-    /// The block's Gaussian [px].
+    /// The block's Gaussian \[px\].
     pub sigma: f32,
 }
 

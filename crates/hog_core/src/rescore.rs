@@ -16,9 +16,9 @@ use crate::separable;
 /// A window that scored at least the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Left edge of the window; negative inside the padding [px].
+    /// Left edge of the window; negative inside the padding \[px\].
     pub x: i64,
-    /// Upper edge [px].
+    /// Upper edge \[px\].
     pub y: i64,
     /// SVM score with its bias.
     pub weight: f64,

@@ -5,8 +5,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use hog_core::pyramid::Pyramid;
-use hog_core::{Grouping, Hog, HogParams, ImageView, Interrupt, Search, model};
+use hog_core::{Grouping, Hog, HogParams, ImageView, Interrupt, Search, SearchOptions, model};
 
 struct Counting;
 
@@ -41,13 +40,14 @@ fn scratch_memory_is_used_again() {
     let hog = Hog::new(&HogParams::default(), Some(model::default_people())).unwrap();
     let search = Search { hit_threshold: 1e3, win_stride: (8, 8), padding: (4, 4) };
     let call = || {
-        hog.detect_multi_scale(
+        hog.detect(
             image,
-            &search,
-            &Pyramid { first: None, scale: 1.05 },
-            Grouping::Similar(2),
-            None,
-            1,
+            &SearchOptions {
+                search,
+                scale: 1.05,
+                grouping: Grouping::Similar(2),
+                ..SearchOptions::default()
+            },
             &Interrupt::NEVER,
         )
         .unwrap()

@@ -5,8 +5,10 @@ mod common;
 
 use common::{ALL_WINDOWS, Detector, PADDED, Picture, assert_same, available, case, reached_by};
 use hog_core::group::{Candidate, clip, group_candidates, mean_shift};
-use hog_core::pyramid::{Pyramid, levels, resize, to_image};
-use hog_core::{Backend, Grouping, Hit, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
+use hog_core::pyramid::{levels, resize, to_image};
+use hog_core::{
+    Backend, Grouping, Hit, Hog, HogParams, ImageView, Interrupt, Rect, Search, SearchOptions, Size,
+};
 use proptest::prelude::*;
 
 fn hog(detector: &Detector, backend: Backend) -> Hog {
@@ -96,7 +98,15 @@ fn candidates(detector: &Detector, image: ImageView, search: &Search, scale: f64
     found
 }
 
-const PYRAMID: Pyramid = Pyramid { first: None, scale: 1.1 };
+/// A pyramid of which every hit is returned.
+const PYRAMID: SearchOptions = SearchOptions {
+    search: PADDED,
+    scale: 1.1,
+    first_level: None,
+    grouping: Grouping::None,
+    guide: None,
+    threads: 1,
+};
 
 fn rects(found: &[(Rect, f64)]) -> Vec<Rect> {
     found.iter().map(|&(rect, _)| rect).collect()
@@ -109,8 +119,7 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
         let (image, mut detector) = (picture.view(), Detector::people());
         // A bias that lets a few windows in a hundred score more than 0.
         detector.coefficients[3780] -= reached_by(&detector.every_window(image, &PADDED), 0.03) as f32;
-        let search = PADDED;
-        let candidates = candidates(&detector, image, &search, 1.1);
+        let candidates = candidates(&detector, image, &PADDED, 1.1);
         let inside = |found| clip(found, size.0 as i32, size.1 as i32);
         let every = inside(group_candidates(&candidates, 0, &Interrupt::NEVER).unwrap());
         let grouped = inside(group_candidates(&candidates, 2, &Interrupt::NEVER).unwrap());
@@ -121,35 +130,18 @@ fn pyramids_are_those_of_the_exact_path_on_every_backend_at_every_number_of_thre
             let hog = hog(&detector, backend);
             for threads in [1, 2, 5, 64] {
                 let detect = |grouping| {
-                    hog.detect_multi_scale(
-                        image,
-                        &search,
-                        &PYRAMID,
-                        grouping,
-                        None,
-                        threads,
-                        &Interrupt::NEVER,
-                    )
-                    .unwrap()
+                    hog.detect(image, &SearchOptions { grouping, threads, ..PYRAMID }, &Interrupt::NEVER)
+                        .unwrap()
                 };
-                let found = detect(Grouping::Similar(0));
+                let found = detect(Grouping::None);
                 assert_eq!(rects(&found), rects(&every), "{}", backend.name());
                 let off = found.iter().zip(&every).map(|(found, wanted)| (found.1 - wanted.1).abs());
                 assert!(off.fold(0.0, f64::max) <= detector.rounding(), "{}", backend.name());
                 assert_eq!(rects(&detect(Grouping::Similar(2))), rects(&grouped), "{}", backend.name());
             }
             // Mean-shift is given exact weights: not a bit differs.
-            let found = hog
-                .detect_multi_scale(
-                    image,
-                    &search,
-                    &PYRAMID,
-                    Grouping::MeanShift(0.1),
-                    None,
-                    2,
-                    &Interrupt::NEVER,
-                )
-                .unwrap();
+            let options = SearchOptions { grouping: Grouping::MeanShift(0.1), threads: 2, ..PYRAMID };
+            let found = hog.detect(image, &options, &Interrupt::NEVER).unwrap();
             assert_eq!(found, modes, "{}", backend.name());
         }
     }
@@ -168,17 +160,17 @@ fn a_search_at_another_size_is_that_of_the_resized_image_on_every_backend() {
         let wanted = group_candidates(&wanted, 0, &Interrupt::NEVER).unwrap();
         let wanted = clip(wanted, size.width as i32, size.height as i32);
         assert!(wanted.len() > 5);
-        let pyramid = Pyramid { first: Some(size), ..PYRAMID };
         // The grouping by mean-shift takes exact weights, which the exact path computes.
         for backend in available() {
             let hog = hog(&detector, backend);
-            let search = |image, pyramid, grouping| {
-                hog.detect_multi_scale(image, &PADDED, pyramid, grouping, None, 1, &Interrupt::NEVER).unwrap()
+            let search = |image, first_level, grouping| {
+                let options = SearchOptions { first_level, grouping, ..PYRAMID };
+                hog.detect(image, &options, &Interrupt::NEVER).unwrap()
             };
-            let found = search(picture.view(), &pyramid, Grouping::Similar(0));
+            let found = search(picture.view(), Some(size), Grouping::None);
             assert_eq!(rects(&found), rects(&wanted), "{}", backend.name());
             let modes = Grouping::MeanShift(0.1);
-            assert_eq!(search(picture.view(), &pyramid, modes), search(resized, &PYRAMID, modes));
+            assert_eq!(search(picture.view(), Some(size), modes), search(resized, None, modes));
         }
     }
 }
@@ -191,15 +183,13 @@ fn a_window_at_the_threshold_is_decided_on_the_resized_image() {
     // Two levels, the second of which is resized twice; on either most windows are far from the threshold.
     let all = Search { hit_threshold: ALL_WINDOWS, ..PADDED };
     let every = candidates(&detector, resized, &all, 1.2);
-    let pyramid = Pyramid { first: Some(size), scale: 1.2 };
     for backend in available() {
         let hog = hog(&detector, backend);
         for &Candidate { weight: hit_threshold, .. } in every.iter().filter(|one| one.scale > 1.0) {
             let wanted = every.iter().filter(|one| one.weight >= hit_threshold).count();
-            let (search, all) = (Search { hit_threshold, ..PADDED }, Grouping::Similar(0));
-            let found = hog
-                .detect_multi_scale(picture.view(), &search, &pyramid, all, None, 1, &Interrupt::NEVER)
-                .unwrap();
+            let search = Search { hit_threshold, ..PADDED };
+            let options = SearchOptions { search, first_level: Some(size), scale: 1.2, ..PYRAMID };
+            let found = hog.detect(picture.view(), &options, &Interrupt::NEVER).unwrap();
             assert_eq!(found.len(), wanted, "{} {hit_threshold}", backend.name());
         }
     }
@@ -216,7 +206,7 @@ fn many_hits_of_a_loud_detector_weigh_what_each_weighs_exactly() {
     for backend in available() {
         for share in [0.1, 1.0] {
             let hit_threshold = reached_by(&wanted, share);
-            let found = hog(&detector, backend).detect(
+            let found = hog(&detector, backend).detect_windows(
                 picture.view(),
                 &Search { hit_threshold, ..search },
                 None,
@@ -251,7 +241,8 @@ fn a_window_asked_for_by_its_place_weighs_what_the_exact_path_says() {
         let places: Vec<_> = wanted.iter().map(|hit| (hit.x, hit.y)).collect();
         for backend in available() {
             let hog = hog(&detector, backend);
-            let found = hog.detect(picture.view(), &search, Some(&places), &Interrupt::NEVER).unwrap();
+            let found =
+                hog.detect_windows(picture.view(), &search, Some(&places), &Interrupt::NEVER).unwrap();
             assert_same(&found, &wanted, 0.0, backend.name());
         }
     }
@@ -295,7 +286,8 @@ fn a_weight_that_is_no_number_gives_no_hits_and_an_infinite_one_the_exact_paths(
         assert_eq!(wanted.is_empty(), weight != f32::INFINITY);
         let wanted = places(wanted);
         for backend in available() {
-            let found = hog(&detector, backend).detect(picture.view(), &search, None, &Interrupt::NEVER);
+            let found =
+                hog(&detector, backend).detect_windows(picture.view(), &search, None, &Interrupt::NEVER);
             assert_eq!(places(found.unwrap()), wanted, "{} {weight}", backend.name());
         }
     }
@@ -318,7 +310,10 @@ fn a_threshold_that_is_no_number_has_no_hits_and_minus_infinity_has_all() {
         let hog = hog(&Detector::people(), backend);
         for (hit_threshold, count) in [(f64::NAN, 0), (f64::NEG_INFINITY, 6), (f64::INFINITY, 0)] {
             let search = Search { hit_threshold, win_stride: (8, 8), padding: (0, 0) };
-            assert_eq!(hog.detect(picture.view(), &search, None, &Interrupt::NEVER).unwrap().len(), count);
+            assert_eq!(
+                hog.detect_windows(picture.view(), &search, None, &Interrupt::NEVER).unwrap().len(),
+                count
+            );
         }
     }
 }

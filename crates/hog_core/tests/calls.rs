@@ -8,8 +8,8 @@ use std::cell::Cell;
 use common::{Detector, Picture, STEPS, assert_same, available, reached_by};
 use hog_core::exact::{RowVotes, Svm, Tables, scores};
 use hog_core::group::{Candidate, group_candidates, group_rectangles, mean_shift};
-use hog_core::pyramid::{Pyramid, Tap, resize, taps};
-use hog_core::{Grouping, Hog, HogParams, ImageView, Interrupt, Rect, Search, Size};
+use hog_core::pyramid::{Tap, resize, taps};
+use hog_core::{Hog, HogParams, ImageView, Interrupt, Rect, Search, SearchOptions, Size};
 
 /// The descriptor of one crop by the exact path.
 fn descriptor(hog: &Hog, crop: &[u8], channels: usize) -> Vec<f32> {
@@ -137,7 +137,7 @@ fn places_of_ones_own_are_decided_as_all_windows_are() {
     for share in [0.0, 0.3, 1.0] {
         let hit_threshold = reached_by(&windows, share);
         let search = Search { hit_threshold, ..STEPS };
-        let found = hog.detect(picture.view(), &search, Some(&places), &Interrupt::NEVER).unwrap();
+        let found = hog.detect_windows(picture.view(), &search, Some(&places), &Interrupt::NEVER).unwrap();
         let hits: Vec<_> = windows.iter().rev().copied().filter(|hit| hit.weight >= hit_threshold).collect();
         assert_same(&found, &hits, 0.0, "places");
     }
@@ -156,7 +156,7 @@ fn padding_wider_than_the_image_is_mirrored_as_the_exact_path_mirrors_it() {
             assert!(wanted.len() > 10);
             for backend in available() {
                 let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
-                let found = hog.detect(picture.view(), &search, None, &Interrupt::NEVER).unwrap();
+                let found = hog.detect_windows(picture.view(), &search, None, &Interrupt::NEVER).unwrap();
                 let what = format!("{} {size:?}x{channels} {padding:?}", backend.name());
                 assert_same(&found, &wanted, detector.rounding(), &what);
             }
@@ -183,7 +183,7 @@ fn rows_of_very_many_windows_and_every_distance_between_windows_are_served() {
         assert!(wanted.len() > 7);
         for backend in available() {
             let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
-            let found = hog.detect(picture.view(), &search, None, &Interrupt::NEVER).unwrap();
+            let found = hog.detect_windows(picture.view(), &search, None, &Interrupt::NEVER).unwrap();
             let what = format!("{} {size:?} {win_stride:?}", backend.name());
             assert_same(&found, &wanted, detector.rounding(), &what);
         }
@@ -195,9 +195,9 @@ fn a_search_at_a_size_that_no_image_can_have_is_refused() {
     let (detector, picture) = (Detector::people(), Picture::new(64, 128, 1, 1));
     let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
     let at = |first: Size| {
-        let pyramid = Pyramid { first: Some(first), scale: 1e9 };
-        let never = Interrupt::NEVER;
-        hog.detect_multi_scale(picture.view(), &STEPS, &pyramid, Grouping::Similar(0), None, 1, &never)
+        let options =
+            SearchOptions { search: STEPS, first_level: Some(first), scale: 1e9, ..Default::default() };
+        hog.detect(picture.view(), &options, &Interrupt::NEVER)
     };
     for (width, height) in [(1 << 29, 128), (64, 1 << 29), (1 << 40, 1 << 40), (0, 128), (64, 0)] {
         let error = at(Size::new(width, height)).unwrap_err().to_string();
@@ -216,8 +216,8 @@ fn a_caller_who_wants_no_answer_any_more_gets_none() {
     let candidates = rects.map(|rect| Candidate { rect, weight: 1.0, scale: 1.0 });
     assert!(group_candidates(&candidates, 2, &interrupt).is_err());
     assert!(mean_shift(&candidates, 0.0, (64, 128), &interrupt).is_err());
-    assert!(hog.detect(picture.view(), &STEPS, None, &interrupt).is_err());
-    assert!(hog.detect(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt).is_err());
+    assert!(hog.detect_windows(picture.view(), &STEPS, None, &interrupt).is_err());
+    assert!(hog.detect_windows(picture.view(), &STEPS, Some(&[(0, 0)]), &interrupt).is_err());
     let (mut shares, mut bins) = (vec![[0.0; 2]; 150 * 190], vec![[0; 2]; 150 * 190]);
     let votes = RowVotes { shares: &mut shares, bins: &mut bins };
     assert!(hog.gradient(picture.view(), [0; 4], &interrupt, votes).is_err());

@@ -4,8 +4,7 @@
 mod common;
 
 use common::{Detector, Picture, STEPS};
-use hog_core::pyramid::Pyramid;
-use hog_core::{Grouping, Guide, Hog, Interrupt, Rect, Search};
+use hog_core::{Grouping, Guide, Hog, Interrupt, Rect, Search, SearchOptions};
 
 fn guide(halvings: u32, margin: f64, reach: f64) -> Option<Guide> {
     Some(Guide { halvings, margin, reach: (reach, reach) })
@@ -22,17 +21,9 @@ fn guided_by(
     search: &Search,
 ) -> Vec<(Rect, f64)> {
     let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
-    let pyramid = Pyramid { first: None, scale: 1.1 };
-    hog.detect_multi_scale(
-        picture.view(),
-        search,
-        &pyramid,
-        Grouping::Similar(0),
-        guide,
-        1,
-        &Interrupt::NEVER,
-    )
-    .unwrap()
+    let options =
+        SearchOptions { search: *search, scale: 1.1, grouping: Grouping::None, guide, ..Default::default() };
+    hog.detect(picture.view(), &options, &Interrupt::NEVER).unwrap()
 }
 
 #[test]

@@ -6,8 +6,9 @@ mod common;
 use common::{Detector, Gradient, PADDED, Picture, available};
 use hog_core::exact::Svm;
 use hog_core::group::{Candidate, group_rectangles, mean_shift};
-use hog_core::pyramid::Pyramid;
-use hog_core::{Backend, Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, model};
+use hog_core::{
+    Backend, Grouping, Hog, HogParams, HogSpec, ImageView, Interrupt, Rect, SearchOptions, model,
+};
 
 fn rect([x, y, width, height]: [i32; 4]) -> Rect {
     Rect { x, y, width, height }
@@ -30,18 +31,14 @@ fn a_search_finds_what_opencv_finds_grouped_by_similarity_and_by_mean_shift() {
     for backend in available() {
         let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
         let search = |grouping| {
-            hog.detect_multi_scale(
+            hog.detect(
                 picture.view(),
-                &PADDED,
-                &Pyramid { first: None, scale: 1.1 },
-                grouping,
-                None,
-                1,
+                &SearchOptions { search: PADDED, scale: 1.1, grouping, ..SearchOptions::default() },
                 &Interrupt::NEVER,
             )
             .unwrap()
         };
-        assert_eq!(search(Grouping::Similar(0)).len(), 51);
+        assert_eq!(search(Grouping::None).len(), 51);
         assert_found(
             &search(Grouping::Similar(1)),
             &[

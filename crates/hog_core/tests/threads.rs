@@ -4,8 +4,7 @@
 mod common;
 
 use common::{Detector, Picture};
-use hog_core::pyramid::Pyramid;
-use hog_core::{Grouping, Hog, Interrupt, Search};
+use hog_core::{Grouping, Hog, Interrupt, Search, SearchOptions};
 
 const SEARCH: Search = Search { hit_threshold: -3.0, win_stride: (8, 8), padding: (8, 8) };
 
@@ -15,13 +14,15 @@ fn threads_that_share_a_detector_find_what_one_alone_finds() {
     let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
     let pictures: Vec<Picture> = (0..4).map(|i| Picture::new(120 + 9 * i, 170, 1 + 2 * (i % 2), 7)).collect();
     let find = |picture: &Picture, threads: usize| {
-        hog.detect_multi_scale(
+        hog.detect(
             picture.view(),
-            &SEARCH,
-            &Pyramid { first: None, scale: 1.1 },
-            Grouping::Similar(0),
-            None,
-            threads,
+            &SearchOptions {
+                search: SEARCH,
+                scale: 1.1,
+                grouping: Grouping::None,
+                threads,
+                ..SearchOptions::default()
+            },
             &Interrupt::NEVER,
         )
         .unwrap()

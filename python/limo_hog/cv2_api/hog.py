@@ -325,14 +325,16 @@ class HOGDescriptor:
         state = self._state
         if state.svm is None:
             return (), ()
+        threshold = real("groupThreshold", groupThreshold if finalThreshold is None else finalThreshold, 2.0)
+        modes = flag("useMeanshiftGrouping", useMeanshiftGrouping, False)
         boxes, weights = state.detecting.detect_multi_scale(
             pixels(img),
-            real("hitThreshold", hitThreshold, 0.0),
-            pair("winStride", winStride),
-            pair("padding", padding),
-            real("scale", scale, 1.05),
-            real("groupThreshold", groupThreshold if finalThreshold is None else finalThreshold, 2.0),
-            flag("useMeanshiftGrouping", useMeanshiftGrouping, False),
+            hit_threshold=real("hitThreshold", hitThreshold, 0.0),
+            win_stride=pair("winStride", winStride),
+            padding=pair("padding", padding),
+            scale=real("scale", scale, 1.05),
+            similar=None if modes else threshold,
+            mean_shift=threshold if modes else None,
         )
         return (boxes, weights) if len(boxes) else ((), ())
 

@@ -234,7 +234,11 @@ def _search(
     # No padding: a window beyond the edge would learn what mirroring looks like.
     height, width = image.shape
     boxes, margins = detector.detect_multi_scale(
-        image, parameters.above, (8, 8), (0, 0), parameters.scale, 0, False, (enlarged * width, enlarged * height)
+        image,
+        hit_threshold=parameters.above,
+        win_stride=(8, 8),
+        scale=parameters.scale,
+        first_level=(enlarged * width, enlarged * height),
     )
     return boxes.astype(np.float64), margins
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from limo_hog.detections import Detector
@@ -92,13 +92,20 @@ def run_episode(
     watch
         Called with every control period. The run keeps none, so its memory does not grow.
     """
-    began = time.perf_counter()
     arena = Arena(scenario, seed)
-    scorer = Scorer(arena.scenario)
     search: Search = detect_in
     if scenario.detector != DetectorFaults():
         search = FaultySearch(arena.scenario, seed, lambda: arena.frame().truth)
-    follower = Follower(controller, detector, search=search)
+    episode = play(arena, Follower(controller, detector, search=search), seconds, names=names, watch=watch)
+    return replace(episode, target_distance=getattr(controller, "target_distance", None))
+
+
+def play(
+    arena: Arena, follower: Follower[Any], seconds: float, *, names: tuple[str, str], watch: Watch = lambda _: None
+) -> Episode:
+    """Let a follower drive the arena's robot; as `run_episode`, whose parameters these are."""
+    began = time.perf_counter()
+    scorer = Scorer(arena.scenario)
     passed: list[Passed] = []
     while arena.time < seconds:
         passed.append(Passed(arena.time, arena.odometry(), arena.imu()))
@@ -116,10 +123,9 @@ def run_episode(
     return Episode(
         arena.scenario,
         *names,
-        seed,
+        arena.seed,
         arena.time,
         scorer,
         arena.contacts,
         time.perf_counter() - began,
-        getattr(controller, "target_distance", None),
     )

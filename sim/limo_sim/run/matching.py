@@ -27,6 +27,8 @@ class Criteria:
     found_within_s
         A lost subject counts as found again within this time [s]. Chosen: a person who walks at 0.75 m/s crosses the
         camera's field, 71° at 1.5 m, in 3 s.
+    kept_up_m
+        A robot that is further from the subject than this has not kept up [m]. Chosen: twice the distance held.
     unseen_s
         A run in which the subject is out of view for longer than this fails [s]. Follow-Bench (arXiv 2509.10796): 100
         frames of a camera of 10 Hz.
@@ -39,6 +41,7 @@ class Criteria:
     """
 
     in_view: float = 0.5
+    kept_up_m: float = 3.0
     lost_after_s: float = 0.5
     found_within_s: float = 3.0
     unseen_s: float = 10.0

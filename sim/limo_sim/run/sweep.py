@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
 from statistics import NormalDist, fmean, stdev
+from typing import TypeVar
 
 import limo_hog
 from limo_hog.exceptions import LimoHogError
@@ -19,10 +20,14 @@ from limo_sim.run.episode import run_episode, score
 from limo_sim.run.score import ScoreCard
 from limo_sim.world.scenario import Scenario
 
+R = TypeVar("R")
+C = TypeVar("C")
+
 #: Figures of a score card that are summed up, in the order they are shown.
 MEASURES = (
     "success",
     "in_view",
+    "kept_up",
     "detected",
     "best_box_wrong",
     "pixel_error_mean",
@@ -126,7 +131,12 @@ class WorkerError(LimoHogError):
 
 
 def play_all(runs: Sequence[Run], workers: int) -> Iterator[tuple[Run, ScoreCard]]:
-    """Play runs on `workers` processes; yields each run with its card, in the order in which they end.
+    """Play runs on `workers` processes; yields each run with its card, as `in_processes` does."""
+    return in_processes(play, runs, workers)
+
+
+def in_processes(task: Callable[[R], C], runs: Sequence[R], workers: int) -> Iterator[tuple[R, C]]:
+    """Do a task for each run on `workers` processes; yields each run with the answer, in the order in which they end.
 
     The processes end with this one, whatever ends it, and at once where the caller takes no more.
 
@@ -142,7 +152,7 @@ def play_all(runs: Sequence[Run], workers: int) -> Iterator[tuple[Run, ScoreCard
     with alive, kept_open:
         pool = ProcessPoolExecutor(workers, context, end_with, (alive,))
         try:
-            runs_of = {pool.submit(play, run): run for run in runs}
+            runs_of = {pool.submit(task, run): run for run in runs}
             for done in as_completed(runs_of):
                 if isinstance(done.exception(), BrokenProcessPool):
                     missing += 1

@@ -27,6 +27,12 @@ def test_fractions_begin_when_the_person_is_first_in_view() -> None:
     assert result.first_detection_s == pytest.approx(0.5)
 
 
+def test_a_robot_keeps_up_where_the_person_is_in_view_and_at_most_three_metres_away() -> None:
+    near, edge, far, hidden = person(2.0), person(3.0), person(3.01), person(2.0, visible=0.4)
+    result = card(*(step(k, one) for k, one in enumerate((near, edge, far, hidden, far))))
+    assert (result.kept_up, result.in_view) == (0.4, 0.8)
+
+
 def test_a_score_as_the_run_goes_needs_12_bytes_a_frame() -> None:
     scorer = Scorer(Scenario.load("two_people"))
 

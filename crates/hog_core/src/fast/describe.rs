@@ -1,4 +1,12 @@
 //! Descriptors of crops, each of which is one window: as many side by side as a vector has room for.
+//!
+//! ```text
+//! Fill:         rows of the crops side by side in each channel's plane, a mirrored row above and below
+//! strips:       as of a level, `ends` naming the first and last cell of each crop, where columns are mirrored
+//! descriptors:  [block row][element][lane] → [crop][block column][block row][element]
+//! ```
+//!
+//! A crop of 64 × 128 fills half a vector of 16: two side by side cost what one does.
 
 use crate::error::Result;
 use crate::geometry::Size;

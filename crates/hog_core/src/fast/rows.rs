@@ -1,4 +1,21 @@
 //! Pixels for the kernels: the image as planes, shrunk to a level, each row mirrored outwards.
+//!
+//! ```text
+//! Planes::fill:  each row of the image → one row in each channel's plane, bytes flipped to signed
+//! Band::begin:   which columns of the level are made, and the taps of each column and row
+//! Band::fill:    each row of the level = mix of two rows of the plane (down), of two columns (across), mirrored outwards
+//! ```
+//!
+//! A band's row, for each channel one after the other, `plane` bytes apart:
+//!
+//! ```text
+//! | slack, ≥ 16 | mirrored | made: pixels of the level | mirrored | OVERREAD | up to a multiple of 64 |
+//! 0                        left                                                               plane
+//! ```
+//!
+//! Tricks: 1. columns and rows are mixed at once, all channels together, by the exact resize's fixed-point weights, so that
+//! no row of mixed columns is stored. 2. Signed bytes let one instruction multiply and add two neighbours. 3. Only the columns
+//! of a tile are made, whatever the level's width.
 
 use std::ops::Range;
 
@@ -37,7 +54,8 @@ impl Planes {
                 let (first, rest) = self.data.split_at_mut(plane);
                 let (second, third) = rest.split_at_mut(plane);
                 let to = [first, second, third].map(|plane| plane[y * width..][..width].as_mut_ptr());
-                l.compiled(Deinterleave { row, to });
+                // SAFETY: each of `to` is a row of `width` pixels.
+                l.compiled(unsafe { Deinterleave::new(row, to, width) });
             }
         }
         Ok(())
@@ -79,11 +97,22 @@ struct Deinterleave<'a> {
     to: [*mut u8; 3],
 }
 
+impl<'a> Deinterleave<'a> {
+    /// # Safety
+    ///
+    /// - `row` has three bytes for each of `width` pixels.
+    /// - Each of `to` points at `width` writable bytes.
+    unsafe fn new(row: &'a [u8], to: [*mut u8; 3], width: usize) -> Self {
+        debug_assert_eq!(row.len(), 3 * width);
+        Self { row, to }
+    }
+}
+
 impl Kernel for Deinterleave<'_> {
     type Output = ();
     #[inline(always)]
     fn run<L: Lane>(self, l: L) {
-        // SAFETY: there is room in each plane.
+        // SAFETY: promised to `new`.
         unsafe { l.deinterleave::<0x80>(self.row.as_ptr(), self.to, self.row.len() / 3) }
     }
 }

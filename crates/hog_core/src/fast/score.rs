@@ -1,4 +1,25 @@
 //! The SVM over a level's blocks: a quantised prefilter for every window, single precision for those that pass it.
+//!
+//! ```text
+//! for each 8 rows of windows:                       Prefilter: lanes are neighbouring windows
+//!     for each row of blocks that these lie on:
+//!         for each block column, word of 4 bytes:   total[window row] += dot(bytes, weights)
+//!     mask[window] = total ≥ least
+//! for each window of the mask:                      ScoreWindows: lanes are neighbouring blocks of one window
+//!     score = bias + Σ block × weight
+//!     found.push(window, score)
+//! ```
+//!
+//! Data: `blocks` is `[block row][element 0..36][lane]`, `bytes` the same as `[block row][word 0..9][lane]`, four elements a
+//! word; lane x is the block column x of the tile, and the first one of window x.
+//!
+//! Tricks, each with what it gains (figures: docs/simd.md):
+//!
+//! 1. Bytes times signed bytes, four at a time: a window costs a quarter of its numbers. The bound on what that loses
+//!    (`plan.rs`) lets no hit be missed; a few windows in a hundred go on.
+//! 2. A row of blocks is loaded once for the eight rows of windows that it is part of; rows of zeros around the weights make
+//!    the first and last of them the same code as the others (seven bodies instead of 36).
+//! 3. Windows that pass lie alone: each is summed with its own blocks as lanes, not with its neighbours.
 
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
@@ -16,7 +37,7 @@ use super::plan::Plan;
 pub(crate) struct Thresholds {
     /// Every window that scores at least this is found.
     pub hit: f64,
-    /// And those that score at least this, but for one in very many: where they only tell where else to look.
+    /// Windows that score at least this guide the search of other levels; the prefilter may, very rarely, miss such a window.
     pub guide: f64,
 }
 
@@ -49,6 +70,7 @@ impl WindowGrid<'_> {
     /// There is such a row.
     #[inline(always)]
     unsafe fn row<T>(&self, parts: [*const T; 2], y: usize, elements: usize) -> *const T {
+        debug_assert!(y < 2 * self.rows, "row {y} of twice {}", self.rows);
         let (part, y) = if y < self.rows { (parts[0], y) } else { (parts[1], y - self.rows) };
         // SAFETY: the caller's promise.
         unsafe { part.add(y * elements * self.lanes) }
@@ -59,8 +81,10 @@ impl WindowGrid<'_> {
 /// some others.
 ///
 /// # Safety
-/// `blocks` and `bytes` hold the blocks of all windows, and `lanes` is at least `width` rounded up to 32 plus the
-/// blocks of a window along x plus 16.
+///
+/// - `blocks` and `bytes` hold the blocks of all windows: `rows` rows of `lanes` lanes in the first part, and in the second as
+///   many as the last windows reach beyond these.
+/// - `lanes` is at least `width` rounded up to 32, plus the blocks of a window along x, plus 16.
 pub(super) unsafe fn score<L: Lane>(
     l: L,
     windows: &WindowGrid,
@@ -71,6 +95,7 @@ pub(super) unsafe fn score<L: Lane>(
 ) -> Result<()> {
     let plan = windows.plan;
     let groups = windows.width.div_ceil(L::LANES);
+    debug_assert!(windows.lanes >= windows.width.next_multiple_of(32) + plan.blocks.width + 16);
     masks.clear();
     memory::resize(masks, groups * windows.height, u32::MAX)?;
     let Thresholds { hit, guide } = thresholds;
@@ -82,7 +107,8 @@ pub(super) unsafe fn score<L: Lane>(
         for top in (0..windows.height).step_by(ROWS) {
             interrupt.check()?;
             let rows = (windows.height - top).min(ROWS);
-            l.compiled(Prefilter { windows, least, top, rows, masks });
+            // SAFETY: the caller's promise; `masks` was made for all windows.
+            l.compiled(unsafe { Prefilter::new(l, windows, least, top..top + rows, masks) });
         }
     }
     for (y, masks) in masks.chunks_exact(groups).enumerate() {
@@ -93,20 +119,39 @@ pub(super) unsafe fn score<L: Lane>(
             let mask = mask & (((1u64 << inside) - 1) as u32);
             if mask != 0 {
                 memory::reserve_some(found, mask.count_ones() as usize)?;
-                l.narrow().compiled(ScoreWindows { windows, x, y, mask, found });
+                // SAFETY: the caller's promise; the mask names windows within the width.
+                l.narrow().compiled(unsafe { ScoreWindows::new(windows, x, y, mask, found) });
             }
         }
     }
     Ok(())
 }
 
-/// Prefilters `rows` rows of windows. Made by [`score`] alone, which has its caller's promise.
+/// Prefilters `rows` rows of windows.
 struct Prefilter<'a> {
     windows: &'a WindowGrid<'a>,
     least: i32,
     top: usize,
     rows: usize,
     masks: &'a mut [u32],
+}
+
+impl<'a> Prefilter<'a> {
+    /// # Safety
+    ///
+    /// - `windows` are as [`score`] wants them, and `rows`, at most [`ROWS`] of them, are among their rows.
+    /// - `masks` has a word for each `LANES` windows of each row.
+    unsafe fn new<L: Lane>(
+        _: L,
+        windows: &'a WindowGrid<'a>,
+        least: i32,
+        rows: std::ops::Range<usize>,
+        masks: &'a mut [u32],
+    ) -> Self {
+        debug_assert!(rows.len() <= ROWS && rows.end <= windows.height);
+        debug_assert!(masks.len() >= windows.width.div_ceil(L::LANES) * windows.height);
+        Self { windows, least, top: rows.start, rows: rows.len(), masks }
+    }
 }
 
 impl Kernel for Prefilter<'_> {
@@ -117,7 +162,7 @@ impl Kernel for Prefilter<'_> {
         let groups = windows.width.div_ceil(L::LANES);
         let mut group = 0;
         while group < groups {
-            // SAFETY: the windows of these rows and lanes are the promise to `score`.
+            // SAFETY: promised to `Prefilter::new`.
             unsafe {
                 if L::PREFILTER_VECTORS == 2 && group + 1 < groups {
                     prefilter::<L, 2>(l, windows, least, top, rows, group, groups, masks);
@@ -131,13 +176,30 @@ impl Kernel for Prefilter<'_> {
     }
 }
 
-/// Scores those of the windows `x..x + 32` of row `y` that `mask` names. Made by [`score`] alone.
+/// Scores those of the windows `x..x + 32` of row `y` that `mask` names.
 struct ScoreWindows<'a> {
     windows: &'a WindowGrid<'a>,
     x: usize,
     y: usize,
     mask: u32,
     found: &'a mut Vec<(usize, usize, f64)>,
+}
+
+impl<'a> ScoreWindows<'a> {
+    /// # Safety
+    ///
+    /// - `windows` are as [`score`] wants them, and `y` is one of their rows.
+    /// - `mask` names windows within their width alone.
+    unsafe fn new(
+        windows: &'a WindowGrid<'a>,
+        x: usize,
+        y: usize,
+        mask: u32,
+        found: &'a mut Vec<(usize, usize, f64)>,
+    ) -> Self {
+        debug_assert!(y < windows.height && x + 32 - (mask.leading_zeros() as usize) <= windows.width);
+        Self { windows, x, y, mask, found }
+    }
 }
 
 impl Kernel for ScoreWindows<'_> {
@@ -148,7 +210,7 @@ impl Kernel for ScoreWindows<'_> {
         while mask != 0 {
             let x = self.x + mask.trailing_zeros() as usize;
             mask &= mask - 1;
-            // SAFETY: the promise to `score`.
+            // SAFETY: promised to `ScoreWindows::new`.
             self.found.push((x, self.y, unsafe { score_window(l, self.windows, x, self.y) }));
         }
     }
@@ -161,6 +223,7 @@ unsafe fn score_window<L: Lane>(l: L, windows: &WindowGrid, x: usize, y: usize) 
     let padded = plan.blocks.width.next_multiple_of(ACROSS);
     let mut score = plan.bias;
     for (block_y, weights) in plan.weights.chunks_exact(BLOCK * padded).enumerate() {
+        debug_assert!(weights.len() == BLOCK * padded && y + block_y < 2 * windows.rows);
         // SAFETY: promised by the caller of `score`; lanes beyond the window's have the weight 0.
         let blocks = unsafe { windows.row(windows.blocks, y + block_y, BLOCK).add(x) };
         for part in (0..plan.blocks.width).step_by(L::LANES) {
@@ -254,6 +317,7 @@ unsafe fn block_row<L: Lane, const V: usize, const FROM: usize, const TO: usize>
             }
             let weights = &prefilter.words[(block_x * WORDS + word) * padded..][..padded];
             for row in FROM..TO {
+                debug_assert!(ROWS + y - row < weights.len());
                 // SAFETY: row < ROWS, and y < ROWS + size.height - 1, as the caller has no more rows of blocks. A check
                 // for each of these would cost as much as the sum.
                 let weight = l.splat_word(unsafe { *weights.get_unchecked(ROWS + y - row) });

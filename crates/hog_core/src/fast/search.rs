@@ -12,7 +12,7 @@ use crate::geometry::Size;
 use crate::interrupt::Interrupt;
 use crate::memory::{self, Pool};
 use crate::pyramid::Grid;
-use crate::threads::{Shared, together};
+use crate::threads::together;
 
 use super::backend::Backend;
 use super::dispatch::{OnLane, on_lane};
@@ -36,12 +36,12 @@ pub(crate) fn trim() {
 
 /// What to search.
 #[derive(Debug)]
-pub(crate) struct Task {
+pub(crate) struct Task<'a> {
     pub backend: Backend,
-    pub plan: Arc<Plan>,
-    pub planes: Arc<Planes>,
+    pub plan: &'a Plan,
+    pub planes: &'a Planes,
     /// The size and the windows of each level.
-    pub levels: Arc<Vec<(Size, Grid)>>,
+    pub levels: &'a [(Size, Grid)],
     pub regions: Vec<Region>,
     pub thresholds: Thresholds,
 }
@@ -67,12 +67,12 @@ pub(crate) fn search(task: Task, threads: usize, interrupt: &Interrupt) -> Resul
     let mut tiles = Vec::new();
     for region in &task.regions {
         if let Some((_, grid)) = task.levels.get(region.level) {
-            tiles_of(region, grid, &task.plan, &mut tiles)?;
+            tiles_of(region, grid, task.plan, &mut tiles)?;
         }
     }
-    let bands = tiles.iter().map(|tile| tile.bands(&task.plan)).sum();
+    let bands = tiles.iter().map(|tile| tile.bands(task.plan)).sum();
     let found = memory::filled(task.levels.len(), Vec::new())?;
-    let search = Arc::new(Search {
+    let search = Search {
         task,
         tiles,
         progress: Mutex::new(Progress {
@@ -81,9 +81,9 @@ pub(crate) fn search(task: Task, threads: usize, interrupt: &Interrupt) -> Resul
             numbers: 0,
         }),
         found: Mutex::new(found),
-    });
-    together(&search, threads.min(bands), interrupt)?;
-    let mut found = std::mem::take(&mut *lock(&search.found));
+    };
+    together(&|interrupt: &Interrupt| search.work(interrupt), threads.min(bands), interrupt)?;
+    let mut found = search.found.into_inner().unwrap_or_else(PoisonError::into_inner);
     for level in &mut found {
         level.sort_unstable_by(|a, b| (a.1, a.0).cmp(&(b.1, b.0)).then(a.2.total_cmp(&b.2)));
     }
@@ -122,8 +122,8 @@ fn tiles_of(region: &Region, grid: &Grid, plan: &Plan, tiles: &mut Vec<Tile>) ->
 }
 
 /// A search at work.
-struct Search {
-    task: Task,
+struct Search<'a> {
+    task: Task<'a>,
     tiles: Vec<Tile>,
     progress: Mutex<Progress>,
     /// What was found on each level.
@@ -175,7 +175,8 @@ impl Seam {
     }
 }
 
-impl Shared for Search {
+impl Search<'_> {
+    /// A thread's part: runs, until there are none left.
     fn work(&self, interrupt: &Interrupt) -> Result<()> {
         SCRATCH.with(|scratch| {
             while let Some(run) = self.take()? {
@@ -184,14 +185,12 @@ impl Shared for Search {
             Ok(())
         })
     }
-}
 
-impl Search {
     /// A run for a thread that has nothing to do: a tile of its own, or half of what another thread has before it.
     fn take(&self) -> Result<Option<Run>> {
         let mut progress = lock(&self.progress);
         let number = progress.numbers;
-        let plan = &self.task.plan;
+        let plan = self.task.plan;
         let run = if let Some(tile) = self.tiles.get(progress.next_tile) {
             let (tile, end) = (progress.next_tile, tile.bands(plan));
             progress.next_tile += 1;
@@ -226,7 +225,7 @@ impl Search {
 
 /// The work of one run.
 struct Bands<'a> {
-    search: &'a Search,
+    search: &'a Search<'a>,
     run: Run,
     scratch: &'a mut Scratch,
     interrupt: &'a Interrupt<'a>,
@@ -237,10 +236,10 @@ impl OnLane for Bands<'_> {
 
     fn run<L: Lane>(self, l: L) -> Result<()> {
         let Self { search, run, scratch, interrupt } = self;
-        let Task { plan, planes, levels, thresholds, .. } = &search.task;
+        let Task { plan, planes, levels, thresholds, .. } = search.task;
         let tile = &search.tiles[run.tile];
         let (size, grid) = &levels[tile.level];
-        let context = Context { plan, source: planes, size: *size, grid, thresholds: *thresholds };
+        let context = Context { plan, source: planes, size: *size, grid, thresholds };
         scratch.found.clear();
         tile::begin(l, &context, tile, scratch)?;
         let mut last: Option<(usize, Arc<Blocks>)> = None;
@@ -314,9 +313,9 @@ mod tests {
         let grid = Steps::new((8, 8), (8, 8), spec.cell, &spec).unwrap().grid(size, &spec);
         let task = Task {
             backend,
-            plan: Arc::new(plan(backend, &geometry, &svm).unwrap()),
-            planes: Arc::new(planes),
-            levels: Arc::new(vec![(size, grid)]),
+            plan: &plan(backend, &geometry, &svm).unwrap(),
+            planes: &planes,
+            levels: &[(size, grid)],
             regions: vec![Region::whole(0, &grid)],
             thresholds,
         };

@@ -1,12 +1,40 @@
 //! One strip of a level, from pixels to normalised blocks. Lanes are neighbouring cells.
 //!
-//! Eight pixels lie between the same pixel of neighbouring cells: a vector holds pixel column `phase` (0..8) of
-//! `LANES` cells. Every stage then works lane by lane; only where a block joins two cells does a lane look at the next.
+//! ```text
+//! for each row of cells:
+//!     for each of its 8 rows of pixels:     fill: load, gamma; 10 vectors, the columns -1..=8 of every cell
+//!     for each of its 8 columns of pixels:
+//!         for each row:                     strongest channel's dx, dy → vote: two bins, two shares of the magnitude
+//!         for each bin:                     spread: Σ over the rows of weight down[y] × vote → carry, sums
+//!     finish: Σ over the columns of across[x] × sums → the 4 cells of each block → L2-Hys → blocks, bytes
+//! ```
 //!
-//! The weight of a pixel in a cell of its block is a Gaussian times a bilinear share, both products of a function of x
-//! and one of y. So the votes of a column are first summed down the rows ([`spread`]), then across the columns
-//! ([`finish`]). A row of cells takes part in two rows of blocks and, per row of blocks, in two cells; a pixel row
-//! reaches three of these four sums.
+//! A block is 2 × 2 cells. A row of cells is the lower one of the blocks that end in it and the upper one of those that
+//! begin in it; a pixel's vote reaches both cells of a block, the nearer one more:
+//!
+//! ```text
+//!              blocks that end here     blocks that begin here
+//! cell above   upper    ← rows 0..4     (not in them)
+//! this cell    lower    ← all rows      upper    ← all rows
+//! cell below   (not in them)            lower    ← rows 4..8
+//! ```
+//!
+//! So a row of pixels reaches three of these four sums; `down[y]` has its weights in the order this cell as upper, the cell
+//! above or below, this cell as lower. `carry` keeps the two sums of the blocks that begin here for the next row of cells,
+//! which completes them.
+//!
+//! Tricks, each with what it gains (figures: docs/simd.md):
+//!
+//! 1. Eight pixels lie between the same pixel of neighbouring cells: a vector holds pixel column `phase` (0..8) of `LANES`
+//!    cells. Every stage works lane by lane, without a gather; only where a block joins two cells a lane looks at the next.
+//! 2. A weight is a Gaussian times a bilinear share, both products of a function of x and one of y. Summing down the rows
+//!    first leaves an eighth of the work for the sums across.
+//! 3. Of two neighbouring bins one is even and one odd. With votes kept by parity a bin looks at one vote, not two
+//!    ([`LaneVotes`]); bins 8 and 0, of equal parity, look at both.
+//! 4. Strips are made from right to left: `edge` takes what a strip's first cells add to the block left of them, so that no
+//!    strip is visited twice.
+//! 5. In colour three rows of square roots are kept in turn, and of each gradient only dx and dy: all channels of ten rows
+//!    would not leave room for the rest in the first-level cache.
 
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
@@ -70,28 +98,52 @@ pub(super) struct LaneVotes<L: Lane> {
 /// Computes the blocks of the strip of cells that begins at lane `first`.
 ///
 /// # Safety
-/// For every channel and row of `job`, the bytes from 8 before to 8 behind the strip's cells are readable; `blocks`
-/// and `bytes` have `cells_y - 1` rows of `lanes` lanes, the strip's among them; `ends` have the strip's lanes.
+/// As [`Strip::new`], with 1 or 3 channels.
 pub(super) unsafe fn strip<L: Lane>(l: L, job: &mut Job, first: usize, channels: usize) {
-    match (channels, job.ends.is_some()) {
-        (1, false) => l.compiled(Strip::<1, false> { job, first }),
-        (_, false) => l.compiled(Strip::<3, false> { job, first }),
-        (1, true) => l.compiled(Strip::<1, true> { job, first }),
-        (_, true) => l.compiled(Strip::<3, true> { job, first }),
+    // SAFETY: the caller's promise.
+    unsafe {
+        match (channels, job.ends.is_some()) {
+            (1, false) => l.compiled(Strip::<1, false>::new(l, job, first)),
+            (_, false) => l.compiled(Strip::<3, false>::new(l, job, first)),
+            (1, true) => l.compiled(Strip::<1, true>::new(l, job, first)),
+            (_, true) => l.compiled(Strip::<3, true>::new(l, job, first)),
+        }
     }
 }
 
-/// The work of [`strip`], which alone makes it.
+/// The work of [`strip`].
 struct Strip<'a, 'b, const CHANNELS: usize, const CROPS: bool> {
     job: &'a mut Job<'b>,
     first: usize,
+}
+
+impl<'a, 'b, const CHANNELS: usize, const CROPS: bool> Strip<'a, 'b, CHANNELS, CROPS> {
+    /// # Safety
+    ///
+    /// - `job.origin` points, for each channel, at rows `stride` bytes apart, of which those of `cells` and one above and
+    ///   below are readable from 8 bytes before the strip's cells to 8 behind them.
+    /// - `job.carry` has [`CARRY`] numbers for each lane up to the strip's last, `job.room` [`ROOM`] for each of `LANES`;
+    ///   both are aligned to the lane's vector.
+    /// - `job.blocks` and `job.bytes` have rows of `lanes` lanes from block row `top` to that above the last row of cells,
+    ///   the strip's lanes among them, and are written by nobody else.
+    /// - Where there are `ends`, they have the strip's lanes.
+    unsafe fn new<L: Lane>(_: L, job: &'a mut Job<'b>, first: usize) -> Self {
+        debug_assert!(first + L::LANES <= job.lanes, "{first} + {} of {} lanes", L::LANES, job.lanes);
+        debug_assert!(job.room.cast::<Room<L, CHANNELS>>().is_aligned());
+        debug_assert!(job.carry.wrapping_add(CARRY * first).cast::<L::F>().is_aligned());
+        debug_assert!(size_of::<Room<L, CHANNELS>>() <= 4 * ROOM * L::LANES);
+        debug_assert!(job.cells.end <= job.top + job.edge.len() + 1, "{:?} of {}", job.cells, job.edge.len());
+        debug_assert!(CROPS == job.ends.is_some());
+        debug_assert!(job.ends.is_none_or(|ends| ends.iter().all(|end| first + L::LANES <= end.len())));
+        Self { job, first }
+    }
 }
 
 impl<const CHANNELS: usize, const CROPS: bool> Kernel for Strip<'_, '_, CHANNELS, CROPS> {
     type Output = ();
     #[inline(always)]
     fn run<L: Lane>(self, l: L) {
-        // SAFETY: promised to `strip`.
+        // SAFETY: promised to `Strip::new`.
         unsafe { blocks_of_strip::<L, CHANNELS, CROPS>(l, self.job, self.first) }
     }
 }
@@ -320,8 +372,8 @@ fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
     phase: usize,
 ) {
     let zero = l.splat(0.0);
-    // Per bin: upper cell of the blocks that begin here; of the blocks that end here the upper (in the first four
-    // rows, then the lower cell of the blocks that begin here); the lower cell of the blocks that end here.
+    // Per bin, in the order of `down`: this cell as the upper one of the blocks that begin here; the cell above (rows 0..4)
+    // or below (rows 4..8), the table at the head of this file; this cell as the lower one of the blocks that end here.
     let mut acc = [[zero; 3]; COUNT];
     for i in 0..COUNT {
         acc[i] = [zero, carry[FROM + STEP * i][0], carry[FROM + STEP * i][1]];

@@ -1,4 +1,14 @@
 //! A tile of a level, from planes to hits: bands of rows, strips, scores.
+//!
+//! ```text
+//! begin:       the columns of the tile
+//! make:        for some rows of cells at a time: Band::fill → strips from right to left → the band's blocks
+//! score_band:  the windows that begin in the band, from its blocks and those of the band below → found
+//! ```
+//!
+//! Blocks lie as `[block row][element 0..36][lane]`, a lane for each column of cells of the tile, and some more, since whole
+//! vectors of windows are scored. 1. Two bands of blocks are kept, not a level: a thread needs less than 4 MB. 2. `carry`
+//! goes from band to band, so that no row of cells is made twice but at a cut between threads.
 
 use std::ops::Range;
 

@@ -1,4 +1,13 @@
 //! A row's gradients and votes with the exact path's roundings, by vectors: for all that computes gradients as OpenCV does.
+//!
+//! ```text
+//! polar: for each vector of columns: dx, dy of the strongest channel → magnitude, position along the bins
+//! share: for each vector of columns: position → two bins; magnitude → two shares, interleaved
+//! ```
+//!
+//! Lanes are neighbouring pixels. 1. Two loops: the steps from a pixel to its votes are too many for a CPU to overlap two
+//! vectors' of one loop. 2. The last vector ends at the last column and makes some votes again: no rest loop. 3. The two bins
+//! are the bytes of one whole number, so that wrapping them takes comparisons that do not wait for each other.
 
 use std::arch::x86_64::*;
 use std::fmt::Debug;
@@ -46,7 +55,8 @@ impl<L: VoteLane> RowKernel for Votes<L> {
             return 0;
         }
         let row = Row { neighbours, plane, columns, turn, magnitude, position, votes };
-        self.0.compiled(RowOn(row, self.0));
+        // SAFETY: all lengths were compared just now.
+        self.0.compiled(unsafe { RowOn::new(row, self.0) });
         columns
     }
 
@@ -70,6 +80,21 @@ pub(super) struct Row<'a, 'b> {
 
 /// A row, and its lane: a [`Kernel`] is given one that knows less.
 struct RowOn<'a, 'b, L>(Row<'a, 'b>, L);
+
+impl<'a, 'b, L: Lane> RowOn<'a, 'b, L> {
+    /// # Safety
+    ///
+    /// - Each of the row's `neighbours` is one or three planes of `plane` numbers, `plane` at least `columns + 2`.
+    /// - `columns` is at least `LANES` and at most the length of all that is written.
+    unsafe fn new(row: Row<'a, 'b>, l: L) -> Self {
+        let planes = row.neighbours.map(|neighbour| neighbour.len() / row.plane);
+        debug_assert!(planes == [1; 3] || planes == [3; 3], "{planes:?} planes");
+        debug_assert!(
+            (L::LANES..=row.magnitude.len()).contains(&row.columns) && row.columns + 2 <= row.plane
+        );
+        Self(row, l)
+    }
+}
 
 impl<V: VoteLane> Kernel for RowOn<'_, '_, V> {
     type Output = ();

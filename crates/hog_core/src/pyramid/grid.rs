@@ -7,11 +7,11 @@ use crate::params::HogSpec;
 /// The windows of one image, row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
-    /// Padding on the left and right, top and bottom [px].
+    /// Padding on the left and right, top and bottom \[px\].
     pub pad: Size,
-    /// Image with its padding [px].
+    /// Image with its padding \[px\].
     pub padded: Size,
-    /// Distance between neighbouring windows [px].
+    /// Distance between neighbouring windows \[px\].
     pub stride: Size,
     /// Windows along x and y.
     pub windows: Size,

@@ -6,22 +6,12 @@ use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::params::HogSpec;
 
-/// Which sizes an image is searched at.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pyramid {
-    /// Size of the first level: the image is resized to it, and the other levels are made of that; none: the image's
-    /// own size.
-    pub first: Option<Size>,
-    /// How much each level is smaller than the one before.
-    pub scale: f64,
-}
-
 /// One level: the image shrunk by `scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
     /// How many image pixels a level pixel spans.
     pub scale: f64,
-    /// Size of the level's image [px].
+    /// Size of the level's image \[px\].
     pub size: Size,
 }
 

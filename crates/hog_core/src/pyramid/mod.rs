@@ -6,6 +6,6 @@ mod resize;
 
 pub(crate) use grid::gcd;
 pub use grid::{Grid, Steps};
-pub use levels::{Level, Pyramid, levels, to_image};
+pub use levels::{Level, levels, to_image};
 pub use resize::{Tap, resize, taps};
 pub(crate) use resize::{check, resize_part};

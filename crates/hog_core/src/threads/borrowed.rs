@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 
-use super::team::{Shared, together};
+use super::team::{self, Shared};
 
 /// `work` of every item on up to `threads` threads; the first error ends it on all of them.
 ///
@@ -31,14 +31,21 @@ pub(crate) fn for_each<T: Send>(
         }
         Ok(())
     };
-    let part: &Part = &part;
-    // SAFETY: what `part` borrows lives until `together` has returned or unwound, and by then no helper holds it any more.
+    together(&part, threads, interrupt)
+}
+
+/// Does `part`, which takes parts of the work until none is left, on this thread and up to `threads` − 1 others.
+pub(crate) fn together(part: &Part, threads: usize, interrupt: &Interrupt) -> Result<()> {
+    if threads <= 1 {
+        return part(interrupt);
+    }
+    // SAFETY: what `part` borrows lives until the call has returned or unwound, and by then no helper holds it any more.
     let part: &'static Part<'static> = unsafe { mem::transmute::<&Part, &'static Part<'static>>(part) };
-    together(&Arc::new(Borrowed(part)), threads, interrupt)
+    team::together(&Arc::new(Borrowed(part)), threads, interrupt)
 }
 
 /// A thread's part of the work.
-type Part<'a> = dyn Fn(&Interrupt) -> Result<()> + Sync + 'a;
+pub(crate) type Part<'a> = dyn Fn(&Interrupt) -> Result<()> + Sync + 'a;
 
 struct Borrowed(&'static Part<'static>);
 

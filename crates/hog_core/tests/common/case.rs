@@ -1,8 +1,8 @@
 //! One random search, geometry × image × options, for proptest and for libFuzzer: it is read from bytes.
 
 use super::{Detector, Picture, available, compare, reached_by};
-use hog_core::pyramid::{Pyramid, Steps};
-use hog_core::{Grouping, Hog, HogParams, HogSpec, Interrupt, Search};
+use hog_core::pyramid::Steps;
+use hog_core::{Grouping, Hog, HogParams, HogSpec, Interrupt, Search, SearchOptions};
 
 /// Reads numbers from bytes; after their end all are the least.
 struct Draw<'a>(&'a [u8]);
@@ -111,7 +111,7 @@ pub fn check(bytes: &[u8]) {
     let image = picture.view();
     let Ok(steps) = Steps::new(search.win_stride, search.padding, spec.cell, &spec) else {
         let hog = Hog::new(&detector.params, Some(&detector.coefficients)).unwrap();
-        assert!(hog.detect(image, &search, None, &Interrupt::NEVER).is_err());
+        assert!(hog.detect_windows(image, &search, None, &Interrupt::NEVER).is_err());
         return;
     };
     let grid = steps.grid(image.size(), &spec);
@@ -128,7 +128,6 @@ pub fn check(bytes: &[u8]) {
         return;
     }
     let search = Search { hit_threshold: reached_by(&wanted, share as f64 / 256.0), ..search };
-    let pyramid = Pyramid { first: None, scale: 1.0 + scale as f64 / 128.0 };
     let hits = wanted.iter().filter(|hit| hit.weight >= search.hit_threshold).count();
     let grouping = if mean_shift && search.hit_threshold > 0.0 && hits < 12 {
         Grouping::MeanShift(group as f64)
@@ -138,7 +137,9 @@ pub fn check(bytes: &[u8]) {
     let mut first = None;
     for backend in available() {
         let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
-        let found = hog.detect_multi_scale(image, &search, &pyramid, grouping, None, 1, &Interrupt::NEVER);
+        let scale = 1.0 + scale as f64 / 128.0;
+        let options = SearchOptions { search, scale, grouping, ..SearchOptions::default() };
+        let found = hog.detect(image, &options, &Interrupt::NEVER);
         let rects: Vec<_> = found.unwrap().into_iter().map(|(rect, _)| rect).collect();
         assert_eq!(*first.get_or_insert_with(|| rects.clone()), rects, "{}: {search:?}", backend.name());
     }

@@ -155,7 +155,7 @@ pub fn compare(detector: &Detector, picture: &Picture, search: Search, tolerance
         let hog = Hog::with_backend(&detector.params, Some(&detector.coefficients), backend).unwrap();
         let check = |hit_threshold, hits: &[Hit]| {
             let search = Search { hit_threshold, ..search };
-            let found = hog.detect(image, &search, None, &Interrupt::NEVER).unwrap();
+            let found = hog.detect_windows(image, &search, None, &Interrupt::NEVER).unwrap();
             assert_same(&found, hits, tolerance, &format!("{what} at {hit_threshold}"));
         };
         check(ALL_WINDOWS, &wanted);

@@ -33,6 +33,8 @@ class ScoreCard:
         When the subject was first detected [s].
     in_view, detected
         Share of frames with at least half of the subject in view; of those, share in which the subject was detected.
+    kept_up
+        Share of frames with at least half of the subject in view, and the robot's centre at most 3 m from the subject.
     best_box_wrong
         Share of frames with boxes whose best box is on no person.
     longest_gap_s
@@ -93,6 +95,7 @@ class ScoreCard:
     frames: int
     first_detection_s: float | None
     in_view: float | None
+    kept_up: float | None
     detected: float | None
     best_box_wrong: float | None
     longest_gap_s: float | None

@@ -129,6 +129,7 @@ class Scorer:
             frames=self._frames,
             first_detection_s=subject.first_detection,
             in_view=_share(subject.in_view, subject.frames),
+            kept_up=_share(subject.kept_up, subject.frames),
             detected=_share(subject.detected, subject.in_view),
             best_box_wrong=_share(self._wrong, self._boxed),
             longest_gap_s=subject.longest_gap,

@@ -23,9 +23,9 @@ class Subject:
         Frames in which the person was the target.
     first_detection, longest_gap
         When the person was first detected, and the longest time between two detections [s].
-    frames, in_view, detected
+    frames, in_view, kept_up, detected
         Frames since the person was first in view; of these, those with the person in view; of these, those in which the
-        person was detected.
+        robot was near enough to have kept up, and those in which the person was detected.
     last_in_view, longest_unseen
         Whether the person was in view in the newest frame; the longest time between two frames with the person [s].
     pixel_errors
@@ -42,7 +42,7 @@ class Subject:
         self.first_detection: float | None = None
         self.longest_gap: float | None = None
         self._stamp: float | None = None
-        self.frames = self.in_view = self.detected = 0
+        self.frames = self.in_view = self.kept_up = self.detected = 0
         self.last_in_view = False
         self.longest_unseen = 0.0
         self._seen_at: float | None = None
@@ -88,8 +88,9 @@ class Subject:
         if self.frames or visible:
             self.frames += 1
             self.last_in_view = visible
-        if box is not None:
+        if box is not None and person is not None:
             self.in_view += 1
+            self.kept_up += person.distance <= self._criteria.kept_up_m
             self.detected += found
             self.pixel_errors.append(abs(box[0] + box[2] / 2 - WIDTH / 2))
             if self._seen_at is not None:

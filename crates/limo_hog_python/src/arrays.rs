@@ -3,29 +3,45 @@
 use std::borrow::Cow;
 
 use numpy::ndarray::{Dim, Dimension};
-use numpy::{Element, PyArray, PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 
-use super::errors::raised;
-use crate::error::ImageError;
-use crate::{HogError, ImageView, memory};
+use hog_core::error::ImageError;
+use hog_core::{HogError, ImageView, Rect, Size};
 
-pub(super) type Array1<'py, T> = Bound<'py, PyArray1<T>>;
+use crate::errors::raised;
+
+pub(crate) type Array1<'py, T> = Bound<'py, PyArray1<T>>;
+pub(crate) type Array2<'py, T> = Bound<'py, PyArray2<T>>;
+/// Along x and y.
+pub(crate) type Pair = (i64, i64);
+
+/// A list of as many items as the iterator promises; where there is no memory for them, the call fails, not the process.
+pub(crate) fn collect<T>(items: impl IntoIterator<Item = T>) -> hog_core::Result<Vec<T>> {
+    let (items, mut list) = (items.into_iter(), Vec::new());
+    let len = items.size_hint().0;
+    list.try_reserve_exact(len)
+        .map_err(|_| HogError::Memory { bytes: len.saturating_mul(size_of::<T>()) })?;
+    list.extend(items);
+    Ok(list)
+}
 
 /// Numbers as an array of numpy's.
-pub(super) fn array1<T: Element>(
+pub(crate) fn array1<T: Element>(
     py: Python<'_>,
     values: impl IntoIterator<Item = T>,
 ) -> PyResult<Array1<'_, T>> {
-    let values = memory::collect(values).map_err(|error| raised(py, &error))?;
+    let values = collect(values).map_err(|error| raised(py, &error))?;
     Ok(PyArray1::from_vec(py, values))
 }
 
 /// Numbers of any value in memory of numpy's, which asks for large pages: small ones take longer to come than to be
 /// filled. (`PyArray::new` would panic where there is no memory.)
-pub(super) fn empty<T: Element, const N: usize>(
+pub(crate) fn empty<T: Element, const N: usize>(
     py: Python<'_>,
     shape: [usize; N],
 ) -> PyResult<Bound<'_, PyArray<T, Dim<[usize; N]>>>>
@@ -43,7 +59,7 @@ where
 }
 
 /// The bytes of an array in C order: borrowed where they lie so, else copied.
-pub(super) fn contiguous<'a>(
+pub(crate) fn contiguous<'a>(
     py: Python<'_>,
     array: &'a PyReadonlyArrayDyn<'_, u8>,
 ) -> PyResult<Cow<'a, [u8]>> {
@@ -51,14 +67,14 @@ pub(super) fn contiguous<'a>(
     match array.as_slice() {
         Ok(slice) if array.is_c_contiguous() => Ok(Cow::Borrowed(slice)),
         _ => {
-            let copy = memory::collect(array.as_array().iter().copied());
+            let copy = collect(array.as_array().iter().copied());
             Ok(Cow::Owned(copy.map_err(|error| raised(py, &error))?))
         }
     }
 }
 
 /// The pixels of a numpy image: borrowed where it is contiguous, else copied.
-pub(super) struct Pixels<'a> {
+pub(crate) struct Pixels<'a> {
     data: Cow<'a, [u8]>,
     width: usize,
     height: usize,
@@ -66,7 +82,7 @@ pub(super) struct Pixels<'a> {
 }
 
 impl<'a> Pixels<'a> {
-    pub(super) fn new(py: Python<'_>, array: &'a PyReadonlyArrayDyn<'_, u8>) -> PyResult<Self> {
+    pub(crate) fn new(py: Python<'_>, array: &'a PyReadonlyArrayDyn<'_, u8>) -> PyResult<Self> {
         let (height, width, channels) = match *array.shape() {
             [height, width] => (height, width, 1),
             [height, width, channels] => (height, width, channels),
@@ -77,7 +93,17 @@ impl<'a> Pixels<'a> {
         Ok(Self { data: contiguous(py, array)?, width, height, channels })
     }
 
-    pub(super) fn view(&self) -> crate::Result<ImageView<'_>> {
+    pub(crate) fn view(&self) -> hog_core::Result<ImageView<'_>> {
         ImageView::new(&self.data, self.width, self.height, self.channels, self.width * self.channels)
     }
+}
+
+/// A negative side is 0, which is refused as such.
+pub(crate) fn size((width, height): Pair) -> Size {
+    Size::new(usize::try_from(width).unwrap_or(0), usize::try_from(height).unwrap_or(0))
+}
+
+pub(crate) fn rect_array<'py, T>(py: Python<'py>, found: &[(Rect, T)]) -> PyResult<Array2<'py, i32>> {
+    let values = found.iter().flat_map(|(r, _)| [r.x, r.y, r.width, r.height]);
+    array1(py, values)?.reshape([found.len(), 4])
 }

@@ -3,14 +3,14 @@
 //! A strip and an ellipse are cast in parallel projections of their own, frusta and boxes in exact perspective.
 
 /// Brightness stays below this, so that a solid's number and its brightness fit in one value.
-pub(crate) const TONES: f64 = 4.0;
+pub const TONES: f64 = 4.0;
 /// Nothing nearer than this is drawn [m].
 const NEAR: f32 = 0.08;
 /// A capsule whose axis leans less than this [sine] is cast as if it lay in the image plane.
 const UPRIGHT: f64 = 0.2;
 
 /// What one ray meets of a solid.
-pub(crate) struct Hit {
+pub struct Hit {
     /// Along the optical axis [m].
     pub depth: f32,
     /// Whether there is a depth.
@@ -20,7 +20,7 @@ pub(crate) struct Hit {
 }
 
 /// A solid as the camera sees it, ready to be cast.
-pub(crate) trait Solid {
+pub trait Solid {
     /// Left, top, right, bottom [px].
     fn bounds(&self) -> [f64; 4];
     /// `x`, `y`: the pixel. Must be `#[inline(always)]`.
@@ -35,9 +35,12 @@ fn least(a: f32, b: f32) -> f32 {
 
 /// Towards the sun (x right, y down, z forward, unit length), and the brightness of a surface: base + gain × cosine.
 #[derive(Clone, Copy)]
-pub(crate) struct Sun {
+pub struct Sun {
+    /// Unit vector.
     pub towards: [f64; 3],
+    /// Brightness where the light comes from the side.
     pub base: f64,
+    /// What full light adds.
     pub gain: f64,
 }
 
@@ -55,7 +58,7 @@ impl Sun {
 }
 
 /// A tapered capsule.
-pub(crate) struct Strip {
+pub struct Strip {
     bounds: [f64; 4],
     u: f32,
     v: f32,
@@ -77,7 +80,7 @@ pub(crate) struct Strip {
 impl Strip {
     /// `row`: part, u, v, axis u, axis v, length, radius [px], taper, depth [m], depth per px, m per px, sine of the
     /// angle between axis and image.
-    pub(crate) fn new(row: [f64; 12], sun: &Sun) -> Self {
+    pub fn new(row: [f64; 12], sun: &Sun) -> Self {
         let [part, u, v, axis_u, axis_v, length, radius, taper, near, slope, metre, lean] = row;
         let (end_u, end_v, end_radius) = (u + axis_u * length, v + axis_v * length, radius + taper * length);
         let [x, y, z] = sun.towards;
@@ -140,7 +143,7 @@ impl Solid for Strip {
 }
 
 /// An ellipsoid.
-pub(crate) struct Ellipse {
+pub struct Ellipse {
     bounds: [f64; 4],
     u: f32,
     v: f32,
@@ -157,7 +160,7 @@ pub(crate) struct Ellipse {
 impl Ellipse {
     /// `row`: part, u, v, the three entries of the lower-triangular whitening matrix, half height and half width [px],
     /// depth [m], depth per canonical x and y, bulge [m].
-    pub(crate) fn new(row: [f64; 12], sun: &Sun) -> Self {
+    pub fn new(row: [f64; 12], sun: &Sun) -> Self {
         let [part, u, v, w00, w10, w11, half_h, half_w, centre, slope_x, slope_y, bulge] = row;
         Self {
             bounds: [u - half_w, v - half_h, u + half_w, v + half_h],
@@ -196,13 +199,15 @@ impl Solid for Ellipse {
 
 /// Pixels to directions: the camera's focal length and principal point [px].
 #[derive(Clone, Copy)]
-pub(crate) struct Pinhole {
+pub struct Pinhole {
+    /// Focal length [px].
     pub focal: f32,
+    /// Principal point [px].
     pub centre: [f32; 2],
 }
 
 /// An upright cone or cylinder.
-pub(crate) struct Frustum {
+pub struct Frustum {
     bounds: [f64; 4],
     pinhole: Pinhole,
     x: f32,
@@ -221,7 +226,7 @@ impl Frustum {
     /// `row`: part, left, top, right, bottom [px], how far to the right and ahead the axis is, radius per metre of
     /// height, radius at the camera's height, half a pixel at the axis, x² + z² - radius² there [m²], top and foot
     /// above and below the camera [m].
-    pub(crate) fn new(row: [f64; 13], sun: &Sun, pinhole: Pinhole) -> Self {
+    pub fn new(row: [f64; 13], sun: &Sun, pinhole: Pinhole) -> Self {
         let [part, left, top, right, bottom, x, z, taper, level, half_pixel, offset, above, below] = row;
         Self {
             bounds: [left, top, right, bottom],
@@ -267,7 +272,7 @@ impl Solid for Frustum {
 }
 
 /// An upright box.
-pub(crate) struct Slab {
+pub struct Slab {
     bounds: [f64; 4],
     pinhole: Pinhole,
     /// Per axis of the box: where the near and the far side are, and the direction of the ray: a constant, and per
@@ -281,7 +286,7 @@ impl Slab {
     /// `row`: left, top, right, bottom [px]; per axis of the box where its two sides are, seen from the camera [m];
     /// for the two level axes the part of the optical axis along them, and that of the image's rows; the tone of the
     /// face across each axis.
-    pub(crate) fn new(row: [f64; 17], pinhole: Pinhole) -> Self {
+    pub fn new(row: [f64; 17], pinhole: Pinhole) -> Self {
         let row32 = row.map(|value| value as f32);
         let [.., a, b, c, d, e, f, g, h, i, j, k, l, m] = row32;
         Self {

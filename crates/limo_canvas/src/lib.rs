@@ -1,6 +1,6 @@
 //! Pictures of solids for the arena's camera: a z-buffer over a window of the image, and how it goes into the image.
 //!
-//! The detector needs none of this. It lives in this crate because limo-sim is pure Python and stays so: numpy takes some
+//! Compiled, because numpy takes some
 //! thirty passes over the pixels of each solid, and a person has 23 of them. Every sum is in the order, and rounded to
 //! the single precision, of the numpy code that drew the arena's first pictures: they stay the same to the last bit.
 //!
@@ -10,6 +10,6 @@ mod buffer;
 mod floor;
 mod solids;
 
-pub(crate) use buffer::{Canvas, Window};
-pub(crate) use floor::{Room, Shadow};
-pub(crate) use solids::{Ellipse, Frustum, Pinhole, Slab, Solid, Strip, Sun};
+pub use buffer::{Canvas, Window};
+pub use floor::{Room, Shadow};
+pub use solids::{Ellipse, Frustum, Pinhole, Slab, Solid, Strip, Sun};

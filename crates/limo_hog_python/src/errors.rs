@@ -3,10 +3,10 @@
 use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError};
 use pyo3::prelude::*;
 
-use crate::HogError;
+use hog_core::HogError;
 
 /// Raises the class of `limo_hog.exceptions` that stands for `error`.
-pub(super) fn raised(py: Python<'_>, error: &HogError) -> PyErr {
+pub(crate) fn raised(py: Python<'_>, error: &HogError) -> PyErr {
     let class = match error {
         HogError::Geometry(_) => "GeometryError",
         HogError::DetectorSize { .. } => "DetectorSizeError",
@@ -20,7 +20,7 @@ pub(super) fn raised(py: Python<'_>, error: &HogError) -> PyErr {
 }
 
 /// Raises a class of `limo_hog.exceptions`.
-pub(super) fn raised_as(py: Python<'_>, class: &str, message: String) -> PyErr {
+pub(crate) fn raised_as(py: Python<'_>, class: &str, message: String) -> PyErr {
     let raise = || {
         let class = py.import("limo_hog.exceptions")?.getattr(class)?;
         Ok(PyErr::from_value(class.call1((message,))?))

@@ -1,12 +1,13 @@
 //! The nearest of the solids of one object, in every pixel of a window of the image.
 
+use std::collections::TryReserveError;
+
+use multiversion::multiversion;
+
 use super::solids::Solid;
-use crate::error::Result;
-use crate::exact::isa::{MulAdd, Work, run};
-use crate::memory;
 
 /// First column, first row, last column + 1, last row + 1.
-pub(crate) type Window = [usize; 4];
+pub type Window = [usize; 4];
 
 /// Steps of a palette from black to the full colour.
 const LEVELS: f32 = 128.0;
@@ -14,7 +15,8 @@ const LEVELS: f32 = 128.0;
 /// One object of several solids: what of it is nearest in every pixel.
 ///
 /// Solids are cast half a pixel too wide, and `cover` falls from 1 to 0 over the last pixel: the edges come out smooth.
-pub(crate) struct Canvas {
+#[derive(Default)]
+pub struct Canvas {
     window: Window,
     /// Of the nearest solid [m]; infinite where there is none.
     depth: Vec<f32>,
@@ -25,7 +27,7 @@ pub(crate) struct Canvas {
 }
 
 /// How much of an object is seen, and the box of its silhouette.
-pub(crate) struct Seen {
+pub struct Seen {
     /// Pixels of the silhouette.
     pub inside: usize,
     /// Those where nothing is nearer.
@@ -35,24 +37,26 @@ pub(crate) struct Seen {
 }
 
 impl Canvas {
-    pub(crate) fn new() -> Self {
-        Self { window: [0; 4], depth: Vec::new(), cover: Vec::new(), tone: Vec::new() }
-    }
-
     /// Empties the canvas, over another window.
-    pub(crate) fn begin(&mut self, window: Window) -> Result<()> {
+    ///
+    /// # Errors
+    ///
+    /// Where there is no memory for it.
+    pub fn begin(&mut self, window: Window) -> Result<(), TryReserveError> {
         self.window = window;
         let len = self.width() * (window[3] - window[1]);
         for (list, empty) in [(&mut self.depth, f32::INFINITY), (&mut self.cover, 0.0), (&mut self.tone, 0.0)]
         {
             list.clear();
-            memory::resize(list, len, empty)?;
+            list.try_reserve_exact(len)?;
+            list.resize(len, empty);
         }
         Ok(())
     }
 
-    pub(crate) fn cast(&mut self, solid: &impl Solid) {
-        run(Cast { canvas: self, solid });
+    /// Keeps of `solid` what is nearer than the solids before.
+    pub fn cast(&mut self, solid: &impl Solid) {
+        cast(self, solid);
     }
 
     fn width(&self) -> usize {
@@ -69,7 +73,7 @@ impl Canvas {
     /// pixels, seen or not.
     ///
     /// `owners` says of every pixel whose it is, and is told that these belong to the number beside it.
-    pub(crate) fn draw(
+    pub fn draw(
         &self,
         stride: usize,
         mut image: Option<(&mut [u32], &[u32])>,
@@ -108,7 +112,7 @@ impl Canvas {
     }
 
     /// Compares the object with the depth of an image of `stride` columns in which it has been drawn.
-    pub(crate) fn seen(&self, stride: usize, depth: &[f32]) -> Seen {
+    pub fn seen(&self, stride: usize, depth: &[f32]) -> Seen {
         let left = self.window[0];
         let mut seen = Seen { inside: 0, visible: 0, bounds: None };
         for (row, first) in self.rows(stride) {
@@ -136,35 +140,26 @@ fn mixed(over: u32, under: u32, share: f32) -> u32 {
 }
 
 /// All rays of a canvas at one solid, compiled for the vectors that the CPU has.
-struct Cast<'a, S> {
-    canvas: &'a mut Canvas,
-    solid: &'a S,
-}
-
-impl<S: Solid> Work for Cast<'_, S> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<M: MulAdd>(self) {
-        let ([x0, y0, ..], width) = (self.canvas.window, self.canvas.width());
-        let height = self.canvas.window[3] - y0;
-        let [left, top, right, bottom] = self.solid.bounds();
-        let (columns, rows) = (span(left, right, x0, width), span(top, bottom, y0, height));
-        if columns.is_empty() {
-            return;
-        }
-        for row in rows {
-            let at = row * width + columns.start..row * width + columns.end;
-            let y = (y0 + row) as f32;
-            let (depth, cover) = (&mut self.canvas.depth[at.clone()], &mut self.canvas.cover[at.clone()]);
-            let tone = &mut self.canvas.tone[at];
-            for (n, ((depth, cover), tone)) in depth.iter_mut().zip(cover).zip(tone).enumerate() {
-                let hit = self.solid.cast((x0 + columns.start + n) as i32 as f32, y);
-                let wins = hit.is_hit & (hit.depth < *depth);
-                *depth = if wins { hit.depth } else { *depth };
-                *tone = if wins { hit.tone } else { *tone };
-                *cover = if hit.cover > *cover { hit.cover } else { *cover };
-            }
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn cast<S: Solid>(canvas: &mut Canvas, solid: &S) {
+    let ([x0, y0, ..], width) = (canvas.window, canvas.width());
+    let height = canvas.window[3] - y0;
+    let [left, top, right, bottom] = solid.bounds();
+    let (columns, rows) = (span(left, right, x0, width), span(top, bottom, y0, height));
+    if columns.is_empty() {
+        return;
+    }
+    for row in rows {
+        let at = row * width + columns.start..row * width + columns.end;
+        let y = (y0 + row) as f32;
+        let (depth, cover) = (&mut canvas.depth[at.clone()], &mut canvas.cover[at.clone()]);
+        let tone = &mut canvas.tone[at];
+        for (n, ((depth, cover), tone)) in depth.iter_mut().zip(cover).zip(tone).enumerate() {
+            let hit = solid.cast((x0 + columns.start + n) as i32 as f32, y);
+            let wins = hit.is_hit & (hit.depth < *depth);
+            *depth = if wins { hit.depth } else { *depth };
+            *tone = if wins { hit.tone } else { *tone };
+            *cover = if hit.cover > *cover { hit.cover } else { *cover };
         }
     }
 }
@@ -180,7 +175,7 @@ fn span(low: f64, high: f64, origin: usize, len: usize) -> std::ops::Range<usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::canvas::solids::Hit;
+    use crate::solids::Hit;
 
     /// A wall that fills every ray.
     struct Wall {
@@ -199,7 +194,7 @@ mod tests {
     }
 
     fn drawn(wall: &Wall, behind: f32) -> (u32, f32, i16) {
-        let mut canvas = Canvas::new();
+        let mut canvas = Canvas::default();
         assert!(canvas.begin([1, 1, 2, 2]).is_ok());
         canvas.cast(wall);
         let palette = vec![0x00FF_0000; 512];

@@ -4,18 +4,19 @@ use numpy::{
     Element, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2, PyUntypedArray,
     PyUntypedArrayMethods,
 };
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
-use super::errors::{raised, raised_as};
-use crate::canvas::{self, Ellipse, Frustum, Pinhole, Room, Shadow, Slab, Solid, Strip, Sun, Window};
+use crate::errors::raised_as;
+use limo_canvas::{self, Ellipse, Frustum, Pinhole, Room, Shadow, Slab, Solid, Strip, Sun, Window};
 
 /// The largest side of an image [px].
 const SIDE_MAX: usize = 1 << 14;
 
 /// A canvas for an image of one size; its memory is kept from object to object.
 #[pyclass(module = "limo_hog._core")]
-pub(super) struct Canvas {
-    inner: canvas::Canvas,
+pub(crate) struct Canvas {
+    inner: limo_canvas::Canvas,
     height: usize,
     width: usize,
     pinhole: Pinhole,
@@ -79,12 +80,12 @@ impl Canvas {
             ));
         }
         let centre = [width, height].map(|side| (side - 1) as f32 / 2.0);
-        Ok(Self { inner: canvas::Canvas::new(), height, width, pinhole: Pinhole { focal, centre } })
+        Ok(Self { inner: limo_canvas::Canvas::default(), height, width, pinhole: Pinhole { focal, centre } })
     }
 
     fn begin(&mut self, py: Python<'_>, window: Window) -> PyResult<()> {
         let window = self.window(py, window)?;
-        self.inner.begin(window).map_err(|error| raised(py, &error))
+        self.inner.begin(window).map_err(|error| PyMemoryError::new_err(error.to_string()))
     }
 
     fn strips(&mut self, rows: PyReadonlyArray2<'_, f64>, light: [f64; 5]) -> PyResult<()> {

@@ -122,11 +122,11 @@ def _without_checksums(recording: Path, path: Path) -> None:
         writer.start("ros2")
         known: dict[str, int] = {}
         for schema, channel, message in make_reader(source).iter_messages():
-            if channel.topic not in known:
+            if channel.topic not in known and schema is not None:
                 number = writer.register_schema(schema.name, schema.encoding, schema.data)
                 known[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, number)
             writer.add_message(known[channel.topic], message.log_time, message.data, message.publish_time)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _answer(arguments: list[str], folder: Path) -> tuple[int, str]:

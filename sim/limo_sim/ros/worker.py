@@ -79,6 +79,7 @@ class Worker:
             self._kill()
             self.status = self._process.returncode
             return self.status
+        self._process.terminate()  # heeded only while it imports, and cannot answer
         with suppress(OSError):
             self._control.sendall(how)
             told = self._control.recv(4)
@@ -101,6 +102,7 @@ class Worker:
     def leave(self) -> None:
         """Let the process end, and its node with it."""
         if FORKS:
+            self._process.terminate()
             with suppress(OSError):
                 self._control.shutdown(socket.SHUT_WR)
         else:

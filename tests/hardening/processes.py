@@ -155,7 +155,7 @@ def terminals(count: int, folder: Path) -> tuple[Counter[str], list[str]]:
     for number, typed in enumerate(SHORT[:count]):
         ordinary: tuple[int, list[str], int] | None = None
         for how in ("", *TERMINALS):
-            place = _place(folder, f"{number}{TERMINALS.index(how) if how else ''}")
+            place = _place(folder, f"{number} {how}".replace("/", ""))
             shell = "" if how == "ascii" else how
             command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", *LIMO_HOG, *typed.split()]
             env = {**os.environ, **(ASCII if how == "ascii" else {})}

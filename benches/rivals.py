@@ -39,6 +39,8 @@ CHILD = Path(__file__).with_name("rival.py")
 ROUNDS = 15
 #: One thread for each library, and no words of the network's.
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "TF_CPP_MIN_LOG_LEVEL": "3"}
+#: Columns of the tables of those who find people; README shows that of USC-C.
+FOUND = ("", "LAMR", "95 % interval", "recall at .1", "recall at 1", "CPU ms", "MB on disk")
 
 
 class Entry(NamedTuple):
@@ -161,7 +163,7 @@ def find(name: str, pictures: Sequence[Picture], min_height: int) -> None:
         used, evaluations = evaluate([Rival(entry.name, one) for entry, one in pairs], pictures)
     count = sum(len(picture.boxes) for picture in used)
     print(f"\n{name}, {len(used)} pictures with {count} people:\n")
-    heads("", "LAMR", "95 % interval", "recall at .1", "recall at 1", "CPU ms", "MB on disk")
+    heads(*FOUND)
     for one, rival in zip(evaluations, rivals, strict=True):
         low, high = one.intervals["lamr"]
         print(

@@ -42,10 +42,8 @@ class Draw(random.Random):
 
 def some_image(draw: Draw, width: int, height: int) -> Image:
     """Noise, few-valued noise (colour ties), a photograph's detail, or a flat picture; in any memory layout."""
-    kind, seed = (
-        draw.choice(("noise", "noise", "ties", "photograph", "photograph", "squares", "flat")),
-        draw.getrandbits(32),
-    )
+    kind = draw.choice(("noise", "noise", "ties", "photograph", "photograph", "squares", "flat"))
+    seed = draw.getrandbits(32)
     if kind == "photograph":
         x, y = draw.randrange(100), draw.randrange(100)
         whole = images.photograph(draw.choice(("astronaut", "coffee", "rocket")))

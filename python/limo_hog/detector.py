@@ -36,21 +36,11 @@ _GROUP_THRESHOLD = 2
 
 
 class Guide(NamedTuple):
-    """What of the levels between two that are searched whole is searched.
+    """What of the levels between two that are searched whole is searched."""
 
-    Attributes
-    ----------
-    halvings
-        How often these levels are halved.
-    margin
-        How much the threshold is lowered for a neighbouring level [SVM margin].
-    reach
-        How far around a place windows are searched, across and down [strides].
-    """
-
-    halvings: int
-    margin: float
-    reach: tuple[float, float]
+    halvings: int  #: how often these levels are halved
+    margin: float  #: how much the threshold is lowered for a neighbouring level [SVM margin]
+    reach: tuple[float, float]  #: how far around a place windows are searched, across and down [strides]
 
 
 #: The guide of each search. docs/simd.md shows others.

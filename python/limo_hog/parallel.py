@@ -9,7 +9,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -25,29 +28,6 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class _Job(Generic[Item, Result]):
-    """One item's work; `done` is set when it has a result or an error."""
-
-    def __init__(self, work: Callable[[Item], Result], item: Item) -> None:
-        self._work, self._item = work, item
-        self._result: Result
-        self._error: BaseException | None = None
-        self.done = threading.Event()
-
-    def run(self) -> None:
-        try:
-            self._result = self._work(self._item)
-        except BaseException as error:
-            self._error = error
-        self.done.set()
-
-    def result(self) -> Result:
-        self.done.wait()
-        if self._error is not None:
-            raise self._error
-        return self._result
-
-
 def in_order(work: Callable[[Item], Result], items: Iterable[Item], threads: int) -> Iterator[Result]:
     """Yield `work(item)` for each item, in the items' order, computed by `threads` threads.
 
@@ -56,18 +36,21 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], threads: int
     what is under way is left after `_PATIENCE_S`. Threads that cannot be had are done without; the caller's works
     where there is none.
     """
-    jobs: queue.SimpleQueue[_Job[Item, Result] | None] = queue.SimpleQueue()
-    waiting: deque[_Job[Item, Result]] = deque()
+    # Imported here: it would lengthen the import of this package.
+    from concurrent.futures import Future
+
+    jobs: queue.SimpleQueue[tuple[Item, Future[Result]] | None] = queue.SimpleQueue()
+    waiting: deque[Future[Result]] = deque()
     helpers: list[threading.Thread] = []
 
     def help_() -> None:
         while (job := jobs.get()) is not None:
-            job.run()
+            _do(work, *job)
 
     try:
         for item in items:
-            job = _Job(work, item)
-            waiting.append(job)
+            job = item, Future[Result]()
+            waiting.append(job[1])
             if len(helpers) < threads:
                 helper = threading.Thread(target=help_, name="limo-hog", daemon=True)
                 try:
@@ -78,7 +61,7 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], threads: int
             if helpers:
                 jobs.put(job)
             else:
-                job.run()
+                _do(work, *job)
             if len(waiting) > 2 * threads:
                 yield waiting.popleft().result()
         while waiting:
@@ -92,3 +75,10 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], threads: int
         patient_until = time.monotonic() + _PATIENCE_S
         for helper in helpers:
             helper.join(max(0.0, patient_until - time.monotonic()))
+
+
+def _do(work: Callable[[Item], Result], item: Item, done: Future[Result]) -> None:
+    try:
+        done.set_result(work(item))
+    except BaseException as error:
+        done.set_exception(error)

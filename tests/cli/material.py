@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -24,3 +26,18 @@ def film_of(path: Path, frames: int = 12) -> None:
 
 def lines_of(text: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in text.splitlines()]
+
+
+#: Runs the command line with files that may not grow beyond so many bytes: a full disk, without one.
+_FULL_DISK = """
+import resource, sys
+from limo_hog.cli.main import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+def on_a_full_disk(room: int, *typed: str) -> subprocess.CompletedProcess[str]:
+    """Run a command where a file has room for so many bytes."""
+    command = [sys.executable, "-c", _FULL_DISK, str(room), *typed]
+    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)

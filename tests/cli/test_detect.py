@@ -19,11 +19,11 @@ from tests.cli.material import OPENCVS, PICTURE, film_of, lines_of
 
 import limo_hog
 from limo_hog.cli.main import main
+from limo_hog.cli.support.scene import street
 from limo_hog.detector import PeopleDetector
 from limo_hog.imaging.writing import write_image
 
 LIMO_HOG = Path(sys.executable).with_name("limo-hog")
-REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
 
 
 def test_results_are_lines_in_the_order_of_the_inputs(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -33,8 +33,8 @@ def test_results_are_lines_in_the_order_of_the_inputs(pictures: Path, capsys: py
     expected = PeopleDetector().detect(PICTURE)
     assert len(expected) > 0
     first = results[0]
-    assert first["boxes"] == expected.boxes.tolist()
-    assert first["scores"] == expected.scores.tolist()
+    assert (first["boxes"], first["scores"]) == (expected.boxes.tolist(), expected.scores.tolist())
+    assert first["probabilities"] == pytest.approx(expected.probabilities.tolist(), abs=1e-4)
     assert (first["frame"], first["width"], first["height"]) == (0, 192, 256)
     assert results[1]["boxes"] == []
 
@@ -55,14 +55,16 @@ def test_what_cannot_be_read_is_named_and_the_rest_is_done(
 ) -> None:
     (pictures / "broken.jpg").write_bytes(b"no picture")
     (pictures / "empty.mp4").write_bytes(b"")
+    (pictures / "gone.png").symlink_to("nowhere.png")
     (tmp_path / "nothing").mkdir()
     inputs = [str(pictures), str(tmp_path / "nothing"), "missing.png"]
     assert main(["detect", *inputs, "--json", "-"]) == 1
     shown = capsys.readouterr()
     assert len(lines_of(shown.out)) == 3
     complaints = [line for line in shown.err.splitlines() if line.startswith("limo-hog: ")]
-    assert len(complaints) == 4
-    for words in ("nothing: no image", "missing.png: no such", "broken.jpg: not an", "empty.mp4: the file is empty"):
+    wanted = ("nothing: no image", "missing.png: no such", "broken.jpg: not an", "empty.mp4: the file is empty")
+    assert len(complaints) == 5
+    for words in (*wanted, "gone.png: No such file or directory"):
         assert sum(words in line for line in complaints) == 1
 
 
@@ -131,49 +133,31 @@ def test_ctrl_c_is_the_end_of_a_camera(
         assert len(list(container.decode(video=0))) == len(results) > 0
 
 
-def test_a_small_person_is_found_by_enlarging(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "small.png"
-    write_image(path, np.asarray(cv2.resize(PICTURE, None, fx=0.4, fy=0.4, interpolation=cv2.INTER_AREA), np.uint8))
-    assert main(["detect", str(path), "--json", "-", "--min-height", "none"]) == 0
-    assert main(["detect", str(path), "--json", "-", "--min-height", "36"]) == 0
-    assert main(["detect", str(path), "--json", "-", "--min-height", "36", "--max-height", "37"]) == 0
-    plain, enlarged, low = lines_of(capsys.readouterr().out)
-    assert plain["boxes"] == []
-    assert len(enlarged["boxes"]) > 0
-    x, y, w, h = enlarged["boxes"][0]
-    assert 0 <= x < x + w <= 77
-    assert 0 <= y < y + h <= 102
-    assert all(h <= 37.5 for _, _, _, h in low["boxes"])
-    assert len(low["boxes"]) < len(enlarged["boxes"])
+WIDE = street(320, 240, 3)
+SMALL = np.asarray(cv2.resize(PICTURE, None, fx=0.4, fy=0.4, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def test_a_box_is_the_person_within_its_window(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["detect", str(pictures / "a.png"), "--json", "-"]) == 0
-    (result,) = lines_of(capsys.readouterr().out)
-    assert len(result["boxes"]) == len(result["windows"]) > 0
-    for box, (x, y, w, h) in zip(result["boxes"], result["windows"], strict=True):
-        assert box == [round(x + 0.2 * w), round(y + 0.1 * h), round(0.6 * w), round(0.78 * h)]
-
-
-def test_json_csv_and_coco_hold_margin_and_probability(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("typed", "image", "options"),
+    [
+        ("--min-height none", PICTURE, {"min_height": None}),
+        ("--min-height 36", SMALL, {"min_height": 36}),
+        ("--max-height 120", PICTURE, {"max_height": 120}),
+        ("--threshold -1 --overlap 1", PICTURE, {"threshold": -1, "overlap": 1}),
+        # The exact search finds one more in it.
+        ("--threshold -1 --overlap 1 --search guided", WIDE, {"threshold": -1, "overlap": 1, "search": "guided"}),
+        (" ".join(OPENCVS), PICTURE, {"model": "opencv", "min_height": None, "nms": "group"}),
+    ],
+)
+def test_every_option_of_the_search_reaches_the_detector(
+    typed: str, image: Any, options: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    table, coco = tmp_path / "people.csv", tmp_path / "people.json"
-    wanted = [str(pictures / "a.png"), "--json", "-", "--csv", str(table), "--coco", str(coco)]
-    assert main(["detect", *wanted]) == 0
+    write_image(tmp_path / "a.png", image)
+    assert main(["detect", str(tmp_path / "a.png"), "--json", "-", *typed.split()]) == 0
     (result,) = lines_of(capsys.readouterr().out)
-    expected = PeopleDetector().detect(PICTURE)
-    assert result["probabilities"] == pytest.approx(expected.probabilities.tolist(), abs=1e-4)
-    assert all(0 <= share <= 1 for share in result["probabilities"])
-    told = list(zip(*(result[name] for name in ("boxes", "windows", "scores", "probabilities")), strict=True))
-    with table.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    box, window = ("x", "y", "w", "h"), ("window_x", "window_y", "window_w", "window_h")
-    for row, (person, around, score, share) in zip(rows, told, strict=True):
-        assert [int(row[name]) for name in box] == person and [int(row[name]) for name in window] == around
-        assert (float(row["score"]), float(row["probability"])) == (score, share)
-    annotations = json.loads(coco.read_text("utf-8"))["annotations"]
-    assert [(a["bbox"], a["window"], a["score"], a["probability"]) for a in annotations] == told
+    found = PeopleDetector(**options).detect(image)
+    assert len(found) > 0 and found != PeopleDetector().detect(image)
+    assert (result["boxes"], result["windows"]) == (found.boxes.tolist(), found.windows.tolist())
 
 
 def test_a_terminal_shows_each_persons_probability(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -197,17 +181,6 @@ def test_a_model_without_calibration_shows_margins(
     assert all(line.endswith(",") for line in table.read_text("utf-8").splitlines()[1:])
     assert main(["detect", path, "--model", str(model)]) == 0
     assert f"{result['scores'][0]:.2f}" in capsys.readouterr().out
-
-
-def test_overlapping_hits_leave_only_the_best(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(pictures / "a.png")
-    for overlap in ("0", "1"):
-        assert main(["detect", path, "--json", "-", "--overlap", overlap]) == 0
-    few, all_ = lines_of(capsys.readouterr().out)
-    raw = PeopleDetector(nms="group", group_threshold=0).detect(PICTURE)
-    assert len(all_["boxes"]) == len(raw)
-    assert 0 < len(few["boxes"]) < len(raw)
-    assert few["windows"][0] == raw.windows[0].tolist()
 
 
 def test_a_picture_is_searched_once_however_its_name_is_spelled(
@@ -240,48 +213,11 @@ def test_copies_of_pictures_above_the_current_folder_lie_below_out(
     assert sorted(map(str, copies)) == ["out/a.png", "out/deep/b.png"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--min-height", "300", "--max-height", "100"], "max_height is 100; at least 300"),
-        (["--min-height", "none", "--max-height", "50"], "max_height is 50; at least 74.88"),
-        (["--model", "bogus"], "model is 'bogus': no such file, and none of the names opencv, default, daimler"),
-        (["--nms", "group", "--overlap", "0.5"], "overlap has no meaning"),
-    ],
-)
-def test_what_could_find_nobody_is_refused_before_work_starts(
-    arguments: list[str], told: str, pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "found.json"
-    assert main(["detect", str(pictures), "--json", str(file), *arguments]) == 2
-    assert told in capsys.readouterr().err
-    assert not file.exists()
-
-
-def test_a_model_from_a_file_is_used(pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    hog = limo_hog.HOGDescriptor()
-    hog.setSVMDetector(hog.getDefaultPeopleDetector())
-    hog.save(tmp_path / "people.yml")
-    path = str(pictures / "a.png")
-    assert main(["detect", path, "--json", "-"]) == 0
-    assert main(["detect", path, "--json", "-", "--model", str(tmp_path / "people.yml")]) == 0
-    named, read = lines_of(capsys.readouterr().out)
-    assert named["boxes"] == read["boxes"] != []
-
-
 def test_a_copy_never_overwrites_its_picture(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for again in ([], ["--overwrite"], ["--resume"]):
         assert main(["detect", str(pictures / "a.png"), "--out", str(pictures), *again]) == 2
         assert "is itself an input" in capsys.readouterr().err
     np.testing.assert_array_equal(np.asarray(cv2.imread(str(pictures / "a.png"))), PICTURE)
-
-
-def test_a_dangling_link_is_named(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (pictures / "gone.png").symlink_to("nowhere.png")
-    assert main(["detect", str(pictures), "--json", "-"]) == 1
-    shown = capsys.readouterr()
-    assert "gone.png: No such file or directory" in shown.err
-    assert len(lines_of(shown.out)) == 3
 
 
 def test_copies_are_of_their_pictures_format_or_the_one_asked_for(tmp_path: Path) -> None:
@@ -302,20 +238,21 @@ def test_results_are_a_table_and_coco_too(pictures: Path, tmp_path: Path) -> Non
     asked = [word for name, path in files.items() for word in (f"--{name}", str(path))]
     assert main(["detect", str(pictures), str(film), *asked]) == 0
     results = lines_of(files["json"].read_text())
-    people = [
-        (r["source"], r["frame"], box, score)
-        for r in results
-        for box, score in zip(r["boxes"], r["scores"], strict=True)
-    ]
-    assert len(people) > 2
+    told = ("boxes", "windows", "scores", "probabilities")
+    people = [(r["source"], r["frame"], *one) for r in results for one in zip(*(r[key] for key in told), strict=True)]
+    assert len(people) > 2 and all(0 <= share <= 1 for *_, share in people)
     with files["csv"].open(newline="") as file:
         rows = list(csv.DictReader(file))
-    found = [(r["source"], int(r["frame"]), [int(r[side]) for side in "xywh"], float(r["score"])) for r in rows]
-    assert found == people
+    box, window = "xywh", ("window_x", "window_y", "window_w", "window_h")
+    for row, (source, frame, person, around, *numbers) in zip(rows, people, strict=True):
+        assert (row["source"], int(row["frame"])) == (source, frame)
+        assert [int(row[side]) for side in box] == person and [int(row[side]) for side in window] == around
+        assert [float(row["score"]), float(row["probability"])] == numbers
     coco = json.loads(files["coco"].read_text())
     images = {image["id"]: (image["file_name"], image["frame"]) for image in coco["images"]}
     assert len(images) == len(results) == 5
-    annotated = [(*images[a["image_id"]], a["bbox"], a["score"]) for a in coco["annotations"]]
+    keys = ("bbox", "window", "score", "probability")
+    annotated = [(*images[a["image_id"]], *(a[key] for key in keys)) for a in coco["annotations"]]
     assert annotated == people
     assert {a["category_id"] for a in coco["annotations"]} == {c["id"] for c in coco["categories"]} == {1}
     # An earlier run's results are in the tables, too.
@@ -332,25 +269,3 @@ def test_a_name_that_is_no_text_is_printed_escaped_and_stands_in_the_table_as_it
     assert (done.returncode, done.stdout.split()[0]) == (0, r"caf\udce9.png"), done.stderr
     lines = (tmp_path / "found.csv").read_bytes().splitlines()
     assert len(lines) > 1 and all(line.startswith(name + b",0,192,256,") for line in lines[1:])
-
-
-def test_tables_to_standard_output_and_of_half_a_run_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["detect", "a.png", "--csv", "-"]) == 2
-    assert "--json -" in capsys.readouterr().err
-    assert main(["detect", "a.png", "--coco", "c.json", "--out", "o", "--resume"]) == 2
-    assert "--json FILE" in capsys.readouterr().err
-
-
-@pytest.mark.skipif(not REAL.exists(), reason="needs ../shared/data/real")
-def test_photographs_give_opencvs_rectangles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    golden = json.loads((REAL / "golden_cv2_4.14.json").read_text())["images"]
-    assert main(["detect", str(REAL / "pedestrians"), "--out", str(tmp_path), "--json", "-", *OPENCVS]) == 0
-    results = lines_of(capsys.readouterr().out)
-    assert len(results) == 12
-    for result in results:
-        wanted = golden[str(Path(result["source"]).relative_to(REAL))]["ws8_pad4_s1.05_group2"]
-        found = sorted(zip(result["windows"], result["scores"], strict=True))
-        expected = sorted(zip(wanted["rects"], wanted["weights"], strict=True))
-        assert [box for box, _ in found] == [box for box, _ in expected]
-        assert [score for _, score in found] == pytest.approx([score for _, score in expected], abs=1e-5)
-    assert len(list(tmp_path.iterdir())) == 12

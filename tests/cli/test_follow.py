@@ -12,36 +12,12 @@ import pytest
 from limo_hog.cli.main import main
 from limo_sim.run.suite import Suite
 
-KEYS = [
-    "scenario",
-    "controller",
-    "detector",
-    "seed",
-    "seconds",
-    "frames",
-    "first_detection_s",
-    "in_view",
-    "detected",
-    "best_box_wrong",
-    "longest_gap_s",
-    "pixel_error_mean",
-    "pixel_error_p95",
-    "distance_min_m",
-    "distance_mean_m",
-    "distance_rms_error_m",
-    "zone_intimate",
-    "zone_personal",
-    "zone_social",
-    "zone_public",
-    "contacts_person",
-    "contacts_wall",
-    "mean_abs_domega",
-    "path_m",
-    "detect_ms_p50",
-    "detect_ms_p95",
-    "render_ms_p50",
-    "real_time_factor",
-]
+KEYS = (
+    "scenario controller detector seed seconds frames first_detection_s in_view detected best_box_wrong "
+    "longest_gap_s pixel_error_mean pixel_error_p95 distance_min_m distance_mean_m distance_rms_error_m "
+    "zone_intimate zone_personal zone_social zone_public contacts_person contacts_wall mean_abs_domega path_m "
+    "detect_ms_p50 detect_ms_p95 render_ms_p50 real_time_factor"
+).split()
 
 
 def test_the_score_card_on_standard_output_has_every_figure_of_the_contract(

@@ -51,7 +51,6 @@ WRONG_ARGUMENTS = [
     ("--verison", "did you mean --version?"),
     ("detect", "the following arguments are required: INPUT"),
     ("detect a.jpg --threshold high", "'high' is no score; wanted is a number from -100 to 100"),
-    ("detect a.jpg --threshold nan", "'nan' is no score"),
     ("detect a.jpg --min-height 0", "'0' is no height in pixels; wanted is a number from 8 to 10000"),
     ("detect a.jpg --min-height 200 --max-height 100", "max_height is 100; at least 200 is wanted"),
     ("detect a.jpg --nms best", "invalid choice: 'best' (choose from"),
@@ -65,9 +64,9 @@ WRONG_ARGUMENTS = [
     ("detect a.jpg --csv -", "standard output is for --json -"),
     ("detect a.jpg --csv t --coco ./t", "t is named twice, as a file to write: give each a name of its own"),
     ("follow --json t.png --plot t.png", "t.png is named twice, as a file to write"),
+    ("detect a.jpg --coco c --out o --resume", "takes the earlier results from --json FILE"),
+    ("detect a.jpg --min-height none --max-height 50", "max_height is 50; at least 74.88"),
     ("detect a.jpg --json folder", "'folder' is a folder"),
-    ("detect a.jpg --json /", "'/' is a folder"),
-    ("bench --json ..", "'..' is a folder"),
     ("bench --size 99999x99999", "at most 64 megapixels"),
     (f"bench --size {'9' * 5000}x1", "at most 64 megapixels"),
     (f"bench --threads {'9' * 5000}", "is no number of threads"),
@@ -79,9 +78,7 @@ WRONG_ARGUMENTS = [
     ("detect a.jpg --outt found", "did you mean --out?"),
     ("detect a.jpg --model nobody.yml", "model is 'nobody.yml': no such file, and none of the names opencv,"),
     ("bench --size 640", "'640' is no size; wanted is WIDTHxHEIGHT such as 640x480"),
-    ("bench --size 0x480", "'0x480' is no size"),
     ("bench --size 200x60", "a picture of 200x60 is smaller than the detector's window; 64x128 or more is wanted"),
-    ("bench --size 63x128", "a picture of 63x128 is smaller than the detector's window"),
     ("bench --image a.jpg --size 64x127", "a picture of 64x127 is smaller than the detector's window"),
     ("bench --image tiny.png", "a picture of 200x60 is smaller than the detector's window"),
     ("bench --channels rgb", "invalid choice: 'rgb' (choose from"),
@@ -110,7 +107,6 @@ WRONG_ARGUMENTS = [
     ),
     ("score --scenario here/same.toml there/same.toml", "there/same.toml: is called 'same', as here/same.toml is"),
     ("score --scenario named.toml empty", "empty: is called 'empty', as named.toml is; give it another name"),
-    ("score --scenario empty empty", "empty: is called 'empty', as empty is"),
     ("arena", "give --ros2, --view, --video or --record"),
     (
         "arena --video a.mp4 --plot a.png --seconds 0.2",
@@ -126,9 +122,7 @@ WRONG_ARGUMENTS = [
     ("workshop grade folder", "folder: no Python file in it"),
     ("workshop grade folder --csv folder", "'folder' is a folder"),
     ("workshop grade folder --seconds -1", "'-1' is no duration in seconds"),
-    ("workshop grade folder --seconds nan", "'nan' is no duration in seconds"),
     ("workshop grade folder --memory 0", "'0' is no count"),
-    ("workshop grade folder --memory -5", "'-5' is no count"),
     ("workshop new there.txt", "there.txt is there already; give another name"),
     ("replay", "the following arguments are required: FILE"),
     ("topic", "the following arguments are required"),
@@ -174,7 +168,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_wrong_arguments_are_answered_by_one_line_and_2(
     typed: str, told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    before = sorted(Path().rglob("*"))
     assert main(typed.split()) == 2
+    assert sorted(Path().rglob("*")) == before
     shown = capsys.readouterr()
     assert not shown.out
     told_lines = [line for line in shown.err.splitlines() if told in line]

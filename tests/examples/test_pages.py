@@ -13,6 +13,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
+from benches.rivals import FOUND, finders
 from tests.examples.pages import ROOT, Page, file_of, pages
 
 PAGES = pages()
@@ -90,6 +91,36 @@ def test_a_page_opens_with_a_sentence_that_says_what_it_is_for(page: Page) -> No
     title, opening, *_ = page.text.split("\n\n")
     assert re.fullmatch(r"# .+", title)
     assert re.match(r"[*`]*\w", opening) and re.search(r"[.:][*]*$", opening)
+
+
+#: What each file tells readers who missed it once, and words that they had to read twice.
+READ = {
+    "README.md": (
+        ["git clone https://github.com/limo-hog/limo-hog", "or `CascadeClassifier`. [Coming from]"],
+        ["keeps its words after", "without that in gray"],
+    ),
+    "docs/coming-from.md": (
+        ["`cv2.ml` (SVM, KNearest, …) | gone", "`warpPerspective` | pixels differ", '# mypy: disable-error-code="attr'],
+        [],
+    ),
+    "docs/parity.md": (["`computeGradient(image)` needs no arrays"], []),
+    "docs/watching.md": (["takes at most 1.5 % longer with the page open"], ["as two cores can took"]),
+    "python/limo_hog/cli/evaluate.py": (["lowest score counted"], ["no surer hit"]),
+    "python/limo_hog/learn/evaluation/report.py": (["If the interval excludes 0"], ["An interval without 0"]),
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_what_readers_missed_is_told_and_what_they_read_twice_is_not(name: str) -> None:
+    text = " ".join(Page(ROOT / name).text.split())
+    told, untold = READ[name]
+    assert [words for words in told if words not in text] == [words for words in untold if words in text] == []
+
+
+def test_the_readme_shows_a_table_that_the_comparison_prints() -> None:
+    table = [line for line in READMES[0].text.splitlines() if line.count("|") == 8]
+    assert table[0] == f"| {' | '.join(FOUND)} |"
+    assert [line.split(" | ")[0] for line in table[2:]] == [f"| {one.name}" for one in finders(64)]
 
 
 def sentences(page: Page) -> set[str]:

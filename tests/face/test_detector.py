@@ -56,13 +56,6 @@ def test_grouped_and_at_the_images_own_size_the_boxes_are_opencvs(model: str) ->
     assert assert_opencvs(picture(), model) + assert_opencvs(street(800, 600, 1), model) > 0
 
 
-@pytest.mark.skipif(not PHOTOGRAPHS.exists(), reason="needs ../shared/data/real")
-def test_on_photographs_daimlers_boxes_are_opencvs() -> None:
-    paths = sorted(path for path in PHOTOGRAPHS.iterdir() if path.suffix in (".jpg", ".png"))
-    assert len(paths) == 12
-    assert sum(assert_opencvs(np.asarray(cv2.imread(str(path)), np.uint8), "daimler") for path in paths) > 0
-
-
 # Sizes of people.
 
 
@@ -181,12 +174,16 @@ def test_a_detector_cannot_be_changed() -> None:
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda d: pickle.loads(pickle.dumps(d)), replace])
-def test_a_copy_is_equal_and_finds_the_same(again: Any) -> None:
-    detector = PeopleDetector(model="daimler", threshold=0.5, win_stride=(8, 16), overlap=0.4)
-    detector.detect(picture())
+@pytest.mark.parametrize("of_a_file", [False, True])
+def test_a_copy_is_equal_and_finds_the_same(again: Any, of_a_file: bool, tmp_path: Path) -> None:
+    model = saved(tmp_path / "m.yml") if of_a_file else "daimler"
+    detector = PeopleDetector(model=model, threshold=0.5, win_stride=(8, 16), overlap=0.4)
+    found = detector.detect(picture())
+    if of_a_file:
+        (tmp_path / "m.yml").unlink()
     twin = again(detector)
     assert twin == detector and hash(twin) == hash(detector) and repr(twin) == repr(detector)
-    np.testing.assert_array_equal(twin.detect(picture()).windows, detector.detect(picture()).windows)
+    np.testing.assert_array_equal(twin.detect(picture()).windows, found.windows)
 
 
 def test_a_guided_search_finds_people_and_only_what_the_exact_search_finds() -> None:
@@ -312,7 +309,7 @@ def saved(path: Path, card: Any = None) -> Path:
     hog.setSVMDetector(hog.getDefaultPeopleDetector())
     hog.save(path)
     if card is not None:
-        path.with_name(path.name + ".json").write_text(json.dumps(card))
+        path.with_name(path.name + ".json").write_text(card if isinstance(card, str) else json.dumps(card))
     return path
 
 
@@ -346,6 +343,8 @@ def test_a_models_card_gives_its_person_box_threshold_and_calibration(tmp_path: 
 @pytest.mark.parametrize(
     ("card", "told"),
     [
+        ("{", "is no model card"),
+        ("[" * 100_000, "is no model card"),
         ([1], "a JSON object is wanted"),
         ({"person_box": [0.1, 0.1, 1.0, 0.5]}, "person_box"),
         ({"person_box": [0.1, 0.1, 0.5]}, "4 finite numbers"),
@@ -361,14 +360,6 @@ def test_a_damaged_card_is_named(tmp_path: Path, card: Any, told: str) -> None:
         PeopleDetector(model=saved(tmp_path / "m.yml", card))
 
 
-def test_a_card_that_is_no_json_is_named(tmp_path: Path) -> None:
-    path = saved(tmp_path / "m.yml")
-    for text in ("{", "[" * 100_000):
-        Path(f"{path}.json").write_text(text)
-        with pytest.raises(limo_hog.ModelFormatError, match=r"m\.yml\.json is no model card"):
-            PeopleDetector(model=path)
-
-
 def test_a_model_need_not_be_in_a_file() -> None:
     detector = PeopleDetector(model=load_model("daimler"))
     np.testing.assert_array_equal(
@@ -377,21 +368,6 @@ def test_a_model_need_not_be_in_a_file() -> None:
     assert replace(detector) == detector == PeopleDetector(model=load_model("daimler"))
     assert detector != PeopleDetector(model=load_model("opencv"))
     assert len(pickle.loads(pickle.dumps(detector)).detect(picture())) > 0
-
-
-def test_a_detector_of_a_file_keeps_its_model_in_copies_and_pickles(tmp_path: Path) -> None:
-    path = saved(tmp_path / "m.yml")
-    detector = PeopleDetector(model=path)
-    before = detector.detect(picture())
-    path.unlink()
-    for copied in (
-        copy.copy(detector),
-        copy.deepcopy(detector),
-        pickle.loads(pickle.dumps(detector)),
-        replace(detector),
-    ):
-        assert copied == detector and hash(copied) == hash(detector)
-        np.testing.assert_array_equal(copied.detect(picture()).scores, before.scores)
 
 
 @pytest.mark.parametrize("word", [".Inf", "-.Inf", ".Nan", "1e39"])
@@ -413,6 +389,3 @@ def test_a_file_without_an_svm_is_refused(tmp_path: Path) -> None:
     HOGDescriptor().save(path)
     with pytest.raises(limo_hog.ModelFormatError, match=r"bare\.yml holds a geometry without an SVM"):
         PeopleDetector(model=path)
-
-
-# Detections.

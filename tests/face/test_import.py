@@ -74,3 +74,10 @@ def test_no_distribution_requires_an_opencv_and_no_extra_but_cv_brings_one() -> 
     (everything,) = [line for line in lines if line.startswith("limo-hog[")]
     extras = set(metadata("limo-hog").get_all("Provides-Extra") or []) - {"all", "cv"}
     assert set(re.findall(r"\w+", everything.partition("]")[0].partition("[")[2])) == extras
+
+
+def test_the_extra_train_brings_what_training_imports_and_nothing_else() -> None:
+    lines = [line for line in requires("limo-hog") or [] if re.search(r"extra == ['\"]train['\"]", line)]
+    brought = {re.split(r"\W", line)[0] for line in lines}
+    solver = (ROOT / "python" / "limo_hog" / "learn" / "solver.py").read_text("utf-8")
+    assert brought == set(re.findall(r"^ +from (\w+)", solver, re.MULTILINE))

@@ -21,28 +21,9 @@ from limo_hog.suppression import nms
 UGLY: list[Any] = [
     *(None, (), [], "", "8", b"8", 1.5, math.nan, math.inf, -math.inf, 10**400, -(10**400), -1, 0, 1, 2**31 - 1, 2**31),
     *(-(2**31), 2**63, True, object(), (1,), (1, 2, 3), (1.5, 2), ("a", "b"), (None, 8), (8, -8), (0, 0), (2**31, 8)),
-    *(
-        np.array([8, 8]),
-        np.array([8.0, 8.0]),
-        np.int64(8),
-        np.uint8(8),
-        np.float32("nan"),
-        np.array(5),
-        {},
-        {1, 2},
-        1 + 2j,
-    ),
-    *(
-        [[]],
-        range(2),
-        np.zeros((0, 4), int),
-        np.zeros((2, 2, 2)),
-        np.array(["a"]),
-        np.array([None]),
-        "\ud800",
-        -0.0,
-        1e-320,
-    ),
+    *(np.array([8, 8]), np.array([8.0, 8.0]), np.int64(8), np.uint8(8), np.float32("nan"), np.array(5), {}, {1, 2}),
+    *(1 + 2j, [[]], range(2), np.zeros((0, 4), int), np.zeros((2, 2, 2)), np.array(["a"]), np.array([None]), "\ud800"),
+    *(-0.0, 1e-320),
     *((50_000, 50_000), (-(2**31), 3), 1e308, [1, [2]], np.datetime64("NaT"), type, np.zeros(3, "i4,f4")),
 ]
 
@@ -96,9 +77,8 @@ class Arguments:
         draw = self.draw
         if self.ugliness and draw.randrange(100) < self.ugliness:
             odd = np.zeros((3, 3, draw.choice((0, 2, 4))), np.uint8)
-            return draw.choice(
-                (*UGLY, odd, np.zeros((40, 30), np.float32), np.zeros((5, 0), np.uint8), np.ones(9, np.uint8))
-            )
+            others = np.zeros((40, 30), np.float32), np.zeros((5, 0), np.uint8), np.ones(9, np.uint8)
+            return draw.choice((*UGLY, odd, *others))
         low, high = draw.choice(((1, 20), (1, 40), (20, 50), (10, 70), (60, 140)))
         return some_image(draw, draw.randint(low, min(high, 100)), draw.randint(low, high))
 
@@ -126,14 +106,8 @@ class Arguments:
 
     def svm(self, hog: Any) -> Any:
         size = max(hog.getDescriptorSize() + self.draw.choice((0, 1, 1, -1, 2)), 0)
-        kinds = [
-            np.full(size, 0.01, np.float32),
-            [1] * min(size, 50),
-            np.full((size, 1), np.nan),
-            np.ones((1, size)),
-            None,
-        ]
-        return self.some(*kinds)
+        floats, ones, column = np.full(size, 0.01, np.float32), [1] * min(size, 50), np.full((size, 1), np.nan)
+        return self.some(floats, ones, column, np.ones((1, size)), None)
 
 
 def boxes_and_weights(found: Any, columns: int) -> tuple[Any, Any]:
@@ -167,10 +141,7 @@ def search(a: Arguments) -> None:
         return
     height, width = (*image.shape, 1)[:2]
     assert (boxes[:, :2] >= 0).all() and (boxes[:, 2:] >= 0).all(), boxes
-    assert (boxes[:, 0] + boxes[:, 2] <= width).all() and (boxes[:, 1] + boxes[:, 3] <= height).all(), (
-        boxes,
-        image.shape,
-    )
+    assert (boxes[:, :2] + boxes[:, 2:] <= (width, height)).all(), (boxes, image.shape)
     if options.get("useMeanshiftGrouping", False) is False:
         assert_reached(weights, options.get("hitThreshold"))
 
@@ -220,15 +191,8 @@ def grouping(a: Arguments) -> None:
 def construction(a: Arguments) -> None:
     size: Callable[[], Any] = lambda: a.some((8, 8), (16, 16), (16, 8), (32, 16), (64, 128), (33, 8), [24, 24])  # noqa: E731
     arguments = [size(), size(), size(), size(), a.some(9, 1, 18, 64, 256)]
-    more = [
-        a.some(1, 3),
-        a.some(-1.0, 4, 0.1),
-        a.some(0, 1),
-        a.some(0.2, 0, 5.0),
-        a.some(True, False),
-        a.some(64, 1, 2),
-        a.some(False, True),
-    ]
+    more = [a.some(1, 3), a.some(-1.0, 4, 0.1), a.some(0, 1), a.some(0.2, 0, 5.0)]
+    more += [a.some(True, False), a.some(64, 1, 2), a.some(False, True)]
     hog: Any = HOGDescriptor(*arguments, *more[: a.draw.randrange(8)])
     repr(hog), hog.getWinSigma()
     hog.setSVMDetector(a.svm(hog))

@@ -133,30 +133,6 @@ def test_ctrl_c_keeps_the_last_round(bollards: Path, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bollard.yml", "bollard.yml.json"]
 
 
-def test_ten_crops_and_a_damaged_negative_make_a_detector_with_warnings(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for i in range(10):
-        image, boxes = drawn.draw(np.random.default_rng(i))
-        x, y, w, h = map(round, boxes[0])
-        write_image(
-            tmp_path / "crops" / f"{i}.png",
-            np.pad(image, ((30, 30), (30, 30), (0, 0)), "edge")[y : y + h + 60, x : x + w + 60],
-        )
-        write_image(tmp_path / "free" / f"{i}.png", np.random.default_rng(i).integers(0, 256, (200, 200), np.uint8))
-    (tmp_path / "free" / "bad.png").write_bytes(b"no")
-    out = tmp_path / "m.yml"
-    assert main(["train", str(tmp_path / "crops"), "--negatives", str(tmp_path / "free"), "--out", str(out)]) == 0
-    warned = [line for line in capsys.readouterr().err.splitlines() if "warning:" in line]
-    assert [line.split("warning: ")[1].partition(":")[0] for line in warned] == [
-        "10 objects only",
-        "no labelled picture is left to measure on",
-        "left out",
-    ]
-    assert "figures" not in json.loads(out.with_name("m.yml.json").read_text())
-    assert load_model(out).person_box.height == 0.78
-
-
 @pytest.mark.slow
 def test_the_arenas_bollards_are_learnt_and_found_in_pictures_of_unseen_seeds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

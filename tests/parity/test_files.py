@@ -81,15 +81,6 @@ def test_files_are_opencvs_own_to_the_byte(tmp_path: Path, suffix: str, stem: st
     assert texts[0] == texts[1]
 
 
-def test_the_people_models_survive_every_format(tmp_path: Path) -> None:
-    hog = HOGDescriptor()
-    hog.setSVMDetector(hog.getDefaultPeopleDetector())
-    for suffix in SUFFIXES:
-        hog.save(tmp_path / f"people{suffix}")
-        loaded = HOGDescriptor(tmp_path / f"people{suffix}")
-        np.testing.assert_array_equal(loaded.svmDetector, hog.getDefaultPeopleDetector())
-
-
 def test_an_object_is_found_by_its_name(tmp_path: Path) -> None:
     path = tmp_path / "two.yml"
     first, second = HOGDescriptor(), HOGDescriptor((48, 96), (16, 16), (8, 8), (8, 8), 9)
@@ -130,60 +121,3 @@ def test_missing_values_count_as_zero_and_a_missing_detector_keeps_the_old(tmp_p
     with pytest.raises(limo_hog.DetectorSizeError, match=r"3781 coefficients.*7560"):
         hogs[0].detect(np.zeros((128, 64), np.uint8))
     assert len(hogs[0].compute(np.zeros((128, 64), np.uint8))) == 7560
-
-
-GOOD = (
-    "%YAML:1.0\n---\nh:\n   winSize: [ 16, 16 ]\n   blockSize: [ 8, 8 ]\n   blockStride: [ 8, 8 ]\n"
-    "   cellSize: [ 8, 8 ]\n   nbins: 9\n   nlevels: 4\n"
-)
-
-
-@pytest.mark.parametrize(
-    ("text", "error", "told"),
-    [
-        ("", ModelFormatError, "starts with"),
-        ("PK\x03\x04", ModelFormatError, "PK"),
-        ("%YAML:1.0\n---\n", ModelFormatError, "no object"),
-        (GOOD.replace("winSize", "windowSize"), ModelFormatError, "winSize is missing"),
-        (GOOD.replace("cellSize: [ 8, 8 ]", "cellSize: [ 8 ]"), ModelFormatError, "cellSize"),
-        (GOOD.replace("nbins: 9", "nbins: nine"), ModelFormatError, "nine"),
-        (GOOD.replace("nbins: 9", "nbins: .Inf"), ModelFormatError, "nbins"),
-        (GOOD.replace("nbins: 9", "nbins: 0"), limo_hog.GeometryError, "nbins is 0"),
-        (GOOD.replace("nlevels: 4", "nlevels: 0"), limo_hog.GeometryError, "nlevels is 0"),
-        (GOOD + "   SVMDetector: [ 1., 2. ]\n", limo_hog.DetectorSizeError, "2 coefficients"),
-        ('<?xml version="1.0"?>\n<opencv_storage><a>', ModelFormatError, "damaged|holds no"),
-        ('<?xml version="1.0"?>\n<html></html>', ModelFormatError, "opencv_storage"),
-        ('{"a": {"winSize": [16, 16', ModelFormatError, "holds no"),
-        ("[1, 2]", ModelFormatError, "starts with"),
-    ],
-)
-def test_a_file_that_is_no_model_is_refused_and_changes_nothing(
-    tmp_path: Path, text: str, error: type[Exception], told: str
-) -> None:
-    path = tmp_path / "bad"
-    path.write_text(text)
-    hog = HOGDescriptor()
-    hog.setSVMDetector(hog.getDefaultPeopleDetector())
-    before = repr(hog), np.array(hog.svmDetector)
-    with pytest.raises(error, match=told):
-        hog.load(path)
-    assert repr(hog) == before[0]
-    np.testing.assert_array_equal(hog.svmDetector, before[1])
-
-
-def test_a_truncated_gzip_file_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "model.xml.gz"
-    HOGDescriptor().save(path)
-    path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(ModelFormatError, match=r"model\.xml\.gz"):
-        HOGDescriptor(path)
-
-
-def test_files_that_cannot_be_read_or_written_raise_instead_of_passing_silently(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="missing"):
-        HOGDescriptor(tmp_path / "missing.yml")
-    with pytest.raises(FileNotFoundError, match="no directory"):
-        HOGDescriptor().save(tmp_path / "nowhere" / "model.yml")
-    with pytest.raises(limo_hog.ParameterError, match="a b"):
-        HOGDescriptor().save(tmp_path / "model.yml", "a b")
-    assert list(tmp_path.iterdir()) == []

@@ -158,19 +158,21 @@ def detection_takes_paddings_that_are_no_multiple() -> None:
 
 
 def levels_come_in_order_with_their_own_weights_on_any_number_of_threads() -> None:
-    image, found = noise(300, 300), []
+    image, found, grouped = noise(300, 300), [], []
     for threads in (1, 2, 3, 16):
         limo_hog.set_num_threads(threads)
         boxes_and_weights = (armed().detectMultiScale(image, -9, groupThreshold=0) for _ in range(10))
         found += [np.column_stack(pair) for pair in boxes_and_weights]
+        grouped.append(np.column_stack(armed().detectMultiScale(image, -9, groupThreshold=1)))
     widths = found[0][(found[0][:, 0] > 0) & (found[0][:, 0] < 150), 2]
     assert len(widths) > 500 and (np.diff(widths) >= 0).all()
     assert all(np.array_equal(other, found[0]) for other in found)
+    assert all(np.array_equal(other, grouped[0]) for other in grouped)
 
 
 def a_wrong_detector_is_refused_before_it_is_taken() -> None:
     hog = armed()
-    raises(limo_hog.DetectorSizeError, "1764", lambda: hog.setSVMDetector(np.ones(1764)))
+    raises(limo_hog.DetectorSizeError, "1764 coefficients", lambda: hog.setSVMDetector(np.ones(1764)))
     assert hog.checkDetectorSize() and np.array_equal(hog.svmDetector, PEOPLE)
 
 

@@ -64,6 +64,7 @@ def test_places_and_weights_are_opencvs_in_its_order(case: Case) -> None:
 def test_the_people_models_are_opencvs(name: str) -> None:
     ours, theirs = (getattr(library, f"HOGDescriptor_get{name}PeopleDetector")() for library in (limo_hog, cv2))
     assert ours.dtype == np.float32
+    np.testing.assert_array_equal(getattr(limo_hog.HOGDescriptor, f"get{name}PeopleDetector")(), ours)
     np.testing.assert_array_equal(ours, np.ravel(theirs))
 
 

@@ -118,14 +118,11 @@ def expect_no_difference(first: int) -> None:
     assert not found, f"{len(found)} of {CHUNK} combinations differ; the first:\n{found[0]}"
 
 
-@pytest.mark.parametrize("first", range(0, QUICK_SEEDS, CHUNK))
+SLOW = [pytest.param(first, marks=pytest.mark.slow) for first in range(QUICK_SEEDS, ALL_SEEDS, CHUNK)]
+
+
+@pytest.mark.parametrize("first", [*range(0, QUICK_SEEDS, CHUNK), *SLOW])
 def test_generated_combinations_are_as_in_opencv(first: int) -> None:
-    expect_no_difference(first)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("first", range(QUICK_SEEDS, ALL_SEEDS, CHUNK))
-def test_all_generated_combinations_are_as_in_opencv(first: int) -> None:
     expect_no_difference(first)
 
 

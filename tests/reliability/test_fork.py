@@ -53,18 +53,11 @@ os._exit(0)
 """
 
 
-def assert_every_child_answers(threads: int, forks: int, timeout: float) -> None:
+MANY = pytest.param(5000, 3500, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])
+
+
+@pytest.mark.parametrize(("forks", "timeout"), [(200, 280), MANY])
+@pytest.mark.parametrize("threads", [0, 1])
+def test_children_forked_while_threads_detect_and_describe_answer(threads: int, forks: int, timeout: float) -> None:
     done = run(FORKING.format(threads=threads, forks=forks), timeout)
     assert done.stdout.splitlines()[-1:] == [f"all {forks} children answered"], done.stdout + done.stderr
-
-
-@pytest.mark.parametrize("threads", [0, 1])
-def test_a_child_forked_while_threads_detect_and_describe_answers(threads: int) -> None:
-    assert_every_child_answers(threads, forks=200, timeout=280)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-@pytest.mark.parametrize("threads", [0, 1])
-def test_five_thousand_children_forked_while_threads_detect_and_describe_answer(threads: int) -> None:
-    assert_every_child_answers(threads, forks=5000, timeout=3500)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import product
 
 import pytest
 from tests.reliability.child import run
@@ -36,35 +37,23 @@ os._exit(0)
 """
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize(
-    "call",
-    [
-        "hog.detectMultiScale(people(640, 480), -1e9, (1, 1), useMeanshiftGrouping=True)",
-        "hog.detectMultiScale(people(320, 240), -1e9, (4, 4), useMeanshiftGrouping=True)",
-        "hog.detectMultiScale(people(640, 480), -1e9, (1, 1))",
-        "small.detectMultiScale(people(4000, 3000), 1e9, (2, 2))",
-        "small.detect(people(4000, 3000), 1e9, (1, 1))",
-        "hog.detectMultiScale(people(8000, 6000, 1), 1e9, scale=1.001)",
-    ],
-)
-def test_ctrl_c_ends_a_long_search_within_a_second(call: str, threads: int) -> None:
-    assert_interrupted(call, threads)
+SHARED = [
+    "hog.detectMultiScale(people(640, 480), -1e9, (1, 1), useMeanshiftGrouping=True)",
+    "hog.detectMultiScale(people(320, 240), -1e9, (4, 4), useMeanshiftGrouping=True)",
+    "hog.detectMultiScale(people(640, 480), -1e9, (1, 1))",
+    "small.detectMultiScale(people(4000, 3000), 1e9, (2, 2))",
+    "small.detect(people(4000, 3000), 1e9, (1, 1))",
+    "hog.detectMultiScale(people(8000, 6000, 1), 1e9, scale=1.001)",
+]
+ALONE = [
+    "hog.compute(people(1200, 1000), (3, 3))",
+    "hog.detect(people(640, 480), 0.0, (8, 8), (0, 0), np.zeros((3_000_000, 2), int))",
+    "limo_hog.groupRectangles(np.tile([0, 0, 9, 9], (200_000, 1)), 1)",
+]
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        "hog.compute(people(1200, 1000), (3, 3))",
-        "hog.detect(people(640, 480), 0.0, (8, 8), (0, 0), np.zeros((3_000_000, 2), int))",
-        "limo_hog.groupRectangles(np.tile([0, 0, 9, 9], (200_000, 1)), 1)",
-    ],
-)
-def test_ctrl_c_ends_other_long_calls_within_a_second(call: str) -> None:
-    assert_interrupted(call, 1)
-
-
-def assert_interrupted(call: str, threads: int) -> None:
+@pytest.mark.parametrize(("call", "threads"), [*product(SHARED, (1, 2)), *product(ALONE, (1,))])
+def test_ctrl_c_ends_a_long_call_within_a_second(call: str, threads: int) -> None:
     done = run(INTERRUPTED.format(call=call, threads=threads), timeout=60)
     words = done.stdout.split()
     assert words[:2] == ["interrupted", "after"], done.stdout + done.stderr

@@ -112,21 +112,3 @@ def test_coefficients_set_during_load_never_meet_the_geometry_that_was_replaced(
         # Whichever came last, the geometry is the file's; the coefficients are of one of the two.
         assert shared.winSize == GEOMETRIES[1][0]
         assert answer(shared) in wanted
-
-
-@pytest.mark.parametrize("threads", [1, 2])
-def test_one_detector_answers_many_threads_alike(threads: int) -> None:
-    import limo_hog
-
-    before = limo_hog.get_num_threads()
-    limo_hog.set_num_threads(threads)
-    try:
-        shared = detector(GEOMETRIES[0], 5)
-        wanted = answer(shared)
-
-        def look() -> None:
-            assert answer(shared) == wanted
-
-        assert not crowd([look] * 8, 1.0)
-    finally:
-        limo_hog.set_num_threads(before)

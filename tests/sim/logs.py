@@ -1,4 +1,4 @@
-"""Logs of runs in the arena, kept without their pictures."""
+"""Logs of runs in the arena, kept without their pictures, and of people who walk in it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from typing import Any
 
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
+from limo_sim.world.crowd import STEP_S, Crowd
+from limo_sim.world.person import Pose
+from limo_sim.world.scenario import Scenario
 
 
 def kept_in(steps: list[Step]) -> Callable[[Step], None]:
@@ -19,3 +22,22 @@ def steps_of(*arguments: Any, **options: Any) -> list[Step]:
     steps: list[Step] = []
     run_episode(*arguments, watch=kept_in(steps), **options)
     return steps
+
+
+def poses_of(
+    scenario: Scenario, seconds: float, robot: tuple[float, float, float] = (-4.5, -4.5, 0.0), seed: int = 0
+) -> list[tuple[Pose | None, ...]]:
+    """Where everybody is from step to step, while the robot stands."""
+    scenario.check()
+    crowd = Crowd(scenario, seed)
+    seen = [crowd.poses]
+    for step in range(1, round(seconds / STEP_S) + 1):
+        crowd.advance(step * STEP_S, robot)
+        seen.append(crowd.poses)
+    return seen
+
+
+def there(pose: Pose | None) -> Pose:
+    """Return the pose of a person who is in the arena."""
+    assert pose is not None
+    return pose

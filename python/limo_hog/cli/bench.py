@@ -15,7 +15,7 @@ from rich import box
 from rich.table import Table
 
 import limo_hog
-from limo_hog.cli.support.arguments import output_file, size, threads
+from limo_hog.cli.support.arguments import add_json, size, threads
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.environment import environment
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
@@ -70,9 +70,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="guided: PeopleDetector's faster search, whose rectangles may differ (exact)",
     )
     parser.add_argument("--image", type=Path, metavar="FILE", help="a picture instead of the drawn street")
-    parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write the result as JSON; - is standard output"
-    )
+    add_json(parser, "the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -80,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     facts = environment()
     opencv = _opencv() if facts["opencv_has_hog"] else None
     images = [
-        (_picture(size, channels, args.image))
+        _picture(size, channels, args.image)
         for size in (args.size or ([None] if args.image else SIZES))
         for channels in ([1, 3] if args.channels is None else [3 if args.channels == "bgr" else 1])
     ]
@@ -106,13 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _picture(size: tuple[int, int] | None, channels: int, path: Path | None) -> Image:
-    """Return the picture of a row.
-
-    Raises
-    ------
-    UsageError
-        It is smaller than the detector's window: OpenCV 4 crashes on such pictures.
-    """
+    """Return the picture of a row; one smaller than the detector's window, on which OpenCV 4 crashes, is refused."""
     if path is None:
         width, height = size or SIZES[0]
         _refuse_less_than_a_window(width, height)

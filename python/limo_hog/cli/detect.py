@@ -6,13 +6,15 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
 from limo_hog.atomic import is_stream
-from limo_hog.cli.support.arguments import MODEL, count, number, output_file, threads
+from limo_hog.cli.support import arguments
+from limo_hog.cli.support.arguments import MODEL, add_json, output_file
 from limo_hog.cli.support.output import STDOUT, UsageError
-from limo_hog.cli.support.results import json_lines, write_coco, write_csv
+from limo_hog.cli.support.results import Result, json_lines, write_coco, write_csv
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
 
@@ -32,9 +34,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--format", choices=["jpg", "png"], help="of annotated pictures (JPEG where the picture is, else PNG)"
     )
-    parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write one JSON object a line; - is standard output"
-    )
+    add_json(parser, "one JSON object a line")
     parser.add_argument("--csv", type=output_file, metavar="FILE", help="write a table, a line a person")
     parser.add_argument("--coco", type=output_file, metavar="FILE", help="write COCO's JSON of images and annotations")
     parser.add_argument("--model", default=PeopleDetector.model, metavar="NAME|FILE", help=f"{MODEL} (%(default)s)")
@@ -44,16 +44,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default="exact",
         help="guided: about twice as fast, a raw hit in two hundred is missed (exact)",
     )
-    parser.add_argument("--threshold", type=_score, metavar="T", help="least SVM margin of a hit (the model's own)")
+    parser.add_argument(
+        "--threshold", type=arguments.score, metavar="T", help="least SVM margin of a hit (the model's own)"
+    )
     parser.add_argument(
         "--min-height",
-        type=_least_height,
+        type=arguments.least_height,
         default=PeopleDetector.min_height,
         metavar="PX",
         help="find people from this height on; half of it takes four times as long; none: from 75 px on (opencv: "
         "100), at a picture's own size (%(default)g)",
     )
-    parser.add_argument("--max-height", type=_pixels, metavar="PX", help="leave out people taller than this")
+    parser.add_argument("--max-height", type=arguments.height, metavar="PX", help="leave out people taller than this")
     parser.add_argument(
         "--nms",
         choices=["overlap", "group"],
@@ -64,54 +66,40 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--overlap", type=_overlap, metavar="X", help="how much two people's boxes may overlap, 0..1 (0.65)"
     )
     parser.add_argument(
-        "--threads", type=threads, default=0, metavar="N", help="how many cores to keep busy; 0: all (0)"
+        "--threads", type=arguments.threads, default=0, metavar="N", help="how many cores to keep busy; 0: all (0)"
     )
-    parser.add_argument("--every", type=count, default=1, metavar="N", help="every Nth frame of a video (1)")
+    parser.add_argument("--every", type=arguments.count, default=1, metavar="N", help="every Nth frame of a video (1)")
     again = parser.add_mutually_exclusive_group()
     again.add_argument("--resume", action="store_true", help="go on where an earlier run with --json or --out stopped")
     again.add_argument("--overwrite", action="store_true", help="replace the files of an earlier run")
 
 
-def _pixels(text: str) -> float:
-    return number(text, 8, 10_000, "height in pixels")
-
-
-def _least_height(text: str) -> float | None:
-    return None if text == "none" else _pixels(text)
-
-
 def _overlap(text: str) -> float:
-    return number(text, 0, 1, "overlap")
+    return arguments.number(text, 0, 1, "overlap")
 
 
-def _score(text: str) -> float:
-    return number(text, -100, 100, "score")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Search all inputs and return 1 if some could not be read, else 0."""
+def _tables(args: argparse.Namespace) -> Mapping[Path, Callable[[Path, Iterable[Result]], None]]:
+    """Return what writes each table that is wanted; refuse files that contradict each other or would be lost."""
     # Standard output, a pipe or a device holds nothing to go on from.
     kept = args.json not in (None, STDOUT) and not is_stream(Path(args.json))
     if args.resume and not kept and args.out is None:
         raise UsageError("--resume goes on from what --json FILE or --out DIR holds: give one of them")
-    try:
-        detector = PeopleDetector(
-            model=args.model,
-            min_height=args.min_height,
-            max_height=args.max_height,
-            threshold=args.threshold,
-            nms=args.nms,
-            overlap=args.overlap,
-            search=args.search,
-        )
-    except ParameterError as error:
-        raise UsageError(str(error)) from error
     tables = {Path(name): write for name, write in ((args.csv, write_csv), (args.coco, write_coco)) if name}
     if any(name == STDOUT for name in (args.csv, args.coco)):
         raise UsageError("--csv and --coco want a file's name; standard output is for --json -")
     if args.resume and tables and not kept:
         raise UsageError("--resume with --csv or --coco takes the earlier results from --json FILE: give it")
+    return tables
+
+
+def run(args: argparse.Namespace) -> int:
+    """Search all inputs and return 1 if some could not be read, else 0."""
     parameters = {name: getattr(args, name) for name in PARAMETERS}
+    try:
+        detector = PeopleDetector(**{name: value for name, value in parameters.items() if name != "every"})
+    except ParameterError as error:
+        raise UsageError(str(error)) from error
+    tables = _tables(args)
     # The error names a broken file in one line; the decoders' own lines are switched off.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import MODEL, number, output_file
+from limo_hog.cli.support.arguments import MODEL, add_json, least_height, score
 from limo_hog.cli.support.output import STDOUT, write_json
 
 if TYPE_CHECKING:
@@ -32,30 +32,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--pictures", type=Path, metavar="DIR", help="where the pictures lie, if not beside the labels")
     parser.add_argument(
         "--min-height",
-        type=_min_height,
+        type=least_height,
         nargs="+",
         metavar="PX",
         help="height of the smallest person sought, or `none` for pictures as they are; several are compared",
     )
-    parser.add_argument(
-        "--least-score",
-        type=_score,
-        default=-1.2,
-        metavar="T",
-        help="lowest score counted (%(default)s)",
-    )
+    parser.add_argument("--least-score", type=score, default=-1.2, metavar="T", help="lowest score counted (-1.2)")
     parser.add_argument("--report", type=Path, metavar="DIR", help="write a page with the curve and the worst mistakes")
-    parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write the figures as JSON; - is standard output"
-    )
-
-
-def _min_height(text: str) -> float | None:
-    return None if text == "none" else number(text, 8, 10_000, "height in pixels")
-
-
-def _score(text: str) -> float:
-    return number(text, -100, 100, "score")
+    add_json(parser, "the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

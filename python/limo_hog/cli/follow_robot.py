@@ -8,12 +8,14 @@ import re
 import statistics
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
+from rich.progress import Progress
 
 from limo_hog.atomic import json_text
 from limo_hog.cli.support.arguments import add_follower, add_ros_arguments, node_of, number, output_file, seconds
@@ -86,33 +88,14 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             lines = sys.stdout if args.json == STDOUT else stack.enter_context(Path(args.json).open("w", buffering=1))
         bar = stack.enter_context(progress("s"))
-        task = bar.add_task("search", total=None if math.isinf(args.seconds) else args.seconds)
         began = time.monotonic()
-        shown: tuple[str, str] | None = None
-
-        def watch(log: FrameLog) -> None:
-            nonlocal shown
-            mode, reason = log.decision.mode.value, log.decision.reason
-            at = time.monotonic() - began
-            bar.update(task, completed=at, description=f"{mode}: {reason}")
-            # A reason whose numbers alone change is the same.
-            now = mode, re.sub(r"[\d.]+", "", reason)
-            if now == shown:
-                return
-            shown = now
-            if args.json != STDOUT:
-                bar.console.print(f"{at:.1f} s {mode}: {reason}", markup=False, highlight=False, soft_wrap=True)
-            if lines is not None:
-                event = {"seconds": round(at, 3), "stamp": log.time, "mode": mode, "reason": reason}
-                print(json_text(event), file=lines, flush=True)
-
         try:
             drive(
                 bus,
                 controller,
                 detector,
                 args.seconds,
-                watch,
+                _told(args, bar, lines, began),
                 moves=not args.no_drive,
                 robot=robot,
                 without_lidar=args.without_lidar,
@@ -135,6 +118,30 @@ def run(args: argparse.Namespace) -> int:
     if stopped is not None:
         raise stopped
     return 0
+
+
+def _told(args: argparse.Namespace, bar: Progress, lines: IO[str] | None, began: float) -> Callable[[FrameLog], None]:
+    """Return what tells each change of mode or reason, on the terminal and as a line of JSON."""
+    task = bar.add_task("search", total=None if math.isinf(args.seconds) else args.seconds)
+    shown: tuple[str, str] | None = None
+
+    def watch(log: FrameLog) -> None:
+        nonlocal shown
+        mode, reason = log.decision.mode.value, log.decision.reason
+        at = time.monotonic() - began
+        bar.update(task, completed=at, description=f"{mode}: {reason}")
+        # A reason whose numbers alone change is the same.
+        now = mode, re.sub(r"[\d.]+", "", reason)
+        if now == shown:
+            return
+        shown = now
+        if args.json != STDOUT:
+            bar.console.print(f"{at:.1f} s {mode}: {reason}", markup=False, highlight=False, soft_wrap=True)
+        if lines is not None:
+            event = {"seconds": round(at, 3), "stamp": log.time, "mode": mode, "reason": reason}
+            print(json_text(event), file=lines, flush=True)
+
+    return watch
 
 
 def _card(args: argparse.Namespace, report: Report, taken: float) -> dict[str, Any]:

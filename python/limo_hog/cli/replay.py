@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 from rich.text import Text
 
-from limo_hog.cli.support.arguments import add_detector, add_ros_arguments, file_ending, node_of, output_file
+from limo_hog.cli.support.arguments import add_detector, add_json, add_ros_arguments, file_ending, node_of
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
@@ -48,9 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="controller (%(default)s)")
     add_detector(parser)
     parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="video of the detections (H.264)")
-    parser.add_argument(
-        "--json", type=output_file, metavar="FILE", help="write the figures as JSON; - is standard output"
-    )
+    add_json(parser, "the figures as JSON")
     add_ros_arguments(parser)
 
 
@@ -69,39 +66,17 @@ def run(args: argparse.Namespace) -> int:
             kinds.setdefault(record.topic, kind_of(record))
             yield record
 
-    with ExitStack() as stack:
-        bar = stack.enter_context(progress("frames"))
+    with progress("frames") as bar, _film(args.video) as show:
         task = bar.add_task("replaying", total=None)
-        write = None
-        if args.video is not None:
-            from limo_hog.imaging.writing import video_writer
-
-            write = stack.enter_context(video_writer(args.video, fps=10))
-
-        def draw(frame: Replayed) -> NDArray[np.uint8]:
-            from limo_hog.imaging.drawing import annotate
-
-            found, target = frame.log.detections, frame.log.decision.target
-            return annotate(frame.frame.image, found.boxes, found.labels, target, f"{frame.frame.stamp:.1f} s")
-
         for frame in replay(records(), controller, detector, node):
             frames.append(_compared(frame))
-            if write is not None:
-                write(draw(frame))
+            show(frame)
             bar.advance(task)
     card = _card(args, frames)
     if args.json:
         write_json(args.json, card)
     if args.json != STDOUT:
-        table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-        for name, value in card.items():
-            shown = f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)
-            label, unit = _SHOWN.get(name, (name.replace("_", " "), ""))
-            table.add_row(label, Text(f"{shown} {unit.format(**card)}".rstrip()))
-        out = console()
-        out.print(table)
-        if card["same_detections"] < card["frames_recorded_with_detections"] or card["linear_difference_max"]:
-            out.print(_WHY, soft_wrap=True)
+        _print(card)
     for line in elsewhere(kinds, node):
         print(line, file=sys.stderr)
     failures = [frame["failure"] for frame in frames if frame["failure"]]
@@ -110,16 +85,40 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+@contextmanager
+def _film(path: Path | None) -> Iterator[Callable[[Replayed], None]]:
+    """Give a function that appends a frame with its detections to a video, where one is wanted."""
+    if path is None:
+        yield lambda _: None
+        return
+    from limo_hog.imaging.drawing import annotate
+    from limo_hog.imaging.writing import video_writer
+
+    with video_writer(path, fps=10) as write:
+
+        def show(frame: Replayed) -> None:
+            found, target = frame.log.detections, frame.log.decision.target
+            write(annotate(frame.frame.image, found.boxes, found.labels, target, f"{frame.frame.stamp:.1f} s"))
+
+        yield show
+
+
+def _print(card: dict[str, Any]) -> None:
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for name, value in card.items():
+        shown = f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)
+        label, unit = _SHOWN.get(name, (name.replace("_", " "), ""))
+        table.add_row(label, Text(f"{shown} {unit.format(**card)}".rstrip()))
+    out = console()
+    out.print(table)
+    if card["same_detections"] < card["frames_recorded_with_detections"] or card["linear_difference_max"]:
+        out.print(_WHY, soft_wrap=True)
+
+
 def _compared(frame: Replayed) -> dict[str, Any]:
     found, twist = frame.log.detections, frame.log.decision.twist
-    row: dict[str, Any] = {
-        "found": len(found) > 0,
-        "failure": frame.log.failure,
-        "detect_ms": frame.log.detect_ms,
-        "same": None,
-        "linear": None,
-        "angular": None,
-    }
+    row: dict[str, Any] = dict.fromkeys(("same", "linear", "angular"))
+    row |= {"found": len(found) > 0, "failure": frame.log.failure, "detect_ms": frame.log.detect_ms}
     if frame.recorded is not None:
         boxes = np.array_equal(found.boxes, frame.recorded.boxes)
         row["same"] = boxes and bool(np.allclose(found.scores, frame.recorded.scores, rtol=0, atol=1e-5))

@@ -82,17 +82,14 @@ def run(args: argparse.Namespace) -> int:
     )
     rounds: list[dict[str, Any]] = []
     with warnings_in_one_line(), progress("pictures") as bar:
-        bar.add_task("reading", total=None)
+        task, shown = bar.add_task("reading", total=None), "reading"
         data = gather(wanted)
-        tasks = {bar.task_ids[0]: "reading"}
 
         def step(stage: str, steps: int | None) -> None:
-            task = next(iter(tasks))
-            if tasks[task] != stage:
+            nonlocal task, shown
+            if shown != stage:
                 bar.remove_task(task)
-                tasks.clear()
-                task = bar.add_task(stage, total=steps)
-                tasks[task] = stage
+                task, shown = bar.add_task(stage, total=steps), stage
             bar.advance(task)
 
         try:

@@ -235,15 +235,8 @@ class HOGDescriptor:
             if replaced(self, before, after):
                 return
 
-    @staticmethod
-    def getDefaultPeopleDetector() -> NDArray[np.float32]:
-        """float32 (3781,): OpenCV's people detector for the default geometry, bias last."""
-        return functions.HOGDescriptor_getDefaultPeopleDetector()
-
-    @staticmethod
-    def getDaimlerPeopleDetector() -> NDArray[np.float32]:
-        """float32 (1981,): OpenCV's people detector for windows of 48 × 96, bias last."""
-        return functions.HOGDescriptor_getDaimlerPeopleDetector()
+    getDefaultPeopleDetector = staticmethod(functions.HOGDescriptor_getDefaultPeopleDetector)
+    getDaimlerPeopleDetector = staticmethod(functions.HOGDescriptor_getDaimlerPeopleDetector)
 
     def detect(
         self,
@@ -308,13 +301,11 @@ class HOGDescriptor:
             Border around each level (x, y) [px], mirrored.
         scale
             How much each level is smaller than the one before; 1 or less searches the image's own size alone.
-        groupThreshold
+        groupThreshold, finalThreshold
             Similar rectangles must be more than this to count; below 1 every hit is returned. With
-            `useMeanshiftGrouping`, the least weight of a mode.
+            `useMeanshiftGrouping`, the least weight of a mode. The second is the old name; it counts when given.
         useMeanshiftGrouping
             Group by mean-shift instead.
-        finalThreshold
-            The old name of `groupThreshold`; used in its place when given.
 
         Returns
         -------

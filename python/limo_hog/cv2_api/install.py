@@ -9,21 +9,6 @@ from limo_hog.cv2_api.hog import HOGDescriptor
 from limo_hog.exceptions import HogError
 from limo_hog.extras import needed
 
-#: The functions and constants that left OpenCV with the HOG detector.
-_FUNCTIONS = (
-    "HOGDescriptor_L2Hys",
-    "HOGDescriptor_DEFAULT_NLEVELS",
-    "HOGDescriptor_DESCR_FORMAT_COL_BY_COL",
-    "HOGDescriptor_DESCR_FORMAT_ROW_BY_ROW",
-    "HOGDESCRIPTOR_L2HYS",
-    "HOGDESCRIPTOR_DEFAULT_NLEVELS",
-    "HOGDESCRIPTOR_DESCR_FORMAT_COL_BY_COL",
-    "HOGDESCRIPTOR_DESCR_FORMAT_ROW_BY_ROW",
-    "HOGDescriptor_getDefaultPeopleDetector",
-    "HOGDescriptor_getDaimlerPeopleDetector",
-    "groupRectangles",
-)
-
 
 def install_into_cv2(*, replace: bool = False) -> list[str]:
     """Put the HOG detector and `groupRectangles` into `cv2` where it lacks them, so that OpenCV 4 scripts run.
@@ -55,7 +40,9 @@ def install_into_cv2(*, replace: bool = False) -> list[str]:
         import cv2
     if not issubclass(HogError, cv2.error):
         HogError.__bases__ += (cv2.error,)
-    names = {"HOGDescriptor": HOGDescriptor} | {name: getattr(functions, name) for name in _FUNCTIONS}
+    # With the functions and constants that left OpenCV beside it.
+    names = {name: value for name, value in vars(functions).items() if name.startswith(("HOGD", "groupRect"))}
+    names["HOGDescriptor"] = HOGDescriptor
     put = [name for name in names if replace or not hasattr(cv2, name)]
     for name in put:
         setattr(cv2, name, names[name])

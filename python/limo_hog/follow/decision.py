@@ -16,104 +16,52 @@ S = TypeVar("S")
 class Mode(str, Enum):
     """What the follower is doing, in words for the score card."""
 
-    SEARCH = "search"
-    """No person has been found yet."""
-    FOLLOW = "follow"
-    """A person is being followed."""
-    HOLD = "hold"
-    """The followed person is at the target distance: no need to drive."""
-    BLOCKED = "blocked"
-    """An obstacle is in the way, or an input is faulty: the robot may not do what the controller asked for."""
-    LOST = "lost"
-    """A person was followed and is not found any more."""
-    DRIVE = "drive"
-    """The robot is commanded by a node that does not say what it is doing: it moves."""
-    STAND = "stand"
-    """The same, and it does not move."""
+    SEARCH = "search"  #: No person has been found yet.
+    FOLLOW = "follow"  #: A person is being followed.
+    HOLD = "hold"  #: The followed person is at the target distance: no need to drive.
+    BLOCKED = "blocked"  #: An obstacle is in the way, or an input is faulty: the command was not let through.
+    LOST = "lost"  #: A person was followed and is not found any more.
+    DRIVE = "drive"  #: The robot is commanded by a node that does not say what it is doing: it moves.
+    STAND = "stand"  #: The same, and it does not move.
 
 
 class Believed(NamedTuple):
-    """A tracked person: where, how surely, and which of the frame's boxes is theirs.
+    """A tracked person: where, how surely, and which of the frame's boxes is theirs."""
 
-    Attributes
-    ----------
-    x, y
-        Position in the base frame [m].
-    probability
-        That it is a person, 0 … 1.
-    number
-        Identifies the person; never used twice.
-    vx, vy
-        Velocity over the ground, along the base frame's axes [m/s].
-    box
-        Index into `observation.detections`; None where HOG did not find them in this frame.
-    same
-        Probability that it is the person followed, 0 … 1; None while none was followed.
-    """
-
-    x: float
+    x: float  #: Position in the base frame [m].
     y: float
-    probability: float
-    number: int = 0
-    vx: float = 0.0
+    probability: float  #: That it is a person, 0 … 1.
+    number: int = 0  #: Identifies the person; never used twice.
+    vx: float = 0.0  #: Velocity over the ground, along the base frame's axes [m/s].
     vy: float = 0.0
-    box: int | None = None
-    same: float | None = None
+    box: int | None = None  #: Index into `observation.detections`; None where HOG did not find them in this frame.
+    same: float | None = None  #: Probability that it is the person followed, 0 … 1; None while none was followed.
 
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """What a controller takes to be true, for those who watch; nothing is decided by it.
+    """What a controller takes to be true, for those who watch; nothing is decided by it."""
 
-    Attributes
-    ----------
-    keeps
-        Distance it holds now [m]; more than its target where nearer the camera would not show the whole person. None
-        for a controller that holds none, and while no person is followed.
-    people
-        Everyone tracked.
-    places
-        Where a lost person may be, each as likely: x, y in the base frame [m].
-    way
-        The way it means to drive: x, y in the base frame [m].
-    followed
-        Number of the person followed; None while there is none.
-    """
-
+    #: Distance it holds now [m], more than its target where the camera would else cut the person off; None without one.
     keeps: float | None = None
-    people: tuple[Believed, ...] = ()
+    people: tuple[Believed, ...] = ()  #: Everyone tracked.
+    #: Where a lost person may be, each as likely: x, y in the base frame [m].
     places: tuple[tuple[float, float], ...] = ()
-    way: tuple[tuple[float, float], ...] = ()
-    followed: int | None = None
+    way: tuple[tuple[float, float], ...] = ()  #: The way it means to drive: x, y in the base frame [m].
+    followed: int | None = None  #: Number of the person followed; None while there is none.
 
 
 @dataclass(frozen=True, slots=True)
 class Decision(Generic[S]):
-    """A controller's answer to one observation.
+    """A controller's answer to one observation."""
 
-    Attributes
-    ----------
-    twist
-        What the robot should do now.
-    state
-        The controller's memory, to be handed in with the next observation.
-    mode, reason
-        What the follower is doing, and why, in a few words.
-    target
-        Index into `observation.detections` of the person followed; None where there is none.
-    region
-        Where to look in the next frame; None asks for the whole image.
-    belief
-        What the controller takes to be true.
-    """
-
-    twist: Twist
-    state: S
-    mode: Mode
+    twist: Twist  #: What the robot should do now.
+    state: S  #: The controller's memory, to be handed in with the next observation.
+    mode: Mode  #: What the follower is doing, and why, in a few words.
     reason: str
-    target: int | None = None
-    region: Region | None = None
-    belief: Belief = field(default_factory=Belief)
+    target: int | None = None  #: Index into `observation.detections` of the person followed; None where there is none.
+    region: Region | None = None  #: Where to look in the next frame; None asks for the whole image.
+    belief: Belief = field(default_factory=Belief)  #: What the controller takes to be true.
 
 
 class Controller(Protocol[S]):
@@ -131,10 +79,7 @@ class Controller(Protocol[S]):
 def made_for(controller: Controller[S], robot: RobotGeometry) -> Controller[S]:
     """Return a controller that drives `robot`: one that knows its robot is given this one.
 
-    Raises
-    ------
-    RobotError
-        It was made for another robot than the Limo and this one.
+    Raises `RobotError` for one that was made for another robot than the Limo and this one.
     """
     known = getattr(controller, "robot", robot)
     if known not in (robot, LIMO):

@@ -1,4 +1,4 @@
-"""Numbers of a controller that may be changed while it drives: their bounds stand with their defaults."""
+"""Numbers of a controller as data: each is one entry, with unit, meaning and the bounds it may be set within."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import dataclasses
 from typing import Any
 
 
-def bounded(default: float, low: float, high: float) -> Any:
-    """Return a dataclass field with a default and the bounds it may be set within, both included.
+def param(default: Any, unit: str, meaning: str, low: float | None = None, high: float | None = None) -> Any:
+    """Return a dataclass field: default, unit or "1", meaning, and the bounds it may be set within while driving."""
+    about: dict[str, Any] = {"unit": "" if unit == "1" else unit, "tooltip": meaning}
+    return dataclasses.field(default=default, metadata=about if high is None else about | {"low": low, "high": high})
 
-    Unit and meaning stand in the class's docstring, under Attributes.
-    """
+
+def bounded(default: float, low: float, high: float) -> Any:
+    """Return a dataclass field with a default and bounds; unit and meaning stand in the class's docstring."""
     return dataclasses.field(default=default, metadata={"low": low, "high": high})

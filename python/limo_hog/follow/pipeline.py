@@ -33,36 +33,17 @@ _SCANS_BETWEEN = 8
 
 @dataclass(frozen=True, slots=True)
 class FrameLog:
-    """One control period: what was sensed, found and commanded.
+    """One control period: what was sensed, found and commanded."""
 
-    Attributes
-    ----------
-    time
-        When the command was decided, on the robot's own clock [s].
-    decision
-        The command and the reason for it; its `target` is an index into `detections`.
-    sensors
-        The readings that it is based on.
-    frame
-        The camera image that was worked on; None in a period without a new one.
-    detections
-        What was found in the image, best first; empty without one, and where the detector failed.
-    region
-        Part of the image that was searched; None where all of it was.
-    failure
-        How the detector failed, "" where it did not.
-    detect_ms
-        Wall time of the detection [ms].
-    """
-
-    time: float
-    decision: Decision[None]
-    sensors: Sensors
-    frame: Frame | None = None
+    time: float  #: When the command was decided, on the robot's own clock [s].
+    decision: Decision[None]  #: The command and the reason for it; its `target` is an index into `detections`.
+    sensors: Sensors  #: The readings that it is based on.
+    frame: Frame | None = None  #: The camera image that was worked on; None in a period without a new one.
+    #: What was found in the image, best first; empty without one, and where the detector failed.
     detections: Detections = field(default_factory=Detections.none)
-    region: Region | None = None
-    failure: str = ""
-    detect_ms: float = 0.0
+    region: Region | None = None  #: Part of the image that was searched; None where all of it was.
+    failure: str = ""  #: How the detector failed, "" where it did not.
+    detect_ms: float = 0.0  #: Wall time of the detection [ms].
 
 
 class Periods:
@@ -73,14 +54,10 @@ class Periods:
         self._last: object = None
 
     def begins(self, now: float, frame: object) -> tuple[bool, bool]:
-        """Return whether a control period begins now, and whether it has a new camera image.
+        """Return whether a control period begins `now` [s], on the robot's own clock, and whether with a new image.
 
-        Parameters
-        ----------
-        now
-            Time on the robot's own clock [s]; one that was set back begins a period.
-        frame
-            The newest camera image: new if it is another object than the last. None without one.
+        A clock that was set back begins one. `frame` is the newest camera image: new if it is another object than the
+        last.
         """
         new = frame is not None and frame is not self._last
         if not new and self._began is not None and 0 <= now - self._began <= CONTROL_PERIOD - _SLACK:
@@ -94,27 +71,10 @@ class Periods:
 class Follower(Generic[S]):
     """A detector and a controller behind the safety layer, fed with one stream of camera images.
 
-    The controllers and the guard are pure functions of observation and state. This object keeps their state between two
-    control periods, and the region to search next. The decisions that it logs hold no state, so that a list of logs
-    does not keep every scan in memory.
-
-    Parameters
-    ----------
-    controller
-        Steers by what the detector finds; `Guard` limits its commands.
-    detector
-        Finds people in uint8 (H, W, 3) BGR images. If it raises, the robot stops and the decision says so.
-    robot
-        Its outline, limits, camera and lidar, for the guard and for a controller that has a `robot`.
-    search
-        Applies the detector to a region of an image.
-    without_lidar
-        The robot has none; see `Guard`.
-
-    Raises
-    ------
-    RobotError
-        The controller was made for another robot.
+    Controllers and guard are pure functions; this object keeps their state, and the region to search next. The detector
+    finds people in uint8 (H, W, 3) BGR images; if it raises, the robot stops and the decision says so. `search` applies
+    it to a region of an image. Without lidar see `Guard`. The decisions that are logged hold no state, so that a list
+    of them does not keep every scan. Raises `RobotError` for a controller that was made for another robot.
     """
 
     def __init__(
@@ -137,15 +97,8 @@ class Follower(Generic[S]):
     def tick(self, now: float, frame: Frame | None, sensors: Sensors) -> FrameLog | None:
         """Decide what to do now; None while the last control period lasts.
 
-        Parameters
-        ----------
-        now
-            Time on the robot's own clock [s], which only goes on: ages are counted on it, whatever the stamps say.
-        frame
-            The newest camera image: a new one is searched for people, without one the last command is checked against
-            the newest scan. None without any.
-        sensors
-            The newest readings of the other sensors.
+        `now` is on the robot's own clock [s], which only goes on: ages are counted on it, whatever the stamps say. A
+        new camera image is searched for people; without one the last command is checked against the newest scan.
         """
         begins, new = self._periods.begins(now, frame)
         if not begins:

@@ -27,46 +27,26 @@ def _within(default: float, low: float, high: float) -> Any:
 class RobotGeometry:
     """A robot with two driven sides; by default the Limo, its lengths from LCAS/limo_ros2's `limo_four_diff.xacro`.
 
-    Attributes
-    ----------
-    half_length, half_width
-        Half of the body's outline [m].
-    camera_x, camera_z
-        Where the camera sits, ahead of the centre and above the floor [m]; it looks level and straight ahead.
-    field_of_view
-        Horizontal field of view of the camera [rad].
-    lidar_x, lidar_z
-        Where the lidar sits, ahead of the centre and above the floor [m]; its plane is level.
-    lidar_yaw
-        Which way the lidar's angle 0 looks [rad], counter-clockwise from straight ahead.
-    wheel_separation
-        Between the left and the right wheels, as the differential drive counts it [m].
-    max_speed, max_turn
-        The most that it is told to drive and to turn [m/s, rad/s].
-    acceleration
-        How fast it speeds up and brakes [m/s²].
-    may_back
-        Whether it may drive backwards.
-
-    Raises
-    ------
-    RobotError
-        A value is of another type, or out of its range.
+    Raises `RobotError` for a value of another type, or out of its range.
     """
 
-    half_length: float = _within(0.145, 0.02, 2.0)
+    half_length: float = _within(0.145, 0.02, 2.0)  #: Half of the body's outline [m].
     half_width: float = _within(0.11, 0.02, 2.0)
+    #: Where the camera sits, ahead of the centre and above the floor [m]; it looks level and straight ahead.
     camera_x: float = _within(0.084, -2.0, 2.0)
     camera_z: float = _within(0.175, 0.02, 2.0)
-    field_of_view: float = _within(1.23918, 0.2, 3.0)
+    field_of_view: float = _within(1.23918, 0.2, 3.0)  #: Horizontal field of view of the camera [rad].
+    #: Where the lidar sits, ahead of the centre and above the floor [m]; its plane is level.
     lidar_x: float = _within(0.103, -2.0, 2.0)
     lidar_z: float = _within(0.111, 0.01, 2.0)
+    #: Which way the lidar's angle 0 looks [rad], counter-clockwise from straight ahead.
     lidar_yaw: float = _within(0.0, -math.pi, math.pi)
+    #: Between the left and the right wheels, as the differential drive counts it [m].
     wheel_separation: float = _within(0.172, 0.02, 4.0)
-    max_speed: float = _within(1.0, 0.01, 10.0)
+    max_speed: float = _within(1.0, 0.01, 10.0)  #: The most that it is told to drive and to turn [m/s, rad/s].
     max_turn: float = _within(11.6, 0.01, 100.0)
-    acceleration: float = _within(1.0, 0.05, 20.0)
-    may_back: bool = True
+    acceleration: float = _within(1.0, 0.05, 20.0)  #: How fast it speeds up and brakes [m/s²].
+    may_back: bool = True  #: Whether it may drive backwards.
 
     def __post_init__(self) -> None:
         for one in fields(self):
@@ -90,10 +70,7 @@ LIMO = RobotGeometry()
 def load_robot(path: str | Path) -> RobotGeometry:
     """Read a robot from a TOML file with `RobotGeometry`'s names; what is left out is the Limo's.
 
-    Raises
-    ------
-    RobotError
-        With the file, the key and what is allowed there.
+    Raises `RobotError` with the file, the key and what is allowed there.
     """
     if sys.version_info >= (3, 11):
         import tomllib
@@ -116,15 +93,7 @@ def load_robot(path: str | Path) -> RobotGeometry:
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """What a differential-drive robot is told to do; the default is to stop.
+    """What a differential-drive robot is told to do; the default is to stop."""
 
-    Attributes
-    ----------
-    linear
-        Forward speed [m/s], along the robot's x axis.
-    angular
-        Turn rate [rad/s] about the robot's z axis, counter-clockwise positive.
-    """
-
-    linear: float = 0.0
-    angular: float = 0.0
+    linear: float = 0.0  #: Forward speed [m/s], along the robot's x axis.
+    angular: float = 0.0  #: Turn rate [rad/s] about the robot's z axis, counter-clockwise positive.

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Controller, Decision, Mode
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.arrivals import CAMERA, DEPTH, ODOMETRY, SCAN, Arrivals
 from limo_hog.follow.sense.clearance import (
@@ -24,7 +25,6 @@ from limo_hog.follow.sense.clearance import (
     Points,
     from_odometry,
     room_ahead,
-    room_behind,
     room_seen_behind,
     scan_points,
     speed_within,
@@ -37,98 +37,44 @@ S = TypeVar("S")
 
 @dataclass(frozen=True, slots=True)
 class GuardState(Generic[S]):
-    """What the guard remembers.
+    """What the guard remembers."""
 
-    Attributes
-    ----------
-    inner
-        The guarded controller's state.
-    proposed
-        The controller's last decision, before limits; None before the first and after a fault.
-    stamp
-        Stamp of the last frame [s].
-    arrivals
-        The newest reading of each sense, by its stamp and by the robot's own clock.
-    depth_points
-        float64 (N, 2) [m], base frame: obstacles in the last depth image.
-    scan_stamp
-        Stamp of the last scan [s].
-    scan_points, scan_points_at
-        float64 (N, 2) [m], odometry frame, and float64 (N,) [s]: returns near the robot, and the stamps of their scans.
-    looks
-        Scans of the last seconds, oldest first: they tell which ground was seen to be free.
-    """
-
-    inner: S
+    inner: S  #: The guarded controller's state.
+    #: The controller's last decision, before limits; None before the first and after a fault.
     proposed: Decision[S] | None = None
-    stamp: float | None = None
+    stamp: float | None = None  #: Stamp of the last frame [s].
+    #: The newest reading of each sense, by its stamp and by the robot's own clock.
     arrivals: Arrivals = field(default_factory=Arrivals)
+    #: float64 (N, 2) [m], base frame: obstacles in the last depth image.
     depth_points: Points = field(default_factory=lambda: NO_POINTS)
-    scan_stamp: float = -math.inf
+    scan_stamp: float = -math.inf  #: Stamp of the last scan [s].
+    #: float64 (N, 2) [m], odometry frame, and float64 (N,) [s]: returns near the robot, and the stamps of their scans.
     scan_points: Points = field(default_factory=lambda: NO_POINTS)
     scan_points_at: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    #: Scans of the last seconds, oldest first: they tell which ground was seen to be free.
     looks: tuple[Look, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Guard(Generic[S]):
-    """A controller behind the safety layer; itself a controller.
+    """A controller behind the safety layer; itself a controller."""
 
-    Attributes
-    ----------
-    controller
-        Whose commands are limited.
-    margin
-        Ground kept free ahead of the robot's outline, and behind it.
-    reaction_s
-        Time from an obstacle's appearance to braking [s]: a scan's period of .125, a command's of .1, and computing.
-    depth_reach
-        Depth further than this from the margin's end is not looked at [m]. Computed: with 1.0 m of room .88 m/s are
-        allowed, more than any controller drives.
-    memory_radius
-        Returns count for the space behind the robot for `memory_s`, if they were so near [m]. Chosen: further than
-        this the robot never backs off at once.
-    look_every_s
-        A scan is kept for the ground it shows to be free when the last one kept is so old [s]. Chosen: at .6 m/s the
-        robot is less than its own length further.
-    memory_s, unseen_speed
-        Highest speed backwards onto ground that was not seen to be free within so long [s, m/s]. Chosen: a person
-        turns back in a corridor that the robot entered 40 s ago; from .2 m/s the robot stops within .09 m. To stand
-        would be run into: with 0 `two_people` ends with a person at .5 m.
-    max_backward
-        Highest speed backwards [m/s]. Chosen: what has come up from behind since is in no sensor's field of view; from
-        .6 m/s the robot stops within .51 m, less than the ground looked at. Measured in 64 development runs of a person
-        who walks at the robot at .8 m/s: with .4 m/s three end with a contact, with .6 m/s clearance is .32 m and more.
-    max_blind
-        Highest speed without a lidar [m/s], and none backwards. Chosen: from .2 m/s the robot stops within .09 m.
-    max_age_s
-        The robot stops when no new camera frame, depth image, scan or odometry has come for so long on its own clock,
-        or one is so late by its stamp [s]. Chosen: four lidar periods, the time of the robot's own watchdog.
-    max_late_s
-        The same for a camera frame's stamp [s]. Chosen: twice the latency that the controllers were tried with.
-    without_lidar
-        The robot has none: it drives by the depth image alone, slowly. Without depth or odometry no robot drives.
-    depth_grid
-        Which depth pixels are looked at.
-    robot
-        The robot's outline, mounts and limits.
-    """
-
-    controller: Controller[S]
-    margin: Margin = field(default_factory=Margin)
-    reaction_s: float = 0.25
-    depth_reach: float = 1.0
-    memory_s: float = 60.0
-    memory_radius: float = 1.5
-    look_every_s: float = 0.5
-    unseen_speed: float = 0.2
-    max_backward: float = 0.6
-    max_blind: float = 0.2
-    max_age_s: float = 0.5
-    max_late_s: float = 1.0
+    controller: Controller[S]  #: Whose commands are limited.
+    margin: Margin = field(default_factory=Margin)  #: Ground kept free ahead of the robot's outline, and behind it.
+    reaction_s: float = param(0.25, "s", "From an obstacle's appearance to braking: periods of scan and command.")
+    depth_reach: float = param(1.0, "m", "Depth further than this from the margin's end is not looked at.")
+    memory_s: float = param(60.0, "s", "How long what was seen behind counts for the way back.")
+    memory_radius: float = param(1.5, "m", "Returns count for the way back if they were this near.")
+    look_every_s: float = param(0.5, "s", "How often a scan is kept for the ground it shows to be free.")
+    unseen_speed: float = param(0.2, "m/s", "Highest speed backwards onto other ground.")
+    max_backward: float = param(0.6, "m/s", "Highest speed backwards: no sensor looks there.")
+    max_blind: float = param(0.2, "m/s", "Highest speed without a lidar, and none backwards.")
+    max_age_s: float = param(0.5, "s", "The robot stops when a sense brings nothing new for this time.")
+    max_late_s: float = param(1.0, "s", "The same for a camera frame's stamp.")
+    #: The robot has none: it drives by the depth image alone, slowly. Without depth or odometry no robot drives.
     without_lidar: bool = False
-    depth_grid: DepthGrid = field(default_factory=DepthGrid)
-    robot: RobotGeometry = LIMO
+    depth_grid: DepthGrid = field(default_factory=DepthGrid)  #: Which depth pixels are looked at.
+    robot: RobotGeometry = LIMO  #: The robot's outline, mounts and limits.
 
     @property
     def braking(self) -> float:
@@ -165,21 +111,14 @@ class Guard(Generic[S]):
             reach = 2 * self.robot.half_length + self.margin.ahead + self.depth_reach
             depth_points = self.depth_grid.points(observation.depth, observation.focal_px, reach, self.robot)
         state = replace(
-            state,
-            inner=proposed.state,
-            proposed=proposed,
-            stamp=observation.stamp,
-            depth_points=depth_points,
+            state, inner=proposed.state, proposed=proposed, stamp=observation.stamp, depth_points=depth_points
         )
         return self._limited(proposed, state, observation.scan, observation.odometry, observation.at)
 
     def recheck(
         self, now: float, scan: Scan | None, odometry: Odometry | None, state: GuardState[S]
     ) -> Decision[GuardState[S]]:
-        """Check the controller's last decision against a newer scan, for a control period without a camera frame.
-
-        The decision has no target and no region: these belong to a frame. `now` is on the robot's own clock [s].
-        """
+        """Check the last decision, less target and region, against a newer scan, `now` on the robot's own clock [s]."""
         if fault := scan_fault(scan) or _odometry(odometry):
             return Decision(Twist(), state, Mode.BLOCKED, fault)
         state = self._heard(now, scan, odometry, state)
@@ -210,12 +149,7 @@ class Guard(Generic[S]):
         return state.arrivals.missing(now, needed, self.max_age_s)
 
     def _limited(
-        self,
-        proposed: Decision[S],
-        state: GuardState[S],
-        scan: Scan | None,
-        odometry: Odometry | None,
-        now: float,
+        self, proposed: Decision[S], state: GuardState[S], scan: Scan | None, odometry: Odometry | None, now: float
     ) -> Decision[GuardState[S]]:
         pose = odometry or Odometry()
 
@@ -229,7 +163,7 @@ class Guard(Generic[S]):
         around = from_odometry(state.scan_points, pose)
         room = room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot)
         ahead = speed_within(room, self.braking, self.reaction_s)
-        behind = speed_within(room_behind(around, self.margin, self.robot), self.braking, self.reaction_s)
+        behind = speed_within(room_ahead(-around, self.margin, self.robot), self.braking, self.reaction_s)
         fastest, backward = self.robot.max_speed, self.max_backward if self.robot.may_back else 0.0
         if scan is None or odometry is None:
             fastest, backward = min(fastest, self.max_blind), 0.0
@@ -284,15 +218,7 @@ class Guard(Generic[S]):
 
 
 def find_fault(observation: Observation, last_stamp: float | None) -> str:
-    """Return what is wrong with an observation, in one line; "" if nothing is.
-
-    Parameters
-    ----------
-    observation
-        The sensors' readings and the detections.
-    last_stamp
-        Stamp of the observation before [s]; None for the first.
-    """
+    """Return what is wrong with an observation, "" if nothing is; `last_stamp` [s] is that of the one before."""
     if observation.fault:
         return observation.fault
     if not math.isfinite(observation.stamp):
@@ -336,10 +262,7 @@ def _depth(observation: Observation) -> str:
 
 
 def scan_fault(scan: Scan | None) -> str:
-    """Return what is wrong with a scan, in one line; "" if nothing is, or if there is none.
-
-    A range below `range_min` is no measurement, inf is a beam that met nothing (REP-117, sensor_msgs/LaserScan).
-    """
+    """Return what is wrong with a scan, "" if nothing: inf is a beam that met nothing (REP-117, LaserScan)."""
     if scan is None:
         return ""
     if scan.ranges.size == 0:

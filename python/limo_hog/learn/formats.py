@@ -93,13 +93,7 @@ def _from_folder(folder: Path, pictures: Path | None) -> list[Picture]:
 
 
 def _found(source: Path, named: list[_Named], pictures: Path | None) -> list[Picture]:
-    """Find each picture's file.
-
-    Raises
-    ------
-    LabelError
-        Some are nowhere, or the labels name no picture.
-    """
+    """Find each picture's file; raise `LabelError` where some are nowhere, or the labels name no picture."""
     if not named:
         raise LabelError(f"{source} names no picture; wanted is {_WANTED}")
     found, missing = [], []
@@ -185,8 +179,7 @@ def _voc(root: ElementTree.Element) -> Iterator[_Named]:
     """PASCAL VOC: corners are pixels, counted from 1, and belong to the box."""
     boxes = []
     for thing in root.iter("object"):
-        corners = [float(_text(thing, f"bndbox/{key}")) for key in ("xmin", "ymin", "xmax", "ymax")]
-        left, top, right, bottom = corners
+        left, top, right, bottom = (float(_text(thing, f"bndbox/{key}")) for key in ("xmin", "ymin", "xmax", "ymax"))
         ignored = _text(thing, "difficult", "0").strip() == "1"
         numbers = left - 1, top - 1, right - left + 1, bottom - top + 1
         boxes.append(_box(_text(thing, "name", ""), numbers, ignored))

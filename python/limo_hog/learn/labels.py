@@ -25,22 +25,14 @@ class LabelWarning(UserWarning):
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """One labelled object: x, y, width, height [px] of a box, top left corner first.
+    """One labelled object: x, y, width, height [px] of a box, top left corner first."""
 
-    Attributes
-    ----------
-    label
-        What it is; empty where the labels do not say.
-    ignored
-        Finding it is neither right nor wrong ("difficult", "crowd", "ignore").
-    """
-
-    label: str
+    label: str  #: what it is; empty where the labels do not say
     x: float
     y: float
     width: float
     height: float
-    ignored: bool = False
+    ignored: bool = False  #: finding it is neither right nor wrong ("difficult", "crowd", "ignore")
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -30,54 +30,26 @@ from limo_hog.suppression import intersection_over_union, nms
 
 @dataclass(frozen=True)
 class MiningParameters:
-    """How negatives are found; with these, 3000 photographs gave the weights that are shipped.
+    """How negatives are found; with these, 3000 photographs gave the weights that are shipped."""
 
-    Attributes
-    ----------
-    random_windows
-        Most windows drawn at random, from all negatives together, before there is a detector.
-    random_per_picture
-        Most of them of one picture: more would show the same again.
-    above
-        Least SVM margin of a hard negative: -1 is where the squared hinge begins to count.
-    per_picture
-        Most hard negatives of one picture and round.
-    scale
-        Ratio of neighbouring levels of the search.
-    surest
-        Hits of a picture that are looked at; the first detectors have thousands.
-    max_iou
-        Of two hits that overlap more, the surer is taken.
-    enlarged
-        Share of the pictures that are also searched at twice their size.
-    clear_of_objects
-        Most intersection over union of a negative with a labelled box.
-    """
-
+    #: Most windows drawn at random, from all negatives together, before there is a detector.
     random_windows: int = 20_000
-    random_per_picture: int = 40
-    above: float = -1.0
-    per_picture: int = 6
-    scale: float = 1.1
-    surest: int = 500
-    max_iou: float = 0.5
-    enlarged: float = 0.15
-    clear_of_objects: float = 0.3
+    random_per_picture: int = 40  #: most of them of one picture: more would show the same again
+    above: float = -1.0  #: least SVM margin of a hard negative: -1 is where the squared hinge begins to count
+    per_picture: int = 6  #: most hard negatives of one picture and round
+    scale: float = 1.1  #: ratio of neighbouring levels of the search
+    surest: int = 500  #: hits of a picture that are looked at; the first detectors have thousands
+    max_iou: float = 0.5  #: of two hits that overlap more, the surer is taken
+    enlarged: float = 0.15  #: share of the pictures that are also searched at twice their size
+    clear_of_objects: float = 0.3  #: most intersection over union of a negative with a labelled box
 
 
 @dataclass(frozen=True)
 class Negatives:
-    """Pictures to take negatives from.
+    """Pictures to take negatives from."""
 
-    Attributes
-    ----------
-    paths
-        The pictures.
-    objects
-        Of the pictures that do show objects, their boxes [px], float64 (N, 4).
-    """
-
-    paths: tuple[Path, ...]
+    paths: tuple[Path, ...]  #: the pictures
+    #: Of the pictures that do show objects, their boxes [px], float64 (N, 4).
     objects: dict[Path, NDArray[np.float64]] = field(default_factory=dict)
 
 
@@ -142,6 +114,10 @@ def describe_objects(
         yield descriptors[:0] if known else descriptors
 
 
+#: Boxes float64 (n, 4) [px] and margins (n,).
+_Hits = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
 @dataclass(frozen=True, slots=True)
 class Mined:
     """Negatives of one picture: its index, their boxes float64 (n, 4) [px], margins (n,), descriptors (n, D)."""
@@ -152,63 +128,70 @@ class Mined:
     descriptors: NDArray[np.float32]
 
 
-def random_negatives(
-    negatives: Negatives, shape: WindowShape, parameters: MiningParameters, seed: int, workers: int
-) -> Iterator[Mined]:
-    """Yield windows drawn at random, of every picture about as many; a picture of a window's size gives itself."""
-    hog = hog_of(shape)
-    share = min(parameters.random_per_picture, parameters.random_windows / max(1, len(negatives.paths)))
+@dataclass(frozen=True)
+class Miner:
+    """Takes negatives of a window's shape from pictures; each picture draws from a generator of its own."""
 
-    def work(number: int) -> Mined:
-        image = readable(negatives.paths[number])
-        if image is None:
-            return _nothing(number, hog)
-        rng = np.random.default_rng([seed, 2, number])
-        count = int(share) + int(rng.random() < share % 1)
-        height, width = image.shape
-        if (width, height) == shape.size:
-            boxes = [(0.0, 0.0, float(width), float(height))]
-        else:
-            boxes = random_boxes((width, height), shape.size, count, rng)
-        return _cut_out(
-            image, number, np.array(boxes, np.float64).reshape(-1, 4), None, negatives, shape, parameters, hog
-        )
+    negatives: Negatives
+    shape: WindowShape
+    parameters: MiningParameters
+    seed: int
+    workers: int
 
-    return in_order(work, range(len(negatives.paths)), workers)
+    def random(self) -> Iterator[Mined]:
+        """Yield windows drawn at random, of every picture about as many; a picture of a window's size gives itself."""
+        how, size = self.parameters, self.shape.size
+        share = min(how.random_per_picture, how.random_windows / max(1, len(self.negatives.paths)))
 
+        def boxes_of(number: int, image: NDArray[np.uint8]) -> _Hits:
+            rng = np.random.default_rng([self.seed, 2, number])
+            count = int(share) + int(rng.random() < share % 1)
+            height, width = image.shape
+            if (width, height) == size:
+                drawn = [(0.0, 0.0, float(width), float(height))]
+            else:
+                drawn = random_boxes((width, height), size, count, rng)
+            return np.array(drawn, np.float64).reshape(-1, 4), np.zeros(len(drawn))
 
-def hard_negatives(
-    coefficients: NDArray[np.float64],
-    negatives: Negatives,
-    known: dict[int, set[tuple[float, ...]]],
-    shape: WindowShape,
-    parameters: MiningParameters,
-    seed: int,
-    workers: int,
-) -> Iterator[Mined]:
-    """Search every picture and yield what the detector takes for an object and is not `known`: boxes by picture."""
-    detector, hog = hog_of(shape, coefficients), hog_of(shape)
+        return self._mined(boxes_of, how.random_per_picture)
 
-    def work(number: int) -> Mined:
-        image = readable(negatives.paths[number])
-        if image is None:
-            return _nothing(number, hog)
-        boxes, margins = _search(detector, image, parameters)
-        if np.random.default_rng([seed, 3, number]).random() < parameters.enlarged:
-            more_boxes, more_margins = _search(detector, image, parameters, enlarged=2)
-            boxes, margins = np.concatenate([boxes, more_boxes / 2]), np.concatenate([margins, more_margins])
-        surest = np.argsort(-margins, kind="stable")[: parameters.surest]
-        boxes, margins = boxes[surest], margins[surest]
-        kept = nms(boxes, margins, parameters.max_iou)
-        fresh = [tuple(box) not in known.get(number, ()) for box in boxes[kept].tolist()]
-        kept = kept[np.array(fresh, np.bool_)]
-        return _cut_out(image, number, boxes[kept], margins[kept], negatives, shape, parameters, hog)
+    def hard(self, coefficients: NDArray[np.float64], known: Mapping[int, set[tuple[float, ...]]]) -> Iterator[Mined]:
+        """Search every picture and yield what the detector takes for an object and is not `known`: boxes by picture."""
+        how, detector = self.parameters, hog_of(self.shape, coefficients)
 
-    return in_order(work, range(len(negatives.paths)), workers)
+        def boxes_of(number: int, image: NDArray[np.uint8]) -> _Hits:
+            boxes, margins = _search(detector, image, how)
+            if np.random.default_rng([self.seed, 3, number]).random() < how.enlarged:
+                more_boxes, more_margins = _search(detector, image, how, enlarged=2)
+                boxes, margins = np.concatenate([boxes, more_boxes / 2]), np.concatenate([margins, more_margins])
+            surest = np.argsort(-margins, kind="stable")[: how.surest]
+            boxes, margins = boxes[surest], margins[surest]
+            kept = nms(boxes, margins, how.max_iou)
+            fresh = [tuple(box) not in known.get(number, ()) for box in boxes[kept].tolist()]
+            kept = kept[np.array(fresh, np.bool_)]
+            return boxes[kept], margins[kept]
 
+        return self._mined(boxes_of, how.per_picture)
 
-def _nothing(number: int, hog: _core.Hog) -> Mined:
-    return Mined(number, np.empty((0, 4)), np.empty(0), describe(hog, []))
+    def _mined(self, boxes_of: Callable[[int, NDArray[np.uint8]], _Hits], most: int) -> Iterator[Mined]:
+        """Cut out of each picture the first `most` of its windows that are clear of labelled objects."""
+        hog = hog_of(self.shape)
+
+        def work(number: int) -> Mined:
+            path = self.negatives.paths[number]
+            image = readable(path)
+            if image is None:
+                return Mined(number, np.empty((0, 4)), np.empty(0), describe(hog, []))
+            boxes, margins = boxes_of(number, image)
+            objects = self.negatives.objects.get(path)
+            if objects is not None and len(objects) and len(boxes):
+                overlaps = intersection_over_union(self.shape.object_box.inside(boxes), objects).max(axis=1)
+                clear = overlaps <= self.parameters.clear_of_objects
+                boxes, margins = boxes[clear], margins[clear]
+            boxes, margins = boxes[:most], margins[:most]
+            return Mined(number, boxes, margins, describe(hog, [cut(image, box, self.shape.size) for box in boxes]))
+
+        return in_order(work, range(len(self.negatives.paths)), self.workers)
 
 
 def hardest(found: Sequence[Mined], room: int) -> tuple[list[Mined], int]:
@@ -228,9 +211,7 @@ def hardest(found: Sequence[Mined], room: int) -> tuple[list[Mined], int]:
     return hardest, len(margins) - most
 
 
-def _search(
-    detector: _core.Hog, image: NDArray[np.uint8], parameters: MiningParameters, enlarged: int = 1
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _search(detector: _core.Hog, image: NDArray[np.uint8], parameters: MiningParameters, enlarged: int = 1) -> _Hits:
     # No padding: a window beyond the edge would learn what mirroring looks like.
     height, width = image.shape
     boxes, margins = detector.detect_multi_scale(
@@ -241,28 +222,3 @@ def _search(
         first_level=(enlarged * width, enlarged * height),
     )
     return boxes.astype(np.float64), margins
-
-
-def _cut_out(
-    image: NDArray[np.uint8],
-    number: int,
-    boxes: NDArray[np.float64],
-    margins: NDArray[np.float64] | None,
-    negatives: Negatives,
-    shape: WindowShape,
-    parameters: MiningParameters,
-    hog: _core.Hog,
-) -> Mined:
-    """Cut out the windows that are clear of labelled objects, of hard ones the surest few."""
-    objects = negatives.objects.get(negatives.paths[number])
-    if objects is not None and len(objects) and len(boxes):
-        clear = (
-            intersection_over_union(shape.object_box.inside(boxes), objects).max(axis=1) <= parameters.clear_of_objects
-        )
-        boxes = boxes[clear]
-        margins = None if margins is None else margins[clear]
-    if margins is None:
-        margins = np.zeros(len(boxes))
-    else:
-        boxes, margins = boxes[: parameters.per_picture], margins[: parameters.per_picture]
-    return Mined(number, boxes, margins, describe(hog, [cut(image, box, shape.size) for box in boxes]))

@@ -31,58 +31,31 @@ class Source:
 
 @dataclass(frozen=True)
 class TrainingData:
-    """All that a detector is made of.
+    """All that a detector is made of."""
 
-    Attributes
-    ----------
-    shape
-        The window.
-    regions
-        A window around each object; one without width is a whole picture, a crop.
-    negatives
-        Pictures to take negatives from.
-    validation
-        Labelled pictures that are not learnt from; where there are none, the detector is not measured.
-    min_height
-        Height [px] from which objects are sought when the detector is measured.
-    sources
-        Of each input, what it held.
-    """
-
-    shape: WindowShape
-    regions: tuple[Region, ...]
-    negatives: Negatives
+    shape: WindowShape  #: the window
+    regions: tuple[Region, ...]  #: a window around each object; one without width is a whole picture, a crop
+    negatives: Negatives  #: pictures to take negatives from
+    #: Labelled pictures that are not learnt from; where there are none, the detector is not measured.
     validation: tuple[Picture, ...]
-    min_height: float
-    sources: tuple[Source, ...]
+    min_height: float  #: height [px] from which objects are sought when the detector is measured
+    sources: tuple[Source, ...]  #: of each input, what it held
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the user asked for.
+    """What the user asked for."""
 
-    Attributes
-    ----------
-    data, negatives
-        Labels or folders of crops; folders of pictures without the object.
-    validation
-        Labels to measure on; None holds back a share of the pictures in `data`.
-    label, window
-        Which label; the window's size [px].
-    held_out
-        Share held back.
-    seed
-        Of the choice of what is held back.
-    """
-
+    #: data, negatives: labels or folders of crops; folders of pictures without the object.
     data: tuple[Path, ...]
     negatives: tuple[Path, ...] = ()
-    validation: Path | None = None
+    validation: Path | None = None  #: labels to measure on; None holds back a share of the pictures in `data`
+    #: label, window: which label; the window's size [px].
     label: str | None = None
     pictures: Path | None = None
     window: tuple[int, int] | None = None
-    held_out: float = 0.2
-    seed: int = 0
+    held_out: float = 0.2  #: share held back
+    seed: int = 0  #: of the choice of what is held back
 
 
 def gather(wanted: Wanted) -> TrainingData:

@@ -16,14 +16,7 @@ from numpy.typing import NDArray
 
 from limo_hog import _core
 from limo_hog.learn.labels import LabelError
-from limo_hog.learn.mining import (
-    Mined,
-    MiningParameters,
-    describe_objects,
-    hard_negatives,
-    hardest,
-    random_negatives,
-)
+from limo_hog.learn.mining import Mined, Miner, MiningParameters, describe_objects, hardest
 from limo_hog.learn.solver import solve
 from limo_hog.learn.sources import TrainingData
 from limo_hog.learn.windows import Jitter
@@ -35,62 +28,34 @@ Progress = Callable[[str, int | None], None]
 
 @dataclass(frozen=True)
 class TrainingParameters:
-    """How a detector is trained; chosen on USC-C and TUD-Stadtmitte, frames 1 to 41.
+    """How a detector is trained; chosen on USC-C and TUD-Stadtmitte, frames 1 to 41."""
 
-    Attributes
-    ----------
-    c
-        Weight of the loss against ½‖w‖²; .0003 to .01 were tried.
-    bias_feature
-        The constant feature that makes the bias.
-    rounds
-        Of hard-negative mining; the first gives most.
-    mirror
-        Take each object the other way round, too.
-    most_bytes
-        Most memory of descriptors [B]; beyond it the least hard new negatives are left out.
-    seed
-        Of all that is drawn.
-    """
-
-    c: float = 0.003
-    bias_feature: float = 10.0
-    rounds: int = 3
-    mirror: bool = True
-    most_bytes: int = 2**31
-    seed: int = 0
+    c: float = 0.003  #: weight of the loss against ½‖w‖²; .0003 to .01 were tried
+    bias_feature: float = 10.0  #: the constant feature that makes the bias
+    rounds: int = 3  #: of hard-negative mining; the first gives most
+    mirror: bool = True  #: take each object the other way round, too
+    most_bytes: int = 2**31  #: most memory of descriptors [B]; beyond it the least hard new negatives are left out
+    seed: int = 0  #: of all that is drawn
     jitter: Jitter = field(default_factory=Jitter)
     mining: MiningParameters = field(default_factory=MiningParameters)
 
 
 @dataclass(frozen=True)
 class Round:
-    """What a round came to; round 0 has random negatives only.
-
-    Attributes
-    ----------
-    coefficients
-        float64 (D + 1,): weights and bias.
-    objects, negatives
-        How many different objects, and how many negatives, were learnt from.
-    new, left_out
-        Hard negatives that the round added, and those that were too many for the memory.
-    descriptor_bytes
-        Memory of all descriptors [B].
-    seconds
-        Since training began.
-    """
+    """What a round came to; round 0 has random negatives only."""
 
     number: int
-    coefficients: NDArray[np.float64]
+    coefficients: NDArray[np.float64]  #: float64 (D + 1,): weights and bias
+    #: objects, negatives: how many different objects, and how many negatives, were learnt from
     objects: int
     negatives: int
+    #: new, left_out: hard negatives that the round added, and those that were too many for the memory
     new: int
     left_out: int
-    descriptor_bytes: int
+    descriptor_bytes: int  #: memory of all descriptors [B]
     objective: float
     iterations: int
-    seconds: float
+    seconds: float  #: since training began
 
 
 def train(
@@ -126,8 +91,8 @@ def _rounds(
         raise LabelError(f"none of the {len(data.regions)} objects can be read")
     count, positives = len(objects), [np.concatenate(objects)]
     del objects
-    drawn = random_negatives(data.negatives, data.shape, how.mining, how.seed, workers)
-    negatives = _blocks(_told(drawn, "random negatives", len(data.negatives.paths), progress))
+    miner = Miner(data.negatives, data.shape, how.mining, how.seed, workers)
+    negatives = _blocks(_told(miner.random(), "random negatives", len(data.negatives.paths), progress))
     if not negatives:
         raise LabelError(
             f"none of the {len(data.negatives.paths)} pictures for negatives is as large as the window, "
@@ -138,7 +103,7 @@ def _rounds(
     for number in range(how.rounds + 1):
         new = left_out = 0
         if last is not None:
-            hard = hard_negatives(last, data.negatives, known, data.shape, how.mining, how.seed, workers)
+            hard = miner.hard(last, known)
             stage = f"round {number} of {how.rounds}: searching"
             room = how.most_bytes - sum(block.nbytes for block in (*positives, *negatives))
             found, left_out = hardest(list(_told(hard, stage, len(data.negatives.paths), progress)), room)

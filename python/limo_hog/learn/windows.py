@@ -112,23 +112,12 @@ def cut(image: NDArray[np.uint8], box: Sequence[float], size: tuple[int, int]) -
 
 @dataclass(frozen=True)
 class Jitter:
-    """How a second copy of each object differs from the first; stronger jitter made people harder to find.
+    """How a second copy of each object differs from the first; stronger jitter made people harder to find."""
 
-    Attributes
-    ----------
-    shift
-        Most pixels of the window it is moved by, each way.
-    size
-        Most it is enlarged or shrunk, as a share.
-    blurred
-        Share of the copies that are blurred.
-    sigma
-        Least and most standard deviation of the Gaussian blur [px of the window].
-    """
-
-    shift: float = 2.0
-    size: float = 0.04
-    blurred: float = 0.3
+    shift: float = 2.0  #: most pixels of the window it is moved by, each way
+    size: float = 0.04  #: most it is enlarged or shrunk, as a share
+    blurred: float = 0.3  #: share of the copies that are blurred
+    #: Least and most standard deviation of the Gaussian blur [px of the window].
     sigma: tuple[float, float] = (0.45, 0.8)
 
 

@@ -86,7 +86,7 @@ def serialize(message: Any) -> bytes:
     return bytes(typestore().serialize_cdr(message, message.__msgtype__))
 
 
-def deserialize(data: bytes, type_name: str) -> Any:
+def deserialize(data: bytes | memoryview, type_name: str) -> Any:
     """Read a message from its CDR bytes.
 
     Raises

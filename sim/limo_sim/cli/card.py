@@ -29,11 +29,11 @@ def show(card: ScoreCard) -> None:
 def picture(card: ScoreCard) -> Panel:
     """Lay a score card out: figures in two columns, below them shares of time as bars."""
     figures = Table.grid(padding=(0, 2))
-    figures.add_column(style="dim", no_wrap=True)
-    figures.add_column(no_wrap=True)
-    figures.add_column(style="dim", no_wrap=True)
-    figures.add_column(no_wrap=True)
+    for style in ("dim", "", "dim", ""):
+        figures.add_column(style=style, no_wrap=True)
     contacts = card.contacts_person + card.contacts_wall
+    switches = "–" if card.identity_switches is None else str(card.identity_switches)
+    near = card.intrusion_intimate, card.intrusion_personal
     error = "error to target" if card.kept_m is None else f"error to {card.kept_m:.3g} m"
     for row in (
         ("success", _success(card), "distance, mean", _unit(card.distance_mean_m, "m", 2)),
@@ -44,18 +44,8 @@ def picture(card: ScoreCard) -> Panel:
         ("best box wrong", _share(card.best_box_wrong, 0, 0.05), "path", _unit(card.path_m, "m")),
         ("pixel error", _pixels(card), "turn-rate change", _unit(card.mean_abs_domega, "rad/s", 3)),
         ("lost", _losses(card), "jerk", _unit(card.jerk_mean, "m/s³")),
-        (
-            "target switches",
-            _count(card.identity_switches),
-            "time to find again",
-            _unit(card.time_to_find_again_s, "s"),
-        ),
-        (
-            "near anybody",
-            f"intimate {_percent(card.intrusion_intimate)}",
-            "",
-            f"personal {_percent(card.intrusion_personal)}",
-        ),
+        ("target switches", switches, "time to find again", _unit(card.time_to_find_again_s, "s")),
+        ("near anybody", f"intimate {_percent(near[0])}", "", f"personal {_percent(near[1])}"),
     ):
         figures.add_row(*row)
     bars = Table.grid(padding=(0, 2))
@@ -110,10 +100,6 @@ def _unit(value: float | None, unit: str, digits: int = 1) -> str:
 
 def _success(card: ScoreCard) -> Text | str:
     return "–" if card.success is None else _good("yes" if card.success else "no", card.success)
-
-
-def _count(count: int | None) -> str:
-    return "–" if count is None else str(count)
 
 
 def _pixels(card: ScoreCard) -> str:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import add_follower
+from limo_hog.cli.support.arguments import add_follower, add_json
 from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
-from limo_sim.cli.options import add_json, add_scenario
+from limo_sim.cli.options import add_scenario
 from limo_sim.cli.watching import HERE, PORT, add_watching, finish, observing, shown_unasked
 
 if TYPE_CHECKING:
@@ -26,11 +26,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     add_follower(parser)
     add_scenario(parser, 60.0, "simulated time (60)")
-    add_json(parser)
+    add_json(parser, "the score card as JSON")
     parser.add_argument(
-        "--ros2",
-        action="store_true",
-        help="follow on a ROS 2 robot instead (see `follow --ros2 --help`)",
+        "--ros2", action="store_true", help="follow on a ROS 2 robot instead (see `follow --ros2 --help`)"
     )
     add_watching(parser)
 
@@ -55,15 +53,8 @@ def run(args: argparse.Namespace) -> int:
                 bar.update(task, completed=round(step.log.time, 1), description=step.log.decision.mode.value)
                 observers.notify(step)
 
-            episode = run_episode(
-                scenario,
-                controller,
-                detector,
-                args.seconds,
-                args.seed,
-                names=(args.controller, args.detector),
-                watch=watch,
-            )
+            names = args.controller, args.detector
+            episode = run_episode(scenario, controller, detector, args.seconds, args.seed, names=names, watch=watch)
         card = score(episode)
         observers.end(episode, card)
     finish(args, card)

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 
-from limo_hog.cli.support.arguments import output_file, seconds, seed
+from limo_hog.cli.support.arguments import seconds, seed
 
 
-def add_scenario(parser: ArgumentParser, default_seconds: float, seconds_help: str) -> None:
+def add_scenario(parser: ArgumentParser, default_seconds: float | None, seconds_help: str, more: str = "") -> None:
     """Add --scenario, --seconds and --seed."""
     parser.add_argument(
-        "--scenario", default="workshop", metavar="NAME|FILE.toml", help="the scenario to run (%(default)s)"
+        "--scenario", default="workshop", metavar="NAME|FILE.toml", help=f"the scenario to run{more} (%(default)s)"
     )
     parser.add_argument("--seconds", type=seconds, default=default_seconds, metavar="S", help=seconds_help)
     parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
-
-
-def add_json(parser: ArgumentParser, what: str = "the score card") -> None:
-    """Add --json."""
-    parser.add_argument("--json", type=output_file, metavar="FILE", help=f"write {what} as JSON; - is standard output")

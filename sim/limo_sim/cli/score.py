@@ -14,14 +14,13 @@ from rich.table import Table
 from rich.text import Text
 
 from limo_hog.atomic import about, whole_file
-from limo_hog.cli.support.arguments import add_target_and_detector, count, file_ending, seconds, seed
+from limo_hog.cli.support.arguments import add_json, add_target_and_detector, count, file_ending, seconds, seed
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.parallel import cores
-from limo_sim.cli.options import add_json
 
 if TYPE_CHECKING:
     from limo_sim.run.score import ScoreCard
@@ -72,7 +71,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--seconds", type=seconds, metavar="S", help=f"simulated time of a run ({_SECONDS:g})")
     add_target_and_detector(parser)
     parser.add_argument("--workers", type=count, metavar="N", help="processes (one for each core)")
-    add_json(parser, "every score card and the summary")
+    add_json(parser, "every score card and the summary as JSON")
     parser.add_argument(
         "--csv",
         type=file_ending(".csv"),

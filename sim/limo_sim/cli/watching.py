@@ -91,21 +91,11 @@ def shown_unasked(args: argparse.Namespace) -> bool:
 
 @dataclass
 class Observers:
-    """Those who look on at one run: pass `notify` to the run, and call `end` after it.
+    """Those who look on at one run: pass `notify` to the run, and call `end` after it."""
 
-    Attributes
-    ----------
-    keepers
-        What writes to files; a signal does not interrupt these.
-    plot
-        File of the figure, drawn at the end.
-    view
-        The live page.
-    """
-
-    keepers: list[Watch] = field(default_factory=list)
-    plot: Path | None = None
-    view: View | None = None
+    keepers: list[Watch] = field(default_factory=list)  #: what writes to files; a signal does not interrupt these
+    plot: Path | None = None  #: file of the figure, drawn at the end
+    view: View | None = None  #: the live page
     _steps: list[Step] = field(default_factory=list)
 
     def __bool__(self) -> bool:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import itertools
+import os
+import shlex
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack, closing
@@ -10,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from limo_hog.atomic import part_of, whole_file, write_text
-from limo_hog.cli.support.arguments import count, output_file, seconds
+from limo_hog.cli.support.arguments import add_json, count, output_file, seconds
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
 
 #: What `check` prints is no wider [columns].
 WIDTH = 80
+#: More checkpoints in a row that were not tried are told in one line.
+_FOLDED = 2
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -54,28 +59,31 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                 metavar="N",
                 help="show N hints for the first checkpoint that does not hold (1)",
             )
-            one.add_argument(
-                "--json",
-                type=output_file,
-                metavar="FILE",
-                help="write points and evidence as JSON; - is standard output",
-            )
+            add_json(one, "points and evidence as JSON")
             one.add_argument("--html", metavar="FILE", help="write a report with the node's pictures as one page")
-            one.add_argument("--stretch", choices=tuple("abcde"), help="a stretch task instead of tasks 1 to 4")
+            _add_exercise(one)
             one.add_argument(
                 "--gradescope", type=output_file, metavar="FILE", help="write results.json for a Gradescope autograder"
             )
-        one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
+        else:
+            one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
     words = "check every node in a folder, each in a process of its own, and write a table of points"
     one = actions.add_parser("grade", help=words, description=words.capitalize() + ".")
-    one.add_argument("folder", metavar="FOLDER", type=Path, help="its .py files, and those of the folders in it")
+    one.add_argument("folder", metavar="FOLDER", type=Path, help="a .py file or a folder, such as a package, a student")
     one.add_argument(
         "--csv", type=output_file, metavar="FILE", default=STDOUT, help="where the table goes (-: standard output)"
     )
     one.add_argument("--seconds", type=seconds, default=100.0, metavar="S", help="wall time of a node (100)")
     one.add_argument("--memory", type=count, default=4000, metavar="MB", help="memory of a node, not on Windows (4000)")
-    one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
-    one.add_argument("--stretch", choices=tuple("abcde"), help="a stretch task instead of tasks 1 to 4")
+    one.add_argument("--html", metavar="DIR", type=Path, help="write a page of feedback for each node into this folder")
+    _add_exercise(one)
+
+
+def _add_exercise(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
+    group.add_argument("--stretch", choices=tuple("abcde"), help="a stretch task instead of tasks 1 to 4")
+    group.add_argument("--exercise", metavar="FILE.toml", help="an exercise of your own instead of tasks 1 to 4")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -84,9 +92,8 @@ def run(args: argparse.Namespace) -> int:
 
     node = "proxemic" if args.sequel else "follower"
     if getattr(args, "stretch", None):
-        if args.sequel:
-            raise UsageError("--sequel and --stretch: one of them")
         node = f"stretch {args.stretch}"
+    node = getattr(args, "exercise", None) or node
     if args.action == "grade":
         return _grade(args, node)
     if args.action == "check":
@@ -109,6 +116,8 @@ def run(args: argparse.Namespace) -> int:
         if missed:
             raise LimoHogError(f"{args.file}: {len(missed)} of {len(verdicts)} checkpoints do not hold")
         return 0
+    if args.action == "solution" and os.environ.get("LIMO_HOG_HIDE_SOLUTION"):
+        raise UsageError("the model solution is hidden on this computer: LIMO_HOG_HIDE_SOLUTION is set")
     text = template(node) if args.action == "new" else solution(node)
     path = args.file or Path(f"{node}.py" if args.action == "new" else f"{node}_solution.py")
     if str(path) == STDOUT:
@@ -117,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
     if path.exists():
         raise UsageError(f"{path} is there already; give another name")
     write_text(path, text)
-    print(f"{path} is written; try it: limo-hog run {path}", file=sys.stderr)
+    print(f"{path} is written; try it: limo-hog run {shlex.quote(str(path))}", file=sys.stderr)
     return 0
 
 
@@ -131,6 +140,8 @@ def _grade(args: argparse.Namespace, node: str) -> int:
     if not files:
         raise UsageError(f"{args.folder}: no Python file in it, nor in the folders in it")
     limits = Limits(seconds=args.seconds, memory_mb=args.memory)
+    if args.html is not None:
+        args.html.mkdir(parents=True, exist_ok=True)
     grades: list[Grade] = []
     with ExitStack() as stack:
         target = sys.stdout
@@ -143,7 +154,7 @@ def _grade(args: argparse.Namespace, node: str) -> int:
         table = Table(node, args.folder, target)
         bar = stack.enter_context(progress("files"))
         task = bar.add_task("graded", total=len(files))
-        for graded in stack.enter_context(closing(grade(files, args.folder, cores(), node, limits))):
+        for graded in stack.enter_context(closing(grade(files, args.folder, cores(), node, limits, pages=args.html))):
             table.add(graded)
             grades.append(graded)
             bar.advance(task)
@@ -166,19 +177,26 @@ def _show(verdicts: list[Verdict], hints: int) -> None:
     from rich.padding import Padding
     from rich.text import Text
 
-    from limo_sim.workshop.checkpoints import task_name
+    from limo_sim.workshop.exercises import task_name
     from limo_sim.workshop.report import by_task, evidence, total
 
     marks = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "dim")}
     screen = console()
     width = min(screen.width, WIDTH)
-    for verdict in verdicts:
-        won = f"{verdict.points:3d}/{verdict.worth:<3d}" if verdict.worth else " " * 7
-        screen.print(Text.assemble(marks[verdict.holds], f" task {task_name(verdict.task)} {won} {verdict.checkpoint}"))
-        style = "" if verdict.holds is False else "dim"
-        screen.print(
-            Padding(Text(evidence(verdict), style=style, overflow="fold"), (0, 0, 0, 4), expand=False), width=width
-        )
+    for holds, group in itertools.groupby(verdicts, key=lambda verdict: verdict.holds):
+        for verdict in (several := list(group)):
+            won = f"{verdict.points:3d}/{verdict.worth:<3d}" if verdict.worth else " " * 7
+            title = f" task {task_name(verdict.task)} {won} {verdict.checkpoint}"
+            if holds is None and len(several) > _FOLDED:
+                title = (
+                    f" {len(several)} checkpoints of task {task_name(verdict.task)} to {task_name(several[-1].task)}"
+                )
+            screen.print(Text.assemble(marks[holds], title))
+            if not holds:
+                told = Padding(Text(evidence(verdict), overflow="fold"), (0, 0, 0, 4), expand=False)
+                screen.print(told, width=width, style="dim" if holds is None else "")
+            if holds is None and len(several) > _FOLDED:
+                break
     points, worth = total(verdicts)
     tasks = ", ".join(f"task {task_name(task)}: {won} of {of}" for task, (won, of) in by_task(verdicts).items())
     screen.print(f"{points} of {worth} points ({tasks})", width=width)

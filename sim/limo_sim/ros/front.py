@@ -42,7 +42,7 @@ class _Module(ModuleType):
 _ROS_TOPS = tuple(
     "rclpy message_filters cv_bridge image_transport image_geometry laser_geometry rosbag2_py tf2_ros tf2_py "
     "tf2_geometry_msgs tf_transformations launch launch_ros ament_index_python rosidl_runtime_py "
-    "nav2_simple_commander".split()
+    "nav2_simple_commander sensor_msgs_py".split()
 )
 
 

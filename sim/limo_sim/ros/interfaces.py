@@ -75,7 +75,9 @@ def _from_wire(field: Field, value: Any) -> Any:
     if field.is_message:
         return from_wire(value) if field.length is None else [from_wire(item) for item in value]
     if field.length == 0 and field.is_numeric:
-        return array.array(_code(field), np.ascontiguousarray(value).tobytes())
+        copied = array.array(_code(field))
+        copied.frombytes(np.ascontiguousarray(value).view(np.uint8).data)
+        return copied
     return copy.copy(value)
 
 

@@ -78,7 +78,7 @@ def run_node(
     *,
     limits: Limits | None = None,
     said: Said = lambda *_: None,
-    fast: bool = False,
+    checked: bool = False,
 ) -> Ended:
     """Run the stage's script as `python SCRIPT ARGUMENTS` would, with the arena behind its topics.
 
@@ -92,8 +92,9 @@ def run_node(
         What the node may use.
     said
         Is given what the node prints.
-    fast
-        Whether limo-hog's HOG detector stands in for OpenCV's: the same boxes in less time.
+    checked
+        Whether the stage's witness is shown what detectors are given; limo-hog's HOG then stands in for OpenCV's: the
+        same boxes in less time.
 
     Raises
     ------
@@ -105,7 +106,7 @@ def run_node(
     run = _Run(stage, limits or Limits(), said)
     with ready() as worker:
         try:
-            run.begin(worker, arguments, fast)
+            run.begin(worker, arguments, checked)
             fault = run.serve()
         finally:
             worker.end()
@@ -131,7 +132,7 @@ class _Run:
         self._fault: Fault | None = None
         self._received = bytearray()
 
-    def begin(self, worker: Worker, arguments: Sequence[str], fast: bool) -> None:
+    def begin(self, worker: Worker, arguments: Sequence[str], checked: bool) -> None:
         """Start the node."""
         self._worker = worker
         pairs = [socket.socketpair() for _ in range(3)]
@@ -144,7 +145,7 @@ class _Run:
             "seconds": self._stage.seconds,
             "patience": self._limits.patience,
             "memory_mb": self._limits.memory_mb,
-            "fast": fast,
+            "checked": checked,
         }
         worker.begin(job, [theirs for _, theirs in pairs])
         for _, theirs in pairs:
@@ -296,7 +297,9 @@ class _Run:
         now, news = self._stage.advance(wanted, target)
         sizes = [(topic, len(data)) for topic, data in news]
         with suppress(BrokenPipeError, ConnectionResetError):  # the node is gone: its link will say so
-            self._ends[-1].sendall(packed([now, sizes], b"".join(data for _, data in news)))
+            # (Images are not copied together.)
+            for part in (packed([now, sizes], more=sum(len(data) for _, data in news)), *(data for _, data in news)):
+                self._ends[-1].sendall(part)
         self._wait()
 
     def _wait(self) -> None:

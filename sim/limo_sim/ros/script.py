@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import runpy
 import sys
+import tokenize
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,10 +24,14 @@ def run_script(world: World, arguments: Sequence[str] = ()) -> Fault | None:
     """Run the world's script as `python SCRIPT ARGUMENTS` would; return why it ended before its time, None if not."""
     argv, path = sys.argv, list(sys.path)
     sys.argv = [str(world.script), *arguments]
-    sys.path.insert(0, str(world.script.resolve().parent))
+    here = world.script.resolve().parent
+    # As where it is installed, an ament package finds its own modules: beside package.xml, or in the folder above.
+    packages = [folder for folder in (here, *here.parents[:3]) if (folder / "package.xml").is_file()]
+    sys.path[:0] = [str(folder) for folder in (here, *packages, *(folder.parent for folder in packages))]
     with in_front(world), watched_cv2(world):
         try:
             with world.patience.watching(), world.turns.main(Context(world)):
+                _check_encoding(world.script)
                 runpy.run_path(str(world.script), run_name="__main__")
         except (RunOver, ExternalShutdownException):
             pass
@@ -40,12 +45,24 @@ def run_script(world: World, arguments: Sequence[str] = ()) -> Fault | None:
     return None if world.fault is None else _told(world.fault, str(world.script))
 
 
+def _check_encoding(script: Path) -> None:
+    """Refuse a source that `python SCRIPT` refuses, and `compile` does not where the odd byte is in a comment."""
+    try:
+        with tokenize.open(script) as source:
+            source.read()
+    except UnicodeDecodeError as error:
+        said = f"byte {error.object[error.start]:#x} is no {error.encoding}: save the file as UTF-8"
+        raise SyntaxError(said, (str(script), None, None, None)) from None
+
+
 def _told(error: BaseException, script: str) -> Fault:
     how = "hung" if isinstance(error, HungError) else f"failed with {type(error).__name__}"
     try:
         message = str(error)
     except BaseException as second:  # whatever a class of the script's raises
         message = f"its text cannot be read: __str__ raises {type(second).__name__}"
+    if isinstance(error, EOFError) or type(error).__module__ == "termios":
+        message += "; a node has no keyboard here: give it parameters, --ros-args -p NAME:=VALUE"
     lines = [line for frame, line in traceback.walk_tb(error.__traceback__) if frame.f_code.co_filename == script]
     if not lines and isinstance(error, SyntaxError) and error.filename == script and error.lineno:
         lines = [error.lineno]

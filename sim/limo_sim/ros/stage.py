@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_hog.follow.decision import Decision, Mode
@@ -36,6 +37,22 @@ from limo_sim.world.scenario import Scenario
 _AFTERMATH = 2.0
 #: What a node may tell in one step of the arena; a loop that publishes tells so much in seconds. Chosen.
 _MOST_TOLD = 10_000
+
+
+class Witness:
+    """Is told what a node does, as it does it; this one takes no notice."""
+
+    def frame(self, time: float, frame: TrueFrame) -> None:
+        """Note that the node is given an image."""
+
+    def found(self, time: float, found: Found, picture: NDArray[np.uint8]) -> None:
+        """Note what was found in a picture, be it by OpenCV's HOG, limo-hog's detectors or a tracker."""
+
+    def shown(self, window: str, shown: Shown) -> None:
+        """Note a picture in a window."""
+
+    def command(self, command: Command) -> None:
+        """Note a command."""
 
 
 class Stage:
@@ -73,6 +90,7 @@ class Stage:
         *,
         log: Log = lambda *_: None,
         watch: Watch = lambda _: None,
+        witness: Witness | None = None,
     ) -> None:
         scenario.check_detector_is_plain("a node brings its own detector")
         self._began = time.perf_counter()
@@ -81,6 +99,7 @@ class Stage:
         self.seconds = seconds
         self.log = log
         self.watch = watch
+        self._witness = witness or Witness()
         # (An hour's: 28 bytes each.)
         self._driven, self._lines = array("d"), array("i")
         self.found: list[Found] = []
@@ -109,6 +128,7 @@ class Stage:
             "log": lambda *line: self.log(self.time, *(str(part) for part in line)),
             "looked": self._looked,
             "published": lambda topic: self.published.add(str(topic)),
+            "read": lambda line: setattr(self.calls, "solution_read", int(line or 0)),
             "shown": self._show,
             "slept": self._slept,
             "spun": lambda: setattr(self.calls, "spun", True),
@@ -165,9 +185,13 @@ class Stage:
         self._warn()
         return self.time, news
 
-    def _called(self, kind: str, name: str, line: int | None) -> None:
+    def _called(self, kind: str, name: str, line: int | None, type_name: str = "") -> None:
         lines: dict[str, int | None] = getattr(self.calls, kind)
         lines.setdefault(str(name), line)
+        if type_name:
+            self.calls.types.setdefault(str(name), str(type_name))
+        if kind == "unmatched":
+            self.log(self.time, "WARN", LOGGER, str(name))
         if kind in ("readers", "clients"):
             self._due.setdefault((kind, str(name)), self.time + UNHEARD_AFTER)
 
@@ -176,6 +200,7 @@ class Stage:
             raise ValueError(f"a command of {linear} m/s and {angular} rad/s")
         self._driven.extend((self.time, linear, angular))
         self._lines.append(line or 0)
+        self._witness.command(Command(self.time, Twist(float(linear), float(angular)), line))
         self.arena.command(Twist(float(linear), float(angular)))
 
     def _looked(self, at: str, line: int | None, has_svm: bool) -> None:
@@ -184,14 +209,21 @@ class Stage:
         if not has_svm:
             self.calls.searched_without_svm = line
 
-    def _find(self, shape: list[int], boxes: list[list[int]], scores: list[float], ms: float) -> None:
-        if len(shape) not in (2, 3) or min(shape) < 1:
-            raise ValueError(f"a picture of {shape}")
-        found = Detections(np.array(boxes, np.int32).reshape(-1, 4), np.array(scores, np.float64))
-        self.found.append(Found(tuple(shape), found, float(ms)))
+    def _find(
+        self, shape: list[int], boxes: list[list[int]], scores: list[float], ms: float, hog: bool, *, data: bytes = b""
+    ) -> None:
+        if len(shape) not in (2, 3) or min(shape) < 1 or len(boxes) != len(scores):
+            raise ValueError(f"a picture of {shape} with {len(boxes)} boxes and {len(scores)} scores")
+        boxes_, scores_ = np.array(boxes, np.int32).reshape(-1, 4), np.array(scores, np.float64)
+        found = Found(tuple(shape), Detections(boxes_, scores_), float(ms))
+        if hog:
+            self.found.append(found)
+        if data:
+            self._witness.found(self.time, found, np.frombuffer(data, np.uint8).reshape(shape))
 
     def _show(self, window: str, shape: list[int], *, data: bytes) -> None:
-        self.shown[str(window)] = Shown(self.time, np.frombuffer(data, np.uint8).reshape(shape))
+        self.shown[str(window)] = shown = Shown(self.time, np.frombuffer(data, np.uint8).reshape(shape))
+        self._witness.shown(str(window), shown)
 
     def _closed(self, window: str | None) -> None:
         for name in list(self.shown) if window is None else [window]:
@@ -208,7 +240,8 @@ class Stage:
             line = getattr(self.calls, kind)[name]
             if kind == "readers" and name not in PUBLISHED and name not in self.calls.writers:
                 where = "" if line is None else f", subscribed to at line {line}"
-                said = f"nobody publishes {name!r}{where}; did you mean {nearest_topic(name)!r}?"
+                said = f"nobody publishes {name!r}{where}; did you mean "
+                said += f"{nearest_topic(name, self.calls.types.get(name, ''))!r}?"
                 self.log(self.time, "WARN", LOGGER, said)
             if kind == "clients" and name not in self.calls.services:
                 where = "" if line is None else f", asked for at line {line}"
@@ -221,6 +254,7 @@ class Stage:
         if self._frame is None or frame.stamp > self._frame.stamp:
             self._render_ms = 1e3 * (time.perf_counter() - drawing)
             self._frame, self.found = frame, []
+            self._witness.frame(self.time, frame)
         return [
             (topic, serialize(make()))
             for topic, make in self._outlet.new()
@@ -269,7 +303,7 @@ class Stage:
 
     def finish(self, fault: Fault | None = None) -> Ended:
         """Let the arena go on without commands until the time is up, or the robot stands; return how the run ended."""
-        failed_at = self.time
+        failed_at, self._witness = self.time, Witness()
         if fault is not None:
             self.seconds = failed_at + _AFTERMATH
         while not self.over:
@@ -298,6 +332,9 @@ class Stage:
             return f"{self.script.name} {fault.how} at {failed_at:.2f} s: {message}; {ending}"
         if not self._driven:
             other = ", ".join(sorted(self.published)) or "nothing at all"
+            if not self.calls.nodes:
+                other += ", and made no node: is main() called, as by if __name__ == '__main__': main()?"
+            other = next(iter(self.calls.unmatched), other)
             never = f"never published on {names.COMMAND} (it published {other})"
             return f"{self.script.name} {never}: the robot never moved"
         return ""
@@ -341,8 +378,8 @@ def score_of(outcome: Ended) -> ScoreCard:
     Whether such a script searches or follows is not known; `modes` then tells whether its commands drive or stand.
     """
     card, driving = score(outcome.episode), outcome.episode.scorer.driving
-    if outcome.failure:
-        card = replace(card, success=False, failure=outcome.failure)
+    if failure := outcome.failure or ("" if driving or not card.success else "the node never moved the robot"):
+        card = replace(card, success=False, failure=failure)
     if outcome.used_hog:
         return card
     return replace(

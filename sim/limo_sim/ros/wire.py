@@ -21,7 +21,7 @@ def prctl(option: int, value: int) -> None:
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
-def packed(content: Any, data: bytes = b"") -> bytes:
-    """Return a message: JSON, and bytes that are none."""
+def packed(content: Any, data: bytes = b"", more: int = 0) -> bytes:
+    """Return a message: JSON, and bytes that are none; as many as `more` says are to follow it."""
     said = json_text(content).encode()
-    return HEAD.pack(len(said), len(data)) + said + data
+    return HEAD.pack(len(said), len(data) + more) + said + data

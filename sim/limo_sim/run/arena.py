@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pymunk
@@ -26,7 +27,7 @@ from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
 from limo_sim.world.movers import Movers
 from limo_sim.world.person import Pose, earlier, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
-from limo_sim.world.scenario import Furniture, Scenario
+from limo_sim.world.scenario import Camera, Furniture, Lidar, Scenario, Wheels
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 from limo_sim.world.variants import (
     CAMERA_STREAM,
@@ -50,22 +51,19 @@ _FRICTION = 0.3  # of every surface; chosen, the outcome of a contact hardly dep
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """The end of a step: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
+    """The end of a step [s]: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
 
     step: int
+    time: float
     x: float
     y: float
     yaw: float
-    velocity: tuple[float, float]
-    turn_rate: float
-    odometry: Odometry
-    contacts: Contacts
     people: tuple[Pose | None, ...]
     people_before: tuple[Pose | None, ...]
-
-    @property
-    def time(self) -> float:
-        return self.step / STEPS_PER_SECOND
+    velocity: tuple[float, float] = (0.0, 0.0)
+    turn_rate: float = 0.0
+    odometry: Odometry = Odometry()  # noqa: RUF009 - frozen
+    contacts: Contacts = Contacts()  # noqa: RUF009
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,31 +103,10 @@ class Arena:
         self._moving = [self._add_mover(piece) for piece in self._movers.at(0.0)]
         for other in (_OBSTACLE, _PERSON):
             self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
-        self._state = self._before = _State(
-            0,
-            robot.x,
-            robot.y,
-            robot.yaw,
-            (0.0, 0.0),
-            0.0,
-            Odometry(),
-            Contacts(),
-            self._crowd.poses,
-            self._crowd.poses,
-        )
-        camera = scenario.camera
-        self._camera = Channel(
-            camera.rate_hz,
-            STEPS_PER_SECOND,
-            self._state,
-            latency_s=camera.latency_s,
-            drop_probability=camera.drop_probability,
-            drops=self._stream(DROP_STREAM),
-        )
-        self._lidar = Channel(scenario.lidar.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.lidar.latency_s)
-        self._wheels = Channel(
-            scenario.odometry.rate_hz, STEPS_PER_SECOND, self._state, latency_s=scenario.odometry.latency_s
-        )
+        self._state = self._before = _State(0, 0.0, robot.x, robot.y, robot.yaw, self._crowd.poses, self._crowd.poses)
+        drops = {"drop_probability": scenario.camera.drop_probability, "drops": self._stream(DROP_STREAM)}
+        self._camera = self._channel(scenario.camera, **drops)
+        self._lidar, self._wheels = self._channel(scenario.lidar), self._channel(scenario.odometry)
         self._static_scanned = _scanned(scenario.furniture) + [wall.footprint for wall in scenario.walls]
         self._renderer: Renderer | None = None
         self._frame: TrueFrame | None = None
@@ -164,9 +141,10 @@ class Arena:
         before = self._state
         self._drive.advance(before.time, STEP_S)
         step = before.step + 1
-        self._crowd.advance(step / STEPS_PER_SECOND, (before.x, before.y, before.yaw))
+        now = step / STEPS_PER_SECOND
+        self._crowd.advance(now, (before.x, before.y, before.yaw))
         self._place_people()
-        for body, piece in zip(self._moving, self._movers.at(step / STEPS_PER_SECOND), strict=True):
+        for body, piece in zip(self._moving, self._movers.at(now), strict=True):
             body.velocity = (piece.x - body.position.x) / STEP_S, (piece.y - body.position.y) / STEP_S
             body.angular_velocity = math.remainder(piece.yaw - body.angle, math.tau) / STEP_S
         with held():  # an exception in one of pymunk's callbacks would be printed and lost
@@ -179,12 +157,13 @@ class Arena:
         self._before = before
         self._state = _State(
             step=step,
+            time=now,
             x=robot.position.x,
             y=robot.position.y,
             yaw=robot.angle,
             velocity=(robot.velocity.x, robot.velocity.y),
             turn_rate=robot.angular_velocity,
-            odometry=Odometry(step / STEPS_PER_SECOND, x, y, yaw, twist.linear, twist.angular),
+            odometry=Odometry(now, x, y, yaw, twist.linear, twist.angular),
             contacts=self.contacts,
             people=self._crowd.poses,
             people_before=before.people,
@@ -195,17 +174,17 @@ class Arena:
     def frame(self) -> TrueFrame:
         """Return the newest camera frame that has arrived: the same one until another does."""
         exposure = self._camera.newest
-        if self._frame is None or self._frame.stamp != exposure.state.time:
+        state = exposure.state
+        if self._frame is None or self._frame.stamp != state.time:
             image, depth, seen = self._render().render(
-                _camera_at(exposure.state),
-                exposure.state.people,
+                _camera_at(state),
+                state.people,
                 self._stream(CAMERA_STREAM, exposure),
-                self._movers.at(exposure.state.time),
-                time=exposure.state.time,
-                past=Earlier(partial(self._earlier, exposure.state), exposure.state.turn_rate),
+                self._movers.at(state.time),
+                time=state.time,
+                past=Earlier(partial(self._earlier, state), state.turn_rate),
             )
-            truth = self._truth_at(exposure.state, seen)
-            self._frame = TrueFrame(exposure.state.time, image, FOCAL_PX, depth, truth)
+            self._frame = TrueFrame(state.time, image, FOCAL_PX, depth, self._truth_at(state, seen))
         return self._frame
 
     def scan(self) -> Scan:
@@ -275,6 +254,9 @@ class Arena:
         )
         people = [earlier(was, now, share) for was, now in zip(state.people_before, state.people, strict=True)]
         return camera, people, self._movers.at(max(state.time - age, 0.0))
+
+    def _channel(self, sensor: Camera | Lidar | Wheels, **drops: Any) -> Channel[_State]:
+        return Channel(sensor.rate_hz, STEPS_PER_SECOND, self._state, latency_s=sensor.latency_s, **drops)
 
     def _stream(self, sensor: int, exposure: Exposure[_State] | None = None) -> np.random.Generator:
         return np.random.default_rng([self.seed, sensor, exposure.index if exposure else 0])

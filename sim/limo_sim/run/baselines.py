@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.control.naming import CONTROLLERS, ControllerError, controller_named
 from limo_hog.follow.decision import Controller, Decision, Mode
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.measurement import measure
 from limo_hog.follow.sense.observation import Observation, Odometry
@@ -61,21 +61,12 @@ class PurePursuit:
     """Drive the arc that leads to where the person was last seen (Coulter, CMU-RI-TR-92-01, 1992).
 
     The curvature is 2 sin(bearing) / distance. The state is the last sighting.
-
-    Attributes
-    ----------
-    target_distance
-        Distance to hold, from the camera to the person's surface [m].
-    linear_gain
-        Speed for each metre of error [1/s].
-    max_linear, max_angular
-        Limits of the command [m/s, rad/s]; it never drives backwards. All three are those of the tracking controller.
     """
 
-    target_distance: float = bounded(1.5, 0.1, 8)
-    linear_gain: float = bounded(0.8, 0, 5)
-    max_linear: float = bounded(0.7, 0, 1)
-    max_angular: float = bounded(1.5, 0, 3)
+    target_distance: float = param(1.5, "m", "Distance to hold, from the camera to the person's surface.", 0.1, 8)
+    linear_gain: float = param(0.8, "1/s", "Speed for each metre of error.", 0, 5)
+    max_linear: float = param(0.7, "m/s", "Limit of the speed; it never drives backwards.", 0, 1)
+    max_angular: float = param(1.5, "rad/s", "Limit of the turn rate, either way.", 0, 3)
 
     def start(self) -> LastSeen | None:
         """Return the state before the first observation."""
@@ -103,22 +94,16 @@ class Policy:
 
     The state is the last sighting.
 
-    Attributes
-    ----------
-    path
-        An .npz file with the arrays `w0`, `b0`, `w1`, `b1`, …: float32 weights (inputs, outputs) and biases of layers
-        with tanh between them, from the 9 numbers of `state_of` to the 2 of an action.
-    target_distance
-        The distance that the environment's reward holds best [m].
-
     Raises
     ------
     ControllerError
         The file cannot be read, or is no such network.
     """
 
+    #: An .npz file with the arrays `w0`, `b0`, `w1`, `b1`, …: float32 weights (inputs, outputs) and biases of layers
+    #: with tanh between them, from the 9 numbers of `state_of` to the 2 of an action.
     path: Path
-    target_distance: float = 1.5
+    target_distance: float = 1.5  #: the distance that the environment's reward holds best [m]
 
     def __post_init__(self) -> None:
         # A wrong file is an error before the robot starts.

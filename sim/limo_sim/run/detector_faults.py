@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from statistics import NormalDist
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,20 +29,12 @@ class FalseBoxes:
 
     Measured: the 30 boxes that OpenCV's model finds, threshold 0, grouped, in 14 photographs without people, each at 1,
     1.5 and 2 times its size, and mirrored. Few, so that a single parameter was fitted to each quantity.
-
-    Attributes
-    ----------
-    least_height
-        Of a window [px]: HOG's own.
-    octaves
-        Mean of log2(height / least_height); heights are drawn from the exponential distribution of it.
-    score
-        Mean margin of the SVM, which is drawn from an exponential distribution.
     """
 
-    least_height: float = 128.0
+    least_height: float = 128.0  #: of a window [px]: HOG's own
+    #: Mean of log2(height / least_height); heights are drawn from the exponential distribution of it.
     octaves: float = 0.44
-    score: float = 0.64
+    score: float = 0.64  #: mean margin of the SVM, which is drawn from an exponential distribution
 
 
 FALSE_BOXES = FalseBoxes()
@@ -54,21 +46,11 @@ FIT_FILE = Path(__file__).with_name("detector_fit.json")
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Recall by height: top · σ(slope · log2(height / middle)).
+    """Recall by height: top · σ(slope · log2(height / middle))."""
 
-    Attributes
-    ----------
-    top
-        Recall of tall people, whom pose, clothes and background still hide [0 … 1].
-    middle_px
-        Height at which half of it is reached [px].
-    slope
-        Of the logistic function, for each doubling of the height.
-    """
-
-    top: float
-    middle_px: float
-    slope: float
+    top: float  #: recall of tall people, whom pose, clothes and background still hide [0 … 1]
+    middle_px: float  #: height at which half of it is reached [px]
+    slope: float  #: of the logistic function, for each doubling of the height
 
     def at(self, height: float) -> float:
         """Return the recall at a height [px]; a height of 0 stands for a person out of the image."""
@@ -77,22 +59,13 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How a model of people does on photographs.
+    """How a model of people does on photographs."""
 
-    Attributes
-    ----------
-    photographs, arena
-        Recall of the detector on photographs, and its own in the arena.
-    memory_s
-        Time in which the correlation of a person's misses falls to 1/e [s].
-    false_rate
-        Mean number of false boxes in a frame.
-    """
-
+    #: photographs, arena: recall of the detector on photographs, and its own in the arena
     photographs: Curve
     arena: Curve
-    memory_s: float
-    false_rate: float
+    memory_s: float  #: time in which the correlation of a person's misses falls to 1/e [s]
+    false_rate: float  #: mean number of false boxes in a frame
 
     def kept(self, height: float) -> float:
         """Return the share of what is found in the arena that is kept for people of a height [px], 0 … 1."""
@@ -107,18 +80,30 @@ def fit_of(model: str) -> Fit:
     return Fit(photographs, arena, table["memory_s"], table["false_rate"])
 
 
-class Missing(Protocol):
+class Missing(ABC):
     """When one person is missed."""
+
+    _period = 0
 
     def at(self, period: int, height: float) -> bool:
         """Return whether the person, so high in the image [px], is missed in a period of the camera.
 
         No earlier period than the last one asked for.
         """
-        ...
+        for _ in range(period - self._period):
+            self._advance()
+        self._period = max(period, self._period)
+        return self._is_missed(height)
+
+    @abstractmethod
+    def _advance(self) -> None:
+        """Go on to the next period."""
+
+    @abstractmethod
+    def _is_missed(self, height: float) -> bool: ...
 
 
-class FittedMisses:
+class FittedMisses(Missing):
     """When one person is missed, by a model's fit.
 
     Missed while a standard normal process with correlation exp(-t / memory) is above the quantile of the share kept at
@@ -128,19 +113,17 @@ class FittedMisses:
     def __init__(self, fit: Fit, rate_hz: float, random: np.random.Generator) -> None:
         self._fit, self._random = fit, random
         self._correlation = math.exp(-1.0 / (rate_hz * fit.memory_s))
-        self._period = 0
         self._value = float(random.standard_normal())
 
-    def at(self, period: int, height: float) -> bool:
-        """Return whether the person is missed, see `Missing.at`."""
-        for _ in range(period - self._period):
-            new = math.sqrt(1.0 - self._correlation**2) * self._random.standard_normal()
-            self._value = self._correlation * self._value + new
-        self._period = max(period, self._period)
+    def _advance(self) -> None:
+        new = math.sqrt(1.0 - self._correlation**2) * self._random.standard_normal()
+        self._value = self._correlation * self._value + new
+
+    def _is_missed(self, height: float) -> bool:
         return NormalDist().cdf(self._value) >= self._fit.kept(height)
 
 
-class Misses:
+class Misses(Missing):
     """When one person is missed: a Markov chain of two states, one step for each period of the camera.
 
     A burst is left with probability q = 1 / (its mean length in frames), and begins with q (1 - recall) / recall: the
@@ -153,16 +136,12 @@ class Misses:
         self._begins = self._leaves * (1.0 - faults.recall) / faults.recall if faults.recall > 0 else 1.0
         if faults.recall == 0:
             self._leaves = 0.0
-        self._period = 0
         self._missed = bool(random.random() >= faults.recall)
 
-    def at(self, period: int, height: float) -> bool:
-        """Return whether the person is missed, see `Missing.at`; the height makes no difference."""
-        del height
-        for _ in range(period - self._period):
-            change = self._random.random() < (self._leaves if self._missed else self._begins)
-            self._missed ^= bool(change)
-        self._period = max(period, self._period)
+    def _advance(self) -> None:
+        self._missed ^= bool(self._random.random() < (self._leaves if self._missed else self._begins))
+
+    def _is_missed(self, height: float) -> bool:  # noqa: ARG002 - the same at every height
         return self._missed
 
 

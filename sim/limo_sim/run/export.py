@@ -21,55 +21,26 @@ from limo_sim.world.variants import WANDERING_STREAM
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """A person or a piece of furniture in a frame.
+    """A person or a piece of furniture in a frame."""
 
-    Attributes
-    ----------
-    label
-        "person", or the kind of furniture.
-    identity
-        Its number in the scenario, people before furniture, movers last: the same in all frames.
-    box
-        x, y, w, h [px] around all that lies within the image, as if nothing stood in front of it.
-    visible
-        Share of the whole silhouette that is seen: 0 (hidden) … 1.
-    """
-
-    label: str
-    identity: int
+    label: str  #: "person", or the kind of furniture
+    identity: int  #: its number in the scenario, people before furniture, movers last: the same in all frames
+    #: x, y, w, h [px] around all that lies within the image, as if nothing stood in front of it.
     box: tuple[int, int, int, int]
-    visible: float
+    visible: float  #: share of the whole silhouette that is seen: 0 (hidden) … 1
 
 
 @dataclass(frozen=True, slots=True)
 class Wandering:
-    """How the robot looks around.
+    """How the robot looks around."""
 
-    Attributes
-    ----------
-    speed
-        [m/s]; half of what it can, so that pictures differ and little is missed.
-    turn
-        Largest turn rate while it drives [rad/s]; drawn anew for every leg.
-    leg_s
-        Length of a leg [s].
-    turn_away
-        Turn rate where the way is blocked [rad/s].
-    keep
-        Nearest obstacle ahead that it drives towards [m]: it stops within less.
-    clear
-        What must be free ahead before it drives again [m].
-    ahead
-        Half of the sector that counts as ahead [rad].
-    """
-
-    speed: float = 0.5
-    turn: float = 0.5
-    leg_s: float = 3.0
-    turn_away: float = 0.9
-    keep: float = 0.7
-    clear: float = 1.0
-    ahead: float = 0.6
+    speed: float = 0.5  #: [m/s]; half of what it can, so that pictures differ and little is missed
+    turn: float = 0.5  #: largest turn rate while it drives [rad/s]; drawn anew for every leg
+    leg_s: float = 3.0  #: length of a leg [s]
+    turn_away: float = 0.9  #: turn rate where the way is blocked [rad/s]
+    keep: float = 0.7  #: nearest obstacle ahead that it drives towards [m]: it stops within less
+    clear: float = 1.0  #: what must be free ahead before it drives again [m]
+    ahead: float = 0.6  #: half of the sector that counts as ahead [rad]
 
 
 WANDERING = Wandering()

@@ -16,32 +16,19 @@ SIZE = 9
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What 1 stands for in a state and in an action.
+    """What 1 stands for in a state and in an action."""
 
-    Attributes
-    ----------
-    linear, angular
-        Speed and turn rate of an action of 1 [m/s, rad/s]: the limits of the tracking controller.
-    range_m
-        The depth camera's reach [m].
-    age_s
-        An older sighting is no older than this [s]. Chosen: half of the time after which a run has failed.
-    person
-        Speed of a person [m/s]. Chosen: a brisk walk is 1.4.
-    smoothing
-        Share by which a new difference of places changes the person's velocity [1]. Chosen: ranges stray by about 5 cm
-        from frame to frame, which is 0.5 m/s; this leaves 0.15.
-    gap_s
-        After a longer gap the velocity begins anew [s].
-    """
-
+    #: linear, angular: speed and turn rate of an action of 1 [m/s, rad/s]: the limits of the tracking controller.
     linear: float = 0.7
     angular: float = 1.5
-    range_m: float = 8.0
+    range_m: float = 8.0  #: the depth camera's reach [m]
+    #: An older sighting is no older than this [s]. Chosen: half of the time after which a run has failed.
     age_s: float = 5.0
-    person: float = 1.5
+    person: float = 1.5  #: speed of a person [m/s]. Chosen: a brisk walk is 1.4.
+    #: Share by which a new difference of places changes the person's velocity [1]. Chosen: ranges stray by about 5 cm
+    #: from frame to frame, which is 0.5 m/s; this leaves 0.15.
     smoothing: float = 0.2
-    gap_s: float = 0.5
+    gap_s: float = 0.5  #: after a longer gap the velocity begins anew [s]
 
 
 SCALE = Scale()
@@ -77,28 +64,15 @@ def state_of(last: LastSeen | None, seen: bool, now: float, odometry: Odometry) 
     the left of the robot. 7, 8: speed and turn rate of the robot. The unit of each is in `Scale`. Before the first
     sighting 1, 2, 5 and 6 are 0, and 3 and 4 are 1.
     """
-    linear = min(max(odometry.linear / SCALE.linear, -1.0), 1.0)
-    angular = min(max(odometry.angular / SCALE.angular, -1.0), 1.0)
+    moves = odometry.linear / SCALE.linear, odometry.angular / SCALE.angular
     if last is None:
-        return np.array((0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, linear, angular), np.float32)
+        return np.clip((0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, *moves), -1.0, 1.0).astype(np.float32)
     dx, dy = last.x - odometry.x, last.y - odometry.y
     distance = math.hypot(dx, dy)
     cos, sin = math.cos(odometry.yaw), math.sin(odometry.yaw)
     ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
     forward, sideways = cos * last.vx + sin * last.vy, cos * last.vy - sin * last.vx
-    age = now - last.stamp
     unit = max(distance, 1e-6)
-    return np.array(
-        (
-            1.0 if seen else 0.0,
-            ahead / unit,
-            left / unit,
-            min(distance / SCALE.range_m, 1.0),
-            min(age / SCALE.age_s, 1.0),
-            min(max(forward / SCALE.person, -1.0), 1.0),
-            min(max(sideways / SCALE.person, -1.0), 1.0),
-            linear,
-            angular,
-        ),
-        np.float32,
-    )
+    place = ahead / unit, left / unit, distance / SCALE.range_m, (now - last.stamp) / SCALE.age_s
+    person = forward / SCALE.person, sideways / SCALE.person
+    return np.clip((float(seen), *place, *person, *moves), -1.0, 1.0).astype(np.float32)

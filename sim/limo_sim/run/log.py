@@ -25,30 +25,15 @@ class Passed(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One control period in the arena.
+    """One control period in the arena."""
 
-    Attributes
-    ----------
-    log
-        What was sensed, found and commanded.
-    truth
-        The arena at `log.time`.
-    seen
-        The arena when the frame was taken; None in a period without a new frame.
-    render_ms
-        Wall time of drawing the frame [ms].
-    windows
-        The pictures that a node shows with `cv2.imshow`, by name: uint8 (H, W, 3) BGR or (H, W).
-    passed
-        What the faster sensors read since the control period before.
-    """
-
-    log: FrameLog
-    truth: Truth
-    seen: Truth | None = None
-    render_ms: float = 0.0
+    log: FrameLog  #: what was sensed, found and commanded
+    truth: Truth  #: the arena at `log.time`
+    seen: Truth | None = None  #: the arena when the frame was taken; None in a period without a new frame
+    render_ms: float = 0.0  #: wall time of drawing the frame [ms]
+    #: The pictures that a node shows with `cv2.imshow`, by name: uint8 (H, W, 3) BGR or (H, W).
     windows: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
-    passed: tuple[Passed, ...] = ()
+    passed: tuple[Passed, ...] = ()  #: what the faster sensors read since the control period before
 
     def bare(self) -> Step:
         """Return the step without images and scans: 4 kB instead of 3 MB."""

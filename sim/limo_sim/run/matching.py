@@ -15,37 +15,25 @@ NO_PERSON = -1
 
 @dataclass(frozen=True, slots=True)
 class Criteria:
-    """Thresholds of the score card; only cards of equal criteria can be compared.
+    """Thresholds of the score card; only cards of equal criteria can be compared."""
 
-    Attributes
-    ----------
-    in_view
-        Share of the silhouette from which a person is in view. Chosen: half.
-    lost_after_s
-        A subject who was not the target for longer than this was lost [s]. Chosen: five camera frames, more than a
-        detector's single misses.
-    found_within_s
-        A lost subject counts as found again within this time [s]. Chosen: a person who walks at 0.75 m/s crosses the
-        camera's field, 71° at 1.5 m, in 3 s.
-    kept_up_m
-        A robot that is further from the subject than this has not kept up [m]. Chosen: twice the distance held.
-    unseen_s
-        A run in which the subject is out of view for longer than this fails [s]. Follow-Bench (arXiv 2509.10796): 100
-        frames of a camera of 10 Hz.
-    box_margin
-        How far beside a silhouette the middle of a box on it may lie [widths of the silhouette]. Chosen: the middle of
-        a box strays by up to 16 px (arena measurements, 1.75 … 4 m), a silhouette 4 m away is 35 … 50 px wide.
-    box_height_min, box_height_max
-        How high a box on a person may be [heights of the silhouette]. HOG's window is 1.33 times as high; chosen: half
-        of that, for silhouettes cut off by the image's edge, to twice.
-    """
-
-    in_view: float = 0.5
+    in_view: float = 0.5  #: share of the silhouette from which a person is in view. Chosen: half.
+    #: A robot further from the subject than this has not kept up [m]. Chosen: twice the distance held.
     kept_up_m: float = 3.0
+    #: A subject who was not the target for longer than this was lost [s]. Chosen: five camera frames, more than a
+    #: detector's single misses.
     lost_after_s: float = 0.5
+    #: A lost subject counts as found again within this time [s]. Chosen: a person who walks at 0.75 m/s crosses the
+    #: camera's field, 71° at 1.5 m, in 3 s.
     found_within_s: float = 3.0
+    #: A run in which the subject is out of view for longer than this fails [s]. Follow-Bench (arXiv 2509.10796): 100
+    #: frames of a camera of 10 Hz.
     unseen_s: float = 10.0
+    #: How far beside a silhouette the middle of a box on it may lie [widths of the silhouette]. Chosen: the middle of a
+    #: box strays by up to 16 px (arena measurements, 1.75 … 4 m), a silhouette 4 m away is 35 … 50 px wide.
     box_margin: float = 0.25
+    #: box_height_min, box_height_max: how high a box on a person may be [heights of the silhouette]. HOG's window is
+    #: 1.33 times as high; chosen: half of that, for silhouettes cut off by the image's edge, to twice.
     box_height_min: float = 0.6
     box_height_max: float = 2.5
 

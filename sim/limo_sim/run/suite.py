@@ -28,22 +28,13 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """A frozen set of scenarios.
+    """A frozen set of scenarios."""
 
-    Attributes
-    ----------
-    name, summary
-        What it is called, and what it is for.
-    seconds
-        Simulated time of every run [s].
-    scenarios
-        In the order in which they are shown, those of a group together.
-    """
-
+    #: name, summary: what it is called, and what it is for
     name: str
     summary: str
-    seconds: float
-    scenarios: tuple[Entry, ...]
+    seconds: float  #: simulated time of every run [s]
+    scenarios: tuple[Entry, ...]  #: in the order in which they are shown, those of a group together
 
     @property
     def groups(self) -> dict[str, str]:

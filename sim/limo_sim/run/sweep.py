@@ -24,30 +24,11 @@ R = TypeVar("R")
 C = TypeVar("C")
 
 #: Figures of a score card that are summed up, in the order they are shown.
-MEASURES = (
-    "success",
-    "in_view",
-    "kept_up",
-    "detected",
-    "best_box_wrong",
-    "pixel_error_mean",
-    "distance_rms_error_m",
-    "zone_social",
-    "found_again",
-    "time_to_find_again_s",
-    "follows_first",
-    "identity_switches",
-    "clearance_min_m",
-    "intrusion_intimate",
-    "intrusion_personal",
-    "intrusion_social",
-    "contacts_person",
-    "contacts_wall",
-    "path_wrong_m",
-    "mean_abs_domega",
-    "jerk_mean",
-    "first_detection_s",
-    "detect_ms_mean",
+MEASURES = tuple(
+    "success in_view kept_up detected best_box_wrong pixel_error_mean distance_rms_error_m zone_social found_again "
+    "time_to_find_again_s follows_first identity_switches clearance_min_m intrusion_intimate intrusion_personal "
+    "intrusion_social contacts_person contacts_wall path_wrong_m mean_abs_domega jerk_mean first_detection_s "
+    "detect_ms_mean".split()
 )
 
 

@@ -32,18 +32,10 @@ HEADERS = {
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Decides by `Host` and `Origin` whether a request is admitted.
+    """Decides by `Host` and `Origin` whether a request is admitted."""
 
-    Attributes
-    ----------
-    name
-        The host that the page was asked to be served at.
-    loopback
-        Whether it listens on loopback addresses alone.
-    """
-
-    name: str
-    loopback: bool
+    name: str  #: the host that the page was asked to be served at
+    loopback: bool  #: whether it listens on loopback addresses alone
 
     @classmethod
     def at(cls, name: str, addresses: Iterable[str]) -> Access:

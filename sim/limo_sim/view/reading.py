@@ -102,15 +102,10 @@ def hits(scan: Scan | None, poses: list[tuple[float, float, float, float]]) -> l
     angles = yaw + np.linspace(scan.angle_min, scan.angle_max, len(ranges))
     hit = np.isfinite(ranges)
     hit[1::2] = False
-    points = np.stack(
-        [
-            x + MOUNT_AHEAD * math.cos(yaw) + ranges[hit] * np.cos(angles[hit]),
-            y + MOUNT_AHEAD * math.sin(yaw) + ranges[hit] * np.sin(angles[hit]),
-        ],
-        axis=1,
-    )
-    rounded: list[list[float]] = np.round(points, 2).tolist()
-    return rounded
+    ahead = x + MOUNT_AHEAD * math.cos(yaw) + ranges[hit] * np.cos(angles[hit])
+    left = y + MOUNT_AHEAD * math.sin(yaw) + ranges[hit] * np.sin(angles[hit])
+    points: list[list[float]] = np.round(np.stack([ahead, left], axis=1), 2).tolist()
+    return points
 
 
 def believed(step: Step) -> list[list[float | None]]:

@@ -68,18 +68,12 @@ class ServeError(LimoHogError):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Page:
-    """One open page.
+    """One open page."""
 
-    Attributes
-    ----------
-    client, transport
-        Its connection, twice: what is sent through, and what can be cut.
-    complaints
-        What was wrong with its control messages, not told yet.
-    """
-
+    #: client, transport: its connection, twice: what is sent through, and what can be cut.
     client: web.WebSocketResponse
     transport: asyncio.Transport
+    #: What was wrong with its control messages, not told yet.
     complaints: deque[str] = field(default_factory=lambda: deque(maxlen=10))
 
     async def send(self, message: dict[str, Any] | bytes) -> None:
@@ -207,9 +201,8 @@ class View:
         app = web.Application(middlewares=[self._guard])
         app.on_response_prepare.append(_add_headers)
         app.router.add_get("/", _page("index.html", "text/html"))
-        app.router.add_get("/view.css", _page("view.css", "text/css"))
-        app.router.add_get("/view.js", _page("view.js", "text/javascript"))
-        app.router.add_get("/plots.js", _page("plots.js", "text/javascript"))
+        for name, kind in (("view.css", "css"), ("view.js", "javascript"), ("plots.js", "javascript")):
+            app.router.add_get(f"/{name}", _page(name, f"text/{kind}"))
         app.router.add_get("/live", self._live)
         logger: Any = QuietLogger(logging.getLogger("limo_sim.view"), {})
         # Connections that ask nothing, or never finish asking, do not hold up the end.

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any, Generic, TypeVar
 
+from limo_hog.cv2_api.arguments import shown
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.sense.observation import Observation
@@ -26,28 +27,15 @@ class ParameterError(LimoHogError):
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Parameter:
-    """A number that can be set.
+    """A number that can be set."""
 
-    Attributes
-    ----------
-    name
-        Of the controller's field; of a field of a field with a dot between them.
-    value
-        What it is now; a whole number stays one.
-    low, high
-        What it may be, both included.
-    unit
-        Its unit, such as "m"; empty where it has none.
-    tooltip
-        What it does, in a sentence.
-    """
-
-    name: str
-    value: float
+    name: str  #: of the controller's field; of a field of a field with a dot between them
+    value: float  #: what it is now; a whole number stays one
+    #: low, high: what it may be, both included
     low: float
     high: float
-    unit: str = ""
-    tooltip: str = ""
+    unit: str = ""  #: its unit, such as "m"; empty where it has none
+    tooltip: str = ""  #: what it does, in a sentence
 
     @property
     def whole(self) -> bool:
@@ -67,7 +55,7 @@ class Parameter:
         if not number or not self.low <= value <= self.high or (self.whole and value != int(value)):
             kind, unit = "whole number" if self.whole else "number", f" {self.unit}" if self.unit else ""
             raise ParameterError(
-                f"{self.name}: got {_short(value)}, want a {kind} from {self.low:g} to {self.high:g}{unit}"
+                f"{self.name}: got {shown(value)}, want a {kind} from {self.low:g} to {self.high:g}{unit}"
             )
         return type(self.value)(value)
 
@@ -113,7 +101,7 @@ class Tunable(Generic[S]):
         parameters = self.parameters
         if name not in parameters:
             near = difflib.get_close_matches(name, parameters, n=5, cutoff=0.3) or [*parameters][:5]
-            raise ParameterError(f"no parameter {_short(name)} among {len(parameters)}; {', '.join(near)} come nearest")
+            raise ParameterError(f"no parameter {shown(name)} among {len(parameters)}; {', '.join(near)} come nearest")
         self._controller = _replaced(self._controller, name.split("."), parameters[name].checked(value))
 
 
@@ -160,12 +148,3 @@ def _documented(kind: type) -> dict[str, tuple[str, str]]:
             unit = units[i] if len(units) == len(names) else units[0]
             found[name] = ("" if unit == "1" else unit, text.replace(bracket[0], "", 1) if bracket else text)
     return found
-
-
-def _short(value: object) -> str:
-    """Show a value of any length in a few characters."""
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # Python refuses to write whole numbers of thousands of digits
-        text = type(value).__name__
-    return text if len(text) <= 40 else f"{text[:37]}…"

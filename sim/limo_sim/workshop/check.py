@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from limo_sim.ros.runner import Limits, Said
-from limo_sim.ros.stage import score_of
-from limo_sim.workshop.checkpoints import Checkpoint
-from limo_sim.workshop.exercises import EXERCISES, FOUND, STANDS, Exercise
+from limo_sim.workshop.exercises import Checkpoint, Exercise, exercise
 from limo_sim.workshop.mistakes import Finding, Source, camera_read, no_command, no_detection, no_picture
-from limo_sim.workshop.scenes import Scene, Take, play
-from limo_sim.world.scenario import Scenario
+from limo_sim.workshop.sights import found
+from limo_sim.workshop.stretch import red_on_person
+from limo_sim.workshop.takes import Look, Take, judge_by_truth, play
+
+#: What a verdict tells is no longer [characters].
+_LONGEST = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,8 @@ class Verdict:
         Line of the student's file that the evidence is about, where it is known.
     hints
         From vague to plain.
+    look
+        The image that the evidence is about, where it is one.
     """
 
     task: int
@@ -44,11 +48,12 @@ class Verdict:
     worth: int = 0
     line: int | None = None
     hints: tuple[str, ...] = ()
+    look: Look | None = None
 
-
-#: The walk's checkpoint.
-WALK = "the robot follows a walking person"
-WALKING = Scene("walk", "a person walks for 20 s", Scenario.load("followable"), 20.0)
+    def __post_init__(self) -> None:
+        # A node's own words: without control characters, which would steer a terminal, and not endless.
+        said = "".join(c if c.isprintable() or c == "\n" else f"\\x{ord(c):02x}" for c in self.evidence[:_LONGEST])
+        object.__setattr__(self, "evidence", said)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,105 +64,134 @@ class Examination:
     takes: list[Take]
 
 
-def check(script: Path, node: str = "follower") -> list[Verdict]:
+NOT_REACHED = Finding(None, "not tried: see the first mistake above")
+LAST = Finding(None, "tried when all checkpoints above hold")
+#: What is judged by a node's boxes; where none could be placed in an image, by the red box and the arena's truth.
+_BOXES = ("found", "scaled_back", "best")
+#: What is judged by boxes that are on people.
+_ON_FOUND = ("logged", "scaled_back", "best", "stands")
+
+
+def check(script: Path, name: str = "follower") -> list[Verdict]:
     """Return the verdicts of `examine`."""
-    return examine(script, node).verdicts
+    return examine(script, name).verdicts
 
 
 def examine(
-    script: Path, node: str = "follower", limits: Limits | None = None, said: Said = lambda *_: None
+    script: Path, name: str = "follower", limits: Limits | None = None, said: Said = lambda *_: None
 ) -> Examination:
-    """Try a node in an exercise's scenes, and if all checkpoints hold there, with a walking person for 20 s.
+    """Try a node in an exercise's scenes, and if all checkpoints hold there, in its last ones.
 
-    The points of all verdicts add up to 100. A node that raises, hangs or dies has one more verdict, the first, that
-    says so. `limits` are those of all scenes together; `said` is given what the node prints.
+    A node that raises, hangs or dies in a scene has one more verdict, the first, that says so; its checkpoints are
+    judged by what it did before, and in the other scenes. `limits` are those of all scenes together; `said` is given
+    what the node prints.
     """
-    exercise = EXERCISES[node]
-    checkpoints = exercise.checkpoints
+    wanted = exercise(name)
     limits = replace(limits or Limits(), began=time.monotonic())
     source = Source(script)
     takes: list[Take] = []
-    fault: Verdict | None = None
-
-    for scene in exercise.scenes:
-        takes.append(play(script, scene, limits, said))
-        fault = _fault(source, takes[-1])
-        if fault is not None:
-            break
-    verdicts = []
-    for checkpoint in checkpoints:
-        worth = 0 if checkpoint in exercise.given else checkpoint.points
-        finding = _judged(source, checkpoint, exercise, takes) if fault is None else NOT_REACHED
-        verdicts.append(_verdict(checkpoint, finding, worth))
-    if exercise.walk:
-        walk = Finding(None, "tried when all checkpoints above hold")
-        if fault is None and all(verdict.holds for verdict in verdicts):
-            walk = _walk(play(script, WALKING, limits, said))
-        verdicts.append(_verdict(Checkpoint(checkpoints[-1].task, WALK, 0, lambda _: walk), walk, exercise.walk))
-    return Examination(verdicts if fault is None else [fault, *verdicts], takes)
+    for scene in wanted.scenes:
+        if not scene.last:
+            takes.append(play(script, scene, limits, said))
+            if _is_hopeless(takes[-1]):
+                break
+    by_truth = judge_by_truth(takes)
+    fault = _fault(source, takes)
+    late = [point for point in wanted.checkpoints if _is_late(point, wanted)]
+    first = [point for point in wanted.checkpoints if point not in late]
+    verdicts = [_verdict(point, _judged(source, point, wanted, takes, by_truth)) for point in first]
+    ready = fault is None and all(verdict.holds for verdict in verdicts)
+    takes += [play(script, scene, limits, said) for scene in wanted.scenes if ready and scene.last]
+    verdicts += [_verdict(point, point.judge(_where(point, wanted, takes)) if ready else LAST) for point in late]
+    return Examination(_marked([*([] if fault is None else [fault]), *verdicts], takes), takes)
 
 
-NOT_REACHED = Finding(None, "not tried: see the first mistake above")
+def _is_hopeless(take: Take) -> bool:
+    """Whether the node would fail in every scene alike, or has used up its time."""
+    fault = take.outcome.fault if take.outcome else None
+    return not take.calls.images or (fault is not None and fault.how in ("hung", "was stopped"))
 
 
-def _judged(source: Source, checkpoint: Checkpoint, exercise: Exercise, takes: Sequence[Take]) -> Finding:
+def _is_late(checkpoint: Checkpoint, wanted: Exercise) -> bool:
+    """Whether it is judged by scenes that are played last."""
+    return any(scene.last and scene.name in checkpoint.scenes for scene in wanted.scenes)
+
+
+def _where(checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take]) -> list[Take]:
+    """Return the takes that a checkpoint is judged by."""
+    first = [scene.name for scene in wanted.scenes if not scene.last]
+    return [take for take in takes if take.scene.name in (checkpoint.scenes or first)]
+
+
+def _judged(source: Source, checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take], by_truth: bool) -> Finding:
     """Judge one checkpoint, or name the mistake that keeps the node from it."""
-    first = exercise.checkpoints[0]
+    first = wanted.checkpoints[0]
     no_image = no_picture(source, takes)
     if no_image is not None:
-        return no_image if checkpoint is first else NOT_REACHED
-    if checkpoint.task > 1 and exercise.hog:
+        return no_image if checkpoint is first and not takes[0].failed else NOT_REACHED
+    if checkpoint.task > 1 and any(point.check == "found" for point in wanted.checkpoints):
         blind = no_detection(source, takes)
-        if blind is not None:
-            return blind if checkpoint in (FOUND, first) else NOT_REACHED
-    if checkpoint is STANDS or checkpoint.task > 3:
+        if blind is not None and red_on_person(takes).holds is not True:
+            return blind if checkpoint.check == "found" or checkpoint is first else NOT_REACHED
+    if checkpoint.check == "stands" or checkpoint.task > 3:
         silent = no_command(takes)
         if silent is not None:
-            return silent if checkpoint in (STANDS, first) else NOT_REACHED
-    return checkpoint.judge(takes)
+            return silent if checkpoint.check == "stands" or checkpoint is first else NOT_REACHED
+    here = _where(checkpoint, wanted, takes)
+    if not here:
+        return NOT_REACHED
+    if by_truth and checkpoint.check in _BOXES:
+        sizes = "; ".join(sorted({str(size) for take in takes for size in take.unplaced}))
+        why = f"pictures of {sizes} were searched, no part of a camera image" if sizes else "no detector known here ran"
+        finding = red_on_person(here)
+        return finding._replace(evidence=f"{why}, so the red box is judged by where people are: {finding.evidence}")
+    if checkpoint.check in _ON_FOUND and not by_truth and found(takes).holds is False:
+        # Boxes on nobody are no evidence of anything.
+        return NOT_REACHED
+    return checkpoint.judge(here)
 
 
-def _verdict(checkpoint: Checkpoint, finding: Finding, worth: int) -> Verdict:
-    won = worth if finding.holds else 0
+def _verdict(checkpoint: Checkpoint, finding: Finding) -> Verdict:
     return Verdict(
         checkpoint.task,
         checkpoint.name,
         finding.holds,
         finding.evidence,
-        won,
-        worth,
+        checkpoint.points if finding.holds else 0,
+        checkpoint.points,
         finding.line,
         checkpoint.hints,
+        finding.look,
     )
 
 
-def _fault(source: Source, take: Take) -> Verdict | None:
-    """Judge a node that raises, hangs or dies: it has no checkpoints to look at."""
-    outcome = take.outcome
-    if outcome is None or outcome.fault is None:
+def _marked(verdicts: list[Verdict], takes: Sequence[Take]) -> list[Verdict]:
+    """Take the points of a node that reads the model solution."""
+    lines = [take.calls.solution_read for take in takes if take.calls.solution_read is not None]
+    if not lines:
+        return verdicts
+    said = "the node reads the workshop's model solution: no points"
+    copied = Verdict(1, "the work is the student's own", False, said, line=lines[0] or None)
+    return [copied, *(replace(verdict, points=0) for verdict in verdicts)]
+
+
+def _fault(source: Source, takes: Sequence[Take]) -> Verdict | None:
+    """Name the scenes in which the node raises, hangs or dies."""
+    failed = [take for take in takes if take.failed]
+    if not failed or (outcome := failed[0].outcome) is None or outcome.fault is None:
         return None
-    line = outcome.fault.line
-    not_bytes = [asked for asked in outcome.stage.detector_inputs if not asked.startswith("uint8")]
+    line, stage = outcome.fault.line, outcome.stage
+    not_bytes = [asked for asked in stage.detector_inputs if not asked.startswith("uint8")]
     if not_bytes:
         said = f"the detector was given {not_bytes[0]}: it reads uint8, as imgmsg_to_cv2(message, 'bgr8') gives it"
         return Verdict(2, "people are found", False, said, line=line)
-    said = f"{take.scene.words}: {outcome.failure}\n{outcome.traceback}".rstrip()
-    if take.calls.readers and take.calls.spun and not camera_read(take.calls):
+    said = f"{failed[0].scene.words}: {outcome.failure}"
+    if len(failed) > 1:
+        said += f"; so it does in {len(failed) - 1} other scenes"
+    said = f"{said}\n{outcome.traceback}".rstrip()
+    if failed[0].calls.readers and failed[0].calls.spun and not camera_read(failed[0].calls):
         # A callback that gets another topic's messages: the wrong topic comes first, then what came of it.
-        deaf = no_picture(source, [take])
+        deaf = no_picture(source, failed)
         if deaf is not None:
             return Verdict(1, "the node runs", False, f"{deaf.evidence}\n{said}", line=deaf.line)
     return Verdict(1, "the node runs", False, said, line=line)
-
-
-def _walk(take: Take) -> Finding:
-    if take.outcome is None:
-        return NOT_REACHED
-    card = score_of(take.outcome)
-    said = (
-        f"in view {card.in_view or 0:.0%}, {card.pixel_error_mean or 0:.0f} px off the middle, "
-        f"nearest {card.distance_min_m or 0:.1f} m, {card.contacts_person + card.contacts_wall} contacts"
-    )
-    if take.outcome.failure:
-        return Finding(False, take.outcome.failure, take.outcome.fault.line if take.outcome.fault else None)
-    return Finding((card.in_view or 0) > 0.7 and card.contacts_person == 0, said)

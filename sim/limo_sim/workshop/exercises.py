@@ -1,105 +1,51 @@
-"""The workshop's exercises: the scenes a node is tried in, its checkpoints, and the points of each."""
+"""An exercise, read from a TOML file: the scenes a node is tried in, its checkpoints, and the points of each."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import inspect
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
 
-from limo_sim.workshop import checkpoints as points
-from limo_sim.workshop import stretch
-from limo_sim.workshop.checkpoints import Checkpoint
-from limo_sim.workshop.scenes import FOLLOWER_SCENES, PROXEMIC_SCENES, Scene
+from limo_sim.run.score import ScoreCard
+from limo_sim.workshop import checkpoints, sights, stretch
+from limo_sim.workshop.mistakes import Finding
+from limo_sim.workshop.scenes import Scene
+from limo_sim.world.scenario import Person, Scenario
+from limo_sim.world.schema import ScenarioError, build
 
-SHOWN = Checkpoint(
-    1,
-    "the camera image is shown",
-    10,
-    points.shown,
-    (
-        "Which function of cv2 shows a picture in a window?",
-        "Call self.show(picture) once for every image; picture is a copy of image.",
-    ),
-)
-FOUND = Checkpoint(
-    2,
-    "people are found",
-    15,
-    points.found,
-    (
-        "The detector is self.hog; which of its methods searches at many scales?",
-        "boxes, weights = self.hog.detectMultiScale(image, winStride=(8, 8), scale=1.05)",
-    ),
-)
-LOGGED = Checkpoint(
-    2,
-    "the number of boxes is logged",
-    5,
-    points.logged,
-    ("len(boxes) is their number.", "self.get_logger().info(f'Detections: {len(boxes)}')"),
-)
-SCALED = Checkpoint(
-    2,
-    "boxes are in the camera's pixels",
-    5,
-    points.scaled_back,
-    ("A box found in an image of half the size has half the coordinates.",),
-)
-STANDS = Checkpoint(
-    3,
-    "the robot stands while no person is found",
-    10,
-    points.stands,
-    ("What should the robot do when boxes is empty?", "Publish Twist() and return from the callback."),
-)
-BEST = Checkpoint(
-    3,
-    "the surest box is chosen and drawn",
-    15,
-    points.best,
-    (
-        "The surest box is the one with the greatest weight.",
-        "best = int(np.argmax(weights)); draw it last, in (0, 0, 255), with a dot in (255, 0, 0), and show it.",
-    ),
-)
-TURNS = Checkpoint(
-    4,
-    "the robot turns towards the person",
-    10,
-    points.turns,
-    (
-        "A positive angular.z turns left. What sign has the error of a person on the left?",
-        "error = middle - cx; twist.angular.z = 0.005 * float(error)",
-    ),
-)
-DEAD_BAND = Checkpoint(
-    4,
-    "a person in the middle does not turn it",
-    5,
-    points.dead_band,
-    ("Leave angular.z at 0.0 while abs(error) is smaller than the dead-band.",),
-)
-DRIVES = Checkpoint(4, "it drives to the person", 5, points.drives, ("Set twist.linear.x to 0.2.",))
-SPEAKS = Checkpoint(
-    4, "a command comes at least every 0.5 s", 5, points.speaks, ("Publish a command after every image.",)
-)
-RETURNS = Checkpoint(
-    4, "callbacks return in time", 5, points.returns, ("Do not call time.sleep in a callback; use a timer.",)
-)
-KEEPS = Checkpoint(
-    5,
-    "it keeps its distance",
-    40,
-    points.keeps,
-    (
-        "Take the median of the depths around the box's centre; the error is distance - self.target.",
-        "twist.linear.x = float(np.clip(self.linear_gain * (distance - self.target), -0.3, 0.3))",
-    ),
-)
-LIMITS = Checkpoint(
-    5, "its speeds keep within the limits", 20, points.limits, ("Clip both speeds with np.clip before publishing.",)
-)
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # type: ignore[import-not-found]
 
-#: The sequel's template does tasks 1 to 3, which therefore are worth no points there.
-GIVEN = (SHOWN, FOUND, LOGGED, SCALED, STANDS, BEST)
+_FOLDER = Path(__file__).with_name("exercises")
+
+#: What a checkpoint's `check` may be.
+CHECKS: dict[str, Callable[..., Finding]] = {
+    **{name: getattr(sights, name) for name in ("shown", "found", "logged", "scaled_back", "best")},
+    **{
+        name: getattr(checkpoints, name)
+        for name in "stands turns dead_band drives speaks returns keeps limits figures".split()
+    },
+    **stretch.CHECKS,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """One checkpoint: its points, check, task and name, hints from vague to plain, where and how it is judged."""
+
+    points: int
+    check: str = ""
+    task: int = 1
+    name: str = ""
+    hints: tuple[str, ...] = ()
+    scenes: tuple[str, ...] = ()
+    judge: Callable[..., Finding] = sights.shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,39 +54,132 @@ class Exercise:
 
     Attributes
     ----------
-    words
-        Its name.
+    title
+        What it is called.
     scenes, checkpoints
         Where the node is tried, and what it is judged by.
-    given
-        Checkpoints that are worth no points.
-    walk
-        Points for a walk of 20 s behind a person, which is tried when all checkpoints hold; 0 for none.
-    hog
-        Whether the checkpoints look at what OpenCV's HOG detector finds.
+    solution
+        Which of `workshop.solution`'s texts solves it; "" where none does.
     """
 
-    words: str
+    title: str
     scenes: tuple[Scene, ...]
     checkpoints: tuple[Checkpoint, ...]
-    given: tuple[Checkpoint, ...] = ()
-    walk: int = 0
-    hog: bool = True
+    solution: str = ""
 
 
-EXERCISES = {
-    "follower": Exercise(
-        "tasks 1 to 4",
-        FOLLOWER_SCENES,
-        (SHOWN, FOUND, LOGGED, SCALED, STANDS, BEST, TURNS, DEAD_BAND, DRIVES, SPEAKS, RETURNS),
-        walk=10,
-    ),
-    "proxemic": Exercise(
-        "the sequel", PROXEMIC_SCENES, (*GIVEN, TURNS, SPEAKS, RETURNS, KEEPS, LIMITS), GIVEN, walk=20
-    ),
-    "stretch a": Exercise("stretch task A: slow down", stretch.SLOW_SCENES, stretch.SLOW),
-    "stretch b": Exercise("stretch task B: fewer boxes", stretch.MERGE_SCENES, stretch.MERGE),
-    "stretch c": Exercise("stretch task C: another detector", stretch.DETECTOR_SCENES, stretch.DETECTOR, hog=False),
-    "stretch d": Exercise("stretch task D: track", stretch.TRACK_SCENES, stretch.TRACK),
-    "stretch e": Exercise("stretch task E: the laser", stretch.LASER_SCENES, stretch.LASER),
-}
+@dataclass(frozen=True, slots=True)
+class _File:
+    """A file: `scene` has the scenes of its own, by name, and `checkpoints` points, or a table with them, by name."""
+
+    title: str
+    scenes: tuple[str, ...]
+    checkpoints: dict  # type: ignore[type-arg]
+    scene: dict = field(default_factory=dict)  # type: ignore[type-arg]
+    solution: str = ""
+    task: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _SceneTable:
+    """A scene in a file; `people` stand at x, y [m], `scenario` names one of `Scenario.names()`, `arena` is one."""
+
+    words: str
+    people: tuple[tuple[float, float], ...] = ()
+    scenario: str = ""
+    arena: Scenario = field(default_factory=Scenario)
+    seconds: float = 1.0
+    arguments: tuple[str, ...] = ()
+    last: bool = False
+
+    def scene(self, name: str, where: str) -> Scene:
+        scenario = Scenario.load(self.scenario) if self.scenario else replace(self.arena, name=f"check:{name}")
+        standing = tuple(Person(route=((x, y, 3600.0),), facing=0.0) for x, y in self.people)
+        scenario = replace(scenario, people=standing + scenario.people)
+        scenario.check(where)
+        return Scene(name, self.words, scenario, self.seconds, self.arguments, self.last)
+
+
+def task_name(task: int) -> str:
+    """Return a task's name: its number; A to E for the stretch tasks, which are numbered from 6 on."""
+    return str(task) if task < 6 else "ABCDE"[task - 6] if task < 11 else str(task)
+
+
+def names() -> list[str]:
+    """Return the names of the exercises that come along."""
+    return sorted(path.stem for path in _FOLDER.glob("*.toml") if path.stem != "common")
+
+
+@cache
+def exercise(name_or_path: str) -> Exercise:
+    """Read one of `names()`, or a TOML file. A scene or checkpoint that it only names is one of `common.toml`.
+
+    Raises
+    ------
+    ScenarioError
+        With the file, the key and what is allowed there.
+    """
+    path = Path(name_or_path) if name_or_path.endswith(".toml") else _FOLDER / f"{name_or_path}.toml"
+    if path.parent == _FOLDER and path.stem not in names():
+        raise ScenarioError(f"unknown exercise {name_or_path}: want one of {', '.join(names())}, or a .toml file")
+    where, common = f"{path.name}: ", _table(_FOLDER / "common.toml")
+    file = build(_File, _table(path), where)
+    own = common["scene"] | file.scene
+    for name in file.scenes:
+        if name not in own:
+            raise ScenarioError(
+                f"{where}scenes: unknown scene {name!r}, want one of {', '.join(own)}, or [scene.{name}]"
+            )
+    keys = {name: f"{where}scene.{name}." for name in file.scenes}
+    scenes = tuple(build(_SceneTable, own[name], key).scene(name, key) for name, key in keys.items())
+    task = {"task": file.task} if file.task else {}
+    checkpoints = tuple(
+        _checkpoint(
+            {"check": name, "name": name} | common["checkpoints"].get(name, {}) | task,
+            given if isinstance(given, dict) else {"points": given},
+            file.scenes,
+            f"{where}checkpoints.{name}",
+        )
+        for name, given in file.checkpoints.items()
+    )
+    return Exercise(file.title, scenes, checkpoints, file.solution)
+
+
+def _checkpoint(common: dict[str, Any], given: dict[str, Any], scenes: tuple[str, ...], where: str) -> Checkpoint:
+    table = common | given
+    bounds = {key: table.pop(key) for key in list(table) if key == "judge" or key not in Checkpoint.__slots__}
+    point = build(Checkpoint, table, f"{where}.")
+    if point.check not in CHECKS:
+        raise ScenarioError(f"{where}: unknown check {point.check!r}, want one of {', '.join(CHECKS)}")
+    there = list(inspect.signature(CHECKS[point.check]).parameters)[1:]
+    there = list(ScoreCard.__slots__) if there == ["wanted"] else there
+    for key in bounds:
+        if key not in there:
+            said = f"unknown key; bounds of {point.check!r} are: {', '.join(there) or 'none'}"
+            raise ScenarioError(f"{where}.{key}: {said}")
+    for scene in point.scenes:
+        if scene not in scenes:
+            raise ScenarioError(f"{where}.scenes: {scene!r} is none of the exercise's scenes: {', '.join(scenes)}")
+    return replace(point, judge=partial(CHECKS[point.check], **bounds))
+
+
+def _table(path: Path) -> dict[str, Any]:
+    try:
+        return dict(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ScenarioError(f"{path}: cannot be read as TOML: {getattr(error, 'strerror', None) or error}") from error
+
+
+def scene_named(name: str) -> Scene:
+    """Return a scene by `NAME` of tasks 1 to 4, or by `EXERCISE/NAME`.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such scene.
+    """
+    of, _, scene = name.rpartition("/")
+    there = {one.name: one for one in exercise(of or "follower").scenes}
+    if scene not in there:
+        raise ScenarioError(f"unknown scene {name!r}, want one of {', '.join(there)}, or EXERCISE/NAME")
+    return there[scene]

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from limo_hog.imaging.notebook import data_uri
 from limo_hog.imaging.writing import jpeg
 from limo_sim.workshop.check import Examination, Verdict
-from limo_sim.workshop.checkpoints import command_of, task_name
-from limo_sim.workshop.exercises import EXERCISES
+from limo_sim.workshop.checkpoints import command_of
+from limo_sim.workshop.exercises import exercise, task_name
 from limo_sim.workshop.report import by_task, evidence, total
-from limo_sim.workshop.scenes import Look, Take
+from limo_sim.workshop.takes import Look, Take
 
 #: Width of the pictures on the page [px]: half the camera's, enough to see a box.
 _WIDTH = 320
@@ -32,7 +32,8 @@ def to_html(script: Path, node: str, examination: Examination) -> str:
         f'<div>Task {task_name(task)}: {won} of {of}<progress max="{of}" value="{won}"></progress></div>'
         for task, (won, of) in by_task(verdicts).items()
     )
-    scenes = "".join(_scene(take) for take in examination.takes)
+    cited = [verdict.look for verdict in verdicts if verdict.look is not None]
+    scenes = "".join(_scene(take, cited) for take in examination.takes)
     return f"""<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
@@ -41,7 +42,7 @@ def to_html(script: Path, node: str, examination: Examination) -> str:
 <style>{_STYLE}</style>
 <header>
 <h1>{escape(script.name)}</h1>
-<p>limo-hog workshop check: {escape(EXERCISES[node].words)}</p>
+<p>limo-hog workshop check: {escape(exercise(node).title)}</p>
 </header>
 <main>
 <p class="points">{points} <small>of {worth} points</small></p>
@@ -65,38 +66,52 @@ def _line(verdict: Verdict) -> str:
     )
 
 
-def _scene(take: Take) -> str:
-    look = _telling(take)
-    if look is None:
-        return f'<figure><div class="none">no frame</div><figcaption>{escape(take.scene.words)}</figcaption></figure>'
-    picture, window = _picture(look)
-    seen = (
-        f'<img alt="{escape(window, quote=True)}" src="{picture}">' if picture else '<div class="none">no window</div>'
-    )
-    command = command_of(look) if look.commands else "no command"
+def _scene(take: Take, cited: Sequence[Look]) -> str:
+    """Return the images that verdicts cite, or a telling one, and the way of the robot."""
+    words = escape(take.scene.words.capitalize())
+    looks = [look for look in take.looks if any(look is one for one in cited)][:3] or _telling(take)
+    if not looks:
+        return f'<figure><div class="none">no frame</div><figcaption>{words}</figcaption></figure>'
+    figures = "".join(_figure(take, look, words) for look in looks)
+    return figures + (_map(take, words) if take.scene.last else "")
+
+
+def _figure(take: Take, look: Look, words: str) -> str:
+    picture = look.pictures[-1] if look.pictures else look.image
+    window = next((name for _, name, there, _ in take.windows if there is picture), "")
+    height = max(round(picture.shape[0] * _WIDTH / picture.shape[1]), 1)
+    small = cv2.resize(picture, (_WIDTH * 2, height * 2), interpolation=cv2.INTER_AREA)
+    uri = data_uri(jpeg(small.astype(np.uint8, copy=False)))
+    command = command_of(look.commands[-1]) if look.commands else "no command"
     count = len(look.found)
     boxes = "" if look.raw is None else f"{count} box{'es' if count != 1 else ''} found; "
-    said = f"at {look.time:.1f} s: {boxes}{command}"
-    shown = f"<span>{escape(window)}</span>" if window else ""
+    shown = f"window “{window}”; " if look.pictures else "the camera's image, no window shows it; "
+    said = escape(f"at {look.time:.1f} s: {shown}{boxes}{command}")
+    return f'<figure><img alt="{said}" src="{uri}"><figcaption>{words}<span>{said}</span></figcaption></figure>'
+
+
+def _map(take: Take, words: str) -> str:
+    """Return the way of the robot and of the people, seen from above, as a drawing."""
+    half = take.scene.scenario.room.half
+    robot = [(x, y) for _, x, y, _ in take.path]
+    people = [
+        [(p.x, p.y) for look in take.looks if (p := look.truth.people[index]) is not None]
+        for index in range(len(take.scene.scenario.people))
+    ]
+    lines = "".join(
+        f'<polyline fill="none" stroke="{colour}" stroke-width=".06" points="'
+        + " ".join(f"{x:.2f},{-y:.2f}" for x, y in way)
+        + '"/>'
+        for colour, way in [*(("#c60", way) for way in people), ("#06c", robot)]
+    )
+    view = f"{-half} {-half} {2 * half} {2 * half}"
     return (
-        f"<figure>{seen}<figcaption>{escape(take.scene.words.capitalize())}<span>{escape(said)}</span>{shown}"
+        f'<figure><svg viewBox="{view}" width="{_WIDTH}" height="{_WIDTH}" role="img">{lines}</svg><figcaption>'
+        f"{words}<span>from above: the robot's way blue, the person's orange; the room is {2 * half:g} m wide</span>"
         "</figcaption></figure>"
     )
 
 
-def _telling(take: Take) -> Look | None:
-    """Return the frame with the most boxes and a window, of equals the last."""
-    return max(take.looks, key=lambda look: (bool(look.windows), len(look.found), look.time), default=None)
-
-
-def _picture(look: Look) -> tuple[str, str]:
-    """Return the newest window's picture as a data URI, and the window's name; empty without a window."""
-    if not look.windows:
-        return "", ""
-    name, shown = max(look.windows.items(), key=lambda entry: entry[1].time)
-    picture: NDArray[np.uint8] = shown.picture
-    if picture.ndim not in (2, 3) or min(picture.shape[:2]) < 1:
-        return "", name
-    height = max(round(picture.shape[0] * _WIDTH / picture.shape[1]), 1)
-    small = cv2.resize(picture, (_WIDTH * 2, height * 2), interpolation=cv2.INTER_AREA)
-    return data_uri(jpeg(small.astype(np.uint8, copy=False))), f"window “{name}”"
+def _telling(take: Take) -> list[Look]:
+    """Return the image with the most boxes and a window, of equals the last."""
+    return sorted(take.looks, key=lambda look: (bool(look.pictures), len(look.found), look.time))[-1:]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import hashlib
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -10,18 +11,19 @@ from typing import NamedTuple
 
 from limo_hog.ros2 import names
 from limo_sim.ros.lockstep.calls import Calls, nearest_topic
-from limo_sim.workshop.scenes import Take
+from limo_sim.workshop.takes import Look, Take
 
 #: Topics that carry the camera's colour image.
 _IMAGES = (names.IMAGE, names.IMAGE_COMPRESSED)
 
 
 class Finding(NamedTuple):
-    """Whether a checkpoint holds, None where it could not be tried; why; and the line of the student's file."""
+    """Whether a checkpoint holds, None where it could not be tried; why; the student's line; the image it is about."""
 
     holds: bool | None
     evidence: str
     line: int | None = None
+    look: Look | None = None
 
 
 class Source:
@@ -48,6 +50,23 @@ class Source:
         return min(lines, default=None)
 
 
+def fingerprint(node: Path | str) -> str:
+    """Return what a file or a text has in common with its copies: its code, without comments and names' spelling."""
+    try:
+        tree = ast.parse(node.read_bytes() if isinstance(node, Path) else node)
+    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError):
+        return ""
+    names: dict[str, str] = {}
+    for part in ast.walk(tree):
+        for key in ("id", "arg", "attr", "name"):
+            if isinstance(old := getattr(part, key, None), str):
+                setattr(part, key, names.setdefault(old, str(len(names))))
+        if isinstance(body := getattr(part, "body", None), list):
+            # (Docstrings are comments.)
+            body[:] = [one for one in body if not isinstance(getattr(one, "value", None), ast.Constant)]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
 def camera_read(calls: Calls) -> bool:
     """Whether a subscription asks for the camera's colour image."""
     return any(topic in calls.readers for topic in _IMAGES)
@@ -71,22 +90,27 @@ def no_picture(source: Source, takes: Sequence[Take]) -> Finding | None:
             False, f"the node {name!r} is made and never spun: without rclpy.spin(node) no callback runs", line
         )
     line = next(calls.readers[topic] for topic in _IMAGES if topic in calls.readers)
+    for said, there in calls.unmatched.items():
+        if any(f"'{topic}'" in said for topic in _IMAGES):
+            return Finding(False, said, there)
     return Finding(False, "the callback never ran; is rclpy.spin given the node that has the subscription?", line)
 
 
 def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
     """Return why the detector cannot find anybody; None where it looks at pictures with an SVM."""
-    if not any(look.raw is not None for take in takes for look in take.looks):
-        line = source.first_call("detectMultiScale")
-        if line is None:
-            return Finding(False, "self.hog.detectMultiScale was never called")
-        return Finding(False, "detectMultiScale was never called: this line never runs", line)
     searched_without_svm = takes[0].calls.searched_without_svm
     if searched_without_svm != 0:
         said = "detectMultiScale ran before setSVMDetector, so it finds nothing; in __init__, call\n"
         said += "hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())"
         return Finding(False, said, searched_without_svm)
-    return None
+    if any(look.raw is not None for take in takes for look in take.looks) or any(take.unplaced for take in takes):
+        return None
+    if any(take.outcome and take.outcome.stage.detector_inputs for take in takes):
+        return Finding(None, "not tried: the detector was asked, and gave no answer")
+    line = source.first_call("detectMultiScale")
+    if line is None:
+        return Finding(False, "self.hog.detectMultiScale was never called")
+    return Finding(False, "detectMultiScale was never called: this line never runs", line)
 
 
 def no_command(takes: Sequence[Take]) -> Finding | None:
@@ -95,6 +119,9 @@ def no_command(takes: Sequence[Take]) -> Finding | None:
         return None
     calls = takes[0].calls
     other = {topic: line for topic, line in calls.writers.items() if topic not in names.TYPES}
+    for said, line in calls.unmatched.items():
+        if f"'{names.COMMAND}'" in said:
+            return Finding(False, f"the robot gets no command: {said}", line)
     if names.COMMAND in calls.writers:
         return Finding(False, "the publisher is made, but publish is never called", calls.writers[names.COMMAND])
     if other:
@@ -107,7 +134,7 @@ def _no_subscription(calls: Calls) -> tuple[str, int | None]:
     unknown = {topic: line for topic, line in calls.readers.items() if topic not in (*names.TYPES, *calls.writers)}
     if unknown:
         topic, line = next(iter(unknown.items()))
-        nearest = nearest_topic(topic)
+        nearest = nearest_topic(topic, calls.types.get(topic, ""))
         return f"the topic {topic!r} is not published; did you mean {nearest!r}?", line
     if calls.readers:
         topic, line = next(iter(calls.readers.items()))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from limo_sim.workshop.check import Verdict
-from limo_sim.workshop.checkpoints import task_name
+from limo_sim.workshop.exercises import task_name
 
 
 def total(verdicts: Sequence[Verdict]) -> tuple[int, int]:

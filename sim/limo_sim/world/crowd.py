@@ -33,49 +33,27 @@ _AWAY, _ENTERING, _INSIDE, _LEAVING, _GOING_OUT, _GONE = range(6)
 
 @dataclass(frozen=True, slots=True)
 class Manners:
-    """How people who yield walk; all chosen, by eye where nothing else is said.
+    """How people who yield walk; all chosen, by eye where nothing else is said."""
 
-    Attributes
-    ----------
-    wander
-        Random acceleration, relative to the speed wanted [s^-1/2]: the paper's fluctuations, which part people who
-        meet head-on. In free walking speed varies by √(τ / 2) of it, that is 2 %.
-    reached
-        A corner without a pause is reached at this distance, in statures [1].
-    stopped
-        A corner with a pause is reached at this distance, in statures [1].
-    given_up_s, given_up_m
-        A corner that something stands on is reached as well, when the person has not come on for so long [s] within
-        this distance [m].
-    notice_m
-        The robot is approached or blocked from this distance on, where it can be seen [m].
-    approach_m
-        How near a person comes who approaches it [m]: Hall's border between personal and social distance.
-    block_m
-        How far ahead of it a person stands who blocks it [m].
-    look_s
-        How often people look for the way [s].
-    outside_m
-        How far behind a door people appear and vanish [m].
-    turn_s, turn_rate
-        Time constant of a turn [s], and its fastest [rad/s].
-    ease_s
-        Time in which the limbs start or stop swinging [s].
-    """
-
+    #: Random acceleration, relative to the speed wanted [s^-1/2]: the paper's fluctuations, which part people who meet
+    #: head-on. In free walking speed varies by √(τ / 2) of it, that is 2 %.
     wander: float = 0.04
-    reached: float = 0.3
-    stopped: float = 0.08
+    reached: float = 0.3  #: a corner without a pause is reached at this distance, in statures [1]
+    stopped: float = 0.08  #: a corner with a pause is reached at this distance, in statures [1]
+    #: given_up_s, given_up_m: a corner that something stands on is reached as well, when the person has not come on for
+    #: so long [s] within this distance [m]
     given_up_s: float = 2.0
     given_up_m: float = 1.0
-    notice_m: float = 4.0
+    notice_m: float = 4.0  #: the robot is approached or blocked from this distance on, where it can be seen [m]
+    #: How near a person comes who approaches it [m]: Hall's border between personal and social distance.
     approach_m: float = 1.2
-    block_m: float = 1.0
-    look_s: float = 0.2
-    outside_m: float = 0.5
+    block_m: float = 1.0  #: how far ahead of it a person stands who blocks it [m]
+    look_s: float = 0.2  #: how often people look for the way [s]
+    outside_m: float = 0.5  #: how far behind a door people appear and vanish [m]
+    #: turn_s, turn_rate: time constant of a turn [s], and its fastest [rad/s]
     turn_s: float = 0.15
     turn_rate: float = 4.0
-    ease_s: float = 0.25
+    ease_s: float = 0.25  #: time in which the limbs start or stop swinging [s]
 
 
 MODEL, MANNERS = SocialForce(), Manners()

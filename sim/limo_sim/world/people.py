@@ -169,21 +169,11 @@ _SHIRTS = ((34, 52, 128), (150, 44, 40), (52, 104, 58), (196, 150, 52), (98, 60,
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What people have to fit between.
+    """What people have to fit between."""
 
-    Attributes
-    ----------
-    half
-        The outer walls stand at ± this [m].
-    robot
-        Where the robot starts, x, y [m].
-    obstacles
-        What stands in the room, by the name that a message gives it.
-    """
-
-    half: float
-    robot: tuple[float, float]
-    obstacles: Sequence[tuple[str, Disc | Rectangle]]
+    half: float  #: the outer walls stand at ± this [m]
+    robot: tuple[float, float]  #: where the robot starts, x, y [m]
+    obstacles: Sequence[tuple[str, Disc | Rectangle]]  #: what stands in the room, by the name that a message gives it
 
     @cached_property
     def _plans(self) -> dict[float, FloorPlan]:

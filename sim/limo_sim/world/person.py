@@ -38,23 +38,14 @@ _TRUNK_HALF_DEPTH, _TRUNK_HALF_BREADTH = 0.052, 0.090
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a person is, and the phase of the gait.
+    """Where a person is, and the phase of the gait."""
 
-    Attributes
-    ----------
-    x, y, yaw
-        In the arena's frame [m, m, rad].
-    phase
-        Of the gait [rad]; a cycle is two steps.
-    swing
-        1 when walking, 0 when standing.
-    """
-
+    #: x, y, yaw: in the arena's frame [m, m, rad]
     x: float
     y: float
     yaw: float
-    phase: float = 0.0
-    swing: float = 0.0
+    phase: float = 0.0  #: of the gait [rad]; a cycle is two steps
+    swing: float = 0.0  #: 1 when walking, 0 when standing
 
 
 def earlier(before: Pose | None, now: Pose | None, steps: float) -> Pose | None:
@@ -72,25 +63,16 @@ def earlier(before: Pose | None, now: Pose | None, steps: float) -> Pose | None:
 
 @dataclass(frozen=True, slots=True)
 class _RouteLeg:
-    """The way from one corner of a route to the next, and the pauses at both.
+    """The way from one corner of a route to the next, and the pauses at both."""
 
-    Attributes
-    ----------
-    begins, duration
-        When the leg begins within a lap, and how long the walk takes [s].
-    walked, length
-        Way walked in the lap before, and on this leg [m].
-    heading
-        Direction of the walk [rad].
-    pause_before, pause_after
-        Time spent standing at either end [s].
-    """
-
+    #: begins, duration: when the leg begins within a lap, and how long the walk takes [s]
     begins: float
     duration: float
+    #: walked, length: way walked in the lap before, and on this leg [m]
     walked: float
     length: float
-    heading: float
+    heading: float  #: direction of the walk [rad]
+    #: pause_before, pause_after: time spent standing at either end [s]
     pause_before: float
     pause_after: float
 
@@ -168,29 +150,17 @@ def _blend(start: float, end: float, share: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class BodyMesh:
-    """The solids a person is made of, in the arena's frame.
+    """The solids a person is made of, in the arena's frame."""
 
-    Attributes
-    ----------
-    start, end
-        float64 (N, 3): the axes of tapered capsules [m].
-    start_radius, end_radius
-        float64 (N,): the radii of the balls at the ends [m].
-    centre
-        float64 (M, 3): the centres of ellipsoids [m].
-    axes
-        float64 (M, 3, 3): their semi-axes as columns [m].
-    colours
-        float64 (N + M, 3): red, green, blue, 0 … 255, capsules first.
-    """
-
+    #: start, end: float64 (N, 3): the axes of tapered capsules [m].
     start: NDArray[np.float64]
     end: NDArray[np.float64]
+    #: start_radius, end_radius: float64 (N,): the radii of the balls at the ends [m].
     start_radius: NDArray[np.float64]
     end_radius: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    colours: NDArray[np.float64]
+    centre: NDArray[np.float64]  #: float64 (M, 3): the centres of ellipsoids [m]
+    axes: NDArray[np.float64]  #: float64 (M, 3, 3): their semi-axes as columns [m]
+    colours: NDArray[np.float64]  #: float64 (N + M, 3): red, green, blue, 0 … 255, capsules first
 
 
 def _limb_angles(phase: float, swing: float) -> tuple[float, float, float]:
@@ -200,8 +170,15 @@ def _limb_angles(phase: float, swing: float) -> tuple[float, float, float]:
     return hip, hip - knee, 0.6 * (hip - knee)
 
 
-def _raise(point: Point, height: float) -> Point:
-    return point[0], point[1], point[2] + height
+def _shifted(capsules: list[Capsule], ahead: float, up: float) -> list[Capsule]:
+    def moved(point: Point) -> Point:
+        return point[0] + ahead, point[1], point[2] + up
+
+    return [(moved(a), moved(b), r0, r1, name) for a, b, r0, r1, name in capsules]
+
+
+def _along(start: Point, direction: Point, length: float) -> Point:
+    return start[0] + length * direction[0], start[1] + length * direction[1], start[2] + length * direction[2]
 
 
 def _legs(pose: Pose) -> tuple[list[Capsule], float]:
@@ -224,7 +201,7 @@ def _legs(pose: Pose) -> tuple[list[Capsule], float]:
         ]
         soles.append(min(heel[2] - 0.026, toe[2] - 0.021))
     hips = -min(soles)
-    return [(_raise(a, hips), _raise(b, hips), r0, r1, name) for a, b, r0, r1, name in capsules], hips
+    return _shifted(capsules, 0.0, hips), hips
 
 
 def _seated_legs() -> tuple[list[Capsule], float]:
@@ -253,27 +230,23 @@ def _skeleton(pose: Pose, *, sits: bool) -> tuple[list[Capsule], list[Ellipsoid]
     legs, hips = _seated_legs()
     capsules, ellipsoids = _trunk(pose, hips, 0.1, 0.75)
     back = -_SEAT_BACK
-    moved = [((a[0] + back, *a[1:]), (b[0] + back, *b[1:]), r0, r1, name) for a, b, r0, r1, name in capsules]
     seat: Ellipsoid = ((back, 0.0, _SEAT - 0.005), (0.085, 0.085, 0.022), 0.0, "stool")
-    return [*legs, *moved], [*(((c[0] + back, *c[1:]), a, t, name) for c, a, t, name in ellipsoids), seat]
+    return [*legs, *_shifted(capsules, back, 0.0)], [
+        *(((c[0] + back, *c[1:]), a, t, name) for c, a, t, name in ellipsoids),
+        seat,
+    ]
 
 
 def _trunk(pose: Pose, hips: float, arms: float, bent: float) -> tuple[list[Capsule], list[Ellipsoid]]:
     """All above the legs: hips at a height, upper arms and elbows bent forward by so much [rad], for stature 1."""
     phase, swing = pose.phase, pose.swing
     twist = swing * 0.12 * math.sin(phase)
-    capsules: list[Capsule] = []
     cos, sin = math.cos(twist), math.sin(twist)
     shoulders = hips + 0.285
-    capsules.append(
-        (
-            (0.092 * sin, -0.092 * cos, shoulders),
-            (-0.092 * sin, 0.092 * cos, shoulders),
-            0.038,
-            0.038,
-            "shirt",
-        )
-    )
+    across = 0.092 * sin, 0.092 * cos
+    capsules: list[Capsule] = [
+        ((across[0], -across[1], shoulders), (-across[0], across[1], shoulders), 0.038, 0.038, "shirt")
+    ]
     for side in (1, -1):
         upper = arms + 0.03 - side * swing * 0.38 * math.sin(phase)
         fore = upper + bent + 0.16 + 0.14 * swing
@@ -284,12 +257,8 @@ def _trunk(pose: Pose, hips: float, arms: float, bent: float) -> tuple[list[Caps
             shoulder[2] - _UPPER_ARM * math.cos(upper),
         )
         reach = (math.sin(fore), -side * 0.05, -math.cos(fore))
-        wrist = (
-            elbow[0] + _FOREARM * reach[0],
-            elbow[1] + _FOREARM * reach[1],
-            elbow[2] + _FOREARM * reach[2],
-        )
-        palm = (wrist[0] + 0.045 * reach[0], wrist[1] + 0.045 * reach[1], wrist[2] + 0.045 * reach[2])
+        wrist = _along(elbow, reach, _FOREARM)
+        palm = _along(wrist, reach, 0.045)
         capsules += [
             (shoulder, elbow, 0.036, 0.028, "shirt"),
             (elbow, wrist, 0.028, 0.021, "shirt"),

@@ -10,25 +10,17 @@ from limo_hog.follow.robot import LIMO, Twist
 
 @dataclass(slots=True)
 class Drive:
-    """Commands in, wheel speeds out.
+    """Commands in, wheel speeds out."""
 
-    Attributes
-    ----------
-    wheel_speed, wheel_acceleration
-        Limits of each wheel [m/s, m/s²].
-    watchdog_s
-        The robot stops when no command has come for this long [s]; the next command arms the watchdog again.
-    left, right
-        Speeds of the wheels' rims [m/s].
-    rejected, watchdog_stops
-        How many commands were not finite, and how often the watchdog stopped the robot.
-    """
-
+    #: wheel_speed, wheel_acceleration: limits of each wheel [m/s, m/s²]
     wheel_speed: float
     wheel_acceleration: float
+    #: The robot stops when no command has come for this long [s]; the next command arms the watchdog again.
     watchdog_s: float
+    #: left, right: speeds of the wheels' rims [m/s]
     left: float = 0.0
     right: float = 0.0
+    #: rejected, watchdog_stops: how many commands were not finite, and how often the watchdog stopped the robot
     rejected: int = 0
     watchdog_stops: int = 0
     _wanted: Twist = field(default_factory=Twist)

@@ -22,70 +22,36 @@ _TINY = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class SocialForce:
-    """Parameters of the model, for an adult; those without another origin are from the paper of 1995.
+    """Parameters of the model, for an adult; those without another origin are from the paper of 1995."""
 
-    Attributes
-    ----------
-    relaxation_s
-        Time in which people return to the velocity they want, τ [s].
-    repulsion, repulsion_m
-        Potential between two people, V⁰ [m²/s²], and how far it reaches, σ [m].
-    step_s
-        How far people look ahead at the steps of others, Δt [s].
-    border, border_m
-        Potential of a wall or an obstacle, U⁰ [m²/s²], and how far it reaches, R [m].
-    sight
-        Half of the angle of sight, φ [rad].
-    behind
-        Weight of what lies outside it, c [1].
-    top_speed
-        Highest speed, relative to the speed wanted [1].
-    stiffness
-        Of bodies that touch, k / m [1/s²]: 1.2·10⁵ kg/s² over 80 kg in the paper of 2000.
-    adult_m
-        Stature of the adult [m]. Chosen: between the mean statures of women and men in Europe.
-    body
-        Radius of the body, relative to the stature [1]: half of the shoulders' breadth in `person.body`.
-    """
-
-    relaxation_s: float = 0.5
+    relaxation_s: float = 0.5  #: time in which people return to the velocity they want, τ [s]
+    #: repulsion, repulsion_m: potential between two people, V⁰ [m²/s²], and how far it reaches, σ [m]
     repulsion: float = 2.1
     repulsion_m: float = 0.3
-    step_s: float = 2.0
+    step_s: float = 2.0  #: how far people look ahead at the steps of others, Δt [s]
+    #: border, border_m: potential of a wall or an obstacle, U⁰ [m²/s²], and how far it reaches, R [m]
     border: float = 10.0
     border_m: float = 0.2
-    sight: float = math.radians(100.0)
-    behind: float = 0.5
-    top_speed: float = 1.3
-    stiffness: float = 1500.0
-    adult_m: float = 1.72
+    sight: float = math.radians(100.0)  #: half of the angle of sight, φ [rad]
+    behind: float = 0.5  #: weight of what lies outside it, c [1]
+    top_speed: float = 1.3  #: highest speed, relative to the speed wanted [1]
+    stiffness: float = 1500.0  #: of bodies that touch, k / m [1/s²]: 1.2·10⁵ kg/s² over 80 kg in the paper of 2000
+    adult_m: float = 1.72  #: stature of the adult [m]. Chosen: between the mean statures of women and men in Europe.
+    #: Radius of the body, relative to the stature [1]: half of the shoulders' breadth in `person.body`.
     body: float = 0.13
 
 
 @dataclass(frozen=True, slots=True)
 class People:
-    """Who and what moves in the room at one instant; the first n are the people who feel forces.
+    """Who and what moves in the room at one instant; the first n are the people who feel forces."""
 
-    Attributes
-    ----------
-    position, velocity
-        float64 (m, 2) [m], [m/s].
-    radius
-        float64 (m,), of the bodies [m].
-    height
-        float64 (n,), statures of those who feel forces [m].
-    wanted
-        float64 (n, 2): the velocities that those who feel forces want [m/s].
-    ahead
-        float64 (n, 2): unit vectors in which they look.
-    """
-
+    #: position, velocity: float64 (m, 2) [m], [m/s]
     position: F64
     velocity: F64
-    radius: F64
-    height: F64
-    wanted: F64
-    ahead: F64
+    radius: F64  #: float64 (m,), of the bodies [m]
+    height: F64  #: float64 (n,), statures of those who feel forces [m]
+    wanted: F64  #: float64 (n, 2): the velocities that those who feel forces want [m/s]
+    ahead: F64  #: float64 (n, 2): unit vectors in which they look
 
 
 def acceleration(people: People, away: F64, hidden: NDArray[np.bool_], model: SocialForce) -> F64:

@@ -17,7 +17,6 @@ from limo_hog.follow.sense.clearance import (
     beam_directions,
     from_odometry,
     room_ahead,
-    room_behind,
     rooms_ahead,
     scan_points,
     speed_within,
@@ -52,8 +51,8 @@ def test_what_touches_the_ellipse_only_from_the_side_is_passed() -> None:
 
 def test_what_is_behind_is_not_in_the_way_ahead_nor_the_other_way_round() -> None:
     assert room_ahead(np.array([[-0.3, 0.0]]), MARGIN, LIMO) == math.inf
-    assert room_behind(np.array([[0.3, 0.0]]), MARGIN, LIMO) == math.inf
-    assert room_behind(np.array([[-1.0, 0.0]]), MARGIN, LIMO) == pytest.approx(0.355)
+    assert room_ahead(-np.array([[0.3, 0.0]]), MARGIN, LIMO) == math.inf
+    assert room_ahead(-np.array([[-1.0, 0.0]]), MARGIN, LIMO) == pytest.approx(0.355)
 
 
 def test_the_room_ahead_of_a_turned_robot_is_that_of_points_turned_the_other_way() -> None:

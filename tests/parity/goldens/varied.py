@@ -49,22 +49,8 @@ def of_street() -> Image:
     return images.gray(STREET())
 
 
-def fortran() -> Image:
-    return np.asfortranarray(CROWD())
-
-
 def flipped() -> Image:
     return CROWD()[::-1, ::-1]
-
-
-def one_channel() -> Image:
-    return of_street()[:, :, None]
-
-
-def read_only() -> Image:
-    image = LONELY()
-    image.flags.writeable = False
-    return image
 
 
 #: How many searches are drawn, and OpenCV's clipping values among them.
@@ -91,10 +77,7 @@ def drawn() -> Iterator[Case]:
 
 def edges() -> Iterator[Case]:
     pictures: Pictures = {
-        **{
-            f"width-{width}": partial(images.noise, width, 9, width, 3, values=5)
-            for width in (1, 2, 3, 7, 15, 16, 17, 33)
-        },
+        **{f"width-{w}": partial(images.noise, w, 9, w, 3, values=5) for w in (1, 2, 3, 7, 15, 16, 17, 33)},
         "one-pixel": partial(images.noise, 1, 1, 1),
         "one-row": partial(images.noise, 2, 1, 40),
         "ramp": partial(images.ramp, 60, 90),
@@ -123,21 +106,18 @@ def edges() -> Iterator[Case]:
 
 
 #: Images searched without grouping, and the threshold of their hits.
+BESIDE = [Figure(x, 10, 130, (30, 40, 50)) for x in (50, 1900, 3790)]
+BELOW = [Figure(35, y, 110, (40, 30, 30)) for y in (10, 600, 1180)]
+TALL = [Figure(300, 60, 600, (90, 80, 20)), Figure(900, 200, 300, (9, 9, 9))]
 RAW: dict[str, tuple[Callable[[], Image], float]] = {
     "blocks": (partial(images.blocks, 52, 300, 260, 3, size=5), -2.2),
     "blocks-large": (partial(images.blocks, 53, 480, 640, size=16), -1.75),
     "exact-fit": (LONELY, 0.0),
     "flipped": (flipped, -1.0),
     "noise": (partial(images.noise, 54, 210, 170, 3), -2.5),
-    "4k-strip": (
-        partial(images.people, 55, 150, 3840, [Figure(x, 10, 130, (30, 40, 50)) for x in (50, 1900, 3790)]),
-        0.3,
-    ),
-    "tall": (partial(images.people, 56, 1300, 70, [Figure(35, y, 110, (40, 30, 30)) for y in (10, 600, 1180)]), 0.0),
-    "hd": (
-        partial(images.people, 57, 720, 1280, [Figure(300, 60, 600, (90, 80, 20)), Figure(900, 200, 300, (9, 9, 9))]),
-        0.5,
-    ),
+    "4k-strip": (partial(images.people, 55, 150, 3840, BESIDE), 0.3),
+    "tall": (partial(images.people, 56, 1300, 70, BELOW), 0.0),
+    "hd": (partial(images.people, 57, 720, 1280, TALL), 0.5),
 }
 
 
@@ -145,12 +125,8 @@ def multi_scale() -> Iterator[Case]:
     usual: dict[str, Any] = {"winStride": (8, 8), "padding": (8, 8), "scale": 1.05}
     default = partial(Case, method="detectMultiScale", detector="default")
     for scale in (1.02, 1.05, 1.1, 1.3, 2.0, 1.0, 0.5):
-        yield default(
-            f"dms-scale-{scale}-street",
-            "steps of the pyramid",
-            STREET,
-            arguments=usual | {"scale": scale, "hitThreshold": 0.2, "groupThreshold": 0},
-        )
+        arguments = usual | {"scale": scale, "hitThreshold": 0.2, "groupThreshold": 0}
+        yield default(f"dms-scale-{scale}-street", "steps of the pyramid", STREET, arguments=arguments)
     for stride, padding in product(((4, 4), (8, 8), (16, 8), (5, 7)), ((0, 0), (4, 4), (32, 32), (24, 16))):
         if stride == (5, 7) and padding != (0, 0):
             continue  # its cache stride is 1: any padding does, and one is enough
@@ -169,8 +145,8 @@ def multi_scale() -> Iterator[Case]:
     pictures: Pictures = {
         "defaults-street": STREET,
         "defaults-street-gray": of_street,
-        "defaults-one-channel": one_channel,
-        "defaults-crowd-fortran": fortran,
+        "defaults-one-channel": lambda: of_street()[:, :, None],
+        "defaults-crowd-fortran": lambda: np.asfortranarray(CROWD()),
         "defaults-crowd-flipped": flipped,
         "defaults-exact-fit": LONELY,
         "defaults-flat": partial(images.flat, 128, 300, 300, 3),
@@ -184,14 +160,8 @@ def multi_scale() -> Iterator[Case]:
         yield default(f"dms-raw-{name}", "hits before grouping, in level order", picture, arguments=arguments)
     for levels, gamma in product((1, 3), (False, True)):
         geometry = (*PEOPLE, 1, -1.0, 0, 0.2, gamma, levels)
-        name = f"dms-levels-{levels}{'-gamma' * gamma}"
-        yield default(
-            name,
-            "a bound on the levels",
-            CROWD,
-            arguments={"hitThreshold": -1.5, "groupThreshold": 0},
-            geometry=geometry,
-        )
+        name, arguments = f"dms-levels-{levels}{'-gamma' * gamma}", {"hitThreshold": -1.5, "groupThreshold": 0}
+        yield default(name, "a bound on the levels", CROWD, arguments=arguments, geometry=geometry)
     daimler = partial(Case, method="detectMultiScale", detector="daimler", geometry=DAIMLER)
     pictures = {"street": STREET, "street-gray": of_street, "crowd": CROWD}
     for name, picture in pictures.items():

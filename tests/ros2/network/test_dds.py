@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import threading
@@ -202,6 +203,8 @@ def test_what_is_no_message_is_dropped_and_counted() -> None:
 
 
 def test_topic_list_info_and_echo_print_as_ros2_topic_does(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["topic", "list", "-t"]) == 0
+    assert re.fullmatch(r"no topics in .+\n", capsys.readouterr().err)
     with publishing(names.COMMAND, messages.twist(Twist(0.2, 0.0))):
         assert main(["topic", "list", "-t"]) == 0
         assert "/cmd_vel [geometry_msgs/msg/Twist]\n" in capsys.readouterr().out

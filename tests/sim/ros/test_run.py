@@ -50,8 +50,12 @@ def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
 
 @pytest.mark.parametrize(
     ("script", "said"),
-    [(node("raise ValueError('boom')"), "failed with ValueError"), (node("pass"), "never published on /cmd_vel")],
-    ids=["crashes", "only spins"],
+    [
+        (node("raise ValueError('boom')"), "failed with ValueError"),
+        (node("pass"), "never published on /cmd_vel"),
+        (node("self.pub.publish(Twist())"), "never moved the robot"),
+    ],
+    ids=["crashes", "only spins", "as the template stands"],
 )
 def test_a_node_that_fails_has_no_success(script: str, said: str, run: Run) -> None:
     card = score_of(run(script, STANDING, 1.0))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from tests.sim.ros.scripts import STANDING, Run, node, said
+from tests.sim.ros.scripts import DRIVE, NOBODY, STANDING, Run, node, run_script, said
 
 from limo_sim.cli.card import picture
 from limo_sim.ros.stage import score_of
@@ -104,3 +106,73 @@ def test_a_node_with_its_own_detector_is_shown_by_what_it_does_not_by_a_search(r
     assert set(card.modes) == {"drive", "stand"}
     assert card.modes["drive"] == pytest.approx(0.5, abs=0.1)
     assert picture(card) is not None
+
+
+HINTS = {
+    "image": ("Image, '/camera/image_raw'", "did you mean '/limo_camera/image'?"),
+    "depth": ("Image, '/camera/depth_raw'", "did you mean '/limo_camera/depth/image_raw'?"),
+    "command": ("Twist, '/cmd_vel_raw'", "did you mean '/cmd_vel'?"),
+}
+
+
+@pytest.mark.parametrize("name", HINTS)
+def test_a_topic_is_hinted_at_by_the_type_of_its_messages(run: Run, name: str) -> None:
+    lines: list[str] = []
+    make = f"self.create_subscription({HINTS[name][0]}, print, 10)"
+    run(node(ZERO, make), seconds=2.2, log=lambda _t, _l, _n, message: lines.append(message))
+    assert HINTS[name][1] in "".join(lines)
+
+
+def test_a_publisher_and_a_subscription_of_other_qualities_exchange_nothing_and_ros_says_so(run: Run) -> None:
+    lines: list[str] = []
+    make = """
+    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+    best = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    self.pub = self.create_publisher(Twist, '/cmd_vel', best)
+    self.mine = self.create_publisher(Twist, '/mine', best)
+    self.create_subscription(Twist, '/mine', lambda m: self.get_logger().info('reliable'), 10)
+    self.create_subscription(Twist, '/mine', lambda m: self.get_logger().info('best effort'), best)
+    self.create_subscription(Image, '/limo_camera/image', lambda m: self.get_logger().info('late'), late)
+    """
+    ended = run(
+        node("self.mine.publish(Twist()); " + DRIVE, make),
+        seconds=0.5,
+        log=lambda _t, _l, _n, message: lines.append(message),
+    )
+    warned = [line.rpartition(": ")[2] for line in lines if "incompatible QoS" in line]
+    assert warned == ["RELIABILITY", "DURABILITY"]
+    assert {line for line in lines if "QoS" not in line} == {"best effort"}
+    assert "incompatible QoS. No messages will be sent to it. Last incompatible policy: RELIABILITY" in ended.failure
+    assert ended.episode.scorer is not None
+    assert not ended.stage.commands
+
+
+def test_a_node_without_a_call_of_main_is_told_so(run: Run) -> None:
+    assert "is main() called" in run(node(ZERO).rpartition("main()")[0], seconds=0.2).failure
+
+
+def test_a_node_of_a_package_finds_the_packages_modules(tmp_path: Path) -> None:
+    package = tmp_path / "src" / "amy"
+    (package / "amy").mkdir(parents=True)
+    (package / "package.xml").write_text("<package/>")
+    (package / "amy" / "__init__.py").write_text("")
+    (package / "amy" / "helper.py").write_text("WORD = 'there'\n")
+    (package / "amy" / "go.py").write_text(
+        "import rclpy\nfrom amy.helper import WORD\nrclpy.init()\nrclpy.create_node('go').get_logger().info(WORD)\n"
+    )
+    lines: list[str] = []
+    run_script(package / "amy" / "go.py", NOBODY, 0.2, log=lambda _t, _l, _n, message: lines.append(message))
+    assert lines == ["there"]
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("import sensor_msgs_py.point_cloud2", "does not offer sensor_msgs_py"),
+        ("input()", "a node has no keyboard here"),
+        ("import sys, termios; termios.tcgetattr(sys.stdin)", "a node has no keyboard here"),
+    ],
+)
+def test_what_only_a_real_ros_or_a_terminal_has_is_refused_by_name(run: Run, line: str, named: str) -> None:
+    assert named in run(node(line), seconds=0.2).failure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +46,9 @@ def test_pure_pursuit_drives_the_circle_through_the_person() -> None:
 def test_pure_pursuit_stands_at_its_distance_and_never_backs_off() -> None:
     for x in (1.584, 1.2):
         assert PurePursuit().step(seeing((x, 0.0)), None).twist.linear == pytest.approx(0.0, abs=1e-6)
-    assert PurePursuit(target_distance=1.0).step(seeing((1.2, 0.0)), None).twist.linear > 0
+    nearer = controller_of("pursuit", 1.0)
+    assert nearer == PurePursuit(target_distance=1.0)
+    assert nearer.step(seeing((1.2, 0.0)), None).twist.linear > 0
 
 
 def test_pure_pursuit_goes_on_to_where_the_person_was_last_seen() -> None:
@@ -134,7 +135,3 @@ def test_the_policy_that_comes_along_earns_more_than_standing_still() -> None:
             assert not terminated
     assert earned["ppo"] > 200
     assert earned["ppo"] > 1.5 * earned["still"]
-
-
-def test_another_distance_is_held_where_one_is_asked_for() -> None:
-    assert controller_of("pursuit", 2.5) == replace(PurePursuit(), target_distance=2.5)

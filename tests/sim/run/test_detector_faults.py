@@ -26,12 +26,14 @@ SILHOUETTES = ((100, 150, 60, 180), (420, 150, 60, 180))
 WINDOWS = np.array([[85, 120, 90, 240], [405, 120, 90, 240]], np.int32)
 
 
-class SeesBoth:
-    """Finds both people in every camera image."""
+class Sees:
+    """Finds the same windows in every image, whatever it shows."""
 
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        del image
-        return Detections(WINDOWS, np.array([1.0, 0.8]))
+    def __init__(self, windows: NDArray[np.int32] = WINDOWS) -> None:
+        self.found = Detections(windows, np.array([1.0, 0.8])[: len(windows)])
+
+    def detect(self, _image: NDArray[np.uint8]) -> Detections:
+        return self.found
 
 
 def truth(frame: int, rate: float = 10.0) -> Truth:
@@ -56,7 +58,7 @@ class Faulty:
 
 
 def seen(faults: DetectorFaults, frames: int, seed: int = 0, rate: float = 10.0) -> list[Detections]:
-    faulty = Faulty(SeesBoth(), faults, seed, rate)
+    faulty = Faulty(Sees(), faults, seed, rate)
     return [faulty.at(truth(frame, rate)) for frame in range(frames)]
 
 
@@ -104,7 +106,7 @@ def test_false_boxes_come_at_their_rate_within_the_image_and_best_first() -> Non
 def test_a_seed_fixes_every_miss_and_false_box_whichever_frames_are_read() -> None:
     faults = DetectorFaults(recall=0.5, false_rate=0.5)
     every = seen(faults, 300, seed=4)
-    sparse = Faulty(SeesBoth(), faults, 4)
+    sparse = Faulty(Sees(), faults, 4)
     for frame in range(0, 300, 7):
         found = sparse.at(truth(frame))
         np.testing.assert_array_equal(found.windows, every[frame].windows)
@@ -137,12 +139,7 @@ def test_a_search_in_part_of_the_image_or_at_half_size_loses_the_same_people(win
 
 @pytest.mark.parametrize("half", [1, 2])
 def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(half: int) -> None:
-    class SeesNobody:
-        def detect(self, image: NDArray[np.uint8]) -> Detections:
-            del image
-            return Detections.none()
-
-    faulty = Faulty(SeesNobody(), DetectorFaults(false_rate=2.0))
+    faulty = Faulty(Sees(WINDOWS[:0]), DetectorFaults(false_rate=2.0))
     region = Region(32, 64, 512, 384, 200.0 * half)
     count = from_the_top = 0
     for frame in range(100):
@@ -161,7 +158,7 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
 
 
 def test_the_half_size_detector_keeps_its_own_boxes() -> None:
-    faulty = Faulty(HalfSize(SeesBoth()), DetectorFaults(false_rate=0.001))
+    faulty = Faulty(HalfSize(Sees()), DetectorFaults(false_rate=0.001))
     np.testing.assert_array_equal(faulty.at(truth(0)).windows[:2], WINDOWS * 2)
 
 
@@ -171,11 +168,7 @@ def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np
     person = PersonTruth(2.0, 0.0, 0.0, 2.0, 0.0, 1.8, 1.0, (x, y, height // 3, height))
     window = np.array([[x + height // 6 - height // 3, y - height // 6, 2 * height // 3, 4 * height // 3]], np.int32)
 
-    class SeesOne:
-        def detect(self, _image: NDArray[np.uint8]) -> Detections:
-            return Detections(window, np.array([1.0]))
-
-    faulty = Faulty(SeesOne(), DetectorFaults(misses_like=model), seed)
+    faulty = Faulty(Sees(window), DetectorFaults(misses_like=model), seed)
     truths = [Truth(frame / 10, (0.0, 0.0, 0.0), (person, None), Contacts()) for frame in range(frames)]
     return np.array([(faulty.at(now).windows == window).all(axis=1).any() for now in truths])
 

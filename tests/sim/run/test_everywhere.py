@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,27 +36,26 @@ def node(tmp_path: Path) -> Path:
     return path
 
 
-def test_an_arena_has_the_people_of_its_seed() -> None:
-    assert Arena(DRAWN, 3).scenario == of_run(DRAWN, 3)
-    assert Arena(DRAWN, 3).scenario != Arena(DRAWN, 4).scenario
-    assert Arena(DRAWN).scenario == Arena(DRAWN, 0).scenario
+@pytest.mark.parametrize(
+    "start",
+    [
+        lambda _: Arena(DRAWN, 3),
+        lambda _: run_episode(DRAWN, ApproachController(), detector_named("hog"), 0.2, 3),
+        lambda node: run_node(Stage(node, DRAWN, 0.5, 3)).episode,
+        lambda _: run_live(DRAWN, 3, 0.04, None),
+    ],
+    ids=["arena", "closed loop", "node", "arena on the network"],
+)
+def test_whoever_runs_meets_the_people_of_the_seed(start: Callable[[Path], Any], node: Path) -> None:
+    assert start(node).scenario == of_run(DRAWN, 3)
 
 
-def test_the_closed_loop_and_a_sweep_run_with_the_people_of_the_seed(tmp_path: Path) -> None:
-    episode = run_episode(DRAWN, ApproachController(), detector_named("hog"), 0.2, 3)
-    assert episode.scenario == of_run(DRAWN, 3)
+def test_a_sweep_runs_with_the_people_of_the_seed(tmp_path: Path) -> None:
+    assert Arena(DRAWN).scenario == Arena(DRAWN, 0).scenario != Arena(DRAWN, 3).scenario
     file = tmp_path / "drawn.toml"
     file.write_text("[vary]\nplace = 0.4\n[[people]]\nroute = [[2.5, 0.0, 0.0], [3.0, 1.5, 0.0]]\n", encoding="utf-8")
     cards = [play(Run(str(file), "approach", "hog", seed, 0.2)) for seed in (3, 4, 3)]
     assert cards[0].scenario_hash == cards[2].scenario_hash != cards[1].scenario_hash
-
-
-def test_a_node_meets_the_people_of_the_seed(node: Path) -> None:
-    assert run_node(Stage(node, DRAWN, 0.5, 3)).episode.scenario == of_run(DRAWN, 3)
-
-
-def test_an_arena_on_the_network_has_the_people_of_the_seed() -> None:
-    assert run_live(DRAWN, 3, 0.04, None).scenario == of_run(DRAWN, 3)
 
 
 def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:

@@ -77,10 +77,16 @@ def test_the_robot_wanders_and_the_same_seed_gives_the_same_pictures() -> None:
     assert all(frame.truth.contacts.wall == 0 for run in runs for frame, _ in run)
 
 
-def test_what_is_written_is_coco_with_depth_and_identities(tmp_path: Path) -> None:
+def test_what_is_written_is_coco_with_depth_and_identities(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    assert main(["export", "--scenario", "two_people", "--out", str(out), "--frames", "8", "--depth"]) == 0
+    command = ["export", "--scenario", "two_people", "--out", str(out), "--frames", "8", "--depth"]
+    assert main(command) == 0
     data = json.loads((out / "coco.json").read_text())
+    told = f"{out}: pictures: 8, labelled things: {len(data['annotations'])}, labels: coco.json\n"
+    assert capsys.readouterr().out == told
+    before = sorted(out.rglob("*"))
+    assert main(command) == 2
+    assert "would be overwritten" in capsys.readouterr().err and sorted(out.rglob("*")) == before
     assert [image["stamp"] for image in data["images"]] == sorted({image["stamp"] for image in data["images"]})
     assert {note["track_id"] for note in data["annotations"]} <= {0, 1}
     assert all(note["iscrowd"] == (note["visible"] < 0.65) for note in data["annotations"])
@@ -122,10 +128,3 @@ def test_a_killed_export_is_completed_as_if_it_had_not_been(tmp_path: Path, caps
     assert main([*typed, str(killed), "--resume"]) == 0
     for path in filter(Path.is_file, whole.rglob("*")):
         assert (killed / path.relative_to(whole)).read_bytes() == path.read_bytes()
-
-
-def test_export_says_what_it_wrote(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", "--scenario", "standing", "--frames", "2", "--out", str(tmp_path / "a")]) == 0
-    told = capsys.readouterr().out
-    labels = json.loads((tmp_path / "a" / "coco.json").read_text())["annotations"]
-    assert told == f"{tmp_path / 'a'}: pictures: 2, labelled things: {len(labels)}, labels: coco.json\n"

@@ -6,25 +6,120 @@ import json
 import math
 import tracemalloc
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from tests.sim.run.steps import CAMERA, OFF, ON, TRUNK, add, card, followed, other_person, person, step
 
+from limo_sim.run.log import Step
 from limo_sim.run.matching import Criteria
 from limo_sim.run.score import Scorer
 from limo_sim.world.scenario import Scenario
-from limo_sim.world.truth import Contacts
+from limo_sim.world.truth import Contacts, PersonTruth
 
 
-def test_fractions_begin_when_the_person_is_first_in_view() -> None:
-    unseen = [step(k, person(visible=0.0, box=None)) for k in range(5)]
-    seen = [followed(k) for k in range(5, 8)]
-    gone = [step(8, person(visible=0.1))]
-    result = card(*unseen, *seen, *gone)
-    assert result.in_view == 0.75
-    assert result.detected == 1.0
-    assert result.first_detection_s == pytest.approx(0.5)
+def seen_at(left: int, visible: float = 1.0) -> PersonTruth:
+    """A person whose silhouette begins at a column [px]."""
+    return person(visible=visible, box=(left, 100, 60, 120))
+
+
+def targets(of: str, metres: float) -> list[Step]:
+    """Steps whose target is the person (a), nobody (x) or none (-), each so far [m] from the last."""
+    boxes = {"a": ON, "x": OFF}
+    return [
+        step(
+            k, person(), boxes=[boxes[one]] if one in boxes else None, target=0 if one in boxes else None, at=metres * k
+        )
+        for k, one in enumerate(of)
+    ]
+
+
+APART = (0.4, 1.0, 2.0, 4.0)
+UNSEEN, GONE = person(visible=0.0, box=None), person(visible=0.1)
+NEAR, FAR, CLOSE = replace(other_person(), distance=0.9), person(4.0), person(0.3)
+#: What a log shows, its steps, and the figures that its card has.
+CARDS: dict[str, tuple[list[Step], dict[str, Any]]] = {
+    "fractions begin when the person is first in view": (
+        [*(step(k, UNSEEN) for k in range(5)), *(followed(k) for k in range(5, 8)), step(8, GONE)],
+        {"in_view": 0.75, "detected": 1.0, "first_detection_s": 0.5},
+    ),
+    "half of a person is in view": ([step(0, person()), step(1, seen_at(300, 0.5))], {"in_view": 1.0}),
+    "less than half of a person is not": ([step(0, person()), step(1, seen_at(300, 0.499))], {"in_view": 0.5}),
+    "nothing to measure is none": (
+        [step(k) for k in range(3)],
+        {"in_view": None, "distance_mean_m": None, "found_again": None, "contacts_person": 1, "contacts_wall": 2},
+    ),
+    "nobody to succeed with, nor to intrude upon": (
+        [step(0), step(1, None, None)],
+        {"success": None, "intrusion_intimate": None, "intrusion_personal": None, "intrusion_social": None},
+    ),
+    "the pixel error is from the image's middle": (
+        [step(0, seen_at(300)), step(1, seen_at(250))],
+        {"pixel_error_mean": 25.0},
+    ),
+    "and of frames with the subject in view": (
+        [step(0, seen_at(300)), step(1, seen_at(0, 0.4)), step(2, seen_at(250))],
+        {"pixel_error_mean": 25.0},
+    ),
+    "95 of 100 frames are nearer": (
+        [step(k, seen_at(290 + k)) for k in range(101)],
+        {"pixel_error_mean": 50.0, "pixel_error_p95": 95.0},
+    ),
+    "distances fall into zones": (
+        [step(k, person(distance)) for k, distance in enumerate(APART)],
+        {"distance_min_m": 0.4, "distance_mean_m": 1.85}
+        | dict.fromkeys(("zone_intimate", "zone_personal", "zone_social", "zone_public"), 0.25),
+    ),
+    "who holds the target exactly is charged no error": (
+        [step(k, person(1.5 + CAMERA + TRUNK)) for k in range(5)],
+        {"distance_rms_error_m": 0.0},
+    ),
+    "intrusions are those of the nearest of all people": (
+        [step(0, FAR, NEAR), step(1, FAR, None), step(2, CLOSE, NEAR), step(3, None, None)],
+        {"intrusion_intimate": 0.25, "intrusion_personal": 0.25, "intrusion_social": 0.0},
+    ),
+    "following the other person is told": (
+        [step(k, person(), other_person(), boxes=[ON if k < 3 else OFF], target=0) for k in range(4)],
+        {"follows_first": 0.75},
+    ),
+    "changes of the turn rate are averaged": (
+        [step(k, turn=turn) for k, turn in enumerate((0.0, 0.5, 0.2, 0.2))],
+        {"mean_abs_domega": 0.8 / 3},
+    ),
+    "a turn rate that is no number counts as none": (
+        [step(k, turn=turn) for k, turn in enumerate((0.0, math.nan, 0.2))],
+        {"mean_abs_domega": 0.1},
+    ),
+    "driving after a decoy is measured": (
+        [step(k, boxes=[OFF], target=0, at=0.1 * k) for k in range(4)],
+        {"path_wrong_m": 0.3, "path_m": 0.3},
+    ),
+    "from a target that is nobody to one that is": (targets("-aax-xa-a", 0.5), {"path_wrong_m": 1.5, "path_m": 4.0}),
+    "periods without a frame are not counted": ([step(k, person(), frame=k != 2) for k in range(5)], {"frames": 4}),
+    "the longest gap is between two detections of the subject": (
+        [step(k, person(), boxes=[ON if k in (0, 1, 5, 7) else OFF], target=0) for k in range(9)],
+        {"longest_gap_s": 0.4},
+    ),
+    "who is never found again is lost once": (
+        [*(followed(k) for k in range(3)), *(step(k, person()) for k in range(3, 50))],
+        {"lost": 1, "found_again": 0.0},
+    ),
+}
+
+
+@pytest.mark.parametrize("said", CARDS)
+def test_the_card_of_a_log_in_which(said: str) -> None:
+    steps, wanted = CARDS[said]
+    found = card(*steps)
+    assert {name: getattr(found, name) for name in wanted} == {
+        name: value if value is None else pytest.approx(value, abs=1e-12) for name, value in wanted.items()
+    }
+
+
+def test_without_a_distance_to_hold_there_is_no_distance_error() -> None:
+    result = card(*(step(k, person()) for k in range(5)), target=None)
+    assert (result.target_m, result.distance_rms_error_m, result.distance_mean_m) == (None, None, 2.0)
 
 
 def test_a_robot_keeps_up_where_the_person_is_in_view_and_at_most_three_metres_away() -> None:
@@ -50,28 +145,6 @@ def test_a_score_as_the_run_goes_needs_12_bytes_a_frame() -> None:
     assert 0 < grown < 1.2 * 12 * 4000
 
 
-def test_nothing_to_measure_is_none() -> None:
-    result = card(*(step(k) for k in range(3)))
-    assert result.in_view is None
-    assert result.distance_mean_m is None
-    assert result.found_again is None
-    assert result.contacts_person == 1
-    assert result.contacts_wall == 2
-
-
-def test_pixel_error_is_from_the_middle_of_the_image() -> None:
-    result = card(step(0, person(box=(300, 100, 60, 120))), step(1, person(box=(250, 100, 60, 120))))
-    assert result.pixel_error_mean == 25.0
-
-
-def test_distances_and_zones() -> None:
-    result = card(*(step(k, person(distance)) for k, distance in enumerate((0.4, 1.0, 2.0, 4.0))))
-    assert result.distance_min_m == 0.4
-    assert result.distance_mean_m == pytest.approx(1.85)
-    zones = (result.zone_intimate, result.zone_personal, result.zone_social, result.zone_public)
-    assert zones == (0.25, 0.25, 0.25, 0.25)
-
-
 def test_the_distance_error_is_to_the_target_of_the_run() -> None:
     steps = [step(k, person(distance)) for k, distance in enumerate((0.4, 1.0, 2.0, 4.0))]
     for target in (0.8, 1.5, 3.0):
@@ -79,11 +152,6 @@ def test_the_distance_error_is_to_the_target_of_the_run() -> None:
         result = card(*steps, target=target)
         assert result.target_m == target
         assert result.distance_rms_error_m == pytest.approx(math.sqrt(sum(error**2 for error in errors) / 4))
-
-
-def test_a_follower_that_holds_its_target_exactly_is_charged_no_error() -> None:
-    result = card(*(step(k, person(1.5 + CAMERA + TRUNK)) for k in range(5)))
-    assert result.distance_rms_error_m == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_distance_error_is_to_what_the_controller_keeps_at_the_time() -> None:
@@ -102,13 +170,6 @@ def test_the_distance_error_is_to_what_the_controller_keeps_at_the_time() -> Non
     assert card(*steps, target=None).kept_m is None
     assert card(step(0, person())).kept_m == 1.5
     assert card(step(0)).kept_m is None
-
-
-def test_a_controller_that_holds_no_distance_has_no_distance_error() -> None:
-    result = card(*(step(k, person()) for k in range(5)), target=None)
-    assert result.target_m is None
-    assert result.distance_rms_error_m is None
-    assert result.distance_mean_m == 2.0
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5, math.pi / 2, 2.0, math.pi, -0.7, -math.pi / 2])
@@ -145,13 +206,6 @@ def test_the_best_box_on_no_person_is_wrong() -> None:
     assert result.detected == 0.8
     assert card(*right).best_box_wrong == 0.0
     assert card(unboxed).best_box_wrong is None
-
-
-def test_following_the_other_person_is_told() -> None:
-    people = person(), other_person()
-    mine = [step(k, *people, boxes=[ON], target=0) for k in range(3)]
-    theirs = [step(3, *people, boxes=[OFF], target=0)]
-    assert card(*mine, *theirs).follows_first == 0.75
 
 
 def test_the_subject_is_the_first_person_chosen_not_the_scenarios_first() -> None:
@@ -194,21 +248,6 @@ def test_success_is_a_person_in_view_at_the_end_untouched_and_never_lost_for_lon
 ) -> None:
     steps = [step(k, person(visible=float(seen))) for k, seen in enumerate(shown)]
     assert card(*steps, contacts=Contacts(contacts, 3)).success is success
-
-
-def test_without_anybody_there_is_nothing_to_succeed_in() -> None:
-    assert card(step(0), step(1, None)).success is None
-
-
-def test_the_turn_rates_changes_are_averaged() -> None:
-    turns = (0.0, 0.5, 0.2, 0.2)
-    result = card(*(step(k, turn=turn) for k, turn in enumerate(turns)))
-    assert result.mean_abs_domega == pytest.approx(0.8 / 3)
-
-
-def test_a_turn_rate_that_is_no_number_counts_as_none() -> None:
-    result = card(*(step(k, turn=turn) for k, turn in enumerate((0.0, math.nan, 0.2))))
-    assert result.mean_abs_domega == pytest.approx((0.0 + 0.2) / 2)
 
 
 def test_driving_is_the_share_of_the_steps_whose_command_moves_the_robot() -> None:
@@ -259,50 +298,11 @@ def test_percentiles_and_means_of_the_wall_clock() -> None:
     assert result.real_time_factor == 1.0
 
 
-def test_the_pixel_error_reached_in_95_of_100_frames() -> None:
-    steps = [step(k, person(box=(290 + k, 100, 60, 120))) for k in range(101)]
-    result = card(*steps)
-    assert result.pixel_error_mean == 50.0
-    assert result.pixel_error_p95 == 95.0
-
-
-def test_the_pixel_error_is_of_the_frames_with_the_subject_in_view() -> None:
-    behind = step(1, person(visible=0.4, box=(0, 100, 60, 120)))
-    result = card(step(0, person(box=(300, 100, 60, 120))), behind, step(2, person(box=(250, 100, 60, 120))))
-    assert result.pixel_error_mean == 25.0
-
-
 def test_the_shares_of_modes_and_reasons_add_up_to_one_however_short_the_log() -> None:
     for count in (1, 2, 5):
         result = card(*(step(k, person()) for k in range(count)))
         assert sum(result.modes.values()) == sum(result.reasons.values()) == 1.0
         assert result.modes["follow"] == result.reasons["because"] == 1.0
-
-
-def test_intrusions_are_those_of_the_nearest_of_all_people() -> None:
-    far, near, absent = person(4.0), replace(other_person(), distance=0.9), None
-    result = card(step(0, far, near), step(1, far, absent), step(2, person(0.3), near), step(3, absent, absent))
-    assert (result.intrusion_intimate, result.intrusion_personal, result.intrusion_social) == (0.25, 0.25, 0.0)
-    empty = card(step(0, None, None))
-    assert empty.intrusion_intimate is empty.intrusion_personal is empty.intrusion_social is None
-
-
-def test_driving_after_a_decoy_is_measured() -> None:
-    steps = [step(k, boxes=[OFF], target=0, at=0.1 * k) for k in range(4)]
-    assert card(*steps).path_wrong_m == pytest.approx(0.3)
-    assert card(*steps).path_m == pytest.approx(0.3)
-
-
-def test_driving_counts_as_wrong_from_a_target_that_is_no_person_to_one_that_is() -> None:
-    targets = "-aax-xa-a"
-    boxes = {"a": ON, "x": OFF}
-    steps = [
-        step(k, person(), boxes=[boxes[of]] if of in boxes else None, target=0 if of in boxes else None, at=0.5 * k)
-        for k, of in enumerate(targets)
-    ]
-    # from 3 to 6
-    assert card(*steps).path_wrong_m == pytest.approx(1.5)
-    assert card(*steps).path_m == pytest.approx(4.0)
 
 
 def test_a_run_fails_only_beyond_the_time_unseen_that_the_criteria_allow() -> None:
@@ -314,10 +314,40 @@ def test_a_run_fails_only_beyond_the_time_unseen_that_the_criteria_allow() -> No
     assert card(*steps, contacts=Contacts(), criteria=Criteria(unseen_s=0.5)).success is True
 
 
-def test_frames_are_counted_and_periods_without_one_are_not() -> None:
-    assert card(*(step(k, person(), frame=k != 2) for k in range(5))).frames == 4
+# When the subject of a run counts as lost, and as found again.
 
 
-@pytest.mark.parametrize(("visible", "share"), [(0.5, 1.0), (0.499, 0.5)])
-def test_a_person_is_in_view_of_whom_half_is_visible(visible: float, share: float) -> None:
-    assert card(step(0, person()), step(1, person(visible=visible))).in_view == share
+@pytest.mark.parametrize(
+    ("until", "lost", "found_again"), [(0.5, 0, None), (0.75, 1, 1.0), (3.0, 1, 1.0), (3.25, 1, 0.0)]
+)
+def test_a_person_is_lost_after_half_a_second_and_found_again_within_three(
+    until: float, lost: int, found_again: float | None
+) -> None:
+    # Times whose sums are exact.
+    without = [step(0, person(), boxes=[ON], time=float(time)) for time in np.arange(0.25, until, 0.25)]
+    result = card(followed(0), *without, followed(0, until))
+    assert (result.lost, result.found_again) == (lost, found_again)
+
+
+def test_a_loss_is_counted_without_the_time_behind_a_pillar() -> None:
+    before = [followed(k) for k in range(3)]
+    hidden = [step(k, person(visible=0.0)) for k in range(3, 50)]
+    again = [followed(50)]
+    result = card(*before, *hidden, *again)
+    assert result.lost == 1
+    assert result.found_again == 1.0
+    away = [step(k, person(visible=0.0, box=None)) for k in range(3, 50)]
+    assert card(*before, *away, *again).found_again == 0.0
+
+
+def test_the_time_to_find_the_subject_again_is_the_mean_over_the_losses() -> None:
+    steps, number = [], 0
+    for gone in (10, 20):
+        steps += [followed(number + k) for k in range(3)]
+        steps += [step(number + 3 + k, person()) for k in range(gone - 1)]
+        number += 2 + gone
+    steps += [followed(number + k) for k in range(3)]
+    assert card(*steps).time_to_find_again_s == pytest.approx((1.0 + 2.0) / 2)
+    never = [followed(k) for k in range(3)]
+    assert card(*never).time_to_find_again_s is None
+    assert card(*never, *(step(k, person()) for k in range(3, 53))).time_to_find_again_s == pytest.approx(5.0)

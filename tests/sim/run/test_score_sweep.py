@@ -32,23 +32,18 @@ def test_every_card_belongs_to_its_run_whatever_the_scenario_calls_itself(tmp_pa
     assert [cards[run].seed for run in runs] == [0, 1, 2]
 
 
+def _stat(number: int | str) -> list[str]:
+    """What Linux says of a process that runs, after its name; nothing of one that has ended."""
+    with suppress(OSError):
+        words = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
+        return words if words[0] != "Z" else []
+    return []
+
+
 def _processes_of(parent: int) -> set[int]:
     """The children of a process, and theirs."""
-    found: set[int] = set()
-    for status in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            words = status.read_text().rpartition(")")[2].split()
-            if int(words[1]) == parent and words[0] != "Z":
-                number = int(status.parent.name)
-                found |= {number} | _processes_of(number)
-    return found
-
-
-def _is_running(number: int) -> bool:
-    try:
-        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    children = [int(one.name) for one in Path("/proc").glob("[0-9]*") if _stat(one.name)[1:2] == [str(parent)]]
+    return {*children, *(number for child in children for number in _processes_of(child))}
 
 
 @contextmanager
@@ -66,11 +61,7 @@ def _scoring(*more: str) -> Iterator[tuple[subprocess.Popen[str], set[int]]]:
 
 def _seconds_of(number: int) -> float:
     """Processor time of a process [s]; importing all it needs takes about two."""
-    try:
-        words = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return 0.0
-    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+    return sum(map(int, _stat(number)[11:13])) / os.sysconf("SC_CLK_TCK")
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -79,7 +70,7 @@ def test_workers_end_with_their_parent_whatever_ends_it(number: signal.Signals) 
         began = time.monotonic()
         child.send_signal(number)
         assert child.wait(20) == (-number if number == signal.SIGKILL else 128 + number)
-        while any(map(_is_running, workers)):
+        while any(map(_stat, workers)):
             assert time.monotonic() - began < 3.0
             time.sleep(0.05)
         assert child.stderr is not None

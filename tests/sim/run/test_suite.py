@@ -1,7 +1,9 @@
-"""Suites are frozen: their files are those that were hashed, and every one of them can be run."""
+"""Suites are frozen: their files are those that were hashed, and can be run. A card tells what it came from."""
 
 from __future__ import annotations
 
+import dataclasses
+import re
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -10,8 +12,9 @@ import pytest
 
 from limo_sim.run import suite as suites
 from limo_sim.run.arena import Arena
+from limo_sim.run.provenance import code_version, scenario_hash
 from limo_sim.run.suite import Suite
-from limo_sim.world.scenario import Scenario
+from limo_sim.world.scenario import Camera, Scenario
 from limo_sim.world.schema import ScenarioError
 
 V1 = Suite.load("v1")
@@ -51,3 +54,26 @@ def test_the_page_of_the_benchmark_is_about_these_files() -> None:
     page = (Path(__file__).parents[3] / "docs" / "benchmark.md").read_text(encoding="utf-8")
     for entry in V1.scenarios:
         assert f"| `{entry.name}` | {Scenario.load(V1.path(entry)).summary} | `{entry.sha256[:16]}` |" in page
+
+
+def test_scenarios_have_hashes_of_their_own_whatever_they_are_called() -> None:
+    names = Scenario.names()
+    assert len({scenario_hash(Scenario.load(name)) for name in names}) == len(names)
+    workshop = Scenario.load("workshop")
+    assert scenario_hash(dataclasses.replace(workshop, name="mine", summary="")) == scenario_hash(workshop)
+    assert scenario_hash(dataclasses.replace(workshop, camera=Camera(noise=1.001))) != scenario_hash(workshop)
+
+
+def test_a_scenario_that_says_what_it_would_have_left_out_has_the_same_hash() -> None:
+    workshop = Scenario.load("workshop")
+    told = dataclasses.replace(workshop, people=(dataclasses.replace(workshop.people[0], speed=0.75),), camera=Camera())
+    assert scenario_hash(told) == scenario_hash(workshop)
+
+
+def test_new_options_leave_the_hashes_of_old_scenarios_alone() -> None:
+    assert scenario_hash(Scenario.load("empty")) == "44136fa355b3678a"
+    assert scenario_hash(Scenario.load("workshop")) == "f6353cf7e6222da5"
+
+
+def test_the_code_is_told_by_versions_and_a_hash() -> None:
+    assert re.fullmatch(r"limo-hog \d+\.\d+\S*, limo-sim \d+\.\d+\S*, [0-9a-f]{16}", code_version())

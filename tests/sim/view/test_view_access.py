@@ -20,7 +20,7 @@ from limo_hog.follow.control.naming import controller_named
 from limo_sim.view.access import Access
 from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
-from limo_sim.view.tuning import Tunable
+from limo_sim.view.tuning import ParameterError, Tunable
 from limo_sim.world.scenario import Scenario
 
 WORKSHOP = Scenario.load("workshop")
@@ -242,13 +242,10 @@ def test_a_fault_of_the_page_itself_is_told(monkeypatch: pytest.MonkeyPatch, cap
 
 def test_every_parameter_is_held_to_its_own_bounds() -> None:
     controller: Tunable[Any] = Tunable(controller_named("tracking", None))
-    with View(WORKSHOP, controller) as view:
-        for name, one in controller.parameters.items():
-            for value in (one.low, one.high):
+    for name, one in controller.parameters.items():
+        for value in (one.low, one.high):
+            controller.set(name, value)
+            assert controller.parameters[name] == dataclasses.replace(one, value=type(one.value)(value))
+        for value in (one.low - 1, one.high * 1.01 + 1, 1e308):
+            with pytest.raises(ParameterError, match=f"want a {'whole ' * isinstance(one.value, int)}number from"):
                 controller.set(name, value)
-                assert controller.parameters[name] == dataclasses.replace(one, value=type(one.value)(value))
-            for value in (one.low - 1, one.high * 1.01 + 1, 1e308):
-                answer = _answer(view, json.dumps({"set": name, "value": value})) if value == 1e308 else None
-                if answer is not None:
-                    assert f"want a {'whole ' * isinstance(one.value, int)}number from" in answer["complaint"]
-                assert controller.parameters[name].value == one.high

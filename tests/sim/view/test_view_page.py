@@ -51,7 +51,9 @@ def test_a_browser_sees_the_run_move_and_steers_it(running: tuple[View, Tunable[
     with chromium() as browser:
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.goto(view.url)
+        _see_no_icon_of_a_broken_picture(page)
         _see_it_move(page)
+        _read_the_words_on_the_map(page)
         _steer_it(page, view)
         _see_it_on_a_phone(browser, view, controller)
         view.pace.set_speed(0)
@@ -65,6 +67,33 @@ def _until(page: Page, expression: str, seconds: float = 30) -> None:
     while not page.evaluate(expression):
         assert time.monotonic() < deadline, f"not within {seconds} s: {expression}"
         page.wait_for_timeout(100)
+
+
+def _see_no_icon_of_a_broken_picture(page: Page) -> None:
+    page.evaluate("document.body.append(Object.assign(new Image(), { id: 'unsent' }))")
+    assert page.evaluate("getComputedStyle(unsent).visibility") == "hidden"
+    page.evaluate("unsent.remove()")
+
+
+def _read_the_words_on_the_map(page: Page) -> None:
+    """Of a person at either wall: what the percentages are of, and nothing beyond the map's edge."""
+    page.evaluate(
+        """(() => {
+            const pen = document.getElementById("map").getContext("2d");
+            window.words = [];
+            pen.fillText = (text, x) => {
+                const [width, right] = [pen.measureText(text).width, pen.textAlign === "right"];
+                words.push([text, right ? x - width : x, right ? x : x + width]);
+            };
+            now.believed = [[-4.9, 0, 0.99, 1], [4.9, 0, 0.98, 0.5]];
+            drawMap();
+            delete pen.fillText;
+        })()"""
+    )
+    drawn = {text: (left, right) for text, left, right in page.evaluate("words")}
+    assert {"person 99 %", "followed 100 %", "person 98 %", "followed 50 %"} <= set(drawn)
+    width = page.evaluate("document.getElementById('map').clientWidth")
+    assert all(left >= 0 and right <= width for left, right in drawn.values())
 
 
 def _see_it_move(page: Page) -> None:
@@ -126,6 +155,9 @@ def _see_the_controls_in_one_row(page: Page) -> None:
     assert max(page.evaluate(tops)) < 48
     assert page.evaluate("document.querySelector('.controls').getBoundingClientRect().height") < 60
     assert page.evaluate("document.querySelector('.controls label span').offsetWidth") > 20
+    # A word of a legend stays with its mark.
+    marks = "[...document.querySelectorAll('figcaption span')].map((mark) => mark.getClientRects().length)"
+    assert max(page.evaluate(marks)) == 1
 
 
 def _see_it_on_a_phone(browser: Browser, view: View, controller: Tunable[Any]) -> None:

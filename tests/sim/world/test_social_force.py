@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.sim.logs import poses_of
 
-from limo_sim.world.crowd import STEP_S, Crowd
+from limo_sim.world.crowd import STEP_S
 from limo_sim.world.scenario import Person, Robot, Room, Scenario, Wall
 from limo_sim.world.social_force import F64, People, SocialForce, acceleration
 
@@ -80,13 +81,8 @@ def test_bodies_that_touch_are_pushed_apart() -> None:
 
 def walked(scenario: Scenario, seconds: float, robot: tuple[float, float, float], seed: int = 0) -> F64:
     """Return everybody's places, float64 (steps, people, 2)."""
-    scenario.check()
-    crowd = Crowd(scenario, seed)
-    places = [crowd.poses]
-    for step in range(1, round(seconds / STEP_S) + 1):
-        crowd.advance(step * STEP_S, robot)
-        places.append(crowd.poses)
-    return np.array([[(pose.x, pose.y) for pose in poses if pose is not None] for poses in places])
+    seen = poses_of(scenario, seconds, robot, seed)
+    return np.array([[(pose.x, pose.y) for pose in poses if pose is not None] for poses in seen])
 
 
 def speeds(places: F64) -> NDArray[np.float64]:

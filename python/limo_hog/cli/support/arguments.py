@@ -83,6 +83,26 @@ def output_file(text: str) -> str:
     return text
 
 
+def add_json(parser: ArgumentParser, what: str) -> None:
+    """Add --json, which writes what the command says."""
+    parser.add_argument("--json", type=output_file, metavar="FILE", help=f"write {what}; - is standard output")
+
+
+def score(text: str) -> float:
+    """Read an SVM margin."""
+    return number(text, -100, 100, "score")
+
+
+def height(text: str) -> float:
+    """Read the height of people in pictures [px]."""
+    return number(text, 8, 10_000, "height in pixels")
+
+
+def least_height(text: str) -> float | None:
+    """Read the height of the smallest person, or none for pictures at their own size [px]."""
+    return None if text == "none" else height(text)
+
+
 def file_ending(*suffixes: str) -> Callable[[str], Path]:
     """Read a file name that ends in one of some suffixes."""
 

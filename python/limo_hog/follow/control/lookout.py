@@ -174,12 +174,12 @@ class Lookout:
 
     def _plan(self, hunt: Hunt, now: float, pose: Odometry, grid: Grid, ground: Ground) -> Hunt:
         routes = self.router.field(grid, ground, pose)
-        cells = np.argwhere(np.isfinite(routes.distance))
+        cells = np.argwhere(np.isfinite(routes))
         here = np.array([[pose.x, pose.y]])
         step = max(len(cells) // self.candidates, 1)
         cells = cells[step // 2 :: step]
         origins = np.concatenate([here, grid.middle_of(ground, cells)])
-        far = np.concatenate([[0.0], routes.distance[cells[:, 0], cells[:, 1]]])
+        far = np.concatenate([[0.0], routes[cells[:, 0], cells[:, 1]]])
         points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
         near = np.hypot(*(origins[:, None] - points[None, :]).transpose(2, 0, 1)) < self.view
         shown = near & grid.sees(ground, origins, points)

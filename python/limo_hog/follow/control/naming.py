@@ -21,10 +21,7 @@ class ControllerError(LimoHogError):
 def controller_named(name: str, target_distance: float | None = None) -> Controller[Any]:
     """Return a controller, with another distance to hold [m] where one is given.
 
-    Raises
-    ------
-    ControllerError
-        There is no such controller, or it holds no distance.
+    Raises `ControllerError` where there is none of that name, or it holds no distance.
     """
     if name == "approach":
         if target_distance is not None:

@@ -1,4 +1,7 @@
-"""The workshop's two controllers: drive to the box with the highest score, or hold a distance to the person."""
+"""The workshop's two controllers: drive to the box with the highest score, or hold a distance to the person.
+
+Their state is whether a person was detected before; the numbers are the workshop's.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from limo_hog.follow.decision import Decision, Mode
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.measurement import box_centre, person_depth, zone_of
 from limo_hog.follow.sense.observation import Observation
@@ -15,23 +18,11 @@ from limo_hog.follow.sense.observation import Observation
 
 @dataclass(frozen=True, slots=True)
 class ApproachController:
-    """Steer by the horizontal error of the best box, drive at one speed, stop without a box.
+    """Steer by the horizontal error of the best box, drive at one speed, stop without a box."""
 
-    The state is whether a person was detected before. The numbers are the workshop's.
-
-    Attributes
-    ----------
-    angular_gain
-        Turn rate for each pixel between the box and the middle of the image [rad/s/px].
-    dead_band_px
-        Errors smaller than this do not turn the robot [px].
-    linear_speed
-        Speed towards a person [m/s].
-    """
-
-    angular_gain: float = bounded(0.005, 0, 0.05)
-    dead_band_px: float = bounded(20.0, 0, 320)
-    linear_speed: float = bounded(0.2, 0, 1)
+    angular_gain: float = param(0.005, "rad/s/px", "Turn rate for each pixel off the middle.", 0, 0.05)
+    dead_band_px: float = param(20.0, "px", "Errors smaller than this do not turn the robot.", 0, 320)
+    linear_speed: float = param(0.2, "m/s", "Speed towards a person.", 0, 1)
 
     def start(self) -> bool:
         """Return the state before the first observation: no person detected yet."""
@@ -48,27 +39,13 @@ class ApproachController:
 
 @dataclass(frozen=True, slots=True)
 class ProxemicController:
-    """Two proportional controllers: the box to the middle of the image, the person to a distance.
+    """Two proportional controllers: the box to the middle of the image, the person to a distance."""
 
-    The state is whether a person was detected before. The numbers are the workshop's.
-
-    Attributes
-    ----------
-    target_distance
-        Distance to hold, by the depth image [m].
-    linear_gain
-        Speed for each metre of error [1/s].
-    angular_gain
-        Turn rate for each pixel of error [rad/s/px].
-    max_linear, max_angular
-        Limits of the command, either way [m/s, rad/s].
-    """
-
-    target_distance: float = bounded(1.5, 0.1, 8)
-    linear_gain: float = bounded(0.5, 0, 5)
-    angular_gain: float = bounded(0.005, 0, 0.05)
-    max_linear: float = bounded(0.3, 0, 1)
-    max_angular: float = bounded(0.8, 0, 3)
+    target_distance: float = param(1.5, "m", "Distance to hold, by the depth image.", 0.1, 8)
+    linear_gain: float = param(0.5, "1/s", "Speed of approach for each metre of error.", 0, 5)
+    angular_gain: float = param(0.005, "rad/s/px", "Turn rate for each pixel of error.", 0, 0.05)
+    max_linear: float = param(0.3, "m/s", "Limit of the speed, either way.", 0, 1)
+    max_angular: float = param(0.8, "rad/s", "Limit of the turn rate, either way.", 0, 3)
 
     def start(self) -> bool:
         """Return the state before the first observation: no person detected yet."""

@@ -11,14 +11,9 @@ CAMERA, DEPTH, SCAN, ODOMETRY = "camera frame", "depth image", "scan", "odometry
 
 @dataclass(frozen=True, slots=True)
 class Arrivals:
-    """The newest reading of each sense.
+    """The newest reading of each sense."""
 
-    Attributes
-    ----------
-    newest
-        By the sense's name: the reading's stamp on the sensor's clock, and when it came on the robot's own [s].
-    """
-
+    #: By the sense's name: the reading's stamp on the sensor's clock, and when it came on the robot's own [s].
     newest: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def after(self, now: float, stamps: Mapping[str, float]) -> Arrivals:
@@ -43,13 +38,7 @@ class Arrivals:
         return "; ".join(reasons)
 
     def disagreement(self, max_age: float, max_late: float) -> str:
-        """Return which sense's stamps do not fit the others'; "" if all do.
-
-        Parameters
-        ----------
-        max_age, max_late
-            How late a reading may be when it comes [s], and an image.
-        """
+        """Return which sense's stamps do not fit the others': readings may be `max_age`, images `max_late` [s] late."""
         # A depth image has its camera frame's stamp. What the others' clocks showed when the last reading came:
         now = max((came for _, came in self.newest.values()), default=0.0)
         clocks = {name: stamp + now - came for name, (stamp, came) in self.newest.items() if name != DEPTH}

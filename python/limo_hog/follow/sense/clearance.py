@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
 
@@ -68,19 +69,10 @@ def _pixel_slopes(
 
 @dataclass(frozen=True, slots=True)
 class DepthGrid:
-    """Which depth pixels are looked at.
+    """Which depth pixels are looked at."""
 
-    Attributes
-    ----------
-    step
-        Every so many rows and columns [px]. Chosen: an ankle, 5 cm wide, covers 40 px at 0.5 m, five of these.
-    floor
-        Points lower than this are the floor [m]. Chosen: to a camera pitched by 1° the floor at 1.8 m is 0.03 m
-        high.
-    """
-
-    step: int = 8
-    floor: float = 0.05
+    step: int = param(8, "px", "Every so many rows and columns are looked at.")
+    floor: float = param(0.05, "m", "Points lower than this are the floor.")
 
     def points(self, depth: NDArray[np.float32], focal_px: float, reach: float, robot: RobotGeometry) -> Points:
         """Return what the depth camera sees above the floor and nearer than `reach` [m] to the camera."""
@@ -97,60 +89,36 @@ class DepthGrid:
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """The ground kept free around the robot's outline, a quarter of an ellipse at each corner.
+    """The ground kept free around the robot's outline, a quarter of an ellipse at each corner."""
 
-    Attributes
-    ----------
-    ahead
-        In the direction of travel [m]. Chosen: the edge of Hall's intimate zone, 0.45 m, and a stride's half.
-    beside
-        To either side [m]. Chosen: the robot passes a door of 0.8 m with 9 cm to spare on either side.
-    """
-
-    ahead: float = 0.6
-    beside: float = 0.2
+    ahead: float = param(0.6, "m", "In the direction of travel.")
+    beside: float = param(0.2, "m", "To either side.")
 
 
 def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
-    """Return how far the robot can drive straight on before a point comes into the ground kept free [m].
-
-    Negative where a point ahead is too near already, inf where nothing is in the way.
-    """
-    x, beside = points[:, 0], np.abs(points[:, 1]) - robot.half_width
-    # Most points are not in the way; only the rest are worth a square root.
-    (near,) = ((x > 0) & (beside < margin.beside)).nonzero()
-    return float(_room_to(x[near], beside[near], margin, robot).min(initial=math.inf))
+    """Return `rooms_ahead` for straight on [m]."""
+    return float(rooms_ahead(points, np.zeros(1), margin, robot)[0])
 
 
 def rooms_ahead(
     points: Points, headings: NDArray[np.float64], margin: Margin, robot: RobotGeometry
 ) -> NDArray[np.float64]:
-    """Return `room_ahead` of a robot that has turned to each of H headings [rad], float64 (H,)."""
+    """Return how far the robot, turned to each of H headings [rad], can drive until a point is too near, float64 (H,).
+
+    In metres: negative where a point ahead is too near already, inf where nothing is in the way. Backwards: `-points`.
+    """
     (x, y), cos, sin = points.T, np.cos(headings)[:, None], np.sin(headings)[:, None]
-    ahead, aside = cos * x + sin * y, cos * y - sin * x
-    beside = np.abs(aside) - robot.half_width
-    room = _room_to(ahead, beside, margin, robot)
-    return np.asarray(np.where((ahead > 0) & (beside < margin.beside), room, np.inf).min(axis=1, initial=np.inf))
-
-
-def _room_to(
-    ahead: NDArray[np.float64], beside: NDArray[np.float64], margin: Margin, robot: RobotGeometry
-) -> NDArray[np.float64]:
-    """Return how far the robot can drive before points so far ahead, and beside its outline, are too near [m]."""
+    ahead, beside = cos * x + sin * y, np.abs(cos * y - sin * x) - robot.half_width
     share = np.maximum(beside, 0) / margin.beside
-    return np.asarray(ahead - robot.half_length - margin.ahead * np.sqrt(np.maximum(1 - share**2, 0)))
-
-
-def room_behind(points: Points, margin: Margin, robot: RobotGeometry) -> float:
-    """Return how far the robot can drive straight back, as `room_ahead`."""
-    return room_ahead(-points, margin, robot)
+    room = ahead - robot.half_length - margin.ahead * np.sqrt(np.maximum(1 - share**2, 0))
+    return np.asarray(np.where((ahead > 0) & (beside < margin.beside), room, np.inf).min(axis=1, initial=np.inf))
 
 
 def speed_within(room: float, braking: float, reaction: float) -> float:
     """Return the highest speed [m/s] that still stops within `room` [m].
 
-    The robot drives on for `reaction` [s] before it brakes with `braking` [m/s²]: the v that solves
-    v·reaction + v²/(2·braking) = room.
+    The robot drives on for `reaction` [s] before it brakes with `braking` [m/s²]: the v that solves v·reaction +
+    v²/(2·braking) = room.
     """
     if room <= 0:
         return 0.0
@@ -190,17 +158,7 @@ class Look:
 
 
 def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry) -> float:
-    """Return how far behind the robot's outline the ground was seen to be free [m]; `FARTHEST_BEHIND` at most.
-
-    Parameters
-    ----------
-    looks
-        Scans of the last seconds. Ground that the robot covered when one was taken was free as well.
-    pose
-        Where the robot is now.
-    robot
-        Its outline and mounts.
-    """
+    """Return how far behind the outline ground was seen free in `looks`, or lay under the robot [m]; 0.6 at most."""
     if not looks:
         return 0.0
     places = to_odometry(places_behind(_DEPTHS_BEHIND, robot), pose)
@@ -209,10 +167,7 @@ def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry
 
 
 def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> NDArray[np.bool_]:
-    """Return for each of L looks and N points, odometry frame, whether a beam passed over it or the robot stood there.
-
-    bool (L, N). All looks at once: one by one they took a millisecond.
-    """
+    """Return whether a beam of each look passed over each point, or the robot stood there, bool (L, N): all at once."""
     numbers = [
         (
             *(look.pose.x, look.pose.y, math.cos(look.pose.yaw), math.sin(look.pose.yaw)),

@@ -15,6 +15,7 @@ from limo_hog.atomic import is_utf8
 from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
+from limo_hog.follow.parameters import param
 from limo_hog.models import PERSON_BOX, WHOLE_WINDOW, PersonBox
 from limo_hog.suppression import nms
 
@@ -35,13 +36,7 @@ def detector_named(name: str) -> Detector:
     """Return one of `NAMES`; MODEL is a model of `PeopleDetector`, by name or file, FILE a network.
 
     "hog" groups its hits as `cv2.HOGDescriptor` does, "hog:MODEL" suppresses them greedily; neither enlarges the image.
-
-    Raises
-    ------
-    DetectorError
-        There is no such detector, OpenCV has no HOG, or the file is no network.
-    ParameterError, ModelFormatError
-        The file holds no model.
+    Raises `DetectorError` where there is none, OpenCV has no HOG or the file is no network.
     """
     kind, colon, file = name.partition(":")
     if kind == "onnx" and colon:
@@ -105,12 +100,9 @@ class HalfSize:
 
 @dataclass(frozen=True)
 class Cv2Detector:
-    """OpenCV's own HOG with the workshop's parameters, where the installed OpenCV has one.
+    """OpenCV's own HOG with the workshop's parameters.
 
-    Raises
-    ------
-    MissingExtraError, DetectorError
-        There is no OpenCV, or it has no HOG.
+    Raises `MissingExtraError` or `DetectorError` where there is no OpenCV, or it has no HOG.
     """
 
     def __post_init__(self) -> None:
@@ -137,27 +129,17 @@ class Cv2Detector:
 class OnnxDetector:
     """A network from a file, run by `cv2.dnn`.
 
-    The network takes float32 (1, 3, size, size), RGB in 0..1, and gives (1, 4 + classes, N): centre x, centre y,
-    width, height [px of its input] and a score in 0..1 for each class, people first: what YOLOv8 exports. The image
-    is made to fit at its own aspect, grey below or beside it.
-
-    Attributes
-    ----------
-    path
-        The ONNX file.
-    size
-        Side of the network's input [px].
-    threshold
-        Least score of a person [0..1].
-    overlap
-        Boxes with a larger intersection over union than this are the same person [1]. Both are the defaults of YOLOv8's
-        own non-maximum suppression.
+    The network takes float32 (1, 3, size, size), RGB in 0..1, and gives (1, 4 + classes, N): centre x, centre y, width,
+    height [px of its input] and a score in 0..1 for each class, people first: what YOLOv8 exports. The image is made to
+    fit at its own aspect, grey below or beside it.
     """
 
-    path: Path
-    size: int = 640
-    threshold: float = 0.25
-    overlap: float = 0.45
+    path: Path  #: The ONNX file.
+    size: int = 640  #: Side of the network's input [px].
+    threshold: float = 0.25  #: Least score of a person [0..1].
+    overlap: float = (
+        0.45  #: Boxes with a larger intersection over union are one person [1]; both are YOLOv8's defaults.
+    )
 
     def __post_init__(self) -> None:
         # A wrong file is an error before the robot starts, not a fault of every frame.
@@ -204,20 +186,13 @@ class OnnxDetector:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Part of an image worth searching.
+    """Part of an image worth searching."""
 
-    Attributes
-    ----------
-    x, y, width, height
-        Within the image [px], top left corner first.
-    window_height
-        Expected height of the detection window [px]: the person's, with the margin HOG was trained with.
-    """
-
-    x: int
+    x: int  #: Within the image [px], top left corner first.
     y: int
     width: int
     height: int
+    #: Expected height of the detection window [px]: the person's, with the margin HOG was trained with.
     window_height: float
 
     def holds(self, column: float) -> bool:
@@ -228,45 +203,22 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class RegionSize:
-    """How large a region is around the expected window.
+    """How large a region is around the expected window."""
 
-    Attributes
-    ----------
-    widths, heights
-        Sides, in expected window widths and heights [1]. Chosen: half a window to either side for a step and the
-        prediction's error, an eighth above and below for the gait.
-    grid
-        Sides are multiples of this [px], so that few different image sizes occur and buffers are used again.
-    most
-        A region larger than this share of the image is not worth it: all of the image is searched [1]. Chosen.
-    widest, nearest
-        Larger bearings are out of any image [rad]; a nearer person fills it [m].
-    """
-
-    widths: float = 2.0
-    heights: float = 1.25
-    grid: int = 16
-    most: float = 0.7
-    widest: float = 1.2
-    nearest: float = 0.3
+    widths: float = param(2.0, "window widths", "Width of a region.")
+    heights: float = param(1.25, "window heights", "Height of a region.")
+    grid: int = param(16, "px", "Sides are multiples of this, so that buffers are used again.")
+    most: float = param(0.7, "1", "Of a region larger than this share of the image all is searched.")
+    widest: float = param(1.2, "rad", "Larger bearings are out of any image.")
+    nearest: float = param(0.3, "m", "A nearer person fills the image.")
 
     def around(
         self, bearing: float, distance: float, window: float, centre: float, focal_px: float, width: int, height: int
     ) -> Region | None:
         """Return where to look for a person expected at a bearing [rad] and a distance [m] from the camera.
 
-        Parameters
-        ----------
-        window
-            Height of the detection window times the distance [px m].
-        centre
-            Middle of the window below the image's middle, times the distance [px m]; above is negative.
-        focal_px, width, height
-            The camera's focal length and image size [px].
-
-        Returns
-        -------
-        None where the expected place is not in the image, or the region would be most of it.
+        `window` is the height of the detection window and `centre` its middle below the image's, times the distance [px
+        m]; the rest is the camera's [px]. None where that is not in the image, or would be most of it.
         """
         if abs(bearing) > self.widest or distance < self.nearest:
             return None

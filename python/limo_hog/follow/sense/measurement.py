@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Clothes, Observation
@@ -23,36 +24,21 @@ WINDOW_PER_STATURE = 4 / 3
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One box, as seen from the robot.
+    """One box, as seen from the robot."""
 
-    Attributes
-    ----------
-    bearing, range
-        From the robot's centre [rad, m]; range None where the depth is unknown.
-    height, centre
-        Height of the box, and its middle below the image's [px].
-    score
-        SVM margin.
-    window, middle
-        Height of the window of the whole person, and its middle below the image's, times the distance [px m]. By the
-        stature in the depth image; without one, the box's.
-    whole
-        Whether that is all of the person: at the image's edge people can only be taller than they show.
-    clothes
-        What is worn in the box; None without a colour image.
-    stands_out
-        How far what is beside the box is behind its middle [m], by `stands_out`; None without depth.
-    """
-
-    bearing: float
+    bearing: float  #: From the robot's centre [rad, m]; range None where the depth is unknown.
     range: float | None
-    height: int
+    height: int  #: Height of the box, and its middle below the image's [px].
     centre: float
-    score: float
-    clothes: Clothes | None = None
+    score: float  #: SVM margin.
+    clothes: Clothes | None = None  #: What is worn in the box; None without a colour image.
+    #: How far what is beside the box is behind its middle [m], by `stands_out`; None without depth.
     stands_out: float | None = None
+    #: Height of the window of the whole person, and its middle below the image's, times the distance [px m]. By the
+    #: stature in the depth image; without one, the box's.
     window: float = 0.0
     middle: float = 0.0
+    #: Whether that is all of the person: at the image's edge people can only be taller than they show.
     whole: bool = True
 
     def is_low(self, share: float) -> bool:
@@ -95,19 +81,10 @@ def box_centre(box: NDArray[np.int32]) -> tuple[int, int]:
 
 
 def person_depth(depth: NDArray[np.float32], box: NDArray[np.int32], side: int = 20) -> float | None:
-    """Return how far away the person in a box is [m]; None where the camera does not know.
+    """Return how far away the person in a box is [m]: the median depth in its middle; None where that is unknown.
 
-    The median of the valid depths in a square at the centre of the box: pixels that see past the person, or nothing,
-    do not change it as long as they are less than half.
-
-    Parameters
-    ----------
-    depth
-        float32 (H, W) [m], not finite or <= 0 where unknown.
-    box
-        int32 (4,): x, y, w, h [px].
-    side
-        Side of the square [px]; the workshop's is 20.
+    Pixels that see past the person do not change it as long as they are less than half. `depth` is float32 (H, W) [m],
+    not finite or <= 0 where unknown, `box` int32 (4,): x, y, w, h, and `side` the square's [px]; the workshop's is 20.
     """
     x, y = box_centre(box)
     half = side // 2
@@ -127,30 +104,15 @@ def median(values: NDArray[np.float32]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Strips:
-    """Where a detection window shows a person's chest, and what is beside it.
+    """Where a detection window shows a person's chest, and what is beside it."""
 
-    Attributes
-    ----------
-    top, bottom
-        Of the rows looked at [window heights]. Chosen: the chest, .27 to .5 of HOG's window.
-    chest
-        Half the width of the strip in the middle [window widths]. Chosen: narrower than a person seen from the side.
-    inner, outer
-        Edges of the two strips beside it, from the middle [window widths]. Chosen: outside of the arms, which reach to
-        .25, and inside of the window, in which HOG was trained to find background.
-    beyond
-        Depth taken where the camera sees none [m]: further than it reaches.
-    known
-        Share of pixels that must be valid for a depth to be known [1].
-    """
-
-    top: float = 0.27
-    bottom: float = 0.5
-    chest: float = 0.06
-    inner: float = 0.36
-    outer: float = 0.46
-    beyond: float = 20.0
-    known: float = 0.2
+    top: float = param(0.27, "window heights", "First of the rows looked at, of the chest.")
+    bottom: float = param(0.5, "window heights", "Last of these rows.")
+    chest: float = param(0.06, "window widths", "Half the width of the strip in the middle.")
+    inner: float = param(0.36, "window widths", "Inner edge of the two strips beside it, from the middle.")
+    outer: float = param(0.46, "window widths", "Their outer edge.")
+    beyond: float = param(20.0, "m", "Depth taken where the camera sees none.")
+    known: float = param(0.2, "1", "Share of pixels that must be valid for a depth to be known.")
 
 
 STRIPS = Strips()
@@ -161,16 +123,7 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
 
     The inverse depth of a plane is linear in the image, so the plane through the strips left and right of the person
     has, in the middle between them, the mean of their inverse depths. A picture on a wall is in that plane, seen from
-    whatever side: 0.
-
-    Parameters
-    ----------
-    depth
-        float32 (H, W) [m], not finite or <= 0 where unknown.
-    box
-        int32 (4,): x, y, w, h [px].
-    strips
-        Where to look.
+    whatever side: 0. `depth` is float32 (H, W) [m], `box` int32 (4,): x, y, w, h [px].
     """
     x, y, w, h = box.tolist()
     band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
@@ -190,27 +143,13 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strip
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """How a person's outline is followed upwards in the depth image.
+    """How a person's outline is followed upwards in the depth image."""
 
-    Attributes
-    ----------
-    half_width
-        Half the width of the strip looked at [window widths]. Chosen: a head is a quarter of HOG's window wide.
-    least_half_px
-        And at least this [px]: the middle of a box strays by 3 px.
-    tolerance
-        Depth within which a pixel is the person's [m]. Chosen: a trunk and an arm; people keep more from walls.
-    share
-        Part of the valid pixels of a row that must be the person's [1].
-    gap_px
-        So many rows without the person end the outline [px]. Chosen: more than the depth image's holes.
-    """
-
-    half_width: float = 0.08
-    least_half_px: int = 4
-    tolerance: float = 0.35
-    share: float = 0.25
-    gap_px: int = 5
+    half_width: float = param(0.08, "window widths", "Half the width of the strip looked at.")
+    least_half_px: int = param(4, "px", "And at least this.")
+    tolerance: float = param(0.35, "m", "Depth within which a pixel is the person's.")
+    share: float = param(0.25, "1", "Part of a row's valid pixels that must be the person's.")
+    gap_px: int = param(5, "px", "Rows without the person that end the outline.")
 
 
 OUTLINE = Outline()
@@ -219,16 +158,7 @@ OUTLINE = Outline()
 def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, outline: Outline = OUTLINE) -> int:
     """Return the highest image row [px] of the person in a box; 0 where they reach the image's edge or beyond.
 
-    Parameters
-    ----------
-    depth
-        float32 (H, W) [m], not finite or <= 0 where unknown.
-    box
-        int32 (4,): x, y, w, h [px].
-    person
-        Depth of the person [m].
-    outline
-        How to follow the outline.
+    `depth` is float32 (H, W) [m], `box` int32 (4,): x, y, w, h [px], `person` the depth of the person [m].
     """
     column, row = box_centre(box)
     half = max(round(outline.half_width * int(box[2])), outline.least_half_px)
@@ -247,45 +177,19 @@ def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, o
 
 @dataclass(frozen=True, slots=True)
 class Visibility:
-    """Where HOG finds people.
+    """Where HOG finds people."""
 
-    Attributes
-    ----------
-    smallest_window
-        Height of the model's window, and so of the smallest person's [px].
-    near
-        Nearer than this a person is often missed, and boxes are on parts of the body [m]. Measured in the arena, by
-        robot-centre distance: found at 1.5 m .67, 1.6 m .92, 1.65 m 1.0 of the frames.
-    widest
-        Larger bearings are out of any image [rad]: twice the Limo's half field of view of 0.62.
-    shown
-        The part of half a window, above and below its middle, that must be in the image [window heights]. Chosen: .5
-        is the whole window; .02 less allows for the middle's own error.
-    cut
-        Share of the window that may be above the image where a distance is chosen [window heights]. Measured in the
-        arena, by camera distance: a .9 m person is found in .92 of the frames at 1.52 m, where .05 is cut, a 1.75 m
-        person in .69 at 3.0 m (.10) and in all at 3.5 m (0).
-    occluder
-        Something nearer than the person by more than this hides them [m]. Measured: the depth at a box's centre was
-        never more than 0.5 m off the person in 3,500 frames.
-    """
-
-    smallest_window: float = 128
-    near: float = 1.7
-    widest: float = 1.2
-    shown: float = 0.48
-    cut: float = 0.06
-    occluder: float = 0.5
+    smallest_window: float = param(128, "px", "Height of the model's window, and so of the smallest person's.")
+    near: float = param(1.7, "m", "Nearer than this a person is often missed, and boxes are on parts of the body.")
+    widest: float = param(1.2, "rad", "Larger bearings are out of any image.")
+    shown: float = param(0.48, "window heights", "Part of each half of a window that must be shown.")
+    cut: float = param(0.06, "window heights", "Share that a kept distance may cut off at the top.")
+    occluder: float = param(0.5, "m", "Something nearer than the person by more than this hides them.")
 
     def least_distance(self, window: float, centre: float, image_height: int) -> float:
         """Return how near a person may be with their window in the image, but for `cut` of it [m].
 
-        Parameters
-        ----------
-        window, centre
-            Height of the detection window, and its middle below the image's, times the distance [px m].
-        image_height
-            Of the camera [px].
+        `window` and `centre` are those of `Person`, `image_height` is the camera's [px].
         """
         return ((0.5 - self.cut) * window - centre) / (image_height / 2)
 
@@ -294,17 +198,9 @@ class Visibility:
     ) -> bool:
         """Whether a person's whole window should be in the part of the image that was searched.
 
-        Parameters
-        ----------
-        bearing, distance
-            Of the person, from the robot's centre [rad, m].
-        window, centre
-            Height of the detection window, and its middle below the image's, times the distance [px m].
-        observation
-            The image that was searched, with its depth.
-        confirmed
-            Whether the track is known to be a person. Near by, the head and the space HOG wants above it are out of
-            the image: that excuses a miss of a person, and not of a track that has yet to prove itself.
+        The person is at a bearing [rad] and a distance [m] from the robot's centre; `window` and `centre` as in
+        `Person`. Near by, the head and the space HOG wants above it are out of the image: that excuses a miss of a
+        `confirmed` person, and not of a track that has yet to prove itself.
         """
         if abs(bearing) > self.widest:
             return False

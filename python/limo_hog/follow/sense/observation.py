@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.detectors import Region
 
 Clothes = NDArray[np.float64]
@@ -20,25 +21,13 @@ deviations of `ColourSampling`."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scan:
-    """One turn of a planar lidar. Two scans are equal only if they are the same object.
+    """One turn of a planar lidar. Two scans are equal only if they are the same object."""
 
-    Attributes
-    ----------
-    stamp
-        When the turn was finished [s], on the clock of `Observation.stamp`.
-    ranges
-        float32 (N,) [m], counter-clockwise from `angle_min`; inf where nothing was hit.
-    angle_min, angle_max
-        Direction of the first and the last beam [rad], 0 straight ahead, counter-clockwise positive.
-    range_min, range_max
-        Limits between which a range is valid [m].
-    """
-
-    stamp: float
-    ranges: NDArray[np.float32]
-    angle_min: float
+    stamp: float  #: When the turn was finished [s], on the clock of `Observation.stamp`.
+    ranges: NDArray[np.float32]  #: float32 (N,) [m], counter-clockwise from `angle_min`; inf where nothing was hit.
+    angle_min: float  #: Direction of the first and the last beam [rad], 0 straight ahead, counter-clockwise positive.
     angle_max: float
-    range_min: float
+    range_min: float  #: Limits between which a range is valid [m].
     range_max: float
 
     def turned(self, yaw: float) -> Scan:
@@ -78,24 +67,13 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One image of the robot's camera.
+    """One image of the robot's camera."""
 
-    Attributes
-    ----------
-    stamp
-        When it was taken [s].
-    image
-        uint8 (H, W, 3) BGR or (H, W).
-    focal_px
-        Focal length of the camera [px].
-    depth
-        float32 (H, W), distance along the optical axis [m] of the same view; inf too far, -inf too near, NaN unknown
-        (REP 118). None without a depth camera.
-    """
-
-    stamp: float
-    image: NDArray[np.uint8]
-    focal_px: float
+    stamp: float  #: When it was taken [s].
+    image: NDArray[np.uint8]  #: uint8 (H, W, 3) BGR or (H, W).
+    focal_px: float  #: Focal length of the camera [px].
+    #: float32 (H, W), distance along the optical axis [m] of the same view; inf too far, -inf too near, NaN unknown
+    #: (REP 118). None without a depth camera.
     depth: NDArray[np.float32] | None
 
 
@@ -109,57 +87,29 @@ class Sensors:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """One camera frame's detections with the other sensors' newest readings.
+    """One camera frame's detections with the other sensors' newest readings."""
 
-    Attributes
-    ----------
-    stamp
-        When the camera frame was taken [s].
-    width, height
-        Size of the camera image [px].
-    focal_px
-        Focal length of the camera [px]; the principal point is the image centre.
-    detections
-        People found in the frame, best first.
-    region
-        Part of the image that was searched; None where all of it was.
-    depth
-        float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; or None.
-    scan
-        The newest lidar scan; None without a lidar.
-    odometry
-        The newest odometry; None without wheel encoders.
-    fault
-        Why the frame cannot be used, "" where it can; with a fault the robot stands still.
-    clothes
-        float64 (N, 2, 3): what the person in each detection wears, by `clothes_in`; None without a colour image.
-    between
-        Scans that came since the frame before, and where the robot was, oldest first: of a camera slower than the
-        lidar.
-    remembered
-        float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
-        not look. `Guard` fills it in; None without it.
-    clock
-        When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
-    now
-        The newest stamp of all sensors [s]: a camera frame may arrive late.
-    """
-
-    stamp: float
-    width: int
+    stamp: float  #: When the camera frame was taken [s].
+    width: int  #: Size of the camera image [px].
     height: int
-    focal_px: float
-    detections: Detections
-    region: Region | None = None
+    focal_px: float  #: Focal length of the camera [px]; the principal point is the image centre.
+    detections: Detections  #: People found in the frame, best first.
+    region: Region | None = None  #: Part of the image that was searched; None where all of it was.
+    #: float32 (height, width) [m] of the same view, not finite or <= 0 where unknown; or None.
     depth: NDArray[np.float32] | None = None
-    scan: Scan | None = None
-    odometry: Odometry | None = None
-    fault: str = ""
+    scan: Scan | None = None  #: The newest lidar scan; None without a lidar.
+    odometry: Odometry | None = None  #: The newest odometry; None without wheel encoders.
+    fault: str = ""  #: Why the frame cannot be used, "" where it can; with a fault the robot stands still.
+    #: float64 (N, 2, 3): what the person in each detection wears, by `clothes_in`; None without a colour image.
     clothes: Clothes | None = None
+    #: Scans that came since the frame before, and where the robot was, oldest first: of a camera slower than the lidar.
     between: tuple[tuple[Scan, Odometry], ...] = ()
+    #: float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
+    #: not look. `Guard` fills it in; None without it.
     remembered: NDArray[np.float64] | None = None
+    #: When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
     clock: float | None = None
-    now: float = field(init=False)
+    now: float = field(init=False)  #: The newest stamp of all sensors [s]: a camera frame may arrive late.
 
     def __post_init__(self) -> None:
         newest = self.stamp if self.scan is None else max(self.stamp, self.scan.stamp)
@@ -202,10 +152,9 @@ def observed(
 
 
 def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
-    """Return the robot's pose at `stamp` [s].
+    """Return the robot's pose at `stamp` [s], interpolated between the nearest of `poses`, oldest first.
 
-    Interpolated between the two nearest of `poses`, which are oldest first. Before the first the robot is taken to
-    have stood; after the last its speeds are taken to have lasted.
+    Before the first the robot is taken to have stood; after the last its speeds are taken to have lasted.
     """
     if not poses:
         return Odometry(stamp)
@@ -231,49 +180,23 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
 
 @dataclass(frozen=True, slots=True)
 class ColourSampling:
-    """Where in a detection window the clothes are, and how much their colours vary.
+    """Where in a detection window the clothes are, and how much their colours vary."""
 
-    Attributes
-    ----------
-    chest, hips
-        Middle and half height of each patch, in window heights. HOG's window has the head at .1 to .2 and the feet at
-        .9; so the patches are on shirt and trousers of the arena's figure from all sides.
-    half_width
-        Half the width of the patches, in window heights. Chosen: narrower than a person seen from the side.
-    dark
-        Added to each channel [of 255]. Chosen: 8 standard deviations of the camera's noise, so that the hue of black
-        cloth is not the hue of noise.
-    red, green, brightness
-        Standard deviation of the same cloth in other light: share of red, share of green, logarithm of the brightness.
-        Chosen so that light from half to 1.3 times as bright, with noise, stays below half of `Appearance.other`.
-    """
-
-    chest: tuple[float, float] = (0.35, 0.07)
-    hips: tuple[float, float] = (0.54, 0.03)
-    half_width: float = 0.04
-    dark: float = 8.0
-    red: float = 0.05
-    green: float = 0.05
-    brightness: float = 0.5
+    chest: tuple[float, float] = param((0.35, 0.07), "window heights", "Middle and half height of the shirt's patch.")
+    hips: tuple[float, float] = param((0.54, 0.03), "window heights", "The same on the trousers.")
+    half_width: float = param(0.04, "window heights", "Half the width of the patches.")
+    dark: float = param(8.0, "of 255", "Added to each channel: the hue of black cloth is not the hue of noise.")
+    red: float = param(0.05, "1", "Standard deviation of one cloth's share of red in other light.")
+    green: float = param(0.05, "1", "The same of its share of green.")
+    brightness: float = param(0.5, "1", "The same of the logarithm of its brightness.")
 
 
 def clothes_in(
     image: NDArray[np.uint8], boxes: NDArray[np.int32], sampling: ColourSampling | None = None
 ) -> NDArray[np.float64]:
-    """Return what the person in each box wears.
+    """Return what the person in each box wears, float64 (N, 2, 3); NaN where that is out of the image.
 
-    Parameters
-    ----------
-    image
-        uint8 (H, W, 3), BGR, or (H, W), in which all clothes are gray.
-    boxes
-        int32 (N, 4): x, y, w, h of detection windows [px].
-    sampling
-        Where to look.
-
-    Returns
-    -------
-    float64 (N, 2, 3): `Clothes` of each; NaN where they are out of the image.
+    `image` is uint8 (H, W, 3), BGR, or (H, W), in which all clothes are gray; `boxes` are windows int32 (N, 4) [px].
     """
     sampling = sampling or ColourSampling()
     worn: NDArray[np.float64] = np.full((len(boxes), 2, 3), np.nan)
@@ -294,25 +217,12 @@ def clothes_in(
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """Compares and learns clothes.
+    """Compares and learns clothes."""
 
-    Attributes
-    ----------
-    max_shirt, max_trousers
-        The most that each can add to the cost [chi-squared of 3 numbers]. Chosen: the trousers less, since hands and
-        the gap between two legs are seen in their patch, and below `other`, so that only a shirt tells people apart.
-    other
-        A larger cost means another person [chi-squared]. Chosen between the arena's shirts (16 and more apart) and one
-        shirt in other light (below 6).
-    rate
-        Share by which the known clothes of a confirmed person move towards those in a new box [1]. Chosen: a time
-        constant of 20 frames, 2 s, slower than a shadow is crossed.
-    """
-
-    max_shirt: float = 16.0
-    max_trousers: float = 9.0
-    other: float = 12.0
-    rate: float = 0.05
+    max_shirt: float = param(16.0, "chi² of 3", "The most that a shirt can add to the cost.")
+    max_trousers: float = param(9.0, "chi² of 3", "The most that trousers can add.")
+    other: float = param(12.0, "chi²", "A larger cost means another person.")
+    rate: float = param(0.05, "1", "Share by which a confirmed person's clothes move towards those in a new box.")
 
     def cost(self, known: Clothes | None, seen: Clothes | None, *, slips: bool = True) -> float:
         """Return how much the colours in a box differ from known clothes [chi-squared].
@@ -332,9 +242,13 @@ class Appearance:
 
     def learn(self, known: Clothes, seen: Clothes) -> Clothes:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""
-        same = ((seen - known) ** 2).sum(axis=1) < (self.max_shirt, self.max_trousers)
-        moved: Clothes = known + self.rate * same[:, None] * (seen - known)
-        return moved
+        return mixed(known, seen, self.rate, (self.max_shirt, self.max_trousers))
+
+
+def mixed(known: Clothes, seen: Clothes, rate: float, most: float | tuple[float, float]) -> Clothes:
+    """Move known clothes by a share towards those seen, but for parts that differ by `most` [chi-squared] or more."""
+    same = ((seen - known) ** 2).sum(axis=1) < most
+    return np.asarray(known + rate * same[:, None] * (seen - known))
 
 
 def chi_squared(known: list[float], seen: list[float]) -> float:

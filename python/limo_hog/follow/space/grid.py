@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, beam_directions, lidar_at, to_odometry
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
@@ -24,74 +25,35 @@ Cells = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """What is known about the ground.
+    """What is known about the ground."""
 
-    Attributes
-    ----------
-    corner
-        Lower corner of cell (0, 0), x and y in the odometry frame [cells].
-    occupied
-        float32 (N, N): log-odds of each cell's being occupied; rows along x, columns along y.
-    seen
-        float64 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never. On a robot times count
-        from 1970: in float32 they would be two minutes apart.
-    freed
-        float64 (N, N): when each cell was last seen to be free [s]; -inf for never.
-    stamp
-        Of the last scan [s].
-    """
-
-    corner: tuple[int, int]
+    corner: tuple[int, int]  #: Lower corner of cell (0, 0), x and y in the odometry frame [cells].
+    #: float32 (N, N): log-odds of each cell's being occupied; rows along x, columns along y.
     occupied: NDArray[np.float32]
+    #: float64 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never. On a robot times count
+    #: from 1970: in float32 they would be two minutes apart.
     seen: NDArray[np.float64]
-    freed: NDArray[np.float64]
-    stamp: float = -math.inf
+    freed: NDArray[np.float64]  #: float64 (N, N): when each cell was last seen to be free [s]; -inf for never.
+    stamp: float = -math.inf  #: Of the last scan [s].
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """How the ground is mapped.
+    """How the ground is mapped."""
 
-    Attributes
-    ----------
-    cell
-        Side of a cell [m]. Chosen: a corridor of 1 m, less the robot's width on either side, is four cells wide.
-    cells
-        Along each side of the square [1]: 10 m, as far as HOG finds an adult to either side.
-    shift_after
-        The square moves along when the robot is so far from its middle [m]. Chosen: moving costs a copy.
-    reach
-        Of a beam's free part and of its end, no more is used [m]. Chosen: at 5 m two beams are .07 m apart.
-    every
-        One in so many beams clears cells [1]; all of them fill cells. Chosen: at 3.5 m two are a cell apart.
-    free, hit
-        What a beam takes and adds [log-odds]. Chosen: two hits make a free cell occupied, three misses free it again.
-    lowest, highest
-        Limits of the log-odds. Chosen: what has moved away is forgotten after seven scans, about a second.
-    person_radius
-        Returns nearer than this to a tracked person are the person's and fill no cell [m].
-    period_s
-        A scan sooner after the last one entered is left out [s]. Chosen: half the computing, and nothing that stands is
-        missed.
-    lasts_s
-        What stands for so long is taken to last [s]. Chosen: people stop for a few seconds.
-    own_radius
-        The ground under the robot is free [m]: the circle around its outline.
-    """
-
-    cell: float = 0.1
-    cells: int = 100
-    shift_after: float = 1.0
-    reach: float = 5.0
-    every: int = 2
-    free: float = 0.4
-    hit: float = 0.9
-    lowest: float = -1.2
-    highest: float = 2.5
-    person_radius: float = PERSON_RADIUS
-    period_s: float = 0.2
-    lasts_s: float = 6.0
-    own_radius: float = 0.2
+    cell: float = param(0.1, "m", "Side of a cell.")
+    cells: int = param(100, "1", "Along each side of the square.")
+    shift_after: float = param(1.0, "m", "The square moves along when the robot is this far from its middle.")
+    reach: float = param(5.0, "m", "Of a beam's free part and of its end, no more is used.")
+    every: int = param(2, "1", "One in so many beams clears cells; all of them fill cells.")
+    free: float = param(0.4, "log-odds", "What a beam takes from a cell that it passes.")
+    hit: float = param(0.9, "log-odds", "What it adds to the cell where it ends.")
+    lowest: float = param(-1.2, "log-odds", "Lower limit.")
+    highest: float = param(2.5, "log-odds", "Upper limit: what has moved away is forgotten after seven scans.")
+    person_radius: float = param(PERSON_RADIUS, "m", "Returns nearer than this to a tracked person fill no cell.")
+    period_s: float = param(0.2, "s", "A scan sooner after the last one entered is left out.")
+    lasts_s: float = param(6.0, "s", "What stands for this time is taken to last.")
+    own_radius: float = param(0.2, "m", "The ground under the robot is free: the circle around its outline.")
 
     def start(self, pose: Odometry) -> Ground:
         """Return ground of which nothing is known, around the robot."""
@@ -108,20 +70,10 @@ class Grid:
         depth_points: Points,
         robot: RobotGeometry = LIMO,
     ) -> Ground:
-        """Enter a scan.
+        """Enter a scan, taken at `pose`, into what was known: None before the first.
 
-        Parameters
-        ----------
-        ground
-            What was known; None before the first scan.
-        scan, pose
-            The scan, and where the robot was at its stamp.
-        people
-            float64 (N, 2) [m], odometry frame: tracked people, who are not part of the ground.
-        depth_points
-            float64 (N, 2) [m], odometry frame: what the depth image shows above the floor; it fills cells only.
-        robot
-            Where the lidar sits.
+        `people` and `depth_points` are float64 (N, 2) [m], odometry frame: people who are tracked are no part of the
+        ground; what the depth image shows above the floor fills cells and clears none.
         """
         ground = self._moved(ground or self.start(pose), pose)
         ranges = scan.ranges.astype(np.float64)
@@ -167,10 +119,7 @@ class Grid:
         return np.asarray((cells + ground.corner + 0.5) * self.cell, np.float64)
 
     def is_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
-        """Return whether each point is in an occupied cell, bool (N,); outside of the square none is.
-
-        With `lasting`, only cells count that were not free within `lasts_s`: what came in since can go away as well.
-        """
+        """Return whether each point is in an occupied cell; `lasting`: one not free within `lasts_s`. bool (N,)."""
         cells, inside = self.index(ground, points)
         flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
         return inside & self._is_occupied(ground, flat, lasting)
@@ -183,10 +132,7 @@ class Grid:
         return free
 
     def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
-        """Return whether an occupied cell is within half a cell of each point, bool (N,); `lasting` as `is_blocked`.
-
-        At the square's edge and outside of it none is.
-        """
+        """Return whether an occupied cell is within half a cell of each point, bool (N,); at the edge none is."""
         lowest, _ = self.index(ground, points - self.cell / 2)
         within = lowest.view(np.uint64) < self.cells - 1
         inside = within[:, 0] & within[:, 1]
@@ -204,11 +150,7 @@ class Grid:
     def sees(
         self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24
     ) -> NDArray[np.bool_]:
-        """Return whether nothing occupied is between each of (K, 2) origins and each of (N, 2) places, bool (K, N).
-
-        `samples` points on each line are looked at [1]; chosen: at 3 m one in every cell. `lasting` is that of
-        `is_blocked`.
-        """
+        """Return whether nothing occupied is between (K, 2) origins and (N, 2) places, at `samples` points, (K, N)."""
         shares = (np.arange(samples) + 0.5) / samples
         way = origins[:, None, None, :] + shares[None, None, :, None] * (places[None, :] - origins[:, None])[:, :, None]
         blocked = self.is_blocked(ground, way.reshape(-1, 2), lasting=lasting).reshape(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
@@ -20,61 +21,27 @@ from limo_hog.follow.space.grid import Grid, Ground
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where the person may be.
+    """Where the person may be."""
 
-    Attributes
-    ----------
-    stamp
-        Time of the estimate [s].
-    points, velocities
-        float64 (N, 2) [m, m/s], odometry frame: each as likely as the others.
-    seed
-        Of the next step's random numbers.
-    """
-
-    stamp: float
-    points: Points
+    stamp: float  #: Time of the estimate [s].
+    points: Points  #: float64 (N, 2) [m, m/s], odometry frame: each as likely as the others.
     velocities: NDArray[np.float64]
-    seed: int = 0
+    seed: int = 0  #: Of the next step's random numbers.
 
 
 @dataclass(frozen=True, slots=True)
 class Wandering:
-    """How people walk on unseen.
+    """How people walk on unseen."""
 
-    Attributes
-    ----------
-    count
-        Of particles [1]. Chosen: looking from one place for all of them takes .1 ms.
-    walk
-        Speed of a person who sets out again [m/s]. Chosen: a stroll; the workshop's person walks at .75.
-    stays
-        Share of the particles that stand at the beginning [1]. Chosen.
-    turn
-        Square root of the spectral density of the heading [rad/√s]. Chosen: after 4 s a right angle off.
-    change_s
-        Mean time after which a person stands still or sets out [s]. Chosen.
-    body
-        A beam that reaches further than a particle by this has looked through it [m]. Chosen: legs in
-        mid-stride are hit up to .17 m from the body's axis.
-    width
-        A person is looked through if all beams in this width pass [m]. Chosen: a leg and a gap.
-    far
-        Beams do not tell further away [m]. Chosen: at 4 m two beams are .055 m apart, a shin's width.
-    found
-        Chance that the camera finds a person in one frame who is not hidden [1]. Chosen low: neighbouring frames show
-        the same, and half a person beside a wall is often missed.
-    """
-
-    count: int = 150
-    walk: float = 0.5
-    stays: float = 0.2
-    turn: float = 0.8
-    change_s: float = 6.0
-    body: float = 0.2
-    width: float = 0.3
-    far: float = 4.0
-    found: float = 0.15
+    count: int = param(150, "1", "Of particles.")
+    walk: float = param(0.5, "m/s", "Speed of a person who sets out again.")
+    stays: float = param(0.2, "1", "Share of the particles that stand at the beginning.")
+    turn: float = param(0.8, "rad/√s", "Square root of the spectral density of the heading.")
+    change_s: float = param(6.0, "s", "Mean time after which a person stands still or sets out.")
+    body: float = param(0.2, "m", "A beam that reaches further than a particle by this has looked through it.")
+    width: float = param(0.3, "m", "A person is looked through if all beams in this width pass.")
+    far: float = param(4.0, "m", "Beams do not tell further away.")
+    found: float = param(0.15, "1", "Chance that the camera finds a person in one frame who is not hidden.")
 
     def start(self, stamp: float, mean: tuple[float, ...], covariance: NDArray[np.float64], seed: int) -> Places:
         """Begin with a track: `mean` is x, y, vx, vy in the odometry frame, `covariance` (4, 4) its."""
@@ -116,16 +83,8 @@ class Wandering:
     ) -> Places | None:
         """Remove places where the person was not found, in favour of the others; None where no place is left.
 
-        Parameters
-        ----------
-        places
-            Where the person may be.
-        scan, pose
-            The newest scan; where the robot was. Nobody is where its beams pass.
-        shown
-            bool (N,): the places that the camera shows, without a person in them.
-        robot
-            Where the lidar sits.
+        Nobody is where the beams of the newest scan, taken at `pose`, pass; `shown`, bool (N,), are the places that the
+        camera shows, without a person in them.
         """
         random = np.random.default_rng([places.seed, 2])
         kept = ~self.looked_through(places.points, scan, pose, robot)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.grid import Grid, Ground
@@ -15,39 +16,18 @@ from limo_hog.follow.space.grid import Grid, Ground
 _NEIGHBOURS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
 
-@dataclass(frozen=True, slots=True)
-class Field:
-    """How far it is to drive to each cell.
-
-    Attributes
-    ----------
-    distance
-        float32 (N, N) [m]: inf where no way leads.
-    """
-
-    distance: NDArray[np.float32]
+Field = NDArray[np.float32]
+"""(N, N): how far it is to drive to each cell [m]; inf where no way leads."""
 
 
 @dataclass(frozen=True, slots=True)
 class Router:
-    """Plans ways.
+    """Plans ways."""
 
-    Attributes
-    ----------
-    keep_off
-        Distance that a way keeps from the middles of occupied cells [m]. Chosen: half the robot's width and what
-        `Guard` wants beside it, .31, and a cell's half.
-    keep_off_far, detour
-        Nearer than this to something, a way counts as longer by this share [m, 1]. Chosen: along the middle of a
-        corridor of 1 m.
-    farthest
-        Longer ways are not looked for [m]. Chosen: the square's half.
-    """
-
-    keep_off: float = 0.36
-    keep_off_far: float = 0.5
-    detour: float = 1.0
-    farthest: float = 6.0
+    keep_off: float = param(0.36, "m", "Distance that a way keeps from the middles of occupied cells.")
+    keep_off_far: float = param(0.5, "m", "Nearer than this to something, a way counts as longer.")
+    detour: float = param(1.0, "1", "By this share.")
+    farthest: float = param(6.0, "m", "Longer ways are not looked for.")
 
     def field(self, grid: Grid, ground: Ground, pose: Odometry) -> Field:
         """Return the driving distance to every cell that is known to be free."""
@@ -58,7 +38,7 @@ class Router:
         cells, inside = grid.index(ground, np.array([[pose.x, pose.y]]))
         distance = np.full(free.shape, np.inf, np.float32)
         if not inside[0]:
-            return Field(distance)
+            return distance
         x, y = cells[0]
         # The robot may stand nearer to something than a way should lead.
         free[max(x - reach, 0) : x + reach + 1, max(y - reach, 0) : y + reach + 1] |= ~blocked[
@@ -83,12 +63,12 @@ class Router:
             if np.array_equal(nearer, before):
                 break
             before[...] = nearer
-        return Field(edged[1:-1, 1:-1])
+        return np.asarray(edged[1:-1, 1:-1])
 
     def way_towards(self, grid: Grid, ground: Ground, pose: Odometry, place: Points) -> Points:
         """Return the shortest way to the cell nearest to a place (2,) [m] of those that a way leads to."""
         field = self.field(grid, ground, pose)
-        cells = np.argwhere(np.isfinite(field.distance))
+        cells = np.argwhere(np.isfinite(field))
         if len(cells) == 0:
             return np.empty((0, 2))
         x, y = cells[np.argmin(np.hypot(*(grid.middle_of(ground, cells) - place).T))].tolist()
@@ -96,16 +76,15 @@ class Router:
 
     def way(self, grid: Grid, ground: Ground, field: Field, goal: tuple[int, int]) -> Points:
         """Return the shortest way from the robot to a cell, float64 (N, 2) [m]; empty where none leads there."""
-        distance = field.distance
-        if not math.isfinite(distance[goal]):
+        if not math.isfinite(field[goal]):
             return np.empty((0, 2))
         cells, here = [goal], goal
-        while distance[here] > 0:
+        while field[here] > 0:
             x, y = here
             around = [
-                (float(distance[x + dx, y + dy]) + cost * grid.cell, (x + dx, y + dy))
+                (float(field[x + dx, y + dy]) + cost * grid.cell, (x + dx, y + dy))
                 for dx, dy, cost in _NEIGHBOURS
-                if 0 <= x + dx < len(distance) and 0 <= y + dy < len(distance)
+                if 0 <= x + dx < len(field) and 0 <= y + dy < len(field)
             ]
             here = min(around)[1]
             cells.append(here)

@@ -1,12 +1,8 @@
 """Which box, and which legs in the scan, belong to which person.
 
-Boxes by a gate, a cost and a greedy assignment. The cost is minus twice the log-likelihood of a match but for a
-constant: the squared Mahalanobis distance, the log volume of the prediction's uncertainty, and the difference of the
-clothes.
-
-Legs keep a track alive where the camera does not show the person: HOG needs space above the head, so nearer than about
-1.6 m, beside the image or between two frames, only the lidar tells where a person is. It cannot tell a person from a
-chair: it may continue a track and never begins one.
+Boxes by a gate, a cost, minus twice the log-likelihood of a match but for a constant, and a greedy assignment. Legs
+keep a track alive where the camera does not show the person: nearer than about 1.6 m, beside the image, between two
+frames. The lidar cannot tell a person from a chair: legs may continue a track and never begin one.
 """
 
 from __future__ import annotations
@@ -19,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry
@@ -28,39 +25,15 @@ from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to
 
 @dataclass(frozen=True, slots=True)
 class Association:
-    """Pairs people with boxes.
+    """Pairs people with boxes."""
 
-    Attributes
-    ----------
-    gate
-        Squared Mahalanobis distance beyond which a box does not belong to a track [chi-squared of 2 numbers]: of a
-        person's own boxes, exp(-18/2), 1 in 8,100, is beyond.
-    max_cost
-        Highest cost of a match [chi-squared]. Chosen: a third more than the gate, for uncertainty and clothes. From 12
-        to 48 `crossing`, `two_people` and
-        `dropouts` give the same figures (seed 3).
-    same_place
-        Boxes and people nearer than this to each other are the same person [m]. Chosen: shoulders and an arm of an
-        adult; the depth at a box's centre was never further off in 3,500 frames of the arena.
-    size_tolerance
-        A range is not the person's where height times range differs from the known window by more than this share
-        [1]. Chosen; from .2 to .6 the pixel error in `crossing` changes by less than .5 px (seed 3).
-    low
-        A box lower than the person by more than this shows trousers in the shirt's place [window heights]. Measured in
-        the arena: of 424 boxes 98 % are within .12 of the middle.
-    appearance
-        Compares clothes.
-    unknown
-        Distance assumed of a box without depth.
-    """
-
-    gate: float = 18.0
-    max_cost: float = 24.0
-    same_place: float = 0.5
-    size_tolerance: float = 0.35
-    low: float = 0.12
-    appearance: Appearance = field(default_factory=Appearance)
-    unknown: UnknownRange = field(default_factory=UnknownRange)
+    gate: float = param(18.0, "chi² of 2", "Squared Mahalanobis distance beyond which a box belongs to another track.")
+    max_cost: float = param(24.0, "chi²", "Highest cost of a match.")
+    same_place: float = param(0.5, "m", "Boxes and people nearer than this to each other are the same person.")
+    size_tolerance: float = param(0.35, "1", "Share by which height times range may differ from the known window.")
+    low: float = param(0.12, "window heights", "Lower boxes show trousers in the shirt's place.")
+    appearance: Appearance = field(default_factory=Appearance)  #: Compares clothes.
+    unknown: UnknownRange = field(default_factory=UnknownRange)  #: Distance assumed of a box without depth.
 
     def pair(
         self,
@@ -71,11 +44,10 @@ class Association:
         flat: AbstractSet[int] = frozenset(),
         others: AbstractSet[tuple[int, int]] = frozenset(),
     ) -> dict[int, int]:
-        """Pair people with boxes: confirmed people first, then by cost.
+        """Pair people with boxes, confirmed people first, then by cost: index of the person -> index of the box.
 
-        `flat` are the indices of boxes that do not stand out from what is behind them: no confirmed person's; `others`
-        are pairs, person and box, of which the scan shows that the box is another's. Returns index of the person ->
-        index of the measurement. Every track must be at the frame's stamp.
+        `flat` boxes do not stand out from what is behind them: no confirmed person's; of the pairs `others` the scan
+        shows that the box is another's. Every track must be at the frame's stamp.
         """
         matches = []
         for who, person in enumerate(people):
@@ -118,10 +90,7 @@ class Association:
         return abs(seen.range * seen.height - person.window) < self.size_tolerance * person.window
 
     def worn(self, seen: Measurement) -> Clothes | None:
-        """Return the clothes in a box; None where its patches are not on shirt and trousers.
-
-        Where the head is cut off, or the box sits lower, they are not.
-        """
+        """Return the clothes in a box; None where the head is cut off or the box sits low, and shows other parts."""
         return seen.clothes if seen.range is None or (seen.whole and not seen.is_low(self.low)) else None
 
     def _is_double(self, seen: Measurement, other: Measurement) -> bool:
@@ -137,52 +106,23 @@ class Association:
 
 @dataclass(frozen=True, slots=True)
 class Returns:
-    """A scan's returns in the odometry frame.
+    """A scan's returns in the odometry frame."""
 
-    Attributes
-    ----------
-    stamp
-        Of the scan [s].
-    points
-        float64 (N, 2) [m].
-    pose
-        Where the robot was.
-    """
-
-    stamp: float
-    points: Points
-    pose: Odometry
+    stamp: float  #: Of the scan [s].
+    points: Points  #: float64 (N, 2) [m].
+    pose: Odometry  #: Where the robot was.
 
 
 @dataclass(frozen=True, slots=True)
 class Legs:
-    """Finds a tracked person's legs in a scan.
+    """Finds a tracked person's legs in a scan."""
 
-    Attributes
-    ----------
-    radius
-        Returns nearer than this to the predicted position are taken for legs [m]. Chosen: half a stride of 0.75 m.
-    widest
-        A wider group is a wall or a piece of furniture [m]. Chosen: in mid-stride the shins of a 0.9 m person are .3 m
-        apart, an adult's .55 m.
-    reach
-        Further away legs are not looked for [m]. Chosen: at 2.2 m a shin of 5 cm is less than 2 of the Limo's beams.
-    sigma
-        Standard deviation of the middle of two walking legs from the person's axis [m]. Chosen: of one leg alone, where
-        it hides the other, the axis is up to .17 m off.
-    trail_s
-        The middle of the legs is where the person was so long ago [s]: the shin that swings trails the trunk. Measured
-        in the arena, 1,000 scans: .05 m at .85 m/s, .02 m at half of it.
-    fewest
-        So many returns at least [1].
-    """
-
-    radius: float = 0.35
-    widest: float = 0.55
-    reach: float = 2.2
-    sigma: float = 0.1
-    trail_s: float = 0.05
-    fewest: int = 2
+    radius: float = param(0.35, "m", "Returns nearer than this to the predicted position are taken for legs.")
+    widest: float = param(0.55, "m", "A wider group is a wall or a piece of furniture.")
+    reach: float = param(2.2, "m", "Further away legs are not looked for.")
+    sigma: float = param(0.1, "m", "Standard deviation of the middle of two walking legs from the person's axis.")
+    trail_s: float = param(0.05, "s", "The middle of the legs is where the person was so long ago.")
+    fewest: int = param(2, "1", "Returns that legs have at least.")
 
     def update(
         self,
@@ -191,10 +131,7 @@ class Legs:
         noise: Noise,
         is_ground: Callable[[Points], NDArray[np.bool_]] | None = None,
     ) -> Track | None:
-        """Return the track predicted for the scan's stamp and corrected by its legs; None where there are none.
-
-        `is_ground` tells of points (N, 2), odometry frame, which of them are on what is known to stand there: no legs.
-        """
+        """Return the track at a scan's stamp, corrected by legs that are not on the ground known; None without any."""
         track = predict(track, returns.stamp, noise)
         if math.dist(track.mean[:2], (returns.pose.x, returns.pose.y)) > self.reach:
             return None
@@ -204,10 +141,7 @@ class Legs:
         return self.corrected(track, legs, returns.pose, noise)
 
     def corrected(self, track: Track, legs: Points, pose: Odometry, noise: Noise) -> Track | None:
-        """Return the track corrected by the returns (N, 2) near it, odometry frame; None where these are no legs.
-
-        The track is predicted for the scan's stamp; `pose` is where the robot was then.
-        """
+        """Return the track, at the scan's stamp, corrected by returns (N, 2) near it; None where these are no legs."""
         x, y, vx, vy = track.mean
         distance = math.hypot(x - pose.x, y - pose.y)
         if len(legs) < self.fewest or distance > self.reach:

@@ -14,55 +14,34 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.measurement import WALK
-from limo_hog.follow.sense.observation import Clothes, chi_squared
+from limo_hog.follow.sense.observation import Clothes, chi_squared, mixed
 from limo_hog.follow.tracks.person import Person, separation
 from limo_hog.follow.tracks.tracker import Tracks
 
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """What a person looks like.
+    """What a person looks like."""
 
-    Attributes
-    ----------
-    number
-        Of the track it was learnt from.
-    clothes
-        What is worn; None where no colour image tells.
-    window
-        Height of the detection window, times the distance [px m]: the stature.
-    boxes
-        Boxes it was learnt from [1].
-    """
-
-    number: int
-    clothes: Clothes | None
-    window: float
-    boxes: int = 1
+    number: int  #: Of the track it was learnt from.
+    clothes: Clothes | None  #: What is worn; None where no colour image tells.
+    window: float  #: Height of the detection window, times the distance [px m]: the stature.
+    boxes: int = 1  #: Boxes it was learnt from [1].
 
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """The person followed, and which track that is.
+    """The person followed, and which track that is."""
 
-    Attributes
-    ----------
-    traits
-        What the person looks like.
-    place, at
-        Where and when the person was last measured for sure: x, y [m] in the odometry frame, [s].
-    chances
-        Number and probability of each track; what is missing to 1 is the probability that none is the person.
-    others
-        What other people look like, who were about lately.
-    """
-
-    traits: Traits
+    traits: Traits  #: What the person looks like.
+    #: Where and when the person was last measured for sure: x, y [m] in the odometry frame, [s].
     place: tuple[float, float]
     at: float
+    #: Number and probability of each track; what is missing to 1 is the probability that none is the person.
     chances: tuple[tuple[int, float], ...]
-    others: tuple[Traits, ...] = ()
+    others: tuple[Traits, ...] = ()  #: What other people look like, who were about lately.
 
     def of(self, number: int) -> float:
         """Return the probability that a track is the person followed."""
@@ -71,90 +50,33 @@ class Likeness:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Moves the probabilities from frame to frame.
+    """Moves the probabilities from frame to frame."""
 
-    Attributes
-    ----------
-    sure
-        From this probability on the person's place, clothes and stature are learnt [1]. Chosen: one in twenty wrong.
-    strange_shirt, strange_trousers
-        How likely it is that another person wears just this, in parts of how likely the person themself does [1].
-        Chosen: a tenth of the shirts are alike, half of the trousers are dark.
-    odd_shirt, odd_trousers
-        Share of boxes in which something else is seen in the shirt's or the trousers' place [1]. Measured in the arena,
-        424 whole boxes: one shirt, three trousers; chosen higher, for hands, bags and shadows.
-    stature_sigma
-        Standard deviation of the stature in the depth image, as a share [1]. Measured in the arena: .01 from frame to
-        frame, and up to .04 between far and near; chosen for shoes, hats and gait as well.
-    strange_stature, odd_stature
-        As for clothes [1]. Chosen: people's statures differ by a tenth; three outlines in ten are wrong, since
-        an arm or another's head is taken for the person's.
-    again
-        Share of its own evidence that a box counts for after a track's first [1]. Chosen: neighbouring frames show
-        nearly the same, as in `Existence`.
-    steady
-        The same for the stature, whose error lasts as long as the distance, and for all that the person followed shows
-        while their legs are the same (`legs_s`): an arm before the shirt stays there while a person stands [1]. Chosen:
-        a second is worth one box.
-    stays
-        Probability from which a track counts as the person for that [1]. Chosen: more likely than not.
-    most
-        The most that a box can tell either way [log-odds]. Chosen: a factor of twelve.
-    passes, strained
-        Chance that a track's next box is another person's, who is not tracked: where the box fits, and where its place
-        or size contradicts the track [1]. Chosen: once in a minute; once in a second.
-    legs_s, legs_apart
-        A track whose legs in the scan have been the same for so long, with no others nearer than this, is no other
-        person's [s, m]. Chosen: people pass each other in a second; more than `Legs.radius`, within which returns
-        count as one person's.
-    fades_s
-        Time constant with which a track that is not measured stops to be where the person is [s]. Chosen: people turn
-        within a second.
-    meets, swaps
-        Two tracks nearer than this to each other may swap their people [m]: in a frame with the chance `passes`, and
-        this for each metre by which they pass each other [1/m]. Chosen: a body's width and a stride. Measured in the
-        arena, where the legs of the two were not told apart: in a crowd, 5 swaps in 33 meetings of a metre or so; of
-        alike ones who walk side by side, for up to four seconds, none in 8.
-    unseen_s
-        A person not measured for longer than this may be a track that begins [s], and surely may be after two seconds.
-        Chosen: three frames.
-    reach, speed
-        A track that begins nearer than this to the last place, and so much more for each second since, may be the
-        person's [m, m/s]. Chosen: a body's width, and a walk.
-    clear
-        A shirt or trousers that differ by more are not learnt; if by less, they do not tell two apart [chi-squared of 3
-        numbers]. Chosen: half of `Appearance.other`; other light stays below.
-    rate
-        Share by which one box moves clothes and stature once they are learnt [1]. Chosen: as in `Appearance`.
-    remembered
-        So many other people are remembered [1].
-    """
-
-    sure: float = 0.95
-    strange_shirt: float = 0.1
-    strange_trousers: float = 0.5
-    odd_shirt: float = 0.1
-    odd_trousers: float = 0.3
-    stature_sigma: float = 0.05
-    strange_stature: float = 0.3
-    odd_stature: float = 0.3
-    again: float = 0.5
-    steady: float = 0.1
-    stays: float = 0.5
-    most: float = 2.5
-    passes: float = 0.002
-    strained: float = 0.1
-    legs_s: float = 1.0
-    legs_apart: float = 0.4
-    fades_s: float = 2.0
-    meets: float = 0.5
-    swaps: float = 0.2
-    unseen_s: float = 0.3
-    reach: float = 0.5
-    speed: float = WALK
-    clear: float = 6.0
-    rate: float = 0.05
-    remembered: int = 8
+    sure: float = param(0.95, "1", "From this probability on the person's place, clothes and stature are learnt.")
+    strange_shirt: float = param(0.1, "1", "How likely another is to wear just this shirt.")
+    strange_trousers: float = param(0.5, "1", "The same of the trousers.")
+    odd_shirt: float = param(0.1, "1", "Share of boxes that show something else in the shirt's place.")
+    odd_trousers: float = param(0.3, "1", "The same of the trousers.")
+    stature_sigma: float = param(0.05, "1", "Standard deviation of the stature in the depth image, as a share.")
+    strange_stature: float = param(0.3, "1", "As `strange_shirt`, of the stature.")
+    odd_stature: float = param(0.3, "1", "As `odd_shirt`, of the stature.")
+    again: float = param(0.5, "1", "Share of its own evidence that a box counts for after a track's first.")
+    steady: float = param(0.1, "1", "The same for the stature, and for everything while the legs are the same.")
+    stays: float = param(0.5, "1", "Probability from which a track counts as the person for `steady`.")
+    most: float = param(2.5, "log-odds", "The most that a box can tell either way.")
+    passes: float = param(0.002, "1", "Chance that the next box of a track is on another person, where it fits.")
+    strained: float = param(0.1, "1", "The same where its place or size contradicts the track.")
+    legs_s: float = param(1.0, "s", "Legs that are the same for this time, with nobody's near, are the same person's.")
+    legs_apart: float = param(0.4, "m", "Other legs nearer than this may have changed places with them.")
+    fades_s: float = param(2.0, "s", "Time constant with which an unmeasured track loses the person.")
+    meets: float = param(0.5, "m", "Two tracks nearer than this to each other may swap their people.")
+    swaps: float = param(0.2, "1/m", "Chance of a swap for each metre by which they pass each other.")
+    unseen_s: float = param(0.3, "s", "A person not measured for longer may be a track that begins.")
+    reach: float = param(0.5, "m", "A track that begins nearer than this to the last place may be the person's.")
+    speed: float = param(WALK, "m/s", "And further off by this for each second since.")
+    clear: float = param(6.0, "chi² of 3", "A shirt or trousers that differ by more are not learnt.")
+    rate: float = param(0.05, "1", "Share by which one box moves clothes and stature once they are learnt.")
+    remembered: int = param(8, "1", "Other people that are remembered.")
 
     def begin(self, person: Person) -> Likeness:
         """Begin with a person who is followed from now on."""
@@ -185,10 +107,7 @@ class Identity:
     def _passed(
         self, known: Likeness, people: dict[int, Person], tracks: Tracks, walking: AbstractSet[int]
     ) -> dict[int, float]:
-        """Return the probabilities of the tracks before the frame's boxes are looked at.
-
-        `walking` are the numbers of those whose legs go on (`_walks_on`).
-        """
+        """Return the tracks' probabilities before the frame's boxes; `walking` are those whose legs go on."""
         stamp = tracks.stamp or 0.0
         chances = {number: chance for number, chance in known.chances if number in people}
         for number in chances:
@@ -274,10 +193,7 @@ class Identity:
         return clothes + stature if first else self.again * clothes + self.steady * stature
 
     def _learnt(self, known: Likeness, person: Person, chance: float, *, alone: bool) -> Likeness:
-        """Learn from a box who looks how: of the person followed where that is sure, of others where they are not.
-
-        `chance` is the probability that this is the person followed; `alone`, whether the box shows nobody else.
-        """
+        """Learn who looks how: the person followed where `chance` is sure and they are `alone` in it, else others."""
         if chance >= self.sure:
             x, y, _, _ = person.track.mean
             traits = self._moved(known.traits, person) if alone else known.traits
@@ -302,13 +218,7 @@ class Identity:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
         clothes, window = traits.clothes, traits.window
         if person.worn is not None:
-            clothes = person.worn if clothes is None else self._mixed(clothes, person.worn, rate)
+            clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, self.clear)
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)
         return Traits(person.number, clothes, window, traits.boxes + 1)
-
-    def _mixed(self, clothes: Clothes, worn: Clothes, rate: float) -> Clothes:
-        """Return clothes moved towards those in a box, but for a shirt or trousers that clearly differ."""
-        same = ((worn - clothes) ** 2).sum(axis=1) < self.clear
-        moved: Clothes = clothes + rate * same[:, None] * (worn - clothes)
-        return moved

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.observation import Odometry
 
 Mean: TypeAlias = tuple[float, float, float, float]
@@ -25,49 +26,23 @@ Covariance: TypeAlias = tuple[float, float, float, float, float, float, float, f
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Process and measurement noise.
+    """Process and measurement noise."""
 
-    Attributes
-    ----------
-    acceleration
-        Square root of the spectral density of a person's acceleration [m/s^1.5]. A corner of the workshop's patrol
-        changes the velocity by 1.06 m/s in about a second: 1.8 standard deviations.
-    bearing
-        Standard deviation of a measured bearing [rad]. Measured in the arena, 10,000 boxes: .003 to .005 beyond 1.4 m,
-        .018 nearer; the rest allows for odometry.
-    range
-        Standard deviation of a measured range [m]. Measured in the same: .02 to .04 around the front of the body, .055
-        nearer than 1.1 m, where the patch may be on an arm.
-    velocity
-        Standard deviation of each component of the velocity of a new track [m/s]: people stand or walk at 0.75 m/s.
-    persistence
-        Time constant with which an unmeasured velocity decays [s]. Chosen: half a side of the workshop's patrol.
-    """
-
-    acceleration: float = 0.6
-    bearing: float = 0.015
-    range: float = 0.06
-    velocity: float = 0.6
-    persistence: float = 4.0
+    acceleration: float = param(0.6, "m/s^1.5", "Square root of the spectral density of a person's acceleration.")
+    bearing: float = param(0.015, "rad", "Standard deviation of a measured bearing.")
+    range: float = param(0.06, "m", "Standard deviation of a measured range.")
+    velocity: float = param(0.6, "m/s", "Standard deviation of each component of a new track's velocity.")
+    persistence: float = param(4.0, "s", "Time constant with which an unmeasured velocity decays.")
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """The estimate of one person's position and velocity.
+    """The estimate of one person's position and velocity."""
 
-    Attributes
-    ----------
-    stamp
-        Time of the estimate [s].
-    mean
-        x, y [m], vx, vy [m/s] in the odometry frame. Numbers: for four of them arrays cost several times as much.
-    covariance
-        Of `mean`.
-    """
-
-    stamp: float
+    stamp: float  #: Time of the estimate [s].
+    #: x, y [m], vx, vy [m/s] in the odometry frame. Numbers: for four of them arrays cost several times as much.
     mean: Mean
-    covariance: Covariance
+    covariance: Covariance  #: Of `mean`.
 
     @property
     def place(self) -> tuple[float, float]:
@@ -95,10 +70,7 @@ def initiate(stamp: float, bearing: float, distance: float, pose: Odometry, nois
 
 
 def predict(track: Track, stamp: float, noise: Noise) -> Track:
-    """Predict the track for `stamp` [s].
-
-    For an earlier stamp the mean moves back along the velocity and the covariance stays as it is.
-    """
+    """Predict the track for `stamp` [s]; for an earlier one the mean moves back, and the covariance stays."""
     dt = stamp - track.stamp
     if dt == 0:
         return track
@@ -143,26 +115,15 @@ def rates(track: Track, pose: Odometry) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Innovation:
-    """A measurement of bearing and range compared with the prediction.
+    """A measurement of bearing and range compared with the prediction."""
 
-    Attributes
-    ----------
-    bearing, range
-        Measured less predicted [rad, m]; range None where only the bearing is measured.
-    by_bearing, by_range
-        How bearing and range change with x and y [rad/m, 1]; with the velocity they do not.
-    covariance
-        Of the two differences: bearing, both, range [rad², rad m, m²].
-    variances
-        Of the measurement alone: bearing, range [rad², m²].
-    """
-
-    bearing: float
+    bearing: float  #: Measured less predicted [rad, m]; range None where only the bearing is measured.
     range: float | None
+    #: How bearing and range change with x and y [rad/m, 1]; with the velocity they do not.
     by_bearing: tuple[float, float]
     by_range: tuple[float, float]
-    covariance: tuple[float, float, float]
-    variances: tuple[float, float]
+    covariance: tuple[float, float, float]  #: Of the two differences: bearing, both, range [rad², rad m, m²].
+    variances: tuple[float, float]  #: Of the measurement alone: bearing, range [rad², m²].
 
     @property
     def distance2(self) -> float:
@@ -176,8 +137,7 @@ class Innovation:
     def log_volume_ratio(self) -> float:
         """Logarithm of det(covariance) over the measurement's own: 0 for a certain prediction.
 
-        A track that has not been measured for long has a large gate and would match any measurement; this is the
-        term of the log-likelihood that penalises it.
+        It penalises a track not measured for long, whose large gate would match any measurement.
         """
         (a, b, d), (of_bearing, of_range) = self.covariance, self.variances
         if self.range is None:

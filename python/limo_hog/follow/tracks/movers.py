@@ -1,7 +1,6 @@
 """What moves in the scan, without a box: people beside and behind, whom the camera does not show.
 
-A group of returns as wide as two legs is followed from scan to scan. It counts once it has moved: walls, furniture and
-people who stand are nothing to be predicted.
+A group of returns as wide as two legs is followed from scan to scan. It counts once it has moved.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
 from limo_hog.follow.sense.measurement import Measurement
@@ -26,31 +26,16 @@ from limo_hog.follow.tracks.person import Person
 
 @dataclass(frozen=True, slots=True)
 class Mover:
-    """A group of returns that may be two legs.
+    """A group of returns that may be two legs."""
 
-    Attributes
-    ----------
-    track
-        Position and velocity.
-    began, since
-        Where it was first, x and y in the odometry frame [m], and when [s].
-    left
-        Whether that place was seen to be empty since.
-    felt
-        Stamp of the last scan that showed it [s].
-    scans, shown
-        How many did, and for how many of these the camera looked there and showed no person [1].
-    number, named
-        Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
-    """
-
-    track: Track
-    began: tuple[float, float]
+    track: Track  #: Position and velocity.
+    began: tuple[float, float]  #: Where it was first, x and y in the odometry frame [m], and when [s].
     since: float
-    felt: float
-    left: bool = False
-    scans: int = 1
+    felt: float  #: Stamp of the last scan that showed it [s].
+    left: bool = False  #: Whether that place was seen to be empty since.
+    scans: int = 1  #: How many did, and for how many of these the camera looked there and showed no person [1].
     shown: int = 0
+    #: Of the person whom the camera showed there last, and since when they are theirs [s]; None if it showed none.
     number: int | None = None
     named: float = math.inf
 
@@ -61,48 +46,21 @@ class Movers:
 
     The end of what is seen of a wall, where a corner or a person hides the rest, moves as well; what it has moved from
     is still wall. So a group moves only when the place where it began is empty.
-
-    Attributes
-    ----------
-    legs
-        How a group is found again: further off than a followed person's legs, since nothing else shows it. At 3.5 m two
-        shins are two beams.
-    gap
-        Returns further apart than this are of two groups [m]. Chosen: in mid-stride the shins of a .9 m person.
-    beams
-        A beam within this passes a place [rad]. Chosen: two of the Limo's beams to either side.
-    fewest_scans, least_way
-        It counts as moving after so many scans, so far from where it began [1, m]. Chosen: half a second; more than the
-        middle of the legs of a person who shifts from one to the other moves.
-    forget_s
-        It is given up when a scan should have shown it for so long [s]. Chosen: four scans; one leg hides the other.
-    unseen_s
-        Where the lidar does not look, it is predicted for so long [s]. Chosen: at a walk, past the blind angle behind.
-    looks
-        After so many scans for which the camera looked there, it is no more turned to [1]. Chosen: a second and a half;
-        of people who are found in three frames of ten one in two hundred is not found in it.
-    beside, taken
-        A person is this far from their legs at most, and so much nearer to legs that were another's than to their own
-        [m]. Chosen: as `Legs.radius`, and the error of the depth; of two who pass close by each other, HOG finds one,
-        half a metre or less between the two.
-    nearer
-        A box is on other legs than a person's own if it is nearer to them by this [m]. Chosen: the error of its range.
-    robot
-        Where the lidar sits.
     """
 
+    #: How a group is found again, further off than a followed person's legs: at 3.5 m two shins are two beams.
     legs: Legs = field(default_factory=lambda: Legs(reach=3.5))
-    gap: float = 0.3
-    beams: float = 0.03
-    fewest_scans: int = 4
-    least_way: float = 0.25
-    forget_s: float = 0.5
-    unseen_s: float = 3.0
-    looks: int = 12
-    beside: float = 0.4
-    taken: float = 0.25
-    nearer: float = 0.15
-    robot: RobotGeometry = LIMO
+    gap: float = param(0.3, "m", "Returns further apart than this are of two groups.")
+    beams: float = param(0.03, "rad", "A beam within this passes a place.")
+    fewest_scans: int = param(4, "1", "Scans after which a group counts as moving.")
+    least_way: float = param(0.25, "m", "Way from where it began, from which it counts as moving.")
+    forget_s: float = param(0.5, "s", "A group is given up when a scan should have shown it for this time.")
+    unseen_s: float = param(3.0, "s", "Where the lidar does not look, a group is predicted for this time.")
+    looks: int = param(12, "1", "Scans without a person in the camera's view after which it is no more turned to.")
+    beside: float = param(0.4, "m", "A person is this far from their own legs at most.")
+    taken: float = param(0.25, "m", "A person must be nearer by this to legs that were another's than to their own.")
+    nearer: float = param(0.15, "m", "A box is on other legs than a person's own if it is nearer to them by this.")
+    robot: RobotGeometry = LIMO  #: Where the lidar sits.
 
     def update(
         self,
@@ -192,10 +150,7 @@ class Movers:
         pose: Odometry,
         noise: Noise,
     ) -> set[tuple[int, int]]:
-        """Return the pairs, person and box, of people whose own legs walk while the box is on other legs that walk.
-
-        People must be at the frame's stamp, the robot at `pose`.
-        """
+        """Return the pairs, person and box, of people whose own legs walk while the box is on other legs that walk."""
         pairs: set[tuple[int, int]] = set()
         if len(moving) < 2 or not people:
             return pairs
@@ -226,10 +181,7 @@ class Movers:
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
     def _whose(self, movers: tuple[Mover, ...], gaps: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return for each of N returns the number of the person whose legs it may be, the nearest; 0 for none.
-
-        `gaps` are the distances from the M movers, float64 (M, N) [m]; those whose number is known come first.
-        """
+        """Return whose legs each of N returns may be, the nearest, 0 for none; in `gaps`, (M, N), known people lead."""
         numbers = np.array([one.number for one in movers if one.number is not None], np.int64)
         if len(numbers) == 0:
             return np.zeros(gaps.shape[1], np.int64)

@@ -11,6 +11,7 @@ import bisect
 import math
 from dataclasses import dataclass, field, replace
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.measurement import Measurement
 from limo_hog.follow.sense.observation import Clothes, Odometry
 from limo_hog.follow.tracks import kalman
@@ -19,49 +20,23 @@ from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person, or something that looks like one.
+    """A person, or something that looks like one."""
 
-    Attributes
-    ----------
-    number
-        Identifies the person; never used twice.
-    track
-        Position and velocity.
-    seen, felt
-        Stamp of the last frame in which HOG found them, and of the last scan with their legs [s].
-    log_odds
-        Of being a person, by all frames in which one should have been found (`Existence`).
-    window, centre
-        Height of the detection window, and its middle below the image's, times the distance [px m].
-    confirmed
-        Whether the log-odds have been high enough, and not too low since.
-    age, misses
-        Frames in which the person should have been found, and those since they were.
-    clothes
-        What they wear; None while no colour image tells.
-    worn, tall
-        Clothes and window as the last box showed them; None where it did not.
-    strained
-        Whether the last box was not where the person was expected, or not of their size.
-    measured
-        Stamp of the last frame or scan that showed the person [s].
-    """
-
-    number: int
-    track: Track
-    seen: float
-    log_odds: float
-    window: float
+    number: int  #: Identifies the person; never used twice.
+    track: Track  #: Position and velocity.
+    seen: float  #: Stamp of the last frame in which HOG found them [s].
+    log_odds: float  #: Of being a person, by all frames in which one should have been found (`Existence`).
+    window: float  #: Height of the detection window, and its middle below the image's, times the distance [px m].
     centre: float
-    confirmed: bool = False
-    age: int = 1
+    confirmed: bool = False  #: Whether the log-odds have been high enough, and not too low since.
+    age: int = 1  #: Frames in which the person should have been found, and those since they were.
     misses: int = 0
-    felt: float = -math.inf
-    clothes: Clothes | None = None
-    worn: Clothes | None = None
+    felt: float = -math.inf  #: Stamp of the last scan with their legs [s].
+    clothes: Clothes | None = None  #: What they wear; None while no colour image tells.
+    worn: Clothes | None = None  #: Clothes and window as the last box showed them; None where it did not.
     tall: float | None = None
-    strained: bool = False
-    measured: float = field(init=False)
+    strained: bool = False  #: Whether the last box was not where the person was expected, or not of their size.
+    measured: float = field(init=False)  #: Stamp of the last frame or scan that showed the person [s].
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "measured", max(self.seen, self.felt))
@@ -74,17 +49,10 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class UnknownRange:
-    """Where a new track begins whose first box has no depth.
+    """Where a new track begins whose first box has no depth."""
 
-    Attributes
-    ----------
-    distance, sigma
-        Assumed distance and its standard deviation [m]. Chosen: the middle of where HOG finds a 0.9 m person, 1.5 to
-        4.8 m, and its half.
-    """
-
-    distance: float = 3.0
-    sigma: float = 1.5
+    distance: float = param(3.0, "m", "Distance assumed of a first box without depth.")
+    sigma: float = param(1.5, "m", "Its standard deviation.")
 
 
 def initiate(
@@ -128,92 +96,40 @@ def distance_to(person: Person, seen: Measurement, pose: Odometry) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """How often people were found, by the height of their window.
+    """How often people were found, by the height of their window."""
 
-    Attributes
-    ----------
-    found, expected
-        Frames in which a person was found, and in which one should have been, for each class of size; old frames count
-        less.
-    """
-
+    #: Frames in which a person was found, and in which one should have been, for each class of size; old frames count
+    #: less.
     found: tuple[float, ...] = ()
     expected: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Existence:
-    """Moves the log-odds of tracks, and learns the recall.
+    """Moves the log-odds of tracks, and learns the recall."""
 
-    Attributes
-    ----------
-    prior
-        Log-odds of a new track before its first box. Chosen: of ten boxes that begin a track one is on a person.
-    person_score
-        Scale of the scores [SVM margin] of boxes on people, which are taken to be gamma distributed with shape 2.
-        Measured in the arena, 1,027 boxes: median 2.9, lower quartile 1.9; near by a median of .8.
-    clutter_score
-        Mean score of boxes on other things, exponentially distributed. Measured: on the arena's furniture .39 (31
-        boxes), in photographs without people .64 (30 boxes).
-    clutter_again
-        Chance that a false box is there again in the next frame [1]. Measured: a pillar is found in 55 % of the frames,
-        a cone in 50 %, other furniture never; chosen, the mean over kinds.
-    weight
-        Share of its own evidence that a frame counts for [1]. Chosen: neighbouring frames show nearly the same, so that
-        two in a row tell as much as one.
-    most
-        The most that a frame can add [log-odds], and `least` the most that it can take. Chosen: four clear frames
-        confirm, and fifteen misses drop a track that was certain.
-    confirm, drop
-        Log-odds from which a track is confirmed, and below which it is not any more. Chosen: 95 % and 27 %.
-    lowest, highest
-        Limits of the log-odds: what is certain can still change within two seconds.
-    stands_out
-        A box whose surroundings are in one plane with it, to within this, is on a picture and no evidence [m].
-        Measured: of 1,027 boxes on people 97 % stand out further; a trunk of .9 m stature is .11 m deep.
-    sizes
-        Heights of windows that part the classes of size [px].
-    recall, recall_frames
-        Recall before anything is learnt, and how many frames that is worth [1]. Chosen: a start with a detector that
-        finds few, three people in ten or four; one that finds more has shown it after a second.
-    recall_memory
-        Share of what was learnt that is kept from frame to frame [1]. Chosen: 100 frames, ten seconds.
-    least_recall, most_recall
-        Limits of what is believed to be learnt [1].
-    run_of_misses
-        Misses in a row that are less likely than this are no chance: the person is not there [1].
-    """
-
-    prior: float = -2.2
-    person_score: float = 1.3
-    clutter_score: float = 0.5
-    clutter_again: float = 0.2
-    weight: float = 0.5
-    most: float = 1.5
-    least: float = 0.4
-    confirm: float = 3.0
-    drop: float = -1.0
-    lowest: float = -5.0
-    highest: float = 5.0
-    stands_out: float = 0.2
-    sizes: tuple[float, ...] = (170.0, 240.0, 330.0)
-    recall: float = 0.4
-    recall_frames: float = 10.0
-    recall_memory: float = 0.99
-    least_recall: float = 0.2
-    most_recall: float = 0.98
-    run_of_misses: float = 1e-3
+    prior: float = param(-2.2, "log-odds", "Of a new track before its first box.")
+    person_score: float = param(1.3, "SVM margin", "Scale of the scores on people, gamma distributed with shape 2.")
+    clutter_score: float = param(0.5, "SVM margin", "Mean of the scores on other things, exponentially distributed.")
+    clutter_again: float = param(0.2, "1", "Chance that a false box is there again in the next frame.")
+    weight: float = param(0.5, "1", "Share of its own evidence that a frame counts for: neighbouring frames are alike.")
+    most: float = param(1.5, "log-odds", "The most that a frame can add.")
+    least: float = param(0.4, "log-odds", "The most that a frame can take.")
+    confirm: float = param(3.0, "log-odds", "From here a track is confirmed.")
+    drop: float = param(-1.0, "log-odds", "Below this it is not any more.")
+    lowest: float = param(-5.0, "log-odds", "Lower limit of the log-odds.")
+    highest: float = param(5.0, "log-odds", "Upper limit of the log-odds.")
+    stands_out: float = param(0.2, "m", "A box in one plane with its surroundings, to within this, is on a picture.")
+    sizes: tuple[float, ...] = param((170.0, 240.0, 330.0), "px", "Heights of windows that part the classes of size.")
+    recall: float = param(0.4, "1", "Recall before anything is learnt.")
+    recall_frames: float = param(10.0, "1", "Frames that this first guess is worth.")
+    recall_memory: float = param(0.99, "1", "Share of what was learnt that is kept from frame to frame.")
+    least_recall: float = param(0.2, "1", "Lower limit of the recall that is believed.")
+    most_recall: float = param(0.98, "1", "Upper limit of the recall that is believed.")
+    run_of_misses: float = param(1e-3, "1", "Misses in a row less likely than this are no chance.")
 
     def of_box(self, seen: Measurement, recall: float) -> float:
-        """Return how much a box adds to the log-odds; negative for one that is more likely on something else.
-
-        Parameters
-        ----------
-        seen
-            The box.
-        recall
-            Share of frames in which a person of this size is found [1].
-        """
+        """Return how much a box adds to the log-odds where people are found with `recall`; negative for clutter."""
         if not self.is_solid(seen):
             return -self.least
         score = max(seen.score, 1e-3)

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
 from limo_hog.follow.sense.measurement import WALK, Measurement, Visibility, measure
@@ -22,43 +23,24 @@ from limo_hog.follow.tracks.person import Existence, Person, Recall, initiate, p
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """What is known about people and the robot's recent past.
+    """What is known about people and the robot's recent past."""
 
-    Attributes
-    ----------
-    people
-        Everyone tracked.
-    boxes
-        Number and index of the box of each person found in the last frame.
-    next_number
-        Number of the next new person.
-    poses, scans
-        Where the robot was and what the lidar hit lately, oldest first.
-    stamp, period
-        Stamp of the last frame, None before the first, and the time between the last two [s].
-    recall
-        How often people are found, as learnt so far.
-    movers, moved_at
-        What may move in the scan, whether the camera shows it or not, and the stamp of that scan [s].
-    """
-
-    people: tuple[Person, ...] = ()
-    boxes: tuple[tuple[int, int], ...] = ()
-    next_number: int = 1
-    poses: tuple[Odometry, ...] = ()
+    people: tuple[Person, ...] = ()  #: Everyone tracked.
+    boxes: tuple[tuple[int, int], ...] = ()  #: Number and index of the box of each person found in the last frame.
+    next_number: int = 1  #: Number of the next new person.
+    poses: tuple[Odometry, ...] = ()  #: Where the robot was and what the lidar hit lately, oldest first.
     scans: tuple[Returns, ...] = ()
+    #: Stamp of the last frame, None before the first, and the time between the last two [s].
     stamp: float | None = None
     period: float = 0.1
-    recall: Recall = field(default_factory=Recall)
+    recall: Recall = field(default_factory=Recall)  #: How often people are found, as learnt so far.
+    #: What may move in the scan, whether the camera shows it or not, and the stamp of that scan [s].
     movers: tuple[Mover, ...] = ()
     moved_at: float = -math.inf
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
-        for one in self.people:
-            if one.number == number:
-                return one
-        return None
+        return next((one for one in self.people if one.number == number), None)
 
     @property
     def in_view(self) -> list[Person]:
@@ -68,71 +50,31 @@ class Tracks:
 
 @dataclass(frozen=True, slots=True)
 class Tracker:
-    """Keeps the tracks of all people.
+    """Keeps the tracks of all people."""
 
-    Attributes
-    ----------
-    noise, association, existence, legs, movers, visibility
-        The parts, each with its parameters.
-    forget_s
-        An unmeasured person is forgotten after so long [s]. Chosen: the time the
-        workshop's person takes for one side of the patrol.
-    legs_only_s
-        A person not found by HOG is followed by legs alone that do not walk for so long [s]. Chosen: a chair's legs may
-        have been taken for theirs, so not as long as `forget_s`.
-    restart_s
-        A person measured again after so long has a new track: the old velocity tells nothing [s]. Chosen: people turn
-        within a second.
-    size_rate
-        Share by which one box moves a person's known size, and their clothes until they are confirmed [1]. Chosen: a
-        time constant of five frames, half a second.
-    turn_speed
-        Standard deviation added to each component of the velocity of a person whose box is outside the gate [m/s], and
-        `association.same_place` to the position's. Chosen: a sharp turn at 0.75 m/s changes the velocity by 1.06 m/s.
-    astray
-        A box whose range differs by more from the person's may be another's, who passes before them [m]. Chosen: half
-        of what people keep from each other; the depth at a box's centre strays by less but for an arm.
-    stature_from
-        From nearer the outline's top is no measure of the stature [m]. Measured in the arena: at 1.25 m it is a tenth
-        too low, since the head touches the image's edge.
-    poses_s, scans_s
-        How long odometry and scans are kept [s]: a camera image may be as late as this.
-    scan_period_s
-        A scan may be so much older than the image it is used with [s]: the lidar's period of 0.125 s at 8 Hz.
-    walk
-        How fast people walk who are not measured [m/s].
-    min_period_s, max_period_s
-        Limits of the time between two frames as it is used to predict the next [s]. Chosen: 2 to 50 Hz.
-    robot
-        Where camera and lidar sit.
-    """
-
-    noise: Noise = field(default_factory=Noise)
+    noise: Noise = field(default_factory=Noise)  #: The parts, each with its parameters.
     association: Association = field(default_factory=Association)
     existence: Existence = field(default_factory=Existence)
     legs: Legs = field(default_factory=Legs)
     movers: Movers = field(default_factory=Movers)
     visibility: Visibility = field(default_factory=Visibility)
-    forget_s: float = 8.0
-    legs_only_s: float = 4.0
-    restart_s: float = 1.0
-    size_rate: float = 0.2
-    turn_speed: float = 1.0
-    astray: float = 0.25
-    stature_from: float = 1.4
-    poses_s: float = 2.0
-    scans_s: float = 1.0
-    scan_period_s: float = 0.13
-    walk: float = WALK
-    min_period_s: float = 0.02
-    max_period_s: float = 0.5
-    robot: RobotGeometry = LIMO
+    forget_s: float = param(8.0, "s", "An unmeasured person is forgotten after this time.")
+    legs_only_s: float = param(4.0, "s", "A person is followed for this time by legs alone that do not walk.")
+    restart_s: float = param(1.0, "s", "A person measured again after this time has a new track.")
+    size_rate: float = param(0.2, "1", "Share by which one box moves a person's size, and clothes at first.")
+    turn_speed: float = param(1.0, "m/s", "Added to the velocity's deviation by a box outside the gate.")
+    astray: float = param(0.25, "m", "A box whose range differs by more may be on another person.")
+    stature_from: float = param(1.4, "m", "From nearer the outline's top is no measure of the stature.")
+    poses_s: float = param(2.0, "s", "How long odometry is kept: a camera image may be as late as this.")
+    scans_s: float = param(1.0, "s", "How long scans are kept.")
+    scan_period_s: float = param(0.13, "s", "A scan may be older by this than the image it is used with.")
+    walk: float = param(WALK, "m/s", "How fast people walk who are not measured.")
+    min_period_s: float = param(0.02, "s", "Shortest time between two frames that is used to predict the next.")
+    max_period_s: float = param(0.5, "s", "Longest time between two frames that is used to predict the next.")
+    robot: RobotGeometry = LIMO  #: Where camera and lidar sit.
 
     def update(self, observation: Observation, tracks: Tracks) -> tuple[Tracks, dict[int, int]]:
-        """Bring all tracks up to a frame.
-
-        Returns the new tracks, and number -> index of the box of each person found.
-        """
+        """Bring all tracks up to a frame; also number -> index of the box of each person found."""
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
         known: list[Person] = []
@@ -185,10 +127,7 @@ class Tracker:
         return initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds)
 
     def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
-        """Update a person by their box; the track is at the box's stamp.
-
-        `recall` is the share of frames in which a person of this size is found.
-        """
+        """Update a person, found with `recall`, by their box; the track is at the box's stamp."""
         window, centre = person.window, person.centre
         solid, fits = self.existence.is_solid(seen), self.association.fits_size(person, seen)
         if seen.range is not None and solid:
@@ -233,12 +172,9 @@ class Tracker:
         )
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
-        """Bring a person up to the newest scan, if their legs are in it.
+        """Bring a person up to the newest scan, if their legs are in it; returns on the known `ground` are none.
 
-        `ground` is what stands around, where that is known: its returns are not legs.
-
-        Returns the person at the newest scan's stamp, and the tracks. There, a person found in the last frame stays at
-        the frame's stamp, since the next frame may be older than the scans.
+        Among the tracks returned, a person found in the last frame stays at its stamp: the next may be older.
         """
         if tracks.stamp is None:
             return person, tracks
@@ -270,10 +206,7 @@ class Tracker:
         return now, replace(tracks, people=tuple(people))
 
     def _walked(self, person: Person, scans: tuple[Returns, ...], stamp: float) -> Person:
-        """Bring a person up to the last scan before a frame of `stamp` [s] that shows their legs.
-
-        Between slow frames a person turns and walks further than the next frame's gate.
-        """
+        """Bring a person up to the last scan before `stamp` [s] with their legs: between slow frames people turn."""
         for returns in scans:
             if person.confirmed and person.track.stamp < returns.stamp <= stamp and returns.stamp > person.felt:
                 track = self.legs.update(person.track, returns, self.noise)
@@ -331,9 +264,8 @@ class Tracker:
     ) -> tuple[list[Track], Points, Track | None]:
         """Return all people, seen by the camera or moving in the scan, as of `now` [s].
 
-        Also the places of those who are not followed and were measured within `lately_s` [s], float64 (N, 2) [m] in the
-        odometry frame, and which track is the person followed, None for none of them. `followed` is the person
-        followed, as measured last; people found by the camera count for `lately_s`.
+        Also where others than `followed` were measured within `lately_s` [s], float64 (N, 2) [m] in the odometry frame,
+        and which track is the person followed; None for none of them.
         """
         people: dict[int, Track] = {}
         for one in tracks.people:

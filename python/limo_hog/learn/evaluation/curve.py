@@ -24,18 +24,11 @@ _SLACK = 1e-9
 
 
 class Match(NamedTuple):
-    """What became of one picture's detections and boxes.
+    """What became of one picture's detections and boxes."""
 
-    Attributes
-    ----------
-    detections
-        int (D,): index of the box found, -1 for a false alarm, -2 for a detection that does not count.
-    boxes
-        int (N,): index of the detection that found it, -1 where none did.
-    """
-
+    #: int (D,): index of the box found, -1 for a false alarm, -2 for a detection that does not count.
     detections: NDArray[np.intp]
-    boxes: NDArray[np.intp]
+    boxes: NDArray[np.intp]  #: int (N,): index of the detection that found it, -1 where none did
 
 
 def match(
@@ -69,26 +62,17 @@ def match(
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """What a detector did on a set of pictures: all that the figures are computed from.
+    """What a detector did on a set of pictures: all that the figures are computed from."""
 
-    Attributes
-    ----------
-    scores, right, picture
-        float64, bool and int (D,): each detection that counts, best first; whether it is right; its picture's index.
-    objects
-        int (P,): how many boxes each picture has.
-    found_at
-        float64 (N,): the score at which each box was found, picture by picture; -inf where it was not.
-    heights
-        float64 (N,): the height of each box [px].
-    """
-
+    #: scores, right, picture: float64, bool and int (D,): each detection that counts, best first; whether it is right;
+    #: its picture's index.
     scores: NDArray[np.float64]
     right: NDArray[np.bool_]
     picture: NDArray[np.intp]
-    objects: NDArray[np.intp]
+    objects: NDArray[np.intp]  #: int (P,): how many boxes each picture has
+    #: float64 (N,): the score at which each box was found, picture by picture; -inf where it was not.
     found_at: NDArray[np.float64]
-    heights: NDArray[np.float64]
+    heights: NDArray[np.float64]  #: float64 (N,): the height of each box [px]
 
 
 def collect(
@@ -137,44 +121,24 @@ def _joined(parts: list[NDArray], dtype: type) -> NDArray:  # type: ignore[type-
 
 
 class Curve(NamedTuple):
-    """Points of the DET curve, by falling threshold: float64 (K,) each.
+    """Points of the DET curve, by falling threshold: float64 (K,) each."""
 
-    Attributes
-    ----------
-    thresholds
-        Least score that counts as a detection.
-    recall
-        Share of the boxes that are found.
-    fppi
-        False positives per image.
-    precision
-        Share of the detections that are right.
-    """
-
-    thresholds: NDArray[np.float64]
-    recall: NDArray[np.float64]
-    fppi: NDArray[np.float64]
-    precision: NDArray[np.float64]
+    thresholds: NDArray[np.float64]  #: least score that counts as a detection
+    recall: NDArray[np.float64]  #: share of the boxes that are found
+    fppi: NDArray[np.float64]  #: false positives per image
+    precision: NDArray[np.float64]  #: share of the detections that are right
 
 
 class Figures(NamedTuple):
-    """The figures that sum up a curve; all are better the larger, but `lamr`.
+    """The figures that sum up a curve; all are better the larger, but `lamr`."""
 
-    Attributes
-    ----------
-    lamr
-        Log-average miss rate: geometric mean of the miss rates at nine FPPI over 10⁻²…10⁰, each with the largest recall
-        whose FPPI is not above it.
-    recall_01, recall_1
-        Largest recall with an FPPI of 0.1 or 1 at most.
-    ap
-        Average precision, COCO's at the IoU of the matching.
-    """
-
+    #: Log-average miss rate: geometric mean of the miss rates at nine FPPI over 10⁻²…10⁰, each with the largest recall
+    #: whose FPPI is not above it.
     lamr: float
+    #: recall_01, recall_1: largest recall with an FPPI of 0.1 or 1 at most
     recall_01: float
     recall_1: float
-    ap: float
+    ap: float  #: average precision, COCO's at the IoU of the matching
 
 
 def curve(outcomes: Outcomes) -> Curve:

@@ -22,22 +22,12 @@ _SURROUNDINGS = 1.8
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """One mistake.
+    """One mistake."""
 
-    Attributes
-    ----------
-    kind
-        "false alarm" or "missed".
-    box
-        x, y, width, height [px] in the picture.
-    score
-        The false alarm's; None of what was missed.
-    """
-
-    kind: str
+    kind: str  #: "false alarm" or "missed"
     path: Path
-    box: tuple[float, float, float, float]
-    score: float | None
+    box: tuple[float, float, float, float]  #: x, y, width, height [px] in the picture
+    score: float | None  #: the false alarm's; None of what was missed
 
 
 def worst_mistakes(evaluation: Evaluation, pictures: Sequence[Picture]) -> list[Mistake]:

@@ -30,43 +30,22 @@ _FEW = 50
 
 @dataclass(frozen=True)
 class EvaluationParameters:
-    """How detectors are measured.
+    """How detectors are measured."""
 
-    Attributes
-    ----------
-    min_iou
-        Intersection over union from which a box is found (PASCAL VOC, Caltech).
-    draws
-        Sets of pictures for an interval; 1000 settle its ends to about .005.
-    confidence
-        Share of the sets inside an interval.
-    seed
-        Of the draws.
-    height_edges
-        Heights [px] that part the rows by height.
-    """
-
-    min_iou: float = 0.5
-    draws: int = 1000
-    confidence: float = 0.95
-    seed: int = 0
-    height_edges: tuple[float, ...] = (64, 96, 144, 216)
+    min_iou: float = 0.5  #: intersection over union from which a box is found (PASCAL VOC, Caltech)
+    draws: int = 1000  #: sets of pictures for an interval; 1000 settle its ends to about .005
+    confidence: float = 0.95  #: share of the sets inside an interval
+    seed: int = 0  #: of the draws
+    height_edges: tuple[float, ...] = (64, 96, 144, 216)  #: heights [px] that part the rows by height
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A detector under its name.
-
-    Attributes
-    ----------
-    search
-        Returns every hit that the curve is to have, however unsure.
-    timed
-        The same with the threshold that a user would set: its time is taken. None: `search` is timed.
-    """
+    """A detector under its name."""
 
     name: str
-    search: Detector
+    search: Detector  #: returns every hit that the curve is to have, however unsure
+    #: The same with the threshold that a user would set: its time is taken. None: `search` is timed.
     timed: Detector | None = None
 
 
@@ -83,24 +62,15 @@ class HeightRow:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One detector's figures.
-
-    Attributes
-    ----------
-    intervals
-        Of each figure, its lower and upper end.
-    threshold_01, threshold_1
-        Least score with an FPPI of 0.1 or 1 at most.
-    ms
-        Median time of a picture [ms], the detectors taking turns on each.
-    """
+    """One detector's figures."""
 
     name: str
     figures: Figures
-    intervals: dict[str, tuple[float, float]]
+    intervals: dict[str, tuple[float, float]]  #: of each figure, its lower and upper end
+    #: threshold_01, threshold_1: least score with an FPPI of 0.1 or 1 at most
     threshold_01: float
     threshold_1: float
-    ms: float
+    ms: float  #: median time of a picture [ms], the detectors taking turns on each
     by_height: tuple[HeightRow, ...]
     curve: Curve = field(repr=False)
     outcomes: Outcomes = field(repr=False)
@@ -110,17 +80,12 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Difference:
-    """How much a figure of the first detector is above another's, on the same draws of pictures.
-
-    Attributes
-    ----------
-    interval
-        The difference's; where it does not hold 0, the difference is more than the choice of pictures.
-    """
+    """How much a figure of the first detector is above another's, on the same draws of pictures."""
 
     name: str
     figure: str
     difference: float
+    #: The difference's; where it does not hold 0, the difference is more than the choice of pictures.
     interval: tuple[float, float]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -35,20 +36,12 @@ class CvBridge:
         CvBridgeError
             If the message is inconsistent or its encoding cannot become the desired one.
         """
-        _want(img_msg, "sensor_msgs/msg/Image")
-        try:
-            pixels = pixels_of(img_msg).copy()
-        except MessageError as error:
-            raise CvBridgeError(str(error)) from error
+        pixels = _read(pixels_of, img_msg, "sensor_msgs/msg/Image").copy()
         return _converted(pixels, img_msg.encoding, desired_encoding)
 
     def compressed_imgmsg_to_cv2(self, cmprs_img_msg: Any, desired_encoding: str = "passthrough") -> NDArray[Any]:
         """Return a CompressedImage's pixels, BGR."""
-        _want(cmprs_img_msg, "sensor_msgs/msg/CompressedImage")
-        try:
-            pixels = decompressed(cmprs_img_msg)
-        except MessageError as error:
-            raise CvBridgeError(str(error)) from error
+        pixels = _read(decompressed, cmprs_img_msg, "sensor_msgs/msg/CompressedImage")
         return _converted(pixels, "bgr8" if pixels.ndim == 3 else "mono8", desired_encoding)
 
     def cv2_to_imgmsg(self, cvim: Any, encoding: str = "passthrough", header: Any = None) -> Message:
@@ -85,9 +78,13 @@ class CvBridge:
         return message  # type: ignore[no-any-return]
 
 
-def _want(message: Any, type_name: str) -> None:
+def _read(pixels: Callable[[Any], NDArray[Any]], message: Any, type_name: str) -> NDArray[Any]:
     if not isinstance(message, message_class(type_name)):
         raise TypeError(f"want a {type_name}, came {type(message).__name__}")
+    try:
+        return pixels(message)
+    except MessageError as error:
+        raise CvBridgeError(str(error)) from error
 
 
 def _converted(pixels: NDArray[Any], encoding: str, desired: str) -> NDArray[Any]:

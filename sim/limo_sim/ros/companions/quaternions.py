@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,12 @@ class Rigid(NamedTuple):
         """Return the transform back."""
         back = conjugate(self.rotation)
         return Rigid(-rotate(back, self.translation), back)
+
+
+def rigid_of(stamped: Any) -> Rigid:
+    """Return what a TransformStamped says."""
+    place, turn = stamped.transform.translation, stamped.transform.rotation
+    return Rigid(np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w]))
 
 
 IDENTITY = Rigid(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))

@@ -6,10 +6,8 @@ import bisect
 import math
 from typing import Any
 
-import numpy as np
-
 from limo_hog.ros2 import names
-from limo_sim.ros.companions.quaternions import IDENTITY, Rigid, slerp
+from limo_sim.ros.companions.quaternions import IDENTITY, Rigid, rigid_of, slerp
 from limo_sim.ros.interfaces import Message, message_class
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.clock import Duration, Time
@@ -121,11 +119,8 @@ class Buffer(PartialApi, missing=_MISSING):
     ) -> Any:
         """Whether `lookup_transform` would succeed; with `return_debug_tuple` also why not."""
         self._wait(target_frame, source_frame, time, timeout)
-        try:
-            self._between(target_frame, source_frame, time)
-        except TransformException as error:
-            return (False, str(error)) if return_debug_tuple else False
-        return (True, "") if return_debug_tuple else True
+        why = self._why_not(target_frame, source_frame, time)
+        return (not why, why) if return_debug_tuple else not why
 
     def transform(
         self, object_stamped: Any, target_frame: str, timeout: Duration | None = None, new_type: Any = None
@@ -160,19 +155,18 @@ class Buffer(PartialApi, missing=_MISSING):
         self._parents[child] = parent
         return child
 
+    def _why_not(self, target: str, source: str, time: Time) -> str:
+        try:
+            self._between(target, source, time)
+        except TransformException as error:
+            return str(error)
+        return ""
+
     def _wait(self, target: str, source: str, time: Time, timeout: Duration | None) -> None:
-        if timeout is None or timeout.nanoseconds <= 0:
-            return
-
-        def known() -> bool:
-            try:
-                self._between(target, source, time)
-            except TransformException:
-                return False
-            return True
-
-        world = current().world
-        world.turns.wait(known, world.time + timeout.nanoseconds * 1e-9)
+        if timeout is not None and timeout.nanoseconds > 0:
+            world = current().world
+            until = world.time + timeout.nanoseconds * 1e-9
+            world.turns.wait(lambda: not self._why_not(target, source, time), until)
 
     def _between(self, target: str, source: str, time: Time) -> tuple[Rigid, int]:
         ways = [self._to_root(frame) for frame in (target, source)]
@@ -295,9 +289,8 @@ def _nanoseconds(stamp: Any) -> int:
 
 
 def _rigid(transform: Any) -> Rigid:
-    place, turn = transform.transform.translation, transform.transform.rotation
-    rotation = np.array([turn.x, turn.y, turn.z, turn.w])
-    length = math.sqrt(float(rotation @ rotation))
+    rigid = rigid_of(transform)
+    length = math.sqrt(float(rigid.rotation @ rigid.rotation))
     if not abs(length - 1) < 0.01:
         raise InvalidArgumentException(f"the rotation of {transform.child_frame_id!r} has length {length:g}, want 1")
-    return Rigid(np.array([place.x, place.y, place.z]), rotation / length)
+    return Rigid(rigid.translation, rigid.rotation / length)

@@ -7,12 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from limo_sim.ros.companions.quaternions import Rigid, multiply, rotate
-
-
-def _rigid(transform: Any) -> Rigid:
-    place, turn = transform.transform.translation, transform.transform.rotation
-    return Rigid(np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w]))
+from limo_sim.ros.companions.quaternions import Rigid, multiply, rigid_of, rotate
 
 
 def _moved(point: Any, rigid: Rigid) -> Any:
@@ -23,7 +18,7 @@ def _moved(point: Any, rigid: Rigid) -> Any:
 
 def do_transform_pose(pose: Any, transform: Any) -> Any:
     """Return a Pose carried by a TransformStamped."""
-    rigid, new, q = _rigid(transform), copy.deepcopy(pose), pose.orientation
+    rigid, new, q = rigid_of(transform), copy.deepcopy(pose), pose.orientation
     new.position = _moved(pose.position, rigid)
     turned = multiply(rigid.rotation, np.array([q.x, q.y, q.z, q.w]))
     new.orientation.x, new.orientation.y, new.orientation.z, new.orientation.w = (float(value) for value in turned)
@@ -33,7 +28,7 @@ def do_transform_pose(pose: Any, transform: Any) -> Any:
 def do_transform_point(point: Any, transform: Any) -> Any:
     """Return a PointStamped carried by a TransformStamped, in its target frame."""
     new = _stamped(point, transform)
-    new.point = _moved(point.point, _rigid(transform))
+    new.point = _moved(point.point, rigid_of(transform))
     return new
 
 
@@ -47,7 +42,7 @@ def do_transform_pose_stamped(pose: Any, transform: Any) -> Any:
 def do_transform_vector3(vector3: Any, transform: Any) -> Any:
     """Return a Vector3Stamped turned by a TransformStamped: a vector has no place."""
     new, v = _stamped(vector3, transform), vector3.vector
-    turned = rotate(_rigid(transform).rotation, np.array([v.x, v.y, v.z]))
+    turned = rotate(rigid_of(transform).rotation, np.array([v.x, v.y, v.z]))
     new.vector.x, new.vector.y, new.vector.z = (float(value) for value in turned)
     return new
 

@@ -30,6 +30,12 @@ class Calls:
         Stamps of the camera images that the script's callbacks were given [s].
     searched_without_svm
         Line of a `detectMultiScale` before `setSVMDetector`; 0 where there was none.
+    types
+        The message types of subscriptions, by topic.
+    unmatched
+        Lines of what no quality of service of the arena's matches, by ROS 2's warning.
+    solution_read
+        Line that reads one of the workshop's model solutions, 0 where it is not known; None where none does.
     """
 
     nodes: dict[str, int | None] = field(default_factory=dict)
@@ -41,8 +47,26 @@ class Calls:
     spun: bool = False
     images: array[float] = field(default_factory=lambda: array("d"))
     searched_without_svm: int | None = 0
+    types: dict[str, str] = field(default_factory=dict)
+    unmatched: dict[str, int | None] = field(default_factory=dict)
+    solution_read: int | None = None
 
 
-def nearest_topic(topic: str) -> str:
-    """Return the arena's topic whose name is most like `topic`."""
-    return difflib.get_close_matches(topic, PUBLISHED, n=1, cutoff=0.0)[0]
+def nearest_topic(topic: str, type_name: str = "") -> str:
+    """Return the topic of this type whose name is most like `topic`, of any type where none has this one."""
+    # A depth image has the colour image's type; who means it says so.
+    of_type = [
+        name for name, kind in names.TYPES.items() if kind == type_name and ("depth" in name) == ("depth" in topic)
+    ]
+    return difflib.get_close_matches(topic, of_type or PUBLISHED, n=1, cutoff=0.0)[0]
+
+
+def incompatible(topic: str, policy: str, *, reads: bool) -> str:
+    """Return ROS 2's warning of a publisher and a subscription that do not match, `policy` being the reason."""
+    other, does, never = (
+        ("publisher", "offering", "received from") if reads else ("subscription", "requesting", "sent to")
+    )
+    return (
+        f"New {other} discovered on topic '{topic}', {does} incompatible QoS. No messages will be {never} it. "
+        f"Last incompatible policy: {policy}"
+    )

@@ -23,10 +23,12 @@ class StubError(LimoHogError):
 
 
 class Reader(Protocol):
-    """A subscription; one that `keeps` is given what was published before it."""
+    """A subscription; one that `keeps` is given what was published before it; `reliable`: what it asks for."""
 
     topic: str
+    msg_type: type[Message]
     keeps: bool
+    reliable: bool
 
     def offer(self, message: Message) -> None:
         """Queue a message, which is the reader's own."""

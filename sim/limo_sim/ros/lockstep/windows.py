@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import limo_hog
 from limo_hog.cv2_api.install import install_into_cv2
 from limo_hog.extras import needed
 from limo_sim.ros.lockstep.world import World
@@ -17,7 +19,10 @@ from limo_sim.ros.lockstep.world import World
 with needed(by="limo-hog run"):
     import cv2
 
+#: No screen is larger, nor a JPEG [px].
+_LARGEST = 16_384
 _MISSING = object()
+_TRACKER = re.compile(r"Tracker\w+_create")
 
 
 @contextmanager
@@ -25,20 +30,22 @@ def watched_cv2(world: World) -> Iterator[None]:
     """Put the replacements into `cv2`, for one run."""
     # OpenCV 5 has no HOG: for this run, ours takes its place.
     installed = install_into_cv2()
-    replacements = {**_windows(world), "HOGDescriptor": _watched(cv2.HOGDescriptor, world)}
-    before = {name: getattr(cv2, name, _MISSING) for name in replacements}
-    for name, value in replacements.items():
-        setattr(cv2, name, value)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is _MISSING:
-                delattr(cv2, name)
-            else:
-                setattr(cv2, name, value)
+    replacements: list[tuple[Any, str, Any]] = [(cv2, name, value) for name, value in _windows(world).items()]
+    replacements.append((cv2, "HOGDescriptor", _watched(cv2.HOGDescriptor, world)))
+    if world.checked:
+        replacements += [
+            (limo_hog, "HOGDescriptor", _watched(limo_hog.HOGDescriptor, world)),
+            (limo_hog.PeopleDetector, "detect", _watched_detect(limo_hog.PeopleDetector.detect, world)),
+            *((cv2, name, _tracker(getattr(cv2, name), world)) for name in vars(cv2) if _TRACKER.fullmatch(name)),
+        ]
+    with ExitStack() as stack:
         for name in installed:
-            delattr(cv2, name)
+            stack.callback(delattr, cv2, name)
+        for owner, name, value in replacements:
+            before = getattr(owner, name, _MISSING)
+            setattr(owner, name, value)
+            stack.callback(delattr, owner, name) if before is _MISSING else stack.callback(setattr, owner, name, before)
+        yield
 
 
 def _windows(world: World) -> dict[str, Callable[..., Any]]:
@@ -47,6 +54,8 @@ def _windows(world: World) -> dict[str, Callable[..., Any]]:
             raise cv2.error(f"imshow: want a picture that is not empty, came {type(mat).__name__}")
         if mat.ndim not in (2, 3) or (mat.ndim == 3 and mat.shape[2] not in (1, 3, 4)):
             raise cv2.error(f"imshow: want (H, W) or 1, 3 or 4 channels, came {mat.shape}")
+        if not isinstance(winname, str) or max(mat.shape[:2]) > _LARGEST:
+            raise cv2.error(f"imshow: want a title and at most {_LARGEST} px a side, came {winname!r}, {mat.shape}")
         picture = _as_shown(mat)
         world.called("windows", str(winname))
         world.link.tell("shown", str(winname), picture.shape, data=picture.tobytes())
@@ -121,8 +130,43 @@ def _watched(base: Any, world: World) -> Any:
             began = time.perf_counter()
             rects, weights = self._descriptor.detectMultiScale(img, *args, **kwargs)
             ms = 1e3 * (time.perf_counter() - began)
-            boxes, scores = np.reshape(rects, (-1, 4)), np.reshape(weights, -1)
-            world.link.tell("found", np.shape(img), boxes.tolist(), scores.tolist(), ms)
+            _found(world, img, np.reshape(rects, (-1, 4)).tolist(), np.reshape(weights, -1).tolist(), ms, hog=True)
             return rects, weights
 
     return HOGDescriptor
+
+
+def _found(
+    world: World, img: Any, boxes: list[Any], scores: list[float], ms: float = 0.0, *, hog: bool = False
+) -> None:
+    """Tell what was found in a picture, and where the arena wants to see it, the picture."""
+    seen = world.checked and isinstance(img, np.ndarray) and img.dtype == np.uint8
+    if hog or seen:
+        world.link.tell("found", np.shape(img), boxes, scores, ms, hog, data=img.tobytes() if seen else b"")
+
+
+def _watched_detect(detect: Callable[..., Any], world: World) -> Callable[..., Any]:
+    def watched(detector: Any, image: Any) -> Any:
+        found = detect(detector, image)
+        _found(world, image, found.windows.tolist(), found.scores.tolist())
+        return found
+
+    return watched
+
+
+def _tracker(create: Callable[..., Any], world: World) -> Callable[..., Any]:
+    class Tracker:
+        """One of OpenCV's trackers; where it sees what it tracks is told."""
+
+        def __init__(self, *args: Any) -> None:
+            self._tracker = create(*args)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._tracker, name)
+
+        def update(self, image: Any) -> Any:
+            ok, box = self._tracker.update(image)
+            _found(world, image, [[round(side) for side in box]] if ok else [], [1.0] if ok else [])
+            return ok, box
+
+    return Tracker

@@ -30,7 +30,7 @@ class Link(Protocol):
         """Tell what the script does: numbers, texts, None and lists of them, and the bytes of a picture."""
         ...
 
-    def advance(self, wanted: Sequence[str], target: float | None) -> tuple[float, list[tuple[str, bytes]]]:
+    def advance(self, wanted: Sequence[str], target: float | None) -> tuple[float, list[tuple[str, memoryview]]]:
         """Let one step pass; returns the time [s], and the new messages of the topics that are wanted, as CDR."""
         ...
 
@@ -58,10 +58,15 @@ class World:
         The script's threads.
     advances
         How often the arena advanced.
+    checked
+        Whether the arena wants to see the pictures that detectors are given.
     """
 
-    def __init__(self, link: Link, seconds: float, *, script: Path, patience: float = 20.0) -> None:
+    def __init__(
+        self, link: Link, seconds: float, *, script: Path, patience: float = 20.0, checked: bool = False
+    ) -> None:
         self.link = link
+        self.checked = checked
         self.seconds = seconds
         self.script = script
         self.patience = Patience(patience)
@@ -136,9 +141,9 @@ class World:
             if self.time > since:
                 self.link.tell("slept", since, self.time - since)
 
-    def called(self, kind: str, name: str) -> None:
+    def called(self, kind: str, name: str, type_name: str = "") -> None:
         """Tell that the script makes a node, a subscription and the like, and on which line."""
-        self.link.tell("called", kind, name, self.line())
+        self.link.tell("called", kind, name, self.line(), type_name)
 
     def spun(self) -> None:
         """Tell that the script spins."""
@@ -149,13 +154,15 @@ class World:
     def subscribe(self, reader: Reader) -> None:
         """Add a subscription."""
         self.readers.append(reader)
-        self.called("readers", reader.topic)
+        self.called("readers", reader.topic, reader.msg_type._type_name)
         if reader.keeps:
             for message in [m for topic, messages in self.kept if topic == reader.topic for m in messages]:
                 reader.offer(copy.deepcopy(message))
 
-    def publish(self, topic: str, message: Message) -> None:
+    def publish(self, topic: str, message: Message, *, reliable: bool = True) -> None:
         """Take a message from the script: a command drives the robot, and the script's own subscriptions get it.
+
+        The robot, and subscriptions that ask for reliable delivery, get none from a publisher that is not.
 
         Raises
         ------
@@ -165,10 +172,10 @@ class World:
         if topic not in self.published:
             self.link.tell("published", topic)
         self.published[topic] = message._type_name
-        if topic == names.COMMAND:
+        if topic == names.COMMAND and reliable:
             self._drive(message.twist if message._type_name == names.STAMPED_COMMAND_TYPE else message)  # type: ignore[attr-defined]
         for reader in self.readers:
-            if reader.topic == topic:
+            if reader.topic == topic and (reliable or not reader.reliable):
                 reader.offer(copy.deepcopy(message))
 
     def _drive(self, message: Any) -> None:

@@ -10,12 +10,12 @@ from typing import Any
 from limo_hog.ros2 import names
 from limo_hog.ros2.messages import to_seconds
 from limo_sim.ros.interfaces import Message
-from limo_sim.ros.lockstep.calls import PUBLISHED
+from limo_sim.ros.lockstep.calls import PUBLISHED, incompatible
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.context import current
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.partial import PartialApi
-from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 
 class Publisher(
@@ -33,6 +33,9 @@ class Publisher(
             self._kept = deque(maxlen=max(qos.depth, 1))
             world.kept.append((topic, self._kept))
         world.called("writers", topic)
+        self._reliable = qos.reliability != ReliabilityPolicy.BEST_EFFORT
+        if topic == names.COMMAND and not self._reliable:
+            world.called("unmatched", incompatible(topic, "RELIABILITY", reads=False))
         world.writers.append(topic)
 
     def publish(self, msg: Message) -> None:
@@ -52,7 +55,7 @@ class Publisher(
             )
         if self._kept is not None:
             self._kept.append(copy.deepcopy(msg))
-        current().world.publish(self.topic, msg)
+        current().world.publish(self.topic, msg, reliable=self._reliable)
 
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions; the robot is one to /cmd_vel."""
@@ -86,7 +89,10 @@ class Subscription(PartialApi, missing=("handle", "event_handlers", "raw", "logg
         # As in ROS, a transient-local subscription gets no message from a volatile publisher.
         volatile = topic in names.TYPES and topic != names.TF_STATIC
         self.keeps = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        self.reliable = qos.reliability not in (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.BEST_AVAILABLE)
         self._deaf = self.keeps and volatile
+        if self._deaf and topic in PUBLISHED:
+            current().world.called("unmatched", incompatible(topic, "DURABILITY", reads=True))
 
     def offer(self, message: Message) -> None:
         """Queue a message; the oldest gives way."""

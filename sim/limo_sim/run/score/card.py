@@ -26,7 +26,7 @@ class ScoreCard:
     success
         Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
         view for more than 10 s after being first in view; None where no person ever was in the arena. A node that
-        failed, or never gave a command, has no success.
+        failed, or never moved the robot, has no success.
     frames
         Camera frames worked on.
     first_detection_s

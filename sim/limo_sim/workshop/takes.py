@@ -1,0 +1,264 @@
+"""What a node did in a scene: each camera image with the boxes, pictures, commands and lines that belong to it.
+
+A box belongs to the image that was searched, and a picture to the image it shows: both are told by their pixels. A
+command and a line of the log belong to the image that was searched last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.detections import Detections
+from limo_hog.suppression import intersection_over_union
+from limo_sim.ros.lockstep.calls import LOGGER, Calls
+from limo_sim.ros.lockstep.records import Command, Found, Shown
+from limo_sim.ros.runner import Limits, Said, run_node
+from limo_sim.ros.stage import Ended, Stage, Witness
+from limo_sim.run.log import Step
+from limo_sim.sensing.camera import TrueFrame
+from limo_sim.workshop.scenes import Scene
+from limo_sim.world.truth import Truth
+
+Picture = NDArray[np.uint8]
+
+#: A command is right if it answers an image of this age or younger; a window is as old at most. The watchdog's [s].
+SILENCE = 0.5
+#: Overlap of a box with a person's outline from which it is on that person. Measured: HOG's boxes, which have a
+#: margin, have .3 to .4 (intersection over union), and less than .05 with the other person.
+ON_PERSON = 0.2
+#: Pixels are alike if no channel differs by more: JPEG's error on this arena's pictures is smaller.
+_ALIKE = 16
+#: Correlation from which a searched picture is taken for a camera image, or for a part of one. Chosen.
+_CORRELATED = 0.9
+#: A window's picture is looked for among images of this age or younger [s].
+_OLDEST = 4.0
+_THUMBNAIL = (160, 120)
+
+
+@dataclass(slots=True, eq=False)
+class Look:
+    """One camera image, and what the node made of it.
+
+    Attributes
+    ----------
+    time
+        When the node got it [s].
+    image, truth
+        The camera's, and the arena when it was taken.
+    found
+        Boxes in the camera's pixels.
+    raw
+        The detector's newest result, in pixels of the picture it was given; None where the image was not searched.
+    searched
+        When that was [s].
+    commands, said
+        What was published on /cmd_vel, and logged, after this image was searched and before the next one was.
+    pictures
+        What windows showed of this image.
+    """
+
+    time: float
+    image: Picture
+    truth: Truth
+    found: Detections = field(default_factory=Detections.none)
+    raw: Found | None = None
+    searched: float | None = None
+    commands: list[Command] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
+    pictures: list[Picture] = field(default_factory=list)
+    _place: tuple[float, int, int] = (1.0, 0, 0)
+
+    @property
+    def people(self) -> Detections:
+        """The people in the image, by the arena's truth: outlines, and their heights as scores."""
+        seen = [p.box for p in self.truth.people if p is not None and p.box is not None and p.visible > 0.5]
+        return Detections(np.array(seen, np.int32).reshape(-1, 4), np.array([float(box[3]) for box in seen]))
+
+    def on_person(self, box: NDArray[np.int32], index: int | None = None) -> bool:
+        """Whether a box is on a person, or on that of this index."""
+        people = self.truth.people if index is None else self.truth.people[index : index + 1]
+        outlines = [p.box for p in people if p is not None and p.box is not None]
+        return bool(outlines) and bool(
+            intersection_over_union(np.asarray(box)[None], np.array(outlines)).max() >= ON_PERSON
+        )
+
+    def take_boxes(self, found: Found, place: tuple[float, int, int]) -> None:
+        """Add what was found in a picture, whose `place` in this image is its scale and its left and upper edge."""
+        scale, x, y = place
+        windows = np.rint(found.detections.windows * scale + np.array([x, y, 0, 0])).astype(np.int32)
+        scores = found.detections.scores
+        if self.raw is not None and place != self._place:
+            # Another part of the same image.
+            windows, scores = np.vstack([self.found.windows, windows]), np.append(self.found.scores, scores)
+        self.found, self.raw, self._place = Detections(windows, scores), found, place
+
+
+@dataclass(eq=False)
+class Take(Witness):
+    """A node in one scene.
+
+    Attributes
+    ----------
+    looks
+        What it made of each camera image.
+    windows
+        What windows showed, in order: when [s], the window, the picture, and the look whose image it shows, if any.
+    path
+        The time, and the robot's x, y, yaw, in each control period [s, m, m, rad].
+    unplaced
+        Sizes of searched pictures that are part of no camera image.
+    outcome
+        How the run ended; None before.
+    """
+
+    scene: Scene
+    looks: list[Look] = field(default_factory=list)
+    windows: list[tuple[float, str, Picture, Look | None]] = field(default_factory=list)
+    path: list[tuple[float, float, float, float]] = field(default_factory=list)
+    unplaced: set[tuple[int, ...]] = field(default_factory=set)
+    outcome: Ended | None = None
+    _answered: Look | None = None
+
+    @property
+    def calls(self) -> Calls:
+        """What the node called."""
+        return self.outcome.stage.calls if self.outcome is not None else Calls()
+
+    @property
+    def failed(self) -> bool:
+        """Whether the node ended before the scene did."""
+        return self.outcome is not None and self.outcome.fault is not None
+
+    def at(self, look: Look) -> str:
+        """Say which image it is."""
+        arguments = f" ({' '.join(self.scene.arguments)})" if self.scene.arguments else ""
+        return f"{self.scene.words}{arguments}, image of {look.time:.1f} s"
+
+    def answers(self) -> Iterator[tuple[Command, Look, list[Look]]]:
+        """Yield each command that answers an image: the image searched last, and all of the last half second."""
+        for answered in self.looks:
+            for command in answered.commands:
+                recent = [
+                    look
+                    for look in self._recent(command.time)
+                    if look.searched is not None and look.searched <= command.time
+                ]
+                yield command, answered, recent
+
+    def _recent(self, time: float, seconds: float = SILENCE) -> list[Look]:
+        """Return the looks of the last half second before a time [s], the newest first."""
+        return [look for look in reversed(self.looks) if time - seconds - 1e-6 <= look.time <= time + 1e-6]
+
+    def frame(self, time: float, frame: TrueFrame) -> None:
+        """Note that the node is given an image, and has time to answer it."""
+        if time < self.scene.seconds - 1e-6:
+            self.looks.append(Look(time, frame.image, frame.truth))
+
+    def found(self, time: float, found: Found, picture: Picture) -> None:
+        """Note a search."""
+        look, place = _located(picture, self._recent(time))
+        if look is None:
+            self.unplaced.add(found.shape)
+            return
+        look.take_boxes(found, place)
+        look.searched, self._answered = time, look
+
+    def shown(self, window: str, shown: Shown) -> None:
+        """Note a picture in a window."""
+        look = _shown_in(shown.picture, self._recent(shown.time, _OLDEST))
+        self.windows.append((shown.time, window, shown.picture, look))
+        if look is not None:
+            look.pictures.append(shown.picture)
+
+    def command(self, command: Command) -> None:
+        """Note a command."""
+        if self.looks:
+            (self._answered or self.looks[-1]).commands.append(command)
+
+    def log(self, _time: float, _level: str, name: str, message: str) -> None:
+        """Note a line of the log."""
+        if self.looks and name != LOGGER:
+            (self._answered or self.looks[-1]).said.append(message)
+
+
+def play(script: Path, scene: Scene, limits: Limits | None = None, said: Said = lambda *_: None) -> Take:
+    """Run a node in a scene and note what it does; `said` is given what it prints."""
+    take = Take(scene)
+
+    def watch(step: Step) -> None:
+        take.path.append((step.log.time, *step.truth.robot))
+
+    stage = Stage(script, scene.scenario, scene.seconds, log=take.log, watch=watch, witness=take)
+    take.outcome = run_node(stage, ("--ros-args", *scene.arguments), limits=limits, said=said, checked=True)
+    return take
+
+
+def judge_by_truth(takes: list[Take]) -> bool:
+    """Where no search could be placed in a camera image, let people's true outlines stand for boxes; return whether."""
+    looks = [look for take in takes for look in take.looks]
+    if any(look.raw is not None for look in looks):
+        return False
+    for look in looks:
+        look.found, look.searched = look.people, look.time
+    return True
+
+
+def alike(shown: Picture, image: Picture) -> float:
+    """Return the share of pixels that are alike, of every fourth row and column."""
+    if shown.shape != image.shape:
+        return 0.0
+    return float((cv2.absdiff(shown[::4, ::4], image[::4, ::4]).max(axis=2) <= _ALIKE).mean())
+
+
+def _shown_in(picture: Picture, looks: list[Look]) -> Look | None:
+    """Return the look whose image a picture shows, with things drawn on it; None if it shows none."""
+    for look in looks:
+        if picture.shape == look.image.shape:
+            same = [
+                float((picture[::4, ::4] == image[::4, ::4]).all(axis=2).mean())
+                for image in (look.image, look.image[..., ::-1])
+            ]
+            if same[0] > 0.5 and same[0] >= same[1]:
+                return look
+    # Of compressed images no pixel is the same.
+    best = max(looks, key=lambda look: alike(picture, look.image), default=None)
+    if best is None or alike(picture, best.image) <= 0.5:
+        return None
+    return None if alike(picture, best.image) < alike(picture, np.asarray(best.image[..., ::-1])) else best
+
+
+def _grey(picture: Picture) -> Picture:
+    grey = picture if picture.ndim == 2 else picture[..., :3].mean(axis=2, dtype=np.float32).astype(np.uint8)
+    return np.ascontiguousarray(grey)
+
+
+def _located(picture: Picture, looks: list[Look]) -> tuple[Look | None, tuple[float, int, int]]:
+    """Return the look whose image was searched, and the picture's place in it; None if it is part of none."""
+    for look in looks:
+        if np.array_equal(picture, look.image):
+            return look, (1.0, 0, 0)
+    height, width = picture.shape[:2]
+    best: tuple[float, Look | None, tuple[float, int, int]] = (_CORRELATED, None, (1.0, 0, 0))
+    grey = _grey(picture)
+    for look in looks:
+        scale = look.image.shape[0] / height
+        if abs(width * scale - look.image.shape[1]) <= max(scale, 1.0):
+            one, other = (cv2.resize(g, _THUMBNAIL, interpolation=cv2.INTER_AREA) for g in (grey, _grey(look.image)))
+            match, place = float(cv2.matchTemplate(one, other, cv2.TM_CCOEFF_NORMED)[0, 0]), (scale, 0, 0)
+        elif height <= look.image.shape[0] and width <= look.image.shape[1] and min(height, width) >= 64:
+            found = cv2.matchTemplate(_grey(look.image), grey, cv2.TM_CCOEFF_NORMED)
+            _, match, _, (x, y) = cv2.minMaxLoc(found)
+            place = (1.0, int(x), int(y))
+        else:
+            continue
+        if match > best[0] + 1e-6:
+            best = (match, look, place)
+        if place[0] == 1.0 and match > 0.9999:
+            break
+    return best[1], best[2]

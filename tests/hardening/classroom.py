@@ -1,0 +1,74 @@
+"""A class of hundreds, a tenth of it hostile: every other mark is as when graded alone, and nothing is left running.
+
+`python -m tests.hardening.classroom --count 300` (ten minutes on two cores).
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from tests.sim.ros.scripts import HEAD, node
+from tests.sim.workshop.strangers import RIGHT, WRONG, source
+from tests.sim.workshop.test_hostile import FILES, IN_A_CALLBACK, THEN, left_running
+
+#: Short, so that hundreds are graded in minutes.
+EXERCISE = """
+title = "three scenes"
+scenes = ["left", "nobody", "two"]
+checkpoints = { shown = 10, found = 20, logged = 10, stands = 20, best = 20, turns = 10, speaks = 10 }
+"""
+
+
+def grade(folder: Path, exercise: Path) -> dict[str, str]:
+    """Grade a folder; return the points by file."""
+    table = folder.with_suffix(".csv")
+    command = [sys.executable, "-m", "limo_hog", "workshop", "grade", str(folder), "--exercise", str(exercise)]
+    done = subprocess.run([*command, "--csv", str(table)], check=False, capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(f"grade ended with {done.returncode}: {done.stderr}")
+    return {row["file"]: row["points"] for row in csv.DictReader(table.read_text(encoding="utf-8").splitlines())}
+
+
+def main() -> None:
+    """Grade each node alone, then the class, and compare."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=300)
+    count = parser.parse_args().count
+    honest = [source(one) for one in (*RIGHT.values(), *WRONG.values()) if one[0] == ""]
+    hostile = [HEAD + node(THEN + body) for body, _ in IN_A_CALLBACK.values()] + [text for text, _ in FILES.values()]
+    with tempfile.TemporaryDirectory() as scratch:
+        exercise = Path(scratch) / "three.toml"
+        exercise.write_text(EXERCISE)
+        alone = []
+        for number, text in enumerate(honest):
+            one = Path(scratch) / f"alone{number}"
+            one.mkdir()
+            (one / "node.py").write_text(text)
+            alone.append(grade(one, exercise)["node.py"])
+        folder = Path(scratch) / "class"
+        folder.mkdir()
+        wanted = {}
+        for number in range(count):
+            name = f"s{number:03}.py"
+            if number % 10 == 9:
+                (folder / name).write_text(hostile[number // 10 % len(hostile)])
+            else:
+                (folder / name).write_text(honest[number % len(honest)])
+                wanted[name] = alone[number % len(honest)]
+        began = time.monotonic()
+        marks = grade(folder, exercise)
+        took = time.monotonic() - began
+        other = {name: (points, marks.get(name)) for name, points in wanted.items() if marks.get(name) != points}
+        print(f"{len(marks)} of {count} rows in {took:.0f} s; other marks than alone: {other or 'none'}")
+        print(f"left running: {left_running() or 'nothing'}; marks alone: {sorted(set(alone), key=int)}")
+        raise SystemExit(bool(other) or len(marks) != count or bool(left_running()))
+
+
+if __name__ == "__main__":
+    main()

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 #: Longest name of a file [bytes] on Linux's and macOS's file systems.
 _LONGEST_NAME = 255
@@ -128,6 +130,17 @@ def alone(path: Path) -> Iterator[None]:
         finally:
             with suppress(OSError):
                 lock.unlink()
+
+
+def json_text(value: object, **options: Any) -> str:
+    """Return JSON that every reader takes; `options` are those of `json.dumps`.
+
+    Raises
+    ------
+    ValueError
+        A number is infinite or NaN, which JSON does not know.
+    """
+    return json.dumps(value, allow_nan=False, **options)  # noqa: TID251
 
 
 def write_text(path: Path, text: str) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import io
+import json
+import math
 import os
 import signal
 import struct
@@ -13,10 +15,11 @@ import time
 import zlib
 from pathlib import Path
 
+import cv2
 import pytest
 from tests.cli.material import PICTURE, film_of, lines_of
 
-from limo_hog.atomic import alone, whole_file
+from limo_hog.atomic import alone, json_text, whole_file
 from limo_hog.cli.main import main
 from limo_hog.cli.support import output
 from limo_hog.cli.support.console import console
@@ -152,6 +155,20 @@ def test_control_characters_and_markup_of_a_file_do_not_reach_the_terminal(tmp_p
     assert "[/]\\x1b[2J" in done.stdout and "\x1b" not in done.stdout
 
 
+def test_films_that_are_none_are_named_and_their_bytes_do_not_reach_the_terminal(tmp_path: Path) -> None:
+    # OpenCV's own reader of AVI prints what stands where LIST is wanted.
+    (tmp_path / "evil.avi").write_bytes(b"RIFF\x10\0\0\0AVI \x1b[2J\x10\0\0\0hdrl" + bytes(99))
+    film = cv2.VideoWriter(str(tmp_path / "cut.mkv"), cv2.VideoWriter.fourcc(*"MJPG"), 10, PICTURE.shape[1::-1])
+    film.write(PICTURE)
+    film.release()
+    with (tmp_path / "cut.mkv").open("r+b") as file:
+        file.truncate(736)  # its header
+    done = ended("detect", tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    named = [line.rpartition("/")[2] for line in done.stderr.splitlines()[:-1]]
+    assert named == ["cut.mkv: no frame of it could be read", "evil.avi: not a video that OpenCV can read"]
+
+
 def test_a_table_escapes_what_a_terminal_would_obey() -> None:
     screen = console()
     screen.file = text = io.StringIO()
@@ -254,6 +271,80 @@ def test_an_input_is_never_written_over(
     assert main(typed.split()) == 2
     assert "is itself an input: give another name" in capsys.readouterr().err
     assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        *(f"detect a.png --{kind} there.txt" for kind in ("json", "csv", "coco")),
+        "train a.png --out there.yml",
+        "evaluate opencv a.png --json there.txt",
+        "evaluate opencv a.png --report full",
+        "bench --json there.txt",
+        "replay r.mcap --json there.txt",
+        "replay r.mcap --video there.mp4",
+        *(f"{one} --json there.txt" for one in ("follow", "follow --ros2", "run n.py", "score", "workshop check n.py")),
+        *(f"{one} --video there.mp4" for one in ("follow", "run n.py", "arena")),
+        *(f"{one} --record there.mcap" for one in ("follow", "run n.py", "arena")),
+        *(f"{one} --plot there.png" for one in ("follow", "run n.py", "score")),
+        *(f"workshop check n.py --{kind} there.txt" for kind in ("html", "gradescope")),
+        "workshop grade full --csv there.csv",
+        "score --csv there.csv",
+        "export --out full",
+    ],
+)
+def test_no_command_replaces_what_is_there_unless_it_is_told_to(
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "full").mkdir()
+    for name in ("full/mine", *(f"there.{suffix}" for suffix in ("txt", "yml", "mp4", "mcap", "png", "csv"))):
+        Path(name).write_text("mine")
+    assert main(typed.split()) == 2
+    assert " would be overwritten: --overwrite replaces it" in capsys.readouterr().err
+    assert {path.read_text() for path in tmp_path.rglob("*") if path.is_file()} == {"mine"}
+
+
+def test_a_command_replaces_what_is_there_where_it_is_told_to(tmp_path: Path) -> None:
+    card, film = tmp_path / "card.json", tmp_path / "film.mp4"
+    for path in (card, film):
+        path.write_text("old")
+    typed = ["follow", "--seconds", "0.1", "--json", str(card), "--video", str(film)]
+    assert main([*typed, "--overwrite"]) == 0
+    assert json.loads(card.read_text()) and film.stat().st_size > 100
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("typed", ["train labels.json --out m.yml", "follow --seconds 1 --record m.mcap"])
+def test_two_runs_of_one_command_do_not_write_one_file(
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with alone(Path(typed.split()[-1])):
+        assert main(typed.split()) == 1
+    assert "another run is writing it, and holds .m.lock." in capsys.readouterr().err
+
+
+def test_json_holds_no_number_that_json_does_not_know() -> None:
+    for value in (math.nan, math.inf, -math.inf):
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            json_text({"ms": [1.0, value]})
+
+
+def test_an_unknown_backend_is_named_in_one_line() -> None:
+    done = ended("detect", "a.png", env={"LIMO_HOG_BACKEND": "mmx"})
+    assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+    assert "mmx" in done.stderr and "scalar" in done.stderr
+
+
+def test_pictures_are_searched_while_python_ends(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.png", PICTURE)
+    code = (
+        "import atexit, limo_hog\nfound = limo_hog.PeopleDetector().detect_many\n"
+        f"atexit.register(lambda: print(sum(map(len, found([{str(tmp_path / 'a.png')!r}] * 8)))))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60)
+    assert int(done.stdout) >= 8 and not done.stderr
 
 
 def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

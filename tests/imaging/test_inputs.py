@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from limo_hog import Detections, MissingExtraError, PeopleDetector
+from limo_hog import Detections, HOGDescriptor, MissingExtraError, ParameterTypeError, PeopleDetector
 from limo_hog.cli.support.scene import street
 from limo_hog.exceptions import ImageError, ImageTypeError
 from limo_hog.imaging.inputs import as_array
@@ -126,3 +126,12 @@ def test_without_either_the_error_names_what_to_install(file: Path) -> None:
 def test_what_is_no_image_is_answered_with_what_was_meant(given: object, told: str) -> None:
     with pytest.raises(ImageTypeError, match=told):
         PeopleDetector().detect(given)  # type: ignore[arg-type]
+
+
+def test_a_masked_array_is_refused_because_its_mask_would_be_lost() -> None:
+    hog = HOGDescriptor()
+    for call in (hog.compute, PeopleDetector().detect):
+        with pytest.raises(ImageTypeError, match=r"mask would be lost; give its \.filled"):
+            call(np.ma.masked_equal(np.zeros((128, 64), np.uint8), 0))
+    with pytest.raises(ParameterTypeError, match="mask would be lost"):
+        hog.setSVMDetector(np.ma.masked_equal(np.zeros(3781, np.float32), 0))

@@ -13,6 +13,7 @@ import av
 import cv2
 import numpy as np
 import pytest
+from tests.cli.material import film_of
 
 from limo_hog.atomic import about, part_of, whole_file, write_text
 from limo_hog.extras import MissingExtraError
@@ -25,6 +26,26 @@ def test_an_image_comes_back_as_it_was_written(tmp_path: Path) -> None:
     write_image(path, picture)
     np.testing.assert_array_equal(np.asarray(cv2.imread(str(path))), picture)
     assert list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no choice of cores")
+def test_a_film_has_the_same_bytes_on_one_core(tmp_path: Path) -> None:
+    mine = os.sched_getaffinity(0)
+    films = []
+    for allowed in (mine, {min(mine)}):
+        os.sched_setaffinity(0, allowed)
+        try:
+            film_of(tmp_path / "film.mp4", 40)
+        finally:
+            os.sched_setaffinity(0, mine)
+        films.append((tmp_path / "film.mp4").read_bytes())
+    assert films[0] == films[1]
+
+
+def test_no_format_complains(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for suffix in (".png", ".jpg", ".bmp", ".webp", ".tiff"):
+        write_image(tmp_path / f"a{suffix}", np.zeros((40, 40, 3), np.uint8))
+    assert capfd.readouterr().err == ""
 
 
 def test_an_unknown_picture_format_is_refused(tmp_path: Path) -> None:

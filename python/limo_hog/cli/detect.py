@@ -14,7 +14,7 @@ from limo_hog.atomic import is_stream
 from limo_hog.cli.support import arguments
 from limo_hog.cli.support.arguments import MODEL, add_json, output_file
 from limo_hog.cli.support.output import STDOUT, UsageError
-from limo_hog.cli.support.results import Result, json_lines, refuse_to_overwrite, write_coco, write_csv
+from limo_hog.cli.support.results import Result, json_lines, write_coco, write_csv
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
 
@@ -85,15 +85,10 @@ def _tables(args: argparse.Namespace) -> Mapping[Path, Callable[[Path, Iterable[
     if args.resume and not kept and args.out is None:
         raise UsageError("--resume goes on from what --json FILE or --out DIR holds: give one of them")
     tables = {Path(name): write for name, write in ((args.csv, write_csv), (args.coco, write_coco)) if name}
-    files = [Path(name).resolve() for name in (args.json, args.csv, args.coco) if name not in (None, STDOUT)]
-    if len(set(files)) < len(files):
-        raise UsageError("--json, --csv and --coco name the same file twice: give each a file of its own")
     if any(name == STDOUT for name in (args.csv, args.coco)):
         raise UsageError("--csv and --coco want a file's name; standard output is for --json -")
     if args.resume and tables and not kept:
         raise UsageError("--resume with --csv or --coco takes the earlier results from --json FILE: give it")
-    if not args.resume and not args.overwrite:
-        refuse_to_overwrite(tables)
     return tables
 
 
@@ -108,6 +103,8 @@ def run(args: argparse.Namespace) -> int:
     # The error names a broken file in one line; the decoders' own lines are switched off.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    # OpenCV's second reader of AVI prints bytes of a file that it cannot read; FFmpeg reads the others.
+    os.environ.setdefault("OPENCV_VIDEOIO_PRIORITY_CV_MJPEG", "0")
     from limo_hog.cli.support.pictures import Run
 
     with ExitStack() as stack:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import re
 import statistics
@@ -18,6 +17,7 @@ from typing import IO, Any
 import numpy as np
 from rich.progress import Progress
 
+from limo_hog.atomic import json_text
 from limo_hog.cli.support.arguments import (
     add_follower,
     add_robot,
@@ -115,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
             stopped = error
         card = _card(args, report, time.monotonic() - began)
         if lines is not None:
-            print(json.dumps(card), file=lines, flush=True)
+            print(json_text(card), file=lines, flush=True)
     if args.json != STDOUT:
         modes = ", ".join(f"{mode} {count}" for mode, count in report.modes.items())
         print(f"{report.frames} images, a person in {report.found}; commands: {modes}")
@@ -147,7 +147,7 @@ def _told(args: argparse.Namespace, bar: Progress, lines: IO[str] | None, began:
             bar.console.print(f"{at:.1f} s {mode}: {reason}", markup=False, highlight=False, soft_wrap=True)
         if lines is not None:
             event = {"seconds": round(at, 3), "stamp": log.time, "mode": mode, "reason": reason}
-            print(json.dumps(event), file=lines, flush=True)
+            print(json_text(event), file=lines, flush=True)
 
     return watch
 

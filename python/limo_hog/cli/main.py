@@ -8,7 +8,6 @@ imported; where the arena is not installed, the error names the line that instal
 from __future__ import annotations
 
 import argparse
-import errno
 import importlib
 import os
 import signal
@@ -16,11 +15,10 @@ import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, NoReturn
 
-from limo_hog.cli.support.output import STDOUT, UsageError, lasting_streams, one_line, printable
+from limo_hog.cli.support.output import WRITTEN, UsageError, guarded_outputs, lasting_streams, one_line, printable
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import missing_extra
 from limo_hog.signals import stopping
@@ -122,9 +120,7 @@ def _run(arguments: list[str]) -> int:
         module = _module_of(wanted, arguments)
     if wanted is not None and module is not None:
         module.add_parser(commands)
-        commands.choices[wanted].add_argument(
-            "--debug", action="store_true", default=argparse.SUPPRESS, help="show the traceback of an error"
-        )
+        _add_common(commands.choices[wanted])
     try:
         if wanted is not None and module is None:
             hint = _likely(wanted, commands.choices) or "limo-hog --help lists them all"
@@ -145,45 +141,19 @@ def _run(arguments: list[str]) -> int:
     if module is None:
         parser.print_help(sys.stderr)
         return 2
-    _assert_writable(args)
-    return int(module.run(args))
+    with guarded_outputs(args):
+        return int(module.run(args))
 
 
-#: Arguments that name files to write, and those that name what is read.
-_WRITTEN = ("json", "csv", "coco", "out", "video", "record", "plot", "html", "gradescope")
-_READ = ("inputs", "model", "against", "data", "negatives", "validate", "scenario", "file", "node", "image")
-
-
-def _assert_writable(args: argparse.Namespace) -> None:
-    """Refuse, before the work, files that cannot be written, and those that are an input.
-
-    Raises
-    ------
-    UsageError
-        A file to write is one that is read.
-    OSError
-        It cannot be written.
-    """
-    given = [value for name in _READ for value in _listed(getattr(args, name, None))]
-    read = {os.path.realpath(value) for value in given if os.path.isfile(value)}  # noqa: PTH113
-    for target in (value for name in _WRITTEN for value in _listed(getattr(args, name, None)) if value != STDOUT):
-        if os.path.realpath(target) in read:
-            raise UsageError(f"{target} is itself an input: give another name")
-        folder = Path(target).absolute().parent
-        while not folder.exists() and folder != folder.parent:
-            folder = folder.parent
-        if not os.access(folder, os.W_OK) or not folder.is_dir():
-            raise OSError(*_why(folder), target)
-
-
-def _listed(value: Any) -> list[str]:
-    values = value if isinstance(value, (list, tuple)) else [value]
-    return [os.fspath(value) for value in values if isinstance(value, (str, Path)) and str(value)]
-
-
-def _why(folder: Path) -> tuple[int, str]:
-    number = errno.EACCES if folder.is_dir() else errno.ENOTDIR
-    return number, os.strerror(number)
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    """Add --debug to a command and its actions, and --overwrite where they write files."""
+    for action in parser._actions:
+        for one in action.choices.values() if isinstance(action, argparse._SubParsersAction) else ():
+            _add_common(one)
+    words = "show the traceback of an error"
+    parser.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=words)
+    if "--overwrite" not in parser._option_string_actions and any(one.dest in WRITTEN for one in parser._actions):
+        parser.add_argument("--overwrite", action="store_true", help="replace files that are there")
 
 
 def whole_parser() -> argparse.ArgumentParser:
@@ -196,6 +166,7 @@ def whole_parser() -> argparse.ArgumentParser:
             if module is not None:
                 # A command has no line of its own in the help; completion leaves out those without.
                 module.add_parser(SimpleNamespace(add_parser=partial(commands.add_parser, help=line)))
+                _add_common(commands.choices[name])
     return parser
 
 

@@ -84,8 +84,6 @@ def run(args: argparse.Namespace) -> int:
     with warnings_in_one_line(), progress("pictures") as bar:
         task, shown = bar.add_task("reading", total=None), "reading"
         data = gather(wanted)
-        # A folder that cannot be made is told before the work, not after.
-        args.out.parent.mkdir(parents=True, exist_ok=True)
 
         def step(stage: str, steps: int | None) -> None:
             nonlocal task, shown

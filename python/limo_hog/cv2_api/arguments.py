@@ -34,7 +34,7 @@ def pixels(image: Any) -> NDArray[np.uint8]:
     ImageError
         It is anything else, or empty.
     """
-    image = _downloaded(image)
+    image = _downloaded(image, ImageTypeError)
     if image is None:
         raise ImageTypeError("the image is None: did imread find no file, or is the video over?")
     if not isinstance(image, np.ndarray):
@@ -64,8 +64,9 @@ def coefficients(svm: ArrayLike | None) -> NDArray[np.float32] | None:
     ParameterTypeError
         They are no numbers of shape (n,), (n, 1) or (1, n).
     """
+    svm = _downloaded(svm, ParameterTypeError)
     try:
-        given = np.asarray(() if svm is None else _downloaded(svm))
+        given = np.asarray(() if svm is None else svm)
     except ValueError:
         raise ParameterTypeError("the detector's coefficients are ragged; one row of numbers is wanted") from None
     if given.size == 0:
@@ -205,6 +206,14 @@ def _index(value: Any) -> int:
     return operator.index(value)
 
 
-def _downloaded(value: Any) -> Any:
-    """Return the array inside a `cv2.UMat`, or else `value` itself; OpenCV need not be there."""
+def _downloaded(value: Any, refusal: type[Exception]) -> Any:
+    """Return the array inside a `cv2.UMat`, or else `value` itself; OpenCV need not be there.
+
+    Raises
+    ------
+    refusal
+        It is a masked array.
+    """
+    if isinstance(value, np.ndarray) and hasattr(value, "mask"):
+        raise refusal("a masked array came, whose mask would be lost; give its .filled(0)")
     return value.get() if type(value).__name__ == "UMat" else value

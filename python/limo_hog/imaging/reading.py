@@ -195,7 +195,7 @@ class Video:
         Raises
         ------
         ReadError
-            At the end, if that comes well before the announced one.
+            At the end, if that comes well before the announced one, or before the first frame.
         """
         number = 0
         while self._capture.grab():
@@ -205,6 +205,8 @@ class Video:
                     break
                 yield number, image.astype(np.uint8, copy=False)
             number += 1
+        if not number:
+            raise ReadError(f"{self.source.name}: no frame of it could be read")
         # Containers estimate their frame count from duration and rate: a few frames fewer are no error.
         if number < 0.98 * self.frame_count - 2:
             raise ReadError(f"{self.source.name}: cut off: {number} of {self.frame_count} frames could be read")

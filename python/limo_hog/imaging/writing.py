@@ -18,6 +18,10 @@ with needed(by="writing pictures"):
     import cv2
 
 
+#: Threads that encode a video: the bytes depend on how many there are, and so must not on the machine.
+_THREADS = 2
+
+
 class WriteError(LimoHogError):
     """A picture could not be written."""
 
@@ -32,9 +36,10 @@ def write_image(path: Path, image: NDArray[np.uint8] | NDArray[np.uint16]) -> No
     OSError
         The file cannot be written; nothing is left under `path` then.
     """
+    # Level 1 is three times as fast as the default and a tenth larger; other formats complain about it.
+    how = [cv2.IMWRITE_PNG_COMPRESSION, 1] if path.suffix.lower() == ".png" else []
     try:
-        # Level 1 is three times as fast as the default and a tenth larger.
-        ok, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        ok, data = cv2.imencode(path.suffix, image, how)
     except cv2.error:
         ok = False
     if not ok:
@@ -73,6 +78,7 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[[NDArray[np.uint8]
 
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         stream.pix_fmt = "yuv420p"
+        stream.thread_count = _THREADS
         stream.options = {"preset": "veryfast", "crf": "20"}
         written = 0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import version
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_hog.atomic import write_text
+from limo_hog.atomic import json_text, write_text
 from limo_hog.cv2_api import model_files
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
@@ -44,7 +43,7 @@ def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShap
         A file cannot be written; no part of it is left behind.
     """
     model_files.save(path, Geometry(winSize=shape.size), coefficients.astype(np.float32))
-    write_text(card_path(path), json.dumps(card, indent=2, allow_nan=False) + "\n")
+    write_text(card_path(path), json_text(card, indent=2) + "\n")
 
 
 def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import count, seconds, seed
-from limo_hog.cli.support.output import UsageError
+from limo_hog.cli.support.output import UsageError, refuse_to_overwrite
 from limo_hog.cli.support.progress import progress
 
 if TYPE_CHECKING:
@@ -38,44 +38,68 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--depth", action="store_true", help="write depth pictures too: PNG, 16 bits, millimetres")
     parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
+    parser.add_argument(
+        "--resume", action="store_true", help="complete what an earlier run with the same options began"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the pictures, then the labels: of those written, if it is stopped."""
-    from limo_hog.atomic import about, write_text
+    from limo_hog.atomic import json_text, write_text
+    from limo_hog.signals import held
     from limo_sim.run.export import labelled_frames, labels_of
     from limo_sim.run.provenance import code_version, scenario_hash
     from limo_sim.world.scenario import Scenario
 
-    folder: Path = args.out
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError(f"{folder} is there already, and not empty; wanted is a new folder")
     scenario = Scenario.load(args.scenario)
     labels = sorted({"person", *labels_of(scenario)})
-    images: list[dict[str, Any]] = []
-    annotations: list[dict[str, Any]] = []
-    with about(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+    info = {"scenario": scenario.name, "scenario_hash": scenario_hash(scenario), "seed": args.seed}
+    info |= {"every_s": args.every, "code_version": code_version()}
+    table: dict[str, Any] = {"info": info, "categories": [{"id": i, "name": name} for i, name in enumerate(labels, 1)]}
+    images = table["images"] = []
+    annotations = table["annotations"] = []
+    file = args.out / "coco.json"
+    known = _known(file, info) if args.resume else 0
+    if not known:
+        # What a killed run made can be told by this.
+        write_text(file, json_text(table) + "\n")
     try:
         with progress("frames") as bar:
             task = bar.add_task(scenario.name, total=args.frames)
             for frame, things in labelled_frames(scenario, args.seed, args.frames, args.every):
                 number = len(images) + 1
-                images.append(_write_pictures(folder, number, frame, depth=args.depth))
-                annotations += [
-                    {"id": len(annotations) + i, "image_id": number, **_annotation(thing, labels)}
-                    for i, thing in enumerate(things, 1)
-                ]
+                with held():
+                    images.append(_write_pictures(args.out, number, frame, depth=args.depth))
+                    annotations += [
+                        {"id": len(annotations) + i, "image_id": number, **_annotation(thing, labels)}
+                        for i, thing in enumerate(things, 1)
+                    ]
                 bar.advance(task)
     finally:
-        if images:
-            about_all = {"scenario": scenario.name, "scenario_hash": scenario_hash(scenario), "seed": args.seed}
-            categories = [{"id": i, "name": label} for i, label in enumerate(labels, 1)]
-            data = {"info": {**about_all, "code_version": code_version()}, "categories": categories}
-            text = json.dumps({**data, "images": images, "annotations": annotations}, allow_nan=False) + "\n"
-            write_text(folder / "coco.json", text)
-            print(f"{folder}: pictures: {len(images)}, labelled things: {len(annotations)}, labels: coco.json")
+        if len(images) > known:
+            write_text(file, json_text(table) + "\n")
+        print(f"{args.out}: pictures: {len(images)}, labelled things: {len(annotations)}, labels: {file.name}")
     return 0
+
+
+def _known(file: Path, info: dict[str, Any]) -> int:
+    """Return how many pictures an earlier run has labelled; 0 where the folder is new or empty.
+
+    Raises
+    ------
+    UsageError
+        Something else lies there.
+    """
+    if not file.exists():
+        refuse_to_overwrite([file.parent])
+        return 0
+    try:
+        before = json.loads(file.read_text("utf-8"))
+        if before["info"] == info:
+            return len(before["images"])
+    except (ValueError, LookupError, TypeError):
+        pass
+    raise UsageError(f"{file} is of another run than {info}: give another folder")
 
 
 def _write_pictures(folder: Path, number: int, frame: TrueFrame, *, depth: bool) -> dict[str, Any]:

@@ -110,14 +110,15 @@ def run(args: argparse.Namespace) -> int:
     suite = Suite.load(args.suite) if args.suite else None
     runs = _runs(args, suite)
     card_of = {}
-    failure: WorkerError | None = None
+    failure: WorkerError | KeyboardInterrupt | None = None
     with progress("runs") as bar:
         task = bar.add_task("playing", total=len(runs))
         try:
             for played, card in play_all(runs, args.workers or cores()):
                 card_of[played] = card
                 bar.advance(task)
-        except WorkerError as error:
+        except (WorkerError, KeyboardInterrupt) as error:
+            # The finished runs are kept.
             if not card_of:
                 raise
             failure = error

@@ -7,11 +7,12 @@ import itertools
 import os
 import shlex
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
-from limo_hog.atomic import whole_file, write_text
+from limo_hog.atomic import part_of, whole_file, write_text
 from limo_hog.cli.support.arguments import add_json, count, output_file, seconds
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
@@ -22,6 +23,7 @@ from limo_hog.parallel import cores
 
 if TYPE_CHECKING:
     from limo_sim.workshop.check import Verdict
+    from limo_sim.workshop.grade import Grade, Table
 
 
 #: What `check` prints is no wider [columns].
@@ -131,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
 def _grade(args: argparse.Namespace, node: str) -> int:
     with needed(by="limo-hog workshop"):
         from limo_sim.ros.runner import Limits
-        from limo_sim.workshop.grade import Grade, Table, grade, nodes_in
+        from limo_sim.workshop.grade import Table, grade, nodes_in
     if not args.folder.is_dir():
         raise UsageError(f"{args.folder}: no such folder; wanted is one with the nodes' .py files")
     files = nodes_in(args.folder)
@@ -144,8 +146,11 @@ def _grade(args: argparse.Namespace, node: str) -> int:
     with ExitStack() as stack:
         target = sys.stdout
         if args.csv != STDOUT:
-            # Rows as they come: what was graded before a signal is not lost.
-            target = stack.enter_context(Path(args.csv).open("w", encoding="utf-8", newline=""))
+            # Rows as they come, in a hidden file beside it: what was graded before a kill is not lost.
+            path = Path(args.csv)
+            target = stack.enter_context(part_of(path).open("w", encoding="utf-8", newline=""))
+            if part_of(path) != path:
+                stack.callback(_in_order, path, grades, lambda target: Table(node, args.folder, target))
         table = Table(node, args.folder, target)
         bar = stack.enter_context(progress("files"))
         task = bar.add_task("graded", total=len(files))
@@ -153,15 +158,18 @@ def _grade(args: argparse.Namespace, node: str) -> int:
             table.add(graded)
             grades.append(graded)
             bar.advance(task)
-    if args.csv != STDOUT:
-        # All are there: now in the order of their names.
-        with whole_file(Path(args.csv)) as part, part.open("w", encoding="utf-8", newline="") as target:
-            table = Table(node, args.folder, target)
-            for graded in sorted(grades, key=lambda graded: graded.file):
-                table.add(graded)
     failed = sum(graded.result is None for graded in grades)
     print(f"{len(files)} files graded, {failed} of them without a result", file=sys.stderr)
     return 0
+
+
+def _in_order(path: Path, grades: list[Grade], table_in: Callable[[TextIO], Table]) -> None:
+    """Write the table of what was graded, in the order of the files' names, in place of the unfinished one."""
+    with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as target:
+        table = table_in(target)
+        for graded in sorted(grades, key=lambda graded: graded.file):
+            table.add(graded)
+    part_of(path).unlink()
 
 
 def _show(verdicts: list[Verdict], hints: int) -> None:

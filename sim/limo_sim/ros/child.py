@@ -10,7 +10,6 @@ from __future__ import annotations
 import array
 import base64
 import contextlib
-import ctypes
 import faulthandler
 import io
 import json
@@ -24,12 +23,17 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
-import limo_hog
-from limo_hog.extras import needed
-from limo_sim.ros.lockstep.world import World
-from limo_sim.ros.offer import offered
-from limo_sim.ros.script import run_script
-from limo_sim.ros.wire import FORKS, HEAD, packed
+from limo_sim.ros.wire import FORKS, HEAD, packed, prctl
+
+_SET_PDEATHSIG, _SET_CHILD_SUBREAPER = 1, 36
+# While this process imports, nothing can be told to it: it ends with its parent, and by SIGTERM.
+prctl(_SET_PDEATHSIG, signal.SIGKILL)
+
+import limo_hog  # noqa: E402
+from limo_hog.extras import needed  # noqa: E402
+from limo_sim.ros.lockstep.world import World  # noqa: E402
+from limo_sim.ros.offer import offered  # noqa: E402
+from limo_sim.ros.script import run_script  # noqa: E402
 
 with needed(by="limo-hog run"):
     import cv2
@@ -37,7 +41,6 @@ with needed(by="limo-hog run"):
 
 #: How long a node that is stopped may take to say where it was [s].
 _LAST_WORDS_S = 0.5
-_SET_PDEATHSIG, _SET_CHILD_SUBREAPER = 1, 36
 
 
 class SocketLink:
@@ -129,10 +132,6 @@ def _limit(memory_mb: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (memory_mb * 10**6, memory_mb * 10**6))
 
 
-def _prctl(option: int, value: int) -> None:
-    ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
-
-
 def _attend(node: int, control: socket.socket) -> int:
     """Wait until the node ends or is to end; end all that it started. Return its status, negative for a signal."""
     ended = os.pidfd_open(node)
@@ -173,7 +172,10 @@ def _children() -> list[int]:
 def _serve() -> None:
     """Wait for jobs, one after another."""
     control = socket.socket(fileno=os.dup(0))
-    _prctl(_SET_CHILD_SUBREAPER, 1)
+    prctl(_SET_CHILD_SUBREAPER, 1)
+    # From here on it ends what it has started before it ends itself.
+    prctl(_SET_PDEATHSIG, 0)
+    signal.signal(signal.SIGTERM, lambda *_: None)
     while True:
         text, fds, _, _ = socket.recv_fds(control, 1 << 20, 3)
         if not text:
@@ -185,7 +187,8 @@ def _serve() -> None:
         ends = [socket.socket(fileno=fd) for fd in fds]
         node = os.fork()
         if node == 0:
-            _prctl(_SET_PDEATHSIG, signal.SIGKILL)
+            prctl(_SET_PDEATHSIG, signal.SIGKILL)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
             control.close()
             _run(json.loads(text), *ends)
         for end in ends:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import base64
-import json
 import os
 import select
 import signal
@@ -18,6 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from limo_hog.atomic import json_text
 from limo_hog.extras import needed
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.wire import FORKS
@@ -47,10 +47,10 @@ class Worker:
         if os.name == "nt":
             shares = [base64.b64encode(end.share(self._process.pid)).decode() for end in ends]  # type: ignore[attr-defined]
             if pipe := self._process.stdin:
-                pipe.write(json.dumps(job | {"shares": shares}).encode() + b"\n")
+                pipe.write(json_text(job | {"shares": shares}).encode() + b"\n")
                 pipe.close()
             return
-        socket.send_fds(self._control, [json.dumps(job).encode()], [end.fileno() for end in ends])
+        socket.send_fds(self._control, [json_text(job).encode()], [end.fileno() for end in ends])
 
     @property
     def alive(self) -> bool:
@@ -79,6 +79,7 @@ class Worker:
             self._kill()
             self.status = self._process.returncode
             return self.status
+        self._process.terminate()  # heeded only while it imports, and cannot answer
         with suppress(OSError):
             self._control.sendall(how)
             told = self._control.recv(4)
@@ -101,6 +102,7 @@ class Worker:
     def leave(self) -> None:
         """Let the process end, and its node with it."""
         if FORKS:
+            self._process.terminate()
             with suppress(OSError):
                 self._control.shutdown(socket.SHUT_WR)
         else:

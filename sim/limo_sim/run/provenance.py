@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import json
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import limo_hog
+from limo_hog.atomic import json_text
 from limo_sim.world.scenario import Scenario
 
 # Of hexadecimal digits: by chance two of a thousand scenarios share a hash in one of 10¹³ tables.
@@ -30,7 +30,7 @@ def scenario_hash(scenario: Scenario) -> str:
     Values that are the defaults are left out as well, so that a new option leaves the hashes of old scenarios alone.
     """
     table = _told(dataclasses.replace(scenario, name="", summary=""))
-    return fingerprint(json.dumps(table, sort_keys=True).encode())[:_DIGITS]
+    return fingerprint(json_text(table, sort_keys=True).encode())[:_DIGITS]
 
 
 def _told(value: Any) -> Any:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import json
 import logging
+import math
 import socket
 import threading
 from collections import deque
@@ -22,6 +22,7 @@ from typing import Any
 
 from aiohttp import WSMsgType, web
 
+from limo_hog.atomic import json_text
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
 from limo_hog.follow.sense.measurement import ZONE_ENDS
@@ -83,7 +84,7 @@ class _Page:
             The connection is gone.
         """
         client = self.client
-        sending = client.send_bytes(message) if isinstance(message, bytes) else client.send_str(json.dumps(message))
+        sending = client.send_bytes(message) if isinstance(message, bytes) else client.send_str(json_text(message))
         try:
             await asyncio.wait_for(sending, STALL_S)
         except asyncio.TimeoutError as error:
@@ -369,4 +370,4 @@ def _page(name: str, kind: str) -> Any:
 
 def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
     """Leave out what a page does not show: all but plain numbers and words."""
-    return {k: v for k, v in values.items() if isinstance(v, (int, float, str)) and v == v}
+    return {k: v for k, v in values.items() if isinstance(v, str) or (isinstance(v, (int, float)) and math.isfinite(v))}

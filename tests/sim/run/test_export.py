@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import cv2
@@ -83,7 +86,7 @@ def test_what_is_written_is_coco_with_depth_and_identities(tmp_path: Path, capsy
     assert capsys.readouterr().out == told
     before = sorted(out.rglob("*"))
     assert main(command) == 2
-    assert "not empty" in capsys.readouterr().err and sorted(out.rglob("*")) == before
+    assert "would be overwritten" in capsys.readouterr().err and sorted(out.rglob("*")) == before
     assert [image["stamp"] for image in data["images"]] == sorted({image["stamp"] for image in data["images"]})
     assert {note["track_id"] for note in data["annotations"]} <= {0, 1}
     assert all(note["iscrowd"] == (note["visible"] < 0.65) for note in data["annotations"])
@@ -98,3 +101,30 @@ def test_what_is_written_is_coco_with_depth_and_identities(tmp_path: Path, capsy
     x, y, w, h = note["bbox"]
     there, beside = (depth[y + h // 3 : y + h // 2, x + w // 2 + shift] for shift in (0, w))
     assert np.median(there[there > 0]) < np.median(beside) or np.median(beside) == 0
+
+
+@pytest.mark.parametrize("more", [[], ["--resume"]])
+def test_a_folder_of_others_is_not_written_into(
+    more: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.txt").write_text("")
+    assert main(["export", "--out", str(tmp_path), *more]) == 2
+    assert "would be overwritten" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_killed_export_is_completed_as_if_it_had_not_been(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    typed = ["export", "--scenario", "standing", "--every", "0.2", "--frames", "4", "--out"]
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    assert main([*typed, str(whole)]) == 0
+    command = [sys.executable, "-m", "limo_hog", *typed, str(killed)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as child:
+        while not list(killed.glob("images/0*.png")):
+            assert child.poll() is None
+            time.sleep(0.01)
+        child.kill()
+    assert main([*typed, str(killed), "--seed", "1", "--resume"]) == 2
+    assert "of another run" in capsys.readouterr().err
+    assert main([*typed, str(killed), "--resume"]) == 0
+    for path in filter(Path.is_file, whole.rglob("*")):
+        assert (killed / path.relative_to(whole)).read_bytes() == path.read_bytes()

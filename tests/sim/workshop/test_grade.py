@@ -85,7 +85,7 @@ def test_no_student_is_run_among_the_files_of_another(tmp_path: Path) -> None:
 
 
 def test_a_signal_to_grade_keeps_the_rows_that_are_done_and_ends_the_nodes(tmp_path: Path) -> None:
-    folder, table = tmp_path / "class", tmp_path / "points.csv"
+    folder, table, unfinished = tmp_path / "class", tmp_path / "points.csv", tmp_path / ".points.part.csv"
     folder.mkdir()
     (folder / "amy.py").write_text("raise ValueError\n")
     for name in ("bob", "eve"):
@@ -93,7 +93,7 @@ def test_a_signal_to_grade_keeps_the_rows_that_are_done_and_ends_the_nodes(tmp_p
     command = [sys.executable, "-m", "limo_hog.cli.main", "workshop", "grade", str(folder), "--csv", str(table)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as run:
         until = time.monotonic() + 60
-        while not (table.is_file() and "amy.py" in table.read_text()) and time.monotonic() < until:
+        while not (unfinished.is_file() and "amy.py" in unfinished.read_text()) and time.monotonic() < until:
             time.sleep(0.1)
         run.terminate()
         began = time.monotonic()
@@ -101,6 +101,22 @@ def test_a_signal_to_grade_keeps_the_rows_that_are_done_and_ends_the_nodes(tmp_p
         assert time.monotonic() - began < 15
         assert run.returncode == 128 + 15
     assert [row["file"] for row in csv.DictReader(table.read_text().splitlines())] == ["amy.py"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["class", "points.csv"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a node's process is killed at once")
+@pytest.mark.parametrize("action", ["check", "grade"])
+def test_a_signal_does_not_wait_for_a_nodes_process_that_still_imports(action: str, tmp_path: Path) -> None:
+    slow = "import sys, time\nif 'limo_sim.ros.child' in sys.orig_argv:\n    time.sleep(30)\n"
+    (tmp_path / "sitecustomize.py").write_text(slow)
+    (tmp_path / "class").mkdir()
+    (tmp_path / "class" / "amy.py").write_text(template("follower"))
+    command = [sys.executable, "-m", "limo_hog", "workshop", action, "class" if action == "grade" else "class/amy.py"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL) as run:
+        time.sleep(4.0)
+        run.terminate()
+        assert run.wait(5) == 128 + 15
 
 
 def test_a_folder_becomes_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

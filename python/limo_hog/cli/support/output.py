@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import errno
 import io
-import json
 import os
 import sys
-from collections.abc import Iterator
+from argparse import Namespace
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
-from limo_hog.atomic import write_text
+from limo_hog.atomic import alone, is_stream, json_text, write_text
 from limo_hog.exceptions import LimoHogError
 
 #: The file name that stands for standard output.
 STDOUT = "-"
+#: Arguments that name files or folders to write, and those that name what is read.
+WRITTEN = ("json", "csv", "coco", "out", "video", "record", "plot", "html", "gradescope", "report")
+_READ = ("inputs", "model", "against", "data", "negatives", "validate", "scenario", "file", "node", "image")
 
 
 class UsageError(LimoHogError):
@@ -31,11 +34,70 @@ def write_json(target: str, value: object) -> None:
     ValueError
         A number in it is not finite, which JSON does not know.
     """
-    text = json.dumps(value, indent=2, allow_nan=False) + "\n"
+    text = json_text(value, indent=2) + "\n"
     if target == STDOUT:
         sys.stdout.write(text)
         return
     write_text(Path(target), text)
+
+
+@contextmanager
+def guarded_outputs(args: Namespace) -> Iterator[None]:
+    """Refuse, before the work, what should or can not be written; in this block no other run writes it.
+
+    Raises
+    ------
+    UsageError
+        A file to write is one that is read, is named twice, or is there and is not to be replaced.
+    OSError
+        It cannot be written, or another run writes it.
+    """
+    read = {os.path.realpath(name) for name in _named(args, _READ) if Path(name).is_file()}
+    targets = [Path(name) for name in _named(args, WRITTEN) if name != STDOUT]
+    if args.command == "train":
+        targets.append(Path(f"{args.out}.json"))  # the model's card
+    for target in targets:
+        if os.path.realpath(target) in read:
+            raise UsageError(f"{target} is itself an input: give another name")
+        if sum(os.path.realpath(target) == os.path.realpath(other) for other in targets) > 1:
+            raise UsageError(f"{target} is named twice, as a file to write: give each a name of its own")
+        folder = next(folder for folder in target.absolute().parents if folder.exists())
+        if not (folder.is_dir() and os.access(folder, os.W_OK)):
+            number = errno.EACCES if folder.is_dir() else errno.ENOTDIR
+            raise OSError(number, os.strerror(number), str(target))
+    if args.command == "detect" and args.out:
+        # A folder for many runs: each copy in it is looked at for itself.
+        targets.remove(args.out)
+    if not (getattr(args, "overwrite", False) or getattr(args, "resume", False)):
+        refuse_to_overwrite(targets, ", --resume goes on from it" if hasattr(args, "resume") else "")
+    with ExitStack() as stack:
+        for target in targets:
+            stack.enter_context(alone(target))
+        yield
+
+
+def _named(args: Namespace, names: Iterable[str]) -> list[str]:
+    values = [getattr(args, name, None) for name in names]
+    each = [one for value in values for one in (value if isinstance(value, (list, tuple)) else [value])]
+    return [os.fspath(one) for one in each if isinstance(one, (str, Path)) and str(one)]
+
+
+def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
+    """Refuse to replace what exists; what is written to a pipe, a device or an empty folder replaces nothing.
+
+    Raises
+    ------
+    UsageError
+        One of them exists; `resume` is the hint to the alternative of overwriting.
+    """
+    there = [
+        path
+        for path in paths
+        if path.exists() and not is_stream(path) and not (path.is_dir() and not any(path.iterdir()))
+    ]
+    if there:
+        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+        raise UsageError(f"{there[0]}{more} would be overwritten: --overwrite replaces it{resume}")
 
 
 def printable(text: str) -> str:

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import limo_hog
-from limo_hog.cli.support.output import UsageError, emit, one_line, printable
-from limo_hog.cli.support.results import Result, Results, refuse_to_overwrite
+from limo_hog.cli.support.output import UsageError, emit, one_line, printable, refuse_to_overwrite
+from limo_hog.cli.support.results import Result, Results
 from limo_hog.detections import Detections, people
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ImageError

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from limo_hog.atomic import about, alone, is_stream, part_of, write_text
-from limo_hog.cli.support.output import STDOUT, UsageError, emit
+from limo_hog.atomic import about, json_text, part_of, write_text
+from limo_hog.cli.support.output import STDOUT, emit, refuse_to_overwrite
 from limo_hog.exceptions import LimoHogError
 
 #: One line: source, frame, width, height, boxes, windows, scores, probabilities, ms, parameters.
@@ -47,20 +47,6 @@ class Results(NamedTuple):
         return frames
 
 
-def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
-    """Refuse to replace files that exist; what is written to a pipe or a device replaces nothing.
-
-    Raises
-    ------
-    UsageError
-        One of them exists; `resume` is the hint to the alternative of overwriting.
-    """
-    there = [path for path in paths if path.exists() and not is_stream(path)]
-    if there:
-        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
-        raise UsageError(f"{there[0]}{more} would be overwritten: --overwrite replaces it{resume}")
-
-
 @contextmanager
 def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, overwrite: bool) -> Iterator[Results]:
     """Open a file (or "-", or nothing) for one JSON object a line; each gets the run's `parameters`.
@@ -77,21 +63,14 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
     """
     if target is None or target == STDOUT:
         # Flushed line by line for a reader at the other end of a pipe.
-        show = (
-            (lambda result: emit(json.dumps(result | {"parameters": parameters}, allow_nan=False))) if target else _drop
-        )
+        show = (lambda result: emit(json_text(result | {"parameters": parameters}))) if target else lambda _: None
         yield Results(show, None)
         return
     path = Path(target)
-    with alone(path):
-        yield from _written(path, parameters, resume, overwrite)
-
-
-def _written(path: Path, parameters: dict[str, Any], resume: bool, overwrite: bool) -> Iterator[Results]:
     part = part_of(path)
     kept = part != path
     if not resume and not overwrite:
-        refuse_to_overwrite([path, part], ", --resume goes on from it")
+        refuse_to_overwrite([part], ", --resume goes on from it")
     earlier = None if not kept else _continue(path, part, parameters) if resume else []
     with about(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -101,7 +80,7 @@ def _written(path: Path, parameters: dict[str, Any], resume: bool, overwrite: bo
 
         def write(result: Result) -> None:
             nonlocal whole
-            line = json.dumps(result | {"parameters": parameters}, allow_nan=False).encode() + b"\n"
+            line = json_text(result | {"parameters": parameters}).encode() + b"\n"
             written = 0
             with about(path):
                 while written < len(line):
@@ -115,10 +94,6 @@ def _written(path: Path, parameters: dict[str, Any], resume: bool, overwrite: bo
                 # A full disk may have taken half a line.
                 file.truncate(whole)
                 part.replace(path)
-
-
-def _drop(_: Result) -> None:
-    """Keep no result."""
 
 
 def _continue(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result]:
@@ -199,4 +174,4 @@ def write_coco(path: Path, results: Iterable[Result]) -> None:
             annotations.append(annotation | {"probability": probability, "window": window})
     categories = [{"id": 1, "name": "person"}]
     table = {"images": images, "annotations": annotations, "categories": categories}
-    write_text(path, json.dumps(table, allow_nan=False) + "\n")
+    write_text(path, json_text(table) + "\n")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import html
-import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limo_hog.atomic import about, whole_file, write_text
+from limo_hog.atomic import about, json_text, whole_file, write_text
 from limo_hog.extras import needed
 from limo_hog.imaging.writing import write_image
 from limo_hog.learn.evaluation.mistakes import draw_sheet, worst_mistakes
@@ -52,7 +51,7 @@ def write_report(
     figures["mistakes"] = [
         {"kind": m.kind, "picture": str(m.path), "box": list(m.box), "score": m.score} for m in mistakes
     ]
-    write_text(folder / "figures.json", json.dumps(figures, indent=2, allow_nan=False) + "\n")
+    write_text(folder / "figures.json", json_text(figures, indent=2) + "\n")
     page = folder / "index.html"
     write_text(page, _page(figures["pictures"], figures["objects"], evaluations, how, bool(mistakes)))
     return page

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -26,6 +27,10 @@ class Finding(NamedTuple):
     look: Look | None = None
 
 
+#: CPython counts the depth of a tree for all threads together (SystemError "recursion depth mismatch" in 3.11).
+_PARSING = threading.Lock()
+
+
 class Source:
     """A script's text, as it was before the script ran."""
 
@@ -33,7 +38,9 @@ class Source:
         self._tree = ast.Module([], [])
         # (A file that Python refuses has no calls; the run says why.)
         with suppress(SyntaxError, ValueError, RecursionError, MemoryError, OSError):
-            self._tree = ast.parse(script.read_bytes())
+            text = script.read_bytes()
+            with _PARSING:
+                self._tree = ast.parse(text)
 
     def uncalled(self, function: str) -> int | None:
         """Return the line of a function of the module that nothing calls; None where it is called or absent."""
@@ -53,7 +60,9 @@ class Source:
 def fingerprint(node: Path | str) -> str:
     """Return what a file or a text has in common with its copies: its code, without comments and names' spelling."""
     try:
-        tree = ast.parse(node.read_bytes() if isinstance(node, Path) else node)
+        text = node.read_bytes() if isinstance(node, Path) else node
+        with _PARSING:
+            tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError, OSError):
         return ""
     names: dict[str, str] = {}

@@ -212,6 +212,8 @@ def test_a_reader_who_leaves_ends_a_run_that_keeps_nothing(tmp_path: Path) -> No
     assert done.returncode == 1 and int(done.stderr.split()[0]) < 40
     kept = ended("detect", tmp_path, "--csv", tmp_path / "found.csv", shell="| head -1")
     assert kept.returncode == 0 and len((tmp_path / "found.csv").read_text().splitlines()) > 40
+    copied = ended("detect", tmp_path, "--json", "-", "--out", tmp_path / "copies", shell="| head -1")
+    assert copied.returncode == 0 and len(list((tmp_path / "copies").iterdir())) == 40
 
 
 def test_a_terminal_that_is_gone_is_survived_and_a_full_disk_is_told() -> None:

@@ -29,6 +29,7 @@ from tests.sim.view.stalled import stalled
 
 from limo_hog.cli.main import main
 from limo_hog.ros2.bag import read_bag
+from limo_hog.signals import Stopped
 
 LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 SECONDS = 6
@@ -248,6 +249,19 @@ def test_a_run_stopped_at_any_moment_leaves_whole_files_or_none(seed: int, tmp_p
             assert list(container.decode(video=0))
     if bag.exists():
         assert sum(1 for _ in read_bag(bag)) > 0
+
+
+def test_a_run_that_is_stopped_before_its_first_frame_was_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise Stopped(signal.SIGTERM)
+
+    monkeypatch.setattr("limo_sim.run.episode.run_episode", stop)
+    files = ["--video", str(tmp_path / "run.mp4"), "--record", str(tmp_path / "run.mcap")]
+    assert main(["follow", "--seconds", "1", *files]) == 128 + signal.SIGTERM
+    assert capsys.readouterr().err == "limo-hog: stopped\n"
+    assert not (tmp_path / "run.mp4").exists()
 
 
 def test_a_closed_terminal_does_not_stop_what_nohup_started(tmp_path: Path) -> None:

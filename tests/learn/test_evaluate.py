@@ -129,7 +129,7 @@ def test_a_curve_without_misses_says_so(tmp_path: Path, monkeypatch: pytest.Monk
     for boxes, words in ((found, ["no misses"]), ([*found, [10, 5, 15, 40]], [])):
         (tmp_path / "boxes.json").write_text(json.dumps({"a.png": boxes}))
         said.clear()
-        assert main(["evaluate", "limo", str(tmp_path), "--report", str(tmp_path / "report")]) == 0
+        assert main(["evaluate", "limo", str(tmp_path), "--report", str(tmp_path / "report"), "--overwrite"]) == 0
         assert said == words
 
 

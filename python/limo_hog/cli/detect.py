@@ -116,7 +116,8 @@ def run(args: argparse.Namespace) -> int:
             bar = stack.enter_context(progress("pictures"))
         run = Run(args, detector, bar)
         run.find(stack)
-        results = stack.enter_context(json_lines(args.json, parameters, args.resume, args.overwrite))
+        only = args.out is None and not tables
+        results = stack.enter_context(json_lines(args.json, parameters, args.resume, args.overwrite, only))
         start = time.perf_counter()
         try:
             run.look(results)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import file_ending
 from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.exceptions import LimoHogError
 from limo_hog.signals import held
 
 if TYPE_CHECKING:
@@ -132,31 +133,36 @@ def observing(
     `controller` is the one whose parameters the page may set.
     """
     stopped: KeyboardInterrupt | None = None
-    with ExitStack() as stack:
-        observers = Observers()
-        if args.plot is not None:
-            # Drawn at the end; a missing library is named now.
-            import limo_sim.view.plot  # noqa: F401
+    try:
+        with ExitStack() as stack:
+            observers = Observers()
+            if args.plot is not None:
+                # Drawn at the end; a missing library is named now.
+                import limo_sim.view.plot  # noqa: F401
 
-            observers.plot = args.plot
-        if args.video is not None:
-            from limo_sim.view.video import filmed
+                observers.plot = args.plot
+            if args.video is not None:
+                from limo_sim.view.video import filmed
 
-            observers.keepers.append(stack.enter_context(filmed(args.video, scenario.camera.rate_hz)))
-        if args.record is not None:
-            from limo_sim.view.record import recorded
+                observers.keepers.append(stack.enter_context(filmed(args.video, scenario.camera.rate_hz)))
+            if args.record is not None:
+                from limo_sim.view.record import recorded
 
-            observers.keepers.append(stack.enter_context(recorded(args.record, scenario)))
-        if args.view:
-            from limo_sim.view.server import View
+                observers.keepers.append(stack.enter_context(recorded(args.record, scenario)))
+            if args.view:
+                from limo_sim.view.server import View
 
-            observers.view = stack.enter_context(View(scenario, controller, *args.view))
-            print(f"watch the run at {observers.view.url}", file=sys.stderr)
-            if has_display():
-                webbrowser.open(observers.view.url)
-        try:
-            yield observers
-        except KeyboardInterrupt as error:
-            stopped = error
+                observers.view = stack.enter_context(View(scenario, controller, *args.view))
+                print(f"watch the run at {observers.view.url}", file=sys.stderr)
+                if has_display():
+                    webbrowser.open(observers.view.url)
+            try:
+                yield observers
+            except KeyboardInterrupt as error:
+                stopped = error
+    except LimoHogError:
+        # Stopped before the first frame, there is nothing to write, and that is not what is wrong.
+        if stopped is None:
+            raise
     if stopped is not None:
         raise stopped

@@ -8,6 +8,7 @@ import json
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -48,8 +49,12 @@ class Results(NamedTuple):
 
 
 @contextmanager
-def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, overwrite: bool) -> Iterator[Results]:
+def json_lines(
+    target: str | None, parameters: dict[str, Any], resume: bool, overwrite: bool, only: bool
+) -> Iterator[Results]:
     """Open a file (or "-", or nothing) for one JSON object a line; each gets the run's `parameters`.
+
+    Where the run writes `only` this, a reader of standard output who has left ends it.
 
     The file gets its name at the end, or when the run is stopped: with every line written so far, and no half line.
     A killed run leaves the unfinished file beside it, which can be resumed, too. A pipe or a device keeps nothing.
@@ -63,7 +68,8 @@ def json_lines(target: str | None, parameters: dict[str, Any], resume: bool, ove
     """
     if target is None or target == STDOUT:
         # Flushed line by line for a reader at the other end of a pipe.
-        show = (lambda result: emit(json_text(result | {"parameters": parameters}))) if target else lambda _: None
+        say = emit if only else partial(print, flush=True)
+        show = (lambda result: say(json_text(result | {"parameters": parameters}))) if target else lambda _: None
         yield Results(show, None)
         return
     path = Path(target)

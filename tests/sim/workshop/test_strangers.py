@@ -14,7 +14,7 @@ from limo_sim.workshop.report import total
 EXERCISES = {"": "follower", "sequel": "proxemic"}
 #: Of the sixty, those that are checked with every change; the others are marked slow.
 QUICK = (
-    *("timer of 3 Hz", "threads", "compressed", "crop of the rows", "limo_hog's windows", "tracker between detections"),
+    *("timer of 3 Hz", "threads", "crop of the rows"),
     *("2 a number that was made up", "3 a timer that always drives", "3 largest", "4 steers by the blue shirt"),
     *(" best effort commands", " the model solution, read", "5 one pixel, unknown is nine metres"),
 )

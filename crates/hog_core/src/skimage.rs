@@ -33,15 +33,15 @@ pub enum Norm {
 /// What is computed of images of one size.
 #[derive(Debug, Clone, Copy)]
 pub struct Layout {
-    /// Rows and columns of an image [px].
+    /// Rows and columns of an image \[px\].
     pub size: (usize, usize),
     /// Channels of an image, one plane after the other.
     pub channels: usize,
     /// Orientation bins over 180°.
     pub bins: usize,
-    /// Rows and columns of a cell [px].
+    /// Rows and columns of a cell \[px\].
     pub cell: (usize, usize),
-    /// Rows and columns of a block [cells].
+    /// Rows and columns of a block \[cells\].
     pub block: (usize, usize),
     /// How blocks are normalised.
     pub norm: Norm,

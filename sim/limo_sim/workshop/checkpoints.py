@@ -41,7 +41,7 @@ def _answers(takes: Iterable[Take], *, seeing: bool) -> list[Answer]:
     """Return the commands whose images of the last half second all had a box, or all had none."""
     found: list[Answer] = []
     for take in takes:
-        for command, look, recent in take.answers():
+        for command, look, recent in take.answers:
             if recent and all(bool(len(one.found)) == seeing for one in recent):
                 found.append((take, command, look, recent))
     return found

@@ -6,7 +6,6 @@ command and a line of the log belong to the image that was searched last.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -111,6 +110,9 @@ class Take(Witness):
         What windows showed, in order: when [s], the window, the picture, and the look whose image it shows, if any.
     path
         The time, and the robot's x, y, yaw, in each control period [s, m, m, rad].
+    answers
+        Each command with the look whose image was searched last, and all looks of the last half second whose image had
+        been searched; where there are none, the former.
     unplaced
         Sizes of searched pictures that are part of no camera image.
     outcome
@@ -121,6 +123,7 @@ class Take(Witness):
     looks: list[Look] = field(default_factory=list)
     windows: list[tuple[float, str, Picture, Look | None]] = field(default_factory=list)
     path: list[tuple[float, float, float, float]] = field(default_factory=list)
+    answers: list[tuple[Command, Look, list[Look]]] = field(default_factory=list)
     unplaced: set[tuple[int, ...]] = field(default_factory=set)
     outcome: Ended | None = None
     _answered: Look | None = None
@@ -139,17 +142,6 @@ class Take(Witness):
         """Say which image it is."""
         arguments = f" ({' '.join(self.scene.arguments)})" if self.scene.arguments else ""
         return f"{self.scene.words}{arguments}, image of {look.time:.1f} s"
-
-    def answers(self) -> Iterator[tuple[Command, Look, list[Look]]]:
-        """Yield each command that answers an image: the image searched last, and all of the last half second."""
-        for answered in self.looks:
-            for command in answered.commands:
-                recent = [
-                    look
-                    for look in self._recent(command.time)
-                    if look.searched is not None and look.searched <= command.time
-                ]
-                yield command, answered, recent
 
     def _recent(self, time: float, seconds: float = SILENCE) -> list[Look]:
         """Return the looks of the last half second before a time [s], the newest first."""
@@ -179,7 +171,13 @@ class Take(Witness):
     def command(self, command: Command) -> None:
         """Note a command."""
         if self.looks:
-            (self._answered or self.looks[-1]).commands.append(command)
+            answered = self._answered or self.looks[-1]
+            answered.commands.append(command)
+            # (Now: a later search may bear the same time.)
+            recent = [look for look in self._recent(command.time) if look.searched is not None]
+            if not recent and answered.searched is not None:
+                recent = [answered]
+            self.answers.append((command, answered, recent))
 
     def log(self, _time: float, _level: str, name: str, message: str) -> None:
         """Note a line of the log."""

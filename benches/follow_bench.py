@@ -89,13 +89,17 @@ def read(path: Path) -> Scenario:
     yaw = float(target["state"][2])
     (x, y), ahead, aside = place(target["state"]), BEHIND * math.cos(yaw), BEHIND * math.sin(yaw)
     start = inside((x - ahead, y - aside), half - _ROBOT_MARGIN)
-    walls = [wall for one in table.get("obstacle", []) for wall in walls_of(one, place(one["state"], 0.0), half)]
+    walls = [
+        wall
+        for obstacle in table.get("obstacle", [])
+        for wall in walls_of(obstacle, place(obstacle["state"], 0.0), half)
+    ]
     room = Scenario(path.stem, robot=Robot(*start, yaw), room=Room(half), walls=tuple(walls), vary=Vary(clothes=True))
     ways = [[(start[0] + ahead, start[1] + aside), place(target["goal"])]]
-    for one in humans:
-        goal = one["goal"][0] if isinstance(one["goal"][0], list) else [one["state"], one["goal"]]
+    for human in humans:
+        goal = human["goal"][0] if isinstance(human["goal"][0], list) else [human["state"], human["goal"]]
         ways.append([place(corner) for corner in goal])
-    speeds = [SCALE * max(one["vel_max"]) for one in (target, *humans)]
+    speeds = [SCALE * max(person["vel_max"]) for person in (target, *humans)]
     kept = [[corner for corner in way if fits(walker([corner], 1.0), room)] for way in ways]
     if len(kept[0]) < 2:
         raise FollowBenchError(f"{path.name}: the person to follow must start and arrive in free places: {ways[0]}")

@@ -48,7 +48,7 @@ def oracle(name: str, arena: Arena) -> Follower[Any]:
 def shown(arena: Arena) -> list[int]:
     """Return the numbers of the people in view in the newest frame: their places in the scenario, from 1."""
     people = enumerate(arena.frame().truth.people, 1)
-    return [number for number, one in people if one and one.box and one.visible >= CRITERIA.in_view]
+    return [number for number, person in people if person and person.box and person.visible >= CRITERIA.in_view]
 
 
 @dataclass(frozen=True)
@@ -81,17 +81,17 @@ class TrueTracker(Tracker):
         truth, pose = self.arena.frame().truth, pose_at(tracks.poses, observation.stamp)
         boxes = {number: box for box, number in enumerate(shown(self.arena))}
         people, turned = [], pose.yaw - truth.robot[2]
-        for number, one in enumerate(truth.people, 1):
-            if one is None:
+        for number, person in enumerate(truth.people, 1):
+            if person is None:
                 continue
             before, stamp = tracks.person(number), observation.stamp
-            yaw = pose.yaw + one.bearing
-            x, y = pose.x + one.distance * math.cos(yaw), pose.y + one.distance * math.sin(yaw)
+            yaw = pose.yaw + person.bearing
+            x, y = pose.x + person.distance * math.cos(yaw), pose.y + person.distance * math.sin(yaw)
             # By places in the arena: in the odometry frame a person far away moves as the robot's heading slips.
-            past = self.past.get(number, (stamp - 1.0, one.x, one.y))
-            self.past[number] = stamp, one.x, one.y
+            past = self.past.get(number, (stamp - 1.0, person.x, person.y))
+            self.past[number] = stamp, person.x, person.y
             dt = max(stamp - past[0], 1e-3)
-            along, aside = (one.x - past[1]) / dt, (one.y - past[2]) / dt
+            along, aside = (person.x - past[1]) / dt, (person.y - past[2]) / dt
             cos, sin = math.cos(turned), math.sin(turned)
             track = Track(stamp, (x, y, cos * along - sin * aside, sin * along + cos * aside), _EXACT)
             height = self.arena.scenario.people[number - 1].height
@@ -144,7 +144,7 @@ class Crude:
         """Decide by the true places, in the robot's frame."""
         now, wheels = self.arena.plan(), observation.odometry or Odometry()
         x, y, yaw = now.robot
-        places = np.array([(one.x, one.y) if one else (np.inf, np.inf) for one in now.people])
+        places = np.array([(p.x, p.y) if p else (np.inf, np.inf) for p in now.people])
         velocity = np.zeros_like(places)
         if state is not None and now.stamp > state[0]:
             with np.errstate(invalid="ignore"):

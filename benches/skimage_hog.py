@@ -54,11 +54,11 @@ def main() -> None:
         ("512 × 512, float64", "scikit-image", lambda: theirs(large), lambda: hog(large)),
         ("512 × 512, uint8", "scikit-image", lambda: theirs(coarse), lambda: hog(coarse)),
         ("one crop of 64 × 128", "scikit-image", lambda: theirs(crop), lambda: hog(crop)),
-        ("100 crops of 64 × 128", "scikit-image", lambda: [theirs(one) for one in crops], lambda: hogs(crops)),
+        ("100 crops of 64 × 128", "scikit-image", lambda: [theirs(crop) for crop in crops], lambda: hogs(crops)),
         (
             "10 faces, RGB",
             "scikit-image",
-            lambda: [theirs(one, **of_faces) for one in faces],
+            lambda: [theirs(face, **of_faces) for face in faces],
             lambda: hogs(faces, **of_faces),
         ),
     ]

@@ -6,7 +6,6 @@ terminal; nothing of a killed command runs on, no broken file has its name, and 
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 import os
@@ -15,7 +14,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections import Counter
 from contextlib import suppress
@@ -24,6 +22,7 @@ from pathlib import Path
 import av
 import cv2
 from tests.cli.material import PICTURE, film_of
+from tests.hardening.trials import main
 from tests.learn import bollards
 
 from limo_hog import HOGDescriptor
@@ -148,8 +147,9 @@ def broken(path: Path) -> str:
     return ""
 
 
-def terminals(count: int, folder: Path) -> tuple[Counter[str], list[str]]:
+def terminals(_: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
     """Each of `SHORT` in each terminal ends with the code and the files of an ordinary one, and tells as little."""
+    material(folder)
     ends: Counter[str] = Counter()
     findings = []
     for number, typed in enumerate(SHORT[:count]):
@@ -185,8 +185,9 @@ def _running(mark: str) -> list[int]:
     return found
 
 
-def kills(count: int, folder: Path) -> tuple[Counter[str], list[str]]:
+def kills(_: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
     """Kill a command at a random time, alone or with its group; look at what is left."""
+    material(folder)
     # What ignores these, as a shell's background job or nohup does, hands that on, and rightly nothing ends.
     for one in (signal.SIGINT, signal.SIGHUP):
         signal.signal(one, signal.SIG_DFL)
@@ -248,24 +249,5 @@ def _resumed(typed: str, place: Path) -> list[str]:
     return [] if len(lines) == different == wanted else [f"{len(lines)} lines, {different} different of {wanted}"]
 
 
-def main() -> int:
-    """Run from the command line; 1 where something was found."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", nargs="+", choices=("terminals", "kills"))
-    parser.add_argument("--count", type=int, default=200)
-    args = parser.parse_args()
-    wrong = False
-    for what in args.what:
-        began = time.monotonic()
-        with tempfile.TemporaryDirectory() as folder:
-            material(Path(folder))
-            ends, findings = (terminals if what == "terminals" else kills)(args.count, Path(folder))
-        wrong |= bool(findings)
-        taken = time.monotonic() - began
-        print(f"{what}: {sum(ends.values())} in {taken:.0f} s, {len(findings)} findings; {dict(ends)}", flush=True)
-        print(*findings, sep="\n", flush=True)
-    return 1 if wrong else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main({"terminals": terminals, "kills": kills}, __doc__ or "", 200))

@@ -6,7 +6,6 @@ command runs in a fork of a process that has imported what it needs: a thousand 
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import json
 import os
@@ -16,7 +15,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
@@ -27,6 +25,7 @@ os.environ |= {"OPENCV_LOG_LEVEL": "SILENT", "OPENCV_FFMPEG_LOGLEVEL": "-8", "OP
 
 from tests.cli.material import PICTURE, film_of
 from tests.hardening.files import damaged
+from tests.hardening.trials import main
 
 from limo_hog import HOGDescriptor
 from limo_hog.cli.main import main as limo_hog
@@ -266,23 +265,5 @@ KINDS = {"names": many, "pictures": many, "films": many, "labels": single, "mode
 }
 
 
-def main() -> int:
-    """Run from the command line; 1 where something was found."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("kinds", nargs="+", choices=KINDS)
-    parser.add_argument("--count", type=int, default=1000)
-    args = parser.parse_args()
-    wrong = False
-    for kind in args.kinds:
-        began = time.monotonic()
-        with tempfile.TemporaryDirectory() as folder:
-            ends, findings = KINDS[kind](kind, args.count, Path(folder))
-        wrong |= bool(findings)
-        taken = time.monotonic() - began
-        print(f"{kind}: {args.count} tried in {taken:.0f} s, {len(findings)} findings; {dict(ends)}", flush=True)
-        print(*findings[:10], sep="\n", flush=True)
-    return 1 if wrong else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(KINDS, __doc__ or "", 1000))

@@ -253,8 +253,12 @@ impl Hog {
             memory::collect(grids.iter().map(|&(size, grid)| LevelWindows { size, grid, found: None }))?;
         let fast = self.plan.as_ref().filter(|_| grids.iter().all(|(_, grid)| fast::serves(grid)));
         if let Some(plan) = fast {
-            let found = self.find(image, plan, levels, &grids, options, interrupt)?;
-            for (level, found) in windows.iter_mut().zip(found) {
+            let planes = self.planes(image, levels)?;
+            let found = self.find(&planes, plan, levels, &grids, options, interrupt);
+            PLANES.give(planes);
+            PLANES.trim();
+            fast::trim();
+            for (level, found) in windows.iter_mut().zip(found?) {
                 level.found = Some(found);
             }
         }
@@ -273,32 +277,20 @@ impl Hog {
         rescored(image, &scorer, &windows, options.threads, interrupt)
     }
 
-    /// What the fast path finds on each of `levels`.
-    fn find(
-        &self,
-        image: ImageView,
-        plan: &Plan,
-        levels: &[Level],
-        grids: &[(Size, Grid)],
-        options: &SearchOptions,
-        interrupt: &Interrupt,
-    ) -> Result<Vec<Vec<Found>>> {
+    /// The image in planes, at the size of the first level.
+    fn planes(&self, image: ImageView, levels: &[Level]) -> Result<Planes> {
         let mut planes = PLANES.take();
         fast::fill_planes(self.backend, &mut planes, image)?;
-        if let Some((first, _)) = grids.first().filter(|(first, _)| *first != image.size()) {
+        if let Some(first) = levels.first().filter(|first| first.size != image.size()) {
             let mut resized = PLANES.take();
-            fast::resize_planes(self.backend, &planes, &mut resized, *first)?;
+            fast::resize_planes(self.backend, &planes, &mut resized, first.size)?;
             PLANES.give(std::mem::replace(&mut planes, resized));
         }
-        let found = self.find_in(&planes, plan, levels, grids, options, interrupt);
-        PLANES.give(planes);
-        PLANES.trim();
-        fast::trim();
-        found
+        Ok(planes)
     }
 
-    /// What the fast path finds on each of `levels` of an image in planes: on all, or by steps that a guide leads.
-    fn find_in(
+    /// What the fast path finds on each of `levels`: on all, or by steps that a guide leads.
+    fn find(
         &self,
         planes: &Planes,
         plan: &Plan,

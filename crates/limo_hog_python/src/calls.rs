@@ -35,8 +35,8 @@ pub(crate) fn cores() -> usize {
     CORES.load(Ordering::Relaxed)
 }
 
-/// How many threads a call uses that asks for so many: no more than there are cores, as others would only cut the work into
-/// smaller parts, and each of them needs scratch memory.
+/// Limits the threads of a call to the number of cores: more would cut the work into smaller parts, and each needs scratch
+/// memory.
 pub(crate) fn at_work(asked: usize) -> usize {
     asked.clamp(1, cores())
 }

@@ -119,7 +119,11 @@ class Stage:
         self._seen_before = False
         self._collected = False
         self._told = 0
-        self._handlers: dict[str, Callable[..., None]] = {
+        self._handlers = self._named_handlers()
+
+    def _named_handlers(self) -> dict[str, Callable[..., None]]:
+        """Return what is done with each message of the node, by its name."""
+        return {
             "called": self._called,
             "closed": self._closed,
             "command": self._command,

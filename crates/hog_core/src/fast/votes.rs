@@ -65,7 +65,7 @@ impl<L: VoteLane> RowKernel for Votes<L> {
     }
 }
 
-/// The first `columns` votes of a row, at least a vector of them; there is room for so many in all that is written.
+/// The first `columns` votes of a row, at least a vector of them; all that is written has room for them.
 pub(super) struct Row<'a, 'b> {
     /// Three rows of one or three planes of `plane` numbers, at least two more than there are columns.
     neighbours: [&'a [f32]; 3],
@@ -106,7 +106,7 @@ impl<V: VoteLane> Kernel for RowOn<'_, '_, V> {
 }
 
 impl Row<'_, '_> {
-    /// In two loops: in one the steps from a pixel to its votes are so many that a CPU's window does not hold two vectors'.
+    /// In two loops: the steps from a pixel to its votes are too many for a CPU to overlap those of two vectors.
     #[inline(always)]
     fn run<L: VoteLane>(mut self, l: L) {
         if self.neighbours[0].len() == self.plane {

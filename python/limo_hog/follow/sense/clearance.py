@@ -71,7 +71,7 @@ def _pixel_slopes(
 class DepthGrid:
     """Which depth pixels are looked at."""
 
-    step: int = param(8, "px", "Every so many rows and columns are looked at.")
+    step: int = param(8, "px", "Distance of the rows and columns that are looked at.")
     floor: float = param(0.05, "m", "Points lower than this are the floor.")
 
     def points(self, depth: NDArray[np.float32], focal_px: float, reach: float, robot: RobotGeometry) -> Points:

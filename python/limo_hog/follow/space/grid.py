@@ -45,7 +45,7 @@ class Grid:
     cells: int = param(100, "1", "Along each side of the square.")
     shift_after: float = param(1.0, "m", "The square moves along when the robot is this far from its middle.")
     reach: float = param(5.0, "m", "Of a beam's free part and of its end, no more is used.")
-    every: int = param(2, "1", "One in so many beams clears cells; all of them fill cells.")
+    every: int = param(2, "1", "Of this number of neighbouring beams one clears cells; all of them fill cells.")
     free: float = param(0.4, "log-odds", "What a beam takes from a cell that it passes.")
     hit: float = param(0.9, "log-odds", "What it adds to the cell where it ends.")
     lowest: float = param(-1.2, "log-odds", "Lower limit.")

@@ -77,7 +77,7 @@ def in_front(world: World) -> Iterator[None]:
     sys.modules.update(modules)
     refuser = _Refuser()
     sys.meta_path.append(refuser)
-    context.enter(world)
+    context.enter(context.Context(world))
     try:
         with in_turns(world.turns, lambda: world.time):
             yield

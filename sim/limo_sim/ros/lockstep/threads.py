@@ -1,4 +1,16 @@
-"""Python's own waits, for one run: in a thread of the script they give the turn away and take simulated time."""
+"""Python's own waits, for one run: in a thread of the script they give the turn away and take simulated time.
+
+Where `limo_sim` touches what is CPython's alone, it does so here:
+
+========================================  =======================================  ===================================
+private                                   why                                      in a Python without it
+========================================  =======================================  ===================================
+`threading._time`, `queue.time`           a timeout is compared with this clock    that timeout is the wall's
+`Condition._waiters`, `._release_save`,   `notify` releases a waiter listed there  waits are real: one for a thread of
+`._acquire_restore`                                                                the script ends as hung
+`Thread._target`                          tells a pool's thread from the script's  a wait for a pool ends as hung
+========================================  =======================================  ===================================
+"""
 
 from __future__ import annotations
 
@@ -7,7 +19,7 @@ import threading
 import time
 from _thread import allocate_lock
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from limo_sim.ros.lockstep.turns import Turns
@@ -57,7 +69,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         if not turns.inside or (timeout is None and turns.alone):
             # A thread of no other kind can notify the script's only one: that takes no simulated time, or hangs.
             return real_wait(condition, timeout)
-        # As threading does it, with the turn given away where that blocks.
+        # As `Condition.wait` of CPython, with the turn given away where that blocks.
         waiter = allocate_lock()
         waiter.acquire()
         condition._waiters.append(waiter)
@@ -75,21 +87,19 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         (time, "sleep", sleep),
         (time, "time", clock(time.time)),
         (time, "monotonic", monotonic),
-        # Modules that imported it by name: their timeouts are compared with it.
         (threading, "_time", monotonic),
         (queue, "time", monotonic),
         (threading.Thread, "start", start),
         (threading.Thread, "join", join),
-        (threading.Condition, "wait", wait),
     ]
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced]
-    for owner, name, value in replaced:
-        setattr(owner, name, value)
-    try:
+    if all(hasattr(threading.Condition(), name) for name in ("_waiters", "_release_save", "_acquire_restore")):
+        replaced.append((threading.Condition, "wait", wait))
+    with ExitStack() as stack:
+        for owner, name, value in replaced:
+            if hasattr(owner, name):
+                stack.callback(setattr, owner, name, getattr(owner, name))
+                setattr(owner, name, value)
         yield
-    finally:
-        for owner, name, value in before:
-            setattr(owner, name, value)
 
 
 def _until(now: Callable[[], float], timeout: float | None) -> tuple[float, ...]:

@@ -5,6 +5,13 @@ use thiserror::Error;
 use crate::geometry::Size;
 
 /// Every way in which a call can fail: its input is refused, its memory cannot be had, or its caller ends it.
+///
+/// ```
+/// use hog_core::error::ImageError;
+/// use hog_core::{HogError, ImageView};
+/// let refused = ImageView::new(&[0; 8], 2, 2, 2, 4).unwrap_err();
+/// assert_eq!(refused, HogError::Image(ImageError::Channels { got: 2 }));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum HogError {
     /// Window, block, stride and cell sizes do not fit together.

@@ -15,6 +15,17 @@ use crate::params::HogSpec;
 use crate::pyramid::{Grid, Level};
 
 /// How the search is guided; by default it is not: every level is searched whole.
+///
+/// ```
+/// use hog_core::{Guide, Hog, HogParams, ImageView, Interrupt, SearchOptions, model};
+/// let people = Hog::new(&HogParams::default(), Some(model::default_people()))?;
+/// let grey = vec![128; 640 * 480];
+/// let image = ImageView::new(&grey, 640, 480, 1, 640)?;
+/// // Every eighth level whole, then the middle of those between, and so on: the one that limo-hog uses.
+/// let guide = Some(Guide { halvings: 3, margin: 0.75, reach: (0.75, 1.25) });
+/// let found = people.detect(image, &SearchOptions { guide, ..SearchOptions::default() }, &Interrupt::NEVER)?;
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Guide {
     /// How often the levels between two that are searched whole are halved: of 2 to this power, one is.

@@ -5,6 +5,13 @@ use std::sync::OnceLock;
 use crate::error::{BackendError, Result};
 
 /// An instruction set that the kernels are compiled for.
+///
+/// ```
+/// use hog_core::{Backend, Hog, HogParams};
+/// assert!(Backend::current()?.is_available());
+/// let plain = Hog::with_backend(&HogParams::default(), None, Backend::Scalar)?;
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
     /// The architecture's baseline.

@@ -97,8 +97,7 @@ class Stage:
         self.script = script
         self.arena = Arena(scenario, seed)
         self.seconds = seconds
-        self.log = log
-        self.watch = watch
+        self.log, self.watch = log, watch
         self._witness = witness or Witness()
         # (An hour's: 28 bytes each.)
         self._driven, self._lines = array("d"), array("i")

@@ -1,6 +1,6 @@
 //! The scores of any geometry by sums that are taken first down the rows, then across the columns.
 //!
-//! Kept for callers of OpenCV's API with a geometry of their own (`cv2_api`, the detectors of `learn`). Without it the exact
+//! Kept for `HOGDescriptor` and `PeopleDetector` of a geometry other than the people models'. Without it the exact
 //! path takes 2.1 to 2.8 times as long for a level of 640 × 480 in gray, and 1.6 to 1.9 times for a pyramid: cells of 16 px,
 //! blocks of 32 px, 12 bins, 18 signed bins (processor time, AVX-512, interleaved). It loses, 0.75 times, where the exact path
 //! scores nearly every window again anyway: hits beyond number, of weights far larger than a trained detector's.

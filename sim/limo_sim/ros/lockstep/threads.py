@@ -1,15 +1,11 @@
 """Python's own waits, for one run: in a thread of the script they give the turn away and take simulated time.
 
-Where `limo_sim` touches what is CPython's alone, it does so here:
+CPython's privates are touched here alone. A run goes on without one of them, less exact:
 
-========================================  =======================================  ===================================
-private                                   why                                      in a Python without it
-========================================  =======================================  ===================================
-`threading._time`, `queue.time`           a timeout is compared with this clock    that timeout is the wall's
-`Condition._waiters`, `._release_save`,   `notify` releases a waiter listed there  waits are real: one for a thread of
-`._acquire_restore`                                                                the script ends as hung
-`Thread._target`                          tells a pool's thread from the script's  a wait for a pool ends as hung
-========================================  =======================================  ===================================
+- `threading._time`, `queue.time`, the clock that timeouts are compared with: these timeouts are the wall's;
+- `Condition._waiters`, `_release_save` and `_acquire_restore`, by which `notify` releases a waiter: waits are real, and
+  one for a thread of the script ends as hung;
+- `Thread._target`, which tells a pool's thread from the script's: a wait for a pool ends as hung.
 """
 
 from __future__ import annotations

@@ -78,18 +78,13 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
     """Sends requests."""
 
     def __init__(
-        self,
-        srv_type: Any,
-        names: tuple[str, str],
-        qos_profile: QoSProfile,
-        callback_group: CallbackGroup,
-        context: Context,
+        self, srv_type: Any, names: tuple[str, str], qos: QoSProfile, group: CallbackGroup, context: Context
     ) -> None:
         self._context = context
         self.srv_type, (self.srv_name, self.service_name) = srv_type, names
         #: The executor that last served it: it runs the done callbacks of its futures.
         self.executor: Any = None
-        self.qos_profile, self.callback_group = qos_profile, callback_group
+        self.qos_profile, self.callback_group = qos, group
         self._responses: deque[tuple[Any, Future]] = deque()
 
     def service_is_ready(self) -> bool:

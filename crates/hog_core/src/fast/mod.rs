@@ -1,4 +1,5 @@
-//! The kernels: the exact path's pipeline on vectors of cells, for one instruction set each, and nearly all of the crate's `unsafe`.
+//! The kernels: the exact path's pipeline on vectors of cells, compiled for each instruction set; nearly all of the crate's
+//! `unsafe`.
 //!
 //! `layout` and `lane` hold the constants and the vector that every kernel uses; `plan` holds a detector's constants; `rows`,
 //! `strip` over `bins`, and `score` are the stages, which `tile` composes; `search` shares tiles among threads; `describe`

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! ```text
-//! pixels     [row: 2 of the cell above, 8 of this one][channel][column -1..=8]    (colour: 3 rows, in turns)
+//! pixels     [row -1..=8][channel][column -1..=8]                                 after gamma (colour: 3 rows, in turns)
 //! gradients  [column][row][dx, dy]                                                (colour alone)
 //! votes      [row]                                                                one column's, see `bins`
 //! carry      [column][bin][2]                                                     the two sums that `bins` hands down
@@ -145,8 +145,7 @@ unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize, const CROPS: bool>(
     first: usize,
 ) {
     let zero = l.splat(0.0);
-    // Two rows from the cell above, eight of the cell, each with one neighbour on both sides. In colour only the last
-    // three are kept, in turn in three places: all would not leave room for the rest in the first-level cache.
+    // Rows -1..=8 of a cell; the last two are the first two of the cell below. In colour only three are kept, in turn.
     // In scratch memory, as zeroing them would take a fiftieth of the time.
     // SAFETY: aligned room for one strip is the caller's promise; any bits are numbers, and all are written before they
     // are read.

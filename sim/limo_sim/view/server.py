@@ -34,6 +34,7 @@ from limo_sim.view.pace import Pace
 from limo_sim.view.reading import (
     annotated,
     believed,
+    choices,
     depth_colours,
     depth_picture,
     figures,
@@ -338,6 +339,7 @@ class View:
             "scan": hits(log.sensors.scan, self._scenario.robot.geometry, list(self._poses)),
             "detect_ms": log.detect_ms or None,
             "boxes": len(log.detections),
+            "choices": choices(self._pictured[1]) if self._pictured and self._controller else [],
             "contacts": asdict(step.truth.contacts),
             "paused": self.pace.paused,
             "speed": self.pace.speed,

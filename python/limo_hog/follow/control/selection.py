@@ -16,6 +16,7 @@ from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import pose_at
 from limo_hog.follow.space.grid import Ground
+from limo_hog.follow.tracks.asking import Whom, picked
 from limo_hog.follow.tracks.identity import Identity, Likeness
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, predict
 from limo_hog.follow.tracks.person import Person
@@ -38,6 +39,8 @@ class Choice:
         Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
     unsure_at
         Since when that is not sure [s]; None where it is.
+    asked
+        Who is asked for and was not in view yet; None where nobody is.
     """
 
     number: int | None = None
@@ -45,6 +48,7 @@ class Choice:
     measured: float | None = None
     candidates: tuple[int, ...] = ()
     unsure_at: float | None = None
+    asked: Whom | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +80,9 @@ class Selection:
         A track in view that is less likely than this is another person [1]. Chosen.
     decide_s
         After so long the likeliest is taken [s]. Chosen: people part within a few seconds, or leave the view.
+    settles_s
+        People are looked at for this time before one is taken who is asked for by a word [s]. Chosen: HOG misses a
+        person in several frames of ten.
     identity
         Which track the person followed is.
     """
@@ -90,11 +97,14 @@ class Selection:
     odds: float = bounded(3.0, 1, 100)
     possible: float = bounded(0.1, 0, 1)
     decide_s: float = bounded(4.0, 0, 60)
+    settles_s: float = bounded(1.0, 0, 60)
     identity: Identity = field(default_factory=Identity)
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
-        """Follow the track that is the person followed so far; before there is one, the likeliest person in view."""
+        """Follow the person asked for, then whoever is followed so far; before there is one, the likeliest in view."""
         now = tracks.stamp or 0.0
+        if choice.asked is not None and (answer := self._asked(choice.asked, tracks, choice)) is not None:
+            return answer
         if choice.likeness is None or choice.measured is None or now - choice.measured > self.reidentify_s:
             choice = self._anybody(tracks, choice)
             followed = tracks.person(choice.number)
@@ -136,6 +146,21 @@ class Selection:
         """Return the people who may be followed and were measured just now."""
         now, lately = tracks.stamp or 0.0, self.identity.unseen_s
         return [one for one in tracks.people if now - one.measured <= lately and self.is_candidate(one)]
+
+    def _asked(self, whom: Whom, tracks: Tracks, choice: Choice) -> Choice | None:
+        """Take the person asked for once they are in view; None where somebody else is followed until then."""
+        now, follows = tracks.stamp or 0.0, choice.likeness is not None
+        people = [one for one in self.measured(tracks) if one.confirmed or not follows]
+        one = picked(whom, people, pose_at(tracks.poses, now))
+        if one is None:
+            return None if follows else replace(choice, number=None)
+        if follows and one.number == choice.number:
+            return replace(choice, asked=None)
+        since = now if choice.unsure_at is None else choice.unsure_at
+        settled = follows or isinstance(whom, int) or now - since >= self.settles_s
+        if settled and one.confirmed and one.seen == now:
+            return Choice(one.number, self.identity.begin(one), one.measured)
+        return None if follows else replace(choice, number=one.number, unsure_at=since)
 
     def _anybody(self, tracks: Tracks, choice: Choice) -> Choice:
         """Take the likeliest person in view, and of two the one straight ahead and near."""

@@ -108,16 +108,6 @@ def hits(scan: Scan | None, robot: RobotGeometry, poses: list[tuple[float, float
     return points
 
 
-def choices(step: Step) -> list[list[int]]:
-    """Return the tracked people found in a step's image, each as number, whether followed, and x, y, w, h [px]."""
-    belief = step.log.decision.belief
-    return [
-        [one.number, one.number == belief.followed, *step.log.detections.boxes[one.box].tolist()]
-        for one in sorted(belief.people)
-        if one.box is not None
-    ]
-
-
 def believed(step: Step) -> list[list[float | None]]:
     """Return where the follower takes people to be, x, y [m] in the arena's frame, two probabilities and a number.
 

@@ -97,9 +97,13 @@ class Selection:
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
         """Follow the person asked for, then whoever is followed so far; before there is one, the likeliest in view."""
+        if choice.asked is None:
+            return self._known(tracks, choice)
+        answer = self._asked(choice.asked, tracks, choice)
+        return replace(self._known(tracks, choice), asked=choice.asked) if answer is None else answer
+
+    def _known(self, tracks: Tracks, choice: Choice) -> Choice:
         now = tracks.stamp or 0.0
-        if choice.asked is not None and (answer := self._asked(choice.asked, tracks, choice)) is not None:
-            return answer
         if choice.likeness is None or choice.measured is None or now - choice.measured > self.reidentify_s:
             choice = self._anybody(tracks, choice)
             followed = tracks.person(choice.number)

@@ -406,8 +406,8 @@ class TrackingController:
         """Return where the person should be in the next frame; None to search all of it."""
         if state.since_full + 1 >= self.whole_image_every or not self.selection.is_candidate(person):
             return None
-        if not self._is_sure(person, state.choice):
-            # The person may be beside the one who is followed.
+        if state.choice.asked is not None or not self._is_sure(person, state.choice):
+            # The person asked for, or the right one, may be beside the one who is followed.
             return None
         stamp = observation.stamp + state.tracks.period
         pose = pose_at(state.tracks.poses, stamp)

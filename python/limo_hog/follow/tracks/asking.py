@@ -12,12 +12,12 @@ from limo_hog.follow.tracks.person import Person
 #: A word of `_RANKS`, or the number of a tracked person.
 Whom = str | int
 
-#: What a word asks for, and what is largest of that person: bearing [rad], distance [m], height of their window [px].
+#: What a word asks for, and what is largest of that person: of bearing [rad], distance [m] and `Person.window`.
 _RANKS: dict[str, tuple[str, Callable[[float, float, float], float]]] = {
-    "nearest": ("the nearest person", lambda _bearing, distance, _height: -distance),
-    "left": ("the person furthest left", lambda bearing, _distance, _height: bearing),
-    "right": ("the person furthest right", lambda bearing, _distance, _height: -bearing),
-    "largest": ("the largest person", lambda _bearing, _distance, height: height),
+    "nearest": ("the nearest person", lambda _bearing, distance, _window: -distance),
+    "left": ("the person furthest left", lambda bearing, _distance, _window: bearing),
+    "right": ("the person furthest right", lambda bearing, _distance, _window: -bearing),
+    "largest": ("the person largest in the image", lambda _bearing, distance, window: window / distance),
 }
 WORDS = tuple(_RANKS)
 

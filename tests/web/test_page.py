@@ -106,6 +106,14 @@ def test_a_cell_has_nine_numbers_and_a_hit_its_score(lab: Lab) -> None:
     assert best == pytest.approx(first, abs=0.02)
 
 
+@pytest.mark.parametrize(("stride", "scale", "hits", "people"), [(8, 1.03, 173, 4), (16, 1.03, 42, 4), (8, 1.5, 15, 1)])
+def test_sliders_give_the_figures_of_the_workshop(lab: Lab, stride: int, scale: float, hits: int, people: int) -> None:
+    lab.page.locator("#model").select_option("opencv")
+    lab.page.locator("#stride").fill(str(stride))
+    lab.page.locator("#scale").fill(str(scale))
+    lab.wait(f"document.getElementById('hits-says').textContent === '{hits} hits become {people} people.'")
+
+
 def street(lab: Lab, width: int = 640, height: int = 480) -> bytes:
     """The drawn street, stretched to this size, as PNG."""
     drawn = """async (size) => {

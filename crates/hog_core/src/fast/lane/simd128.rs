@@ -123,11 +123,7 @@ impl Lane for Simd128 {
     fn byte<const K: u32>(self, words: [v128; 2]) -> v128 {
         isa!({
             let pair = words[K as usize % 2];
-            f32x4_convert_i32x4(if K < 2 {
-                v128_and(pair, i32x4_splat(0xffff))
-            } else {
-                u32x4_shr(pair, 16)
-            })
+            f32x4_convert_i32x4(if K < 2 { v128_and(pair, i32x4_splat(0xffff)) } else { u32x4_shr(pair, 16) })
         })
     }
     #[inline(always)]

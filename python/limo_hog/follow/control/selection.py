@@ -16,6 +16,7 @@ from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import pose_at
 from limo_hog.follow.space.grid import Ground
+from limo_hog.follow.tracks.asking import Whom, picked
 from limo_hog.follow.tracks.identity import Identity, Likeness
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, predict
 from limo_hog.follow.tracks.person import Person
@@ -38,6 +39,8 @@ class Choice:
         Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
     unsure_at
         Since when that is not sure [s]; None where it is.
+    asked
+        Who is asked for and was not in view yet; None where nobody is.
     """
 
     number: int | None = None
@@ -45,6 +48,7 @@ class Choice:
     measured: float | None = None
     candidates: tuple[int, ...] = ()
     unsure_at: float | None = None
+    asked: Whom | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +89,20 @@ class Selection:
     )
     # Chosen: people part within a few seconds, or leave the view.
     decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)
+    # Chosen: HOG misses a person in several frames of ten.
+    settles_s: float = param(
+        1.0, "s", "People are looked at for this time before one asked for by a word is taken.", 0, 60
+    )
     identity: Identity = field(default_factory=Identity)
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
-        """Follow the track that is the person followed so far; before there is one, the likeliest person in view."""
+        """Follow the person asked for, then whoever is followed so far; before there is one, the likeliest in view."""
+        if choice.asked is None:
+            return self._known(tracks, choice)
+        answer = self._asked(choice.asked, tracks, choice)
+        return replace(self._known(tracks, choice), asked=choice.asked) if answer is None else answer
+
+    def _known(self, tracks: Tracks, choice: Choice) -> Choice:
         now = tracks.stamp or 0.0
         if choice.likeness is None or choice.measured is None or now - choice.measured > self.reidentify_s:
             choice = self._anybody(tracks, choice)
@@ -131,6 +145,21 @@ class Selection:
         """Return the people who may be followed and were measured just now."""
         now, lately = tracks.stamp or 0.0, self.identity.unseen_s
         return [one for one in tracks.people if now - one.measured <= lately and self.is_candidate(one)]
+
+    def _asked(self, whom: Whom, tracks: Tracks, choice: Choice) -> Choice | None:
+        """Take the person asked for once they are in view; None where somebody else is followed until then."""
+        now, follows = tracks.stamp or 0.0, choice.likeness is not None
+        people = [one for one in self.measured(tracks) if one.confirmed or not follows]
+        one = picked(whom, people, pose_at(tracks.poses, now))
+        if one is None:
+            return None if follows else replace(choice, number=None)
+        if follows and one.number == choice.number:
+            return replace(choice, asked=None)
+        since = now if choice.unsure_at is None else choice.unsure_at
+        settled = follows or isinstance(whom, int) or now - since >= self.settles_s
+        if settled and one.confirmed and one.seen == now:
+            return Choice(one.number, self.identity.begin(one), one.measured)
+        return None if follows else replace(choice, number=one.number, unsure_at=since)
 
     def _anybody(self, tracks: Tracks, choice: Choice) -> Choice:
         """Take the likeliest person in view, and of two the one straight ahead and near."""

@@ -11,6 +11,7 @@ mod backend;
 mod bins;
 mod describe;
 mod dispatch;
+#[allow(unused_macros, reason = "an architecture may have no lane but the portable one")]
 mod lane;
 mod layout;
 mod plan;

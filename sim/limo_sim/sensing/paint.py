@@ -254,19 +254,8 @@ def _poster(picture: U8, middle: float, light: float, random: np.random.Generato
     motif = int(random.integers(6))
     if motif > 2:  # the sign of a person, as on doors of lavatories
         ball(0.5, 0.16, 0.075)
-        polygon(
-            [
-                (0.3, 0.28),
-                (0.7, 0.28),
-                (0.72, 0.56),
-                (0.62, 0.58),
-                (0.62, 0.92),
-                (0.38, 0.92),
-                (0.38, 0.58),
-                (0.28, 0.56),
-            ],
-            ink,
-        )
+        arms, legs = [(0.3, 0.28), (0.7, 0.28), (0.72, 0.56), (0.62, 0.58)], [(0.62, 0.92), (0.38, 0.92)]
+        polygon([*arms, *legs, (0.38, 0.58), (0.28, 0.56)], ink)
     elif motif == 0:  # a carafe with a stopper
         ball(0.5, 0.16, 0.07)
         neck, shoulder, foot = [(0.44, 0.2), (0.56, 0.2)], [(0.58, 0.3), (0.7, 0.38)], [(0.66, 0.92), (0.34, 0.92)]

@@ -131,6 +131,7 @@ def run(args: argparse.Namespace) -> int:
         comparisons = compare(cards, args.against, groups)
         comparisons += compare(cards, args.against, {card.scenario: "all" for card in cards})
     if args.json:
+        tables: dict[str, Sequence[Summary | Comparison]]
         tables = {"summary": summaries, "groups": of_groups, "comparison": comparisons}
         result = {name: [asdict(one) for one in rows] for name, rows in tables.items()}
         write_json(args.json, {"runs": [card.to_json() for card in cards], **result})

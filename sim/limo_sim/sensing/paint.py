@@ -39,24 +39,12 @@ _PAPERS = ((222, 226, 228), (186, 206, 216), (150, 190, 214), (206, 190, 160))
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One side of a wall.
+    """One side of a wall."""
 
-    Attributes
-    ----------
-    start
-        Left end of the side for who stands before it [m].
-    along
-        Unit vector from there to the right.
-    length
-        Of the side [m].
-    grey
-        Its brightness, 0 … 255.
-    """
-
-    start: tuple[float, float]
-    along: tuple[float, float]
-    length: float
-    grey: float
+    start: tuple[float, float]  #: left end of the side for who stands before it [m]
+    along: tuple[float, float]  #: unit vector from there to the right
+    length: float  #: of the side [m]
+    grey: float  #: its brightness, 0 … 255
 
 
 def sides_of(half: float, walls: Sequence[Rectangle], greys: Sequence[float]) -> list[Side]:

@@ -122,7 +122,5 @@ def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters)
         sure = "" if low <= 0 <= high else ", unlikely to be chance"
         names = f"{evaluations[0].name} minus {other.name}"
         screen.print(
-            f"LAMR of {names}: {lamr.difference:+.3f} ({low:+.3f} to {high:+.3f}){sure}",
-            soft_wrap=True,
-            markup=False,
+            f"LAMR of {names}: {lamr.difference:+.3f} ({low:+.3f} to {high:+.3f}){sure}", soft_wrap=True, markup=False
         )

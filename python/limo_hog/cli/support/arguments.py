@@ -88,6 +88,22 @@ def add_json(parser: ArgumentParser, what: str) -> None:
     parser.add_argument("--json", type=output_file, metavar="FILE", help=f"write {what}; - is standard output")
 
 
+def add_labels(parser: ArgumentParser) -> None:
+    """Add --label and --pictures, which say what of the labels is meant."""
+    parser.add_argument("--label", metavar="NAME", help="which label is meant, where there are several")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="where the pictures lie, if not beside the labels")
+
+
+def add_search(parser: ArgumentParser) -> None:
+    """Add --search."""
+    parser.add_argument(
+        "--search",
+        choices=("exact", "guided"),
+        default="exact",
+        help="guided: about twice as fast, a raw hit in two hundred is missed (%(default)s)",
+    )
+
+
 def score(text: str) -> float:
     """Read an SVM margin."""
     return number(text, -100, 100, "score")

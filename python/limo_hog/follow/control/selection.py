@@ -63,7 +63,7 @@ class Selection:
 
     # Chosen: three clear frames.
     min_existence: float = param(
-        0.4, "probability", "From this on a person too far away for HOG is worth driving nearer.", 0, 1
+        0.4, "of 1", "Probability of being a person from which one too far away for HOG is approached.", 0, 1
     )
     # Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
     max_unconfirmed_frames: int = param(
@@ -72,21 +72,23 @@ class Selection:
     # Chosen: two full turns of the search.
     reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
     # Chosen: one frame of evidence.
-    switch_lead: float = param(0.1, "probability", "By this another must exceed the person who is faced already.", 0, 1)
+    switch_lead: float = param(
+        0.1, "of 1", "Probability by which another must exceed the person who is faced already.", 0, 1
+    )
     # Chosen: at the image's edge three frames of evidence; two metres are worth two.
     bearing_cost: float = param(
         0.6, "1/rad", "Probability that each radian off straight ahead takes from whom to choose.", 0, 5
     )
     distance_cost: float = param(0.1, "1/m", "Probability that each metre of distance takes from whom to choose.", 0, 5)
     # Chosen: more likely than not.
-    min_same: float = param(0.5, "probability", "From this on a track in view is taken for the person followed.", 0, 1)
+    min_same: float = param(
+        0.5, "of 1", "Probability from which a track in view is taken for the person followed.", 0, 1
+    )
     # Chosen: one wrong in four guesses would be too many.
     min_same_odds: float = param(
         3.0, "times", "The surest track must be this much likelier than any other in view.", 1, 100
     )
-    other_below: float = param(
-        0.1, "probability", "A track in view that is less likely than this is another person.", 0, 1
-    )
+    other_below: float = param(0.1, "of 1", "Probability below which a track in view is another person.", 0, 1)
     # Chosen: people part within a few seconds, or leave the view.
     decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)
     # Chosen: HOG misses a person in several frames of ten.

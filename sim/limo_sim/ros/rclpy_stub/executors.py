@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
-from limo_sim.ros.lockstep.turns import ExternalShutdownException
+from limo_sim.ros.lockstep.turns import ExternalShutdownException, at_once
 from limo_sim.ros.rclpy_stub.context import Context, current
 from limo_sim.ros.rclpy_stub.future import Future, Task
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
@@ -129,8 +130,8 @@ class Executor(PartialApi, missing=_MISSING):
                 return ended or enough() or bool(self._ready()) or self._failed() is not None
 
             polls, before = timeout <= 0 and not wanted(), world.advances
-            until = math.inf if polls else world.time + timeout
-            world.turns.wait(lambda: wanted() or (polls and world.advances > before), until)
+            until, wakes = (math.inf, at_once) if polls else (world.time + timeout, self._wakes)
+            world.turns.wait(lambda: wanted() or (polls and world.advances > before), until, wakes)
             failure = self._failed()
             if failure is not None:
                 raise failure
@@ -162,9 +163,12 @@ class Executor(PartialApi, missing=_MISSING):
         self._tasks = [task for task in self._tasks if not _ended(task)]
         due: list[_Due] = [(None, task) for task in reversed(self._tasks) if task.is_ready()]
         for node in self._nodes:
-            for kind in ("timers", "subscriptions", "clients", "services"):
-                due += [(one.callback_group, one) for one in getattr(node, kind) if _may_run(one.callback_group, one)]
+            due += [(one.callback_group, one) for one in node.entities if _may_run(one.callback_group, one)]
         return due
+
+    def _wakes(self) -> float:
+        """Return when the next timer is due [s]."""
+        return min((timer.due for node in self._nodes for timer in node.timers), default=math.inf)
 
     def _next(self) -> _Due | None:
         """Return what runs next: as in ROS, what is due together runs once each before any of it runs again."""
@@ -224,33 +228,31 @@ def global_executor() -> Executor:
     return executor
 
 
-def spin(node: Node, executor: Executor | None = None) -> None:
-    """Run a node's callbacks until the run is over."""
+@contextmanager
+def _having(node: Node, executor: Executor | None) -> Iterator[Executor]:
     executor = executor or global_executor()
     executor.add_node(node)
     try:
-        executor.spin()
+        yield executor
     finally:
         executor.remove_node(node)
+
+
+def spin(node: Node, executor: Executor | None = None) -> None:
+    """Run a node's callbacks until the run is over."""
+    with _having(node, executor) as having:
+        having.spin()
 
 
 def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None) -> None:
     """Run one callback of a node."""
-    executor = executor or global_executor()
-    executor.add_node(node)
-    try:
-        executor.spin_once(timeout_sec=timeout_sec)
-    finally:
-        executor.remove_node(node)
+    with _having(node, executor) as having:
+        having.spin_once(timeout_sec)
 
 
 def spin_until_future_complete(
     node: Node, future: Future, executor: Executor | None = None, timeout_sec: float | None = None
 ) -> None:
     """Run a node's callbacks until a future is done, or simulated time is up."""
-    executor = executor or global_executor()
-    executor.add_node(node)
-    try:
-        executor.spin_until_future_complete(future, timeout_sec)
-    finally:
-        executor.remove_node(node)
+    with _having(node, executor) as having:
+        having.spin_until_future_complete(future, timeout_sec)

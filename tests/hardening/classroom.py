@@ -1,6 +1,6 @@
 """A class of hundreds, a tenth of it hostile: every other mark is as when graded alone, and nothing is left running.
 
-`python -m tests.hardening.classroom --count 300` (ten minutes on two cores).
+`python -m tests.hardening.classroom --count 300` (half an hour on two cores).
 """
 
 from __future__ import annotations

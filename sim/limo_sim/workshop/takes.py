@@ -246,7 +246,7 @@ def _shown_in(picture: Picture, looks: list[Look]) -> Look | None:
 
 
 def _thumbnail(picture: Picture) -> Picture:
-    return _grey(cv2.resize(picture, _THUMBNAIL, interpolation=cv2.INTER_AREA))
+    return _grey(np.asarray(cv2.resize(picture, _THUMBNAIL, interpolation=cv2.INTER_AREA), np.uint8))
 
 
 def _grey(picture: Picture) -> Picture:

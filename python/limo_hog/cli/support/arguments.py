@@ -120,6 +120,26 @@ def add_follower(parser: ArgumentParser) -> None:
 
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="the controller (%(default)s)")
     add_target_and_detector(parser)
+    add_person(parser)
+
+
+def add_person(parser: ArgumentParser) -> None:
+    """Add --person."""
+    from limo_hog.follow.tracks.asking import WORDS
+
+    parser.add_argument(
+        "--person", type=whom, metavar="|".join((*WORDS, "N")), help="whom of several to follow; N is a person's number"
+    )
+
+
+def whom(text: str) -> str | int:
+    """Read whom to follow."""
+    from limo_hog.follow.tracks.asking import WhomError, checked
+
+    try:
+        return checked(text)
+    except WhomError as error:
+        raise ArgumentTypeError(str(error)) from None
 
 
 def add_target_and_detector(parser: ArgumentParser) -> None:

@@ -1,7 +1,7 @@
 //! A faster search that may miss some hits: a few levels are searched whole, those between them around what was found.
 //!
 //! Kept for `PeopleDetector(search="guided")` and `limo-hog detect --search guided`. On ten photographs of 640 px (gray, one
-//! thread, AVX-512, processor time, interleaved) it is 1.8 times as fast as the exact search and keeps all of 348 hits. The
+//! thread, AVX2, processor time, interleaved) it is 1.8 times as fast as the exact search and keeps all of 348 hits. The
 //! halving is kept, too: where every second level guides the one behind it, the search is 1.4 times as fast, where every
 //! fourth does 1.7, every sixteenth 1.75. What larger sets lose: docs/simd.md.
 //!

@@ -29,6 +29,16 @@ class Scan:
     angle_max: float
     range_min: float  #: Limits between which a range is valid [m].
     range_max: float
+    #: bool (N,): the beams by which anything is measured; None where that is all of them.
+    measured: NDArray[np.bool_] | None = None
+
+    def looks_at(self, angles: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether each direction [rad] is measured, bool (N,)."""
+        if self.measured is not None:
+            beams = beams_at(angles, self.angle_min, self.angle_max, len(self.ranges)).astype(np.int64)
+            return np.asarray(self.measured[np.clip(beams, 0, len(self.ranges) - 1)])
+        off = angles - (self.angle_min + self.angle_max) / 2
+        return np.abs(off - math.tau * np.rint(off / math.tau)) <= (self.angle_max - self.angle_min) / 2
 
     def turned(self, yaw: float) -> Scan:
         """Return the scan of a lidar whose angle 0 looks `yaw` [rad] from straight ahead, by the robot's angles."""

@@ -14,7 +14,6 @@ import math
 import os
 import sys
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
@@ -120,7 +119,9 @@ def judged(ride: Ride, row: Row) -> Row:
     if needed := [TOPICS[name][1] for name in row.lost if TOPICS[name][1]]:
         limit = STANDS_S if row.at else 0.0
         wrong += [f"stands after {stood_s:.2f} s only"] if stood_s > limit + 1e-6 else []
-        silent = [one for one in after if one.time > row.at + limit and any(no not in one.decision.reason for no in needed)]
+        silent = [
+            one for one in after if one.time > row.at + limit and any(no not in one.decision.reason for no in needed)
+        ]
         wrong += [f"at {one.time:.2f} s it does not say {needed}: {one.decision.reason}" for one in silent[:1]]
         backs = [one for one in after if one.decision.twist.linear < 0 and one.time > row.at + 0.7]
         wrong += [f"backs at {one.time:.2f} s" for one in backs[:1]]
@@ -144,10 +145,7 @@ def rows_of(seed: int, shifted: str, shift: float) -> list[Row]:
     """Play all cases of a seed and a wrong clock: they share the first seconds."""
     limo_hog.set_num_threads(1)
     ride = Ride(seed, shifted, shift)
-    if shifted:
-        losses = [(name,) for name in SHIFTED if name != shifted]
-    else:
-        losses = SUBSETS
+    losses = [(name,) for name in SHIFTED if name != shifted] if shifted else SUBSETS
     rows = [] if shifted else [judged_apart(ride, Row(seed, lost, 0.0)) for lost in losses]
     ride.until(LOST_AT)
     return rows + [judged_apart(ride, Row(seed, lost, LOST_AT, shifted, shift)) for lost in losses]
@@ -156,16 +154,18 @@ def rows_of(seed: int, shifted: str, shift: float) -> list[Row]:
 def main() -> Iterator[str]:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="of the seeds")
     parser.add_argument("--rows", type=Path, required=True, help="a line of JSON for each run")
     args = parser.parse_args()
     args.rows.touch()
     told = [json.loads(line) for line in args.rows.read_text().splitlines()]
     done = {(row["seed"], row["shifted"], row["shift"]) for row in told}
     clocks = [("", 0.0), *itertools.product(SHIFTED, SHIFTS)]
-    groups = [(seed, *clock) for seed in range(args.seeds) for clock in clocks if (seed, *clock) not in done]
-    with ProcessPoolExecutor(args.processes) as pool, args.rows.open("a") as file:
-        for rows in pool.map(rows_of, *zip(*groups, strict=True)) if groups else ():
+    seeds = range(args.first, args.first + args.seeds)
+    groups = [(seed, *clock) for seed in seeds for clock in clocks if (seed, *clock) not in done]
+    with args.rows.open("a") as file:
+        for group in groups:
+            rows = rows_of(*group)
             told += map(asdict, rows)
             file.write("".join(json.dumps(asdict(row)) + "\n" for row in rows))
             file.flush()
@@ -173,7 +173,8 @@ def main() -> Iterator[str]:
         if row["wrong"]:
             yield json.dumps(row)
     driven = [row["stood_s"] for row in told if row["lost"] != ["camera_info"]]
-    yield f"{len(told)} runs, {sum(bool(row['wrong']) for row in told)} wrong; stood within {max(driven, default=0):.2f} s"
+    wrong = sum(bool(row["wrong"]) for row in told)
+    yield f"{len(told)} runs, {wrong} wrong; stood within {max(driven, default=0):.2f} s"
 
 
 if __name__ == "__main__":

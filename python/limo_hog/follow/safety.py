@@ -71,7 +71,8 @@ class Guard(Generic[S]):
     max_blind: float = param(0.2, "m/s", "Highest speed without a lidar, and none backwards.")
     max_age_s: float = param(0.5, "s", "The robot stops when a sense brings nothing new for this time.")
     max_late_s: float = param(1.0, "s", "The same for a camera frame's stamp.")
-    stands_s: float = param(0.9, "s", "Faster than it can stop this long after a reading, less its age, no wheel turns.")
+    late_s: float = param(0.15, "s", "A reading older than this is late: every sense is faster.")
+    stands_s: float = param(0.9, "s", "When one is late, no wheel turns faster than it can stop this long after it.")
     #: The robot has none: it drives by the depth image alone, slowly. Without depth or odometry no robot drives.
     without_lidar: bool = False
     depth_grid: DepthGrid = field(default_factory=DepthGrid)  #: Which depth pixels are looked at.
@@ -142,7 +143,8 @@ class Guard(Generic[S]):
         """Note which readings are new at `now` on the robot's own clock [s]."""
         stamps = {SCAN: scan.stamp if scan else math.nan, ODOMETRY: odometry.stamp if odometry else math.nan}
         if seen is not None:
-            stamps |= {CAMERA: seen.stamp, DEPTH: math.nan if seen.depth is None else seen.stamp}
+            depth = seen.stamp if seen.depth_stamp is None else seen.depth_stamp
+            stamps |= {CAMERA: seen.stamp, DEPTH: math.nan if seen.depth is None else depth}
         return replace(state, arrivals=state.arrivals.after(now, stamps))
 
     def _missing(self, now: float, state: GuardState[S]) -> str:
@@ -186,7 +188,9 @@ class Guard(Generic[S]):
         return decision(twist, proposed.mode, f"slowed by an obstacle {where}")
 
     def _stoppable(self, twist: Twist, age: float) -> Twist:
-        """Slow a command down, so that the wheels can stand in time if the sense of the oldest reading is lost."""
+        """Slow a command down while a reading is late: if its sense is lost, the wheels must stand in time."""
+        if age <= self.late_s:
+            return twist
         rim = abs(twist.linear) + self.robot.wheel_separation / 2 * abs(twist.angular)
         most = self.robot.acceleration * max(self.stands_s - age, 0.0)
         return twist if rim <= most else Twist(twist.linear * most / rim, twist.angular * most / rim)

@@ -85,6 +85,8 @@ class Frame:
     #: float32 (H, W), distance along the optical axis [m] of the same view; inf too far, -inf too near, NaN unknown
     #: (REP 118). None without a depth camera.
     depth: NDArray[np.float32] | None
+    #: Of the newest depth image, which may belong to a later frame [s]; None for `stamp`.
+    depth_stamp: float | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +121,7 @@ class Observation:
     remembered: NDArray[np.float64] | None = None
     #: When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
     clock: float | None = None
+    depth_stamp: float | None = None  #: Of the newest depth image that has come [s]; None for `stamp`.
     now: float = field(init=False)  #: The newest stamp of all sensors [s]: a camera frame may arrive late.
 
     def __post_init__(self) -> None:
@@ -158,6 +161,7 @@ def observed(
         clothes,
         between,
         clock=clock,
+        depth_stamp=frame.depth_stamp,
     )
 
 

@@ -35,23 +35,12 @@ SETTLED = 3.0
 
 @dataclass
 class Report:
-    """How a drive went.
+    """How a drive went."""
 
-    Attributes
-    ----------
-    frames, found
-        Camera images worked on, and those with a person detected.
-    dropped
-        Messages that could not be read.
-    answer_ms
-        From the arrival of each image to its command, for the last hour [ms].
-    modes
-        Number of commands in each mode.
-    """
-
-    frames: int = 0
+    frames: int = 0  #: Camera images worked on, and those with a person detected.
     found: int = 0
-    dropped: int = 0
+    dropped: int = 0  #: Messages that could not be read.
+    #: From the arrival of each image to its command, for the last hour [ms]; number of commands in each mode.
     answer_ms: deque[float] = field(default_factory=lambda: deque(maxlen=_ANSWERS))
     modes: dict[str, int] = field(default_factory=dict)
 

@@ -41,20 +41,11 @@ SENSED = (CAMERA_INFO, DEPTH, DEPTH_LCAS, SCAN, ODOMETRY)
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """One camera frame, then and now.
+    """One camera frame, then and now."""
 
-    Attributes
-    ----------
-    frame
-        What the camera saw.
-    log
-        What is found and decided now.
-    recorded, recorded_twist
-        What was found and commanded then; None where that was not recorded.
-    """
-
-    frame: Frame
-    log: FrameLog
+    frame: Frame  #: What the camera saw.
+    log: FrameLog  #: What is found and decided now.
+    #: What was found and commanded then; None where that was not recorded.
     recorded: Detections | None
     recorded_twist: Twist | None
 

@@ -390,7 +390,7 @@ def test_the_age_of_a_frame_counts_from_when_it_was_decided_on() -> None:
     guard = ahead()
     late = whole(100.0, scan=scan(stamp=100.4), odometry=Odometry(100.4))
     state = guard.step(late, guard.start()).state
-    assert guard.recheck(100.8, scan(stamp=100.8), Odometry(100.8), state).twist.linear == 0.5
+    assert guard.recheck(100.8, scan(stamp=100.8), Odometry(100.8), state).twist.linear > 0.4
     assert guard.recheck(101.0, scan(stamp=101.0), Odometry(101.0), state).twist == Twist()
 
 

@@ -1,10 +1,11 @@
-"""Control messages of a page: pause, resume, step, speed, and the value of a parameter."""
+"""Control messages of a page: pause, resume, step, speed, whom to follow, and the value of a parameter."""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
+from limo_hog.follow.tracks.asking import WhomError
 from limo_sim.view.pace import Pace
 from limo_sim.view.tuning import Parameter, ParameterError, Tunable
 
@@ -21,11 +22,15 @@ def apply(text: str, pace: Pace, controller: Tunable[Any] | None) -> str | None:
             if controller is None:
                 return "this run has no parameters"
             controller.set(message["set"], message["value"])
+        elif "follow" in message:
+            if controller is None:
+                return "this run has no follower of ours"
+            controller.follow(message["follow"])
         elif message["do"] == "speed":
             pace.set_speed(SPEED.checked(message["value"]))
         else:
             {"pause": pace.pause, "resume": pace.resume, "step": pace.step}[message["do"]]()
-    except ParameterError as error:
+    except (ParameterError, WhomError) as error:
         return str(error)
     except (ValueError, KeyError, TypeError, RecursionError):
         return f"not understood: {text[:100]}"

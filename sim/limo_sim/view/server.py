@@ -25,6 +25,7 @@ from aiohttp import WSMsgType, web
 from limo_hog.atomic import json_text
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Mode
+from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.sense.measurement import ZONE_ENDS
 from limo_hog.imaging.writing import jpeg
 from limo_sim.run.log import Step
@@ -57,6 +58,8 @@ _REMEMBERED = 3000
 STALL_S = 5.0
 #: How long a page may take to hear that the run is over and to close [s]; a run ends within 2 s.
 _CLOSE_S = 1.0
+#: Somebody not found for so long cannot be clicked on [s]: longer than between two searches of the whole image.
+_BOX_S = 2.0
 #: What the system keeps for a page that does not read [bytes]: about two pictures, so that what it shows is new.
 _SEND_BUFFER = 1 << 17
 
@@ -132,6 +135,8 @@ class View:
         self._pictured: tuple[int, Step] | None = None
         self._rows: deque[list[float | None]] = deque(maxlen=_REMEMBERED)
         self._written = 0
+        # The newest box of each tracked person, by number: the follower searches the whole image now and then.
+        self._boxes: dict[int, tuple[float, list[int]]] = {}
         # Index of the person followed last; None before, and during a search.
         self._followed: int | None = None
         # Time and pose of the last control periods: a scan is as old as it is.
@@ -159,6 +164,8 @@ class View:
         log, robot = step.log, step.truth.robot
         if log.frame is not None:
             self._pictured = self._written, step
+            boxes, tracked = log.detections.boxes, log.decision.belief.people
+            self._boxes |= {one.number: (log.time, boxes[one.box].tolist()) for one in tracked if one.box is not None}
         people = [(None, None) if p is None else (p.x, p.y) for p in step.truth.people]
         self._rows.append([*figures(step).values(), measured_m(log), *robot, *itertools.chain(*people)])
         if log.decision.mode is Mode.SEARCH:
@@ -338,10 +345,21 @@ class View:
             "scan": hits(log.sensors.scan, self._scenario.robot.geometry, list(self._poses)),
             "detect_ms": log.detect_ms or None,
             "boxes": len(log.detections),
+            "choices": self._choices(log) if self._controller else [],
             "contacts": asdict(step.truth.contacts),
             "paused": self.pace.paused,
             "speed": self.pace.speed,
         }
+
+    def _choices(self, log: FrameLog) -> list[list[int]]:
+        """Return who can be clicked on: number, whether followed, and the newest box x, y, w, h [px] of each."""
+        belief = log.decision.belief
+        boxes = {one.number: self._boxes.get(one.number, (-math.inf, [])) for one in belief.people}
+        return [
+            [number, number == belief.followed, *box]
+            for number, (at, box) in sorted(boxes.items())
+            if log.time - at < _BOX_S
+        ]
 
     def _pictures(self, step: Step) -> list[bytes]:
         """Encode the pictures of a step: the camera's, the depth's and a node's windows; a letter tells which."""

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import inspect
-import re
 from collections.abc import Iterator
-from functools import cache
 from typing import Any, Generic, TypeVar
 
 from limo_hog.cv2_api.arguments import shown
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.sense.observation import Observation
+from limo_hog.follow.tracks.asking import Whom, WhomError, checked
 
 S = TypeVar("S")
-
-#: Where a field gives no bounds: from 0 to so many times its default.
-_SPAN = 10.0
 
 
 class ParameterError(LimoHogError):
@@ -34,8 +29,8 @@ class Parameter:
     #: low, high: what it may be, both included
     low: float
     high: float
-    unit: str = ""  #: its unit, such as "m"; empty where it has none
-    tooltip: str = ""  #: what it does, in a sentence
+    unit: str  #: its unit, such as "m" or "frames"
+    tooltip: str  #: what it does, in a sentence
 
     @property
     def whole(self) -> bool:
@@ -63,13 +58,12 @@ class Parameter:
 class Tunable(Generic[S]):
     """Stands for a controller, and can swap it for one with another parameter between two steps.
 
-    Parameters are the numeric fields of a dataclass. A field's `metadata` may give `low`, `high`, `unit` and
-    `tooltip`; unit and tooltip are otherwise those of the class's docstring, and bounds from 0 to ten times the
-    default. Numbers of a field that is a dataclass itself are parameters where their metadata give bounds.
+    Parameters are the numbers that `limo_hog.follow.parameters.param` gives bounds, in a dataclass and its fields.
     """
 
     def __init__(self, controller: Controller[S]) -> None:
         self._controller = controller
+        self._asked: Whom | None = None
 
     def start(self) -> S:
         """Return the state before the first observation."""
@@ -77,7 +71,16 @@ class Tunable(Generic[S]):
 
     def step(self, observation: Observation, state: S) -> Decision[S]:
         """Decide as the controller with today's parameters does."""
-        return self._controller.step(observation, state)
+        asked, self._asked = self._asked, None
+        controller: Any = self._controller
+        decision: Decision[S] = controller.step(observation, state if asked is None else controller.ask(asked, state))
+        return decision
+
+    def follow(self, whom: Whom) -> None:
+        """Ask to follow a person from the next step on, as `Follower.follow`; raises `WhomError`."""
+        if not hasattr(self._controller, "ask"):
+            raise WhomError(f"{type(self._controller).__name__} follows nobody in particular")
+        self._asked = checked(whom)
 
     @property
     def target_distance(self) -> float | None:
@@ -110,17 +113,8 @@ def _parameters_of(owner: Any, prefix: str = "") -> Iterator[Parameter]:
         return
     for field in dataclasses.fields(owner):
         value, about = getattr(owner, field.name), field.metadata
-        default: Any = field.default if type(field.default) in (int, float) else 0
-        if type(value) in (int, float) and ("high" in about or not prefix):
-            unit, tooltip = _documented(type(owner)).get(field.name, ("", ""))
-            yield Parameter(
-                prefix + field.name,
-                value,
-                about.get("low", 0),
-                about.get("high", _SPAN * (abs(default) or 1)),
-                about.get("unit", unit),
-                about.get("tooltip", tooltip),
-            )
+        if "high" in about:
+            yield Parameter(prefix + field.name, value, **about)
         else:
             yield from _parameters_of(value, f"{prefix}{field.name}.")
 
@@ -128,23 +122,3 @@ def _parameters_of(owner: Any, prefix: str = "") -> Iterator[Parameter]:
 def _replaced(owner: Any, path: list[str], value: float) -> Any:
     name, *rest = path
     return dataclasses.replace(owner, **{name: _replaced(getattr(owner, name), rest, value) if rest else value})
-
-
-@cache
-def _documented(kind: type) -> dict[str, tuple[str, str]]:
-    """Read unit and meaning of each attribute from a class's docstring, in numpydoc's form.
-
-    The unit is what first stands in brackets, [1] for none; an entry of several names may have as many units, or one
-    for all.
-    """
-    _, _, section = (inspect.getdoc(kind) or "").partition("\nAttributes\n----------\n")
-    found = {}
-    for entry in re.finditer(r"^(\w[\w, ]*)\n((?:[ ]+.*\n?)+)", section, re.MULTILINE):
-        names = [name.strip() for name in entry[1].split(",")]
-        text = " ".join(entry[2].split())
-        bracket = re.search(r" \[([^\]]*)\]", text)
-        units = [one.strip() for one in bracket[1].split(",")] if bracket else ["1"]
-        for i, name in enumerate(names):
-            unit = units[i] if len(units) == len(names) else units[0]
-            found[name] = ("" if unit == "1" else unit, text.replace(bracket[0], "", 1) if bracket else text)
-    return found

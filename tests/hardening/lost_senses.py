@@ -59,7 +59,7 @@ class Ride:
     def __init__(self, seed: int, shifted: str = "", shift: float = 0.0) -> None:
         self.arena = Arena(replace(Scenario.load("followable"), walls=WALLS), seed)
         self.senses, self.moments = Senses(), list[Moment]()
-        self._outlet, self._frame = Outlet(self.arena), None
+        self._outlet = Outlet(self.arena)
         self._follower = Follower(TrackingController(), detector_named("hog-half"))
         self._shifts = {TOPICS[shifted][0]: shift} if shifted else {}
         self._frame: Frame | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,11 @@ from tests.follow.views import scan
 from limo_hog.cli import replay as command
 from limo_hog.cli.main import main
 from limo_hog.detections import Detections
-from limo_hog.follow import Decision, Mode, Observation, Odometry, Scan, Twist
+from limo_hog.follow import LIMO, Decision, Follower, Mode, Observation, Odometry, RobotGeometry, Scan, Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.bag import Record, bag_writer
 from limo_hog.ros2.findings import stamped_twist
+from limo_hog.ros2.frames import static_transforms
 from limo_hog.ros2.messages import MessageError
 from limo_hog.ros2.replay import replay
 from limo_hog.ros2.senses import Senses, picture_of
@@ -199,3 +200,24 @@ def test_a_recording_of_other_names_is_replayed_by_the_robots_words(
     assert capsys.readouterr().err == ""
     assert driver.told[1].scan is not None
     assert driver.told[1].depth is not None
+
+
+def test_a_replay_has_the_robot_of_a_file_and_its_sensors_where_tf_static_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "robot.toml").write_text("half_length = 0.25\ncamera_x = 0.2\n")
+    with bag_writer(tmp_path / "run.mcap") as write:
+        write(names.TF_STATIC, 0.0, static_transforms(0.0, replace(LIMO, camera_z=0.25, lidar_yaw=3.1)))
+        for record in frames(2):
+            write(record.topic, record.time, record.message)
+    robots: list[RobotGeometry] = []
+
+    def noted(controller: Driver, detector: Empty, robot: RobotGeometry) -> Follower[None]:
+        robots.append(robot)
+        return Follower(controller, detector, robot)
+
+    monkeypatch.setattr("limo_hog.ros2.replay.Follower", noted)
+    assert main(["replay", str(tmp_path / "run.mcap"), "--robot", str(tmp_path / "robot.toml")]) == 0
+    (made,) = robots
+    assert (made.half_length, made.camera_x, made.camera_z) == (0.25, 0.2, 0.25)
+    assert made.lidar_yaw == pytest.approx(3.1)

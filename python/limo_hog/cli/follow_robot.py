@@ -34,7 +34,7 @@ from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import LIMO, load_robot
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.ros2.dds import Bus
-from limo_hog.ros2.follower import Report, drive
+from limo_hog.ros2.follower import Report, Settings, drive
 from limo_hog.ros2.network import BusError
 from limo_hog.ros2.outputs import FRAMES
 
@@ -98,19 +98,16 @@ def run(args: argparse.Namespace) -> int:
         bar = stack.enter_context(progress("s"))
         began = time.monotonic()
         try:
-            drive(
-                bus,
-                controller,
-                detector,
+            settings = Settings(
                 args.seconds,
-                _told(args, bar, lines, began),
+                robot,
                 moves=not args.no_drive,
-                robot=robot,
                 without_lidar=args.without_lidar,
                 compressed=args.compressed,
+                watch=_told(args, bar, lines, began),
                 say=lambda line: print(line, file=sys.stderr),
-                report=report,
             )
+            drive(bus, controller, detector, settings, report)
         except (KeyboardInterrupt, BusError) as error:
             stopped = error
         card = _card(args, report, time.monotonic() - began)

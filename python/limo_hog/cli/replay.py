@@ -14,11 +14,19 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from limo_hog.cli.support.arguments import add_detector, add_json, add_ros_arguments, file_ending, node_of
+from limo_hog.cli.support.arguments import (
+    add_detector,
+    add_json,
+    add_robot,
+    add_ros_arguments,
+    file_ending,
+    node_of,
+)
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
+from limo_hog.follow.robot import LIMO, load_robot
 from limo_hog.follow.sense.detectors import detector_named
 
 if TYPE_CHECKING:
@@ -46,6 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="controller (%(default)s)")
     add_detector(parser)
+    add_robot(parser)
     parser.add_argument("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="video of the detections (H.264)")
     add_json(parser, "the figures as JSON")
     add_ros_arguments(parser)
@@ -57,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     from limo_hog.ros2.replay import elsewhere, kind_of, replay
 
     detector, controller = detector_named(args.detector), controller_named(args.controller)
-    node = node_of(args, "limo_hog_follower")
+    node, robot = node_of(args, "limo_hog_follower"), load_robot(args.robot) if args.robot else LIMO
     kinds: dict[str, str] = {}
     frames: list[dict[str, Any]] = []
 
@@ -68,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
     with progress("frames") as bar, _film(args.video) as show:
         task = bar.add_task("replaying", total=None)
-        for frame in replay(records(), controller, detector, node):
+        for frame in replay(records(), controller, detector, node, robot):
             frames.append(_compared(frame))
             show(frame)
             bar.advance(task)

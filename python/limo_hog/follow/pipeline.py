@@ -14,6 +14,7 @@ from limo_hog.detections import Detections, Detector
 from limo_hog.follow.decision import Controller, Decision, made_for
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.safety import Guard
+from limo_hog.follow.sense.clearance import completed
 from limo_hog.follow.sense.detectors import Region, detect_in
 from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors, observed
 from limo_hog.follow.tracks.asking import Whom
@@ -88,7 +89,7 @@ class Follower(Generic[S]):
         without_lidar: bool = False,
     ) -> None:
         self._guard = Guard(made_for(controller, robot), robot=robot, without_lidar=without_lidar)
-        self._lidar_yaw = robot.lidar_yaw
+        self._robot = robot
         self._detector, self._search = detector, search
         self._state = self._guard.start()
         self._region: Region | None = None
@@ -122,7 +123,10 @@ class Follower(Generic[S]):
         except Exception as error:  # whatever a detector raises, the robot must stop and the loop must go on
             detections, failure = Detections.none(), f"the detector failed: {error}"
         detect_ms = 1e3 * (time.perf_counter() - began)
-        observation = observed(frame, self._turned(sensors), detections, region, failure, self._between, now)
+        turned = self._turned(sensors)
+        if turned.scan is not None:
+            turned = replace(turned, scan=completed(turned.scan, frame, turned.odometry, self._robot))
+        observation = observed(frame, turned, detections, region, failure, self._between, now)
         self._between = ()
         decision = self._guard.step(observation, self._state)
         self._state, self._region = decision.state, decision.region
@@ -142,4 +146,4 @@ class Follower(Generic[S]):
         """Return the readings with the scan's angles as the robot's."""
         if sensors.scan is None:
             return sensors
-        return replace(sensors, scan=sensors.scan.turned(self._lidar_yaw))
+        return replace(sensors, scan=sensors.scan.turned(self._robot.lidar_yaw))

@@ -72,6 +72,8 @@ class Guard(Generic[S]):
     max_blind: float = param(0.2, "m/s", "Highest speed without a lidar, and none backwards.")
     max_age_s: float = param(0.5, "s", "The robot stops when a sense brings nothing new for this time.")
     max_late_s: float = param(1.0, "s", "The same for a camera frame's stamp.")
+    late_s: float = param(0.15, "s", "A reading older than this is late: every sense is faster.")
+    stands_s: float = param(0.9, "s", "When one is late, no wheel turns faster than it can stop this long after it.")
     #: The robot has none: it drives by the depth image alone, slowly. Without depth or odometry no robot drives.
     without_lidar: bool = False
     depth_grid: DepthGrid = field(default_factory=DepthGrid)  #: Which depth pixels are looked at.
@@ -149,7 +151,8 @@ class Guard(Generic[S]):
         """Note which readings are new at `now` on the robot's own clock [s]."""
         stamps = {SCAN: scan.stamp if scan else math.nan, ODOMETRY: odometry.stamp if odometry else math.nan}
         if seen is not None:
-            stamps |= {CAMERA: seen.stamp, DEPTH: math.nan if seen.depth is None else seen.stamp}
+            depth = seen.stamp if seen.depth_stamp is None else seen.depth_stamp
+            stamps |= {CAMERA: seen.stamp, DEPTH: math.nan if seen.depth is None else depth}
         return replace(state, arrivals=state.arrivals.after(now, stamps))
 
     def _missing(self, now: float, state: GuardState[S]) -> str:
@@ -181,6 +184,7 @@ class Guard(Generic[S]):
         wanted = min(max(proposed.twist.linear, -min(backward, fastest)), fastest)
         linear = min(max(wanted, -behind), ahead)
         twist = Twist(linear, min(max(proposed.twist.angular, -self.robot.max_turn), self.robot.max_turn))
+        twist = self._stoppable(twist, state.arrivals.oldest(now))
         if backward == 0 > proposed.twist.linear:
             why = "without sight" if self.robot.may_back else "at all"
             return decision(twist, Mode.BLOCKED, f"the robot does not back {why}")
@@ -190,6 +194,14 @@ class Guard(Generic[S]):
         if linear == 0:
             return decision(twist, Mode.BLOCKED, f"an obstacle is too close {where}")
         return decision(twist, proposed.mode, f"slowed by an obstacle {where}")
+
+    def _stoppable(self, twist: Twist, age: float) -> Twist:
+        """Slow a command down while a reading is late: if its sense is lost, the wheels must stand in time."""
+        if age <= self.late_s:
+            return twist
+        rim = abs(twist.linear) + self.robot.wheel_separation / 2 * abs(twist.angular)
+        most = self.robot.acceleration * max(self.stands_s - age, 0.0)
+        return twist if rim <= most else Twist(twist.linear * most / rim, twist.angular * most / rim)
 
     def _remember(self, state: GuardState[S], scan: Scan | None, odometry: Odometry | None) -> GuardState[S]:
         """Add a new scan; of earlier returns, keep those that are recent and out of the lidar's field of view now."""
@@ -203,9 +215,7 @@ class Guard(Generic[S]):
         new = scan_points(scan, self.robot)
         new = to_odometry(new[np.hypot(new[:, 0], new[:, 1]) < self.memory_radius], pose)
         old = from_odometry(state.scan_points, pose)
-        angle = np.arctan2(old[:, 1], old[:, 0] - self.robot.lidar_x)
-        off = angle - (scan.angle_min + scan.angle_max) / 2
-        out_of_view = np.abs(off - math.tau * np.rint(off / math.tau)) > (scan.angle_max - scan.angle_min) / 2
+        out_of_view = ~scan.looks_at(np.arctan2(old[:, 1], old[:, 0] - self.robot.lidar_x))
         age = scan.stamp - state.scan_points_at
         kept = out_of_view & (age >= 0) & (age < self.memory_s)
         return replace(

@@ -27,6 +27,8 @@ with needed(by="ROS 2 over the network"):
     from cyclonedds.topic import Topic
     from cyclonedds.util import duration
 
+#: A writer that ends says nothing of its topic's instance, as in ROS 2: Fast DDS reads that message for ever.
+_LIFE = Policy.WriterDataLifecycle(autodispose=False)
 #: ROS 2's prefix of topics in DDS.
 _PREFIX = "rt"
 
@@ -95,6 +97,7 @@ def _qos(type_name: str, depth: int, *, reliable: bool = True, kept: bool = Fals
         Policy.Durability.TransientLocal if kept else Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
         Policy.DataRepresentation(use_cdrv0_representation=True),
+        _LIFE,
         # ROS 2 Jazzy and later tell each other the type's hash in this way.
         Policy.Userdata(f"typehash={typestore().hash_rihs01(type_name)};".encode()),
     )
@@ -121,6 +124,7 @@ class _Graph:
             Policy.Durability.TransientLocal,
             Policy.History.KeepLast(1),
             Policy.DataRepresentation(use_cdrv0_representation=True),
+            _LIFE,
         )
         self._writer = DataWriter(participant, Topic(participant, "ros_discovery_info", kind), qos=qos)
         self._kind, self._node, self._own = kind, node, bytes(participant.guid.bytes)

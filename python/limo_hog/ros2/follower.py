@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -35,23 +35,12 @@ SETTLED = 3.0
 
 @dataclass
 class Report:
-    """How a drive went.
+    """How a drive went."""
 
-    Attributes
-    ----------
-    frames, found
-        Camera images worked on, and those with a person detected.
-    dropped
-        Messages that could not be read.
-    answer_ms
-        From the arrival of each image to its command, for the last hour [ms].
-    modes
-        Number of commands in each mode.
-    """
-
-    frames: int = 0
+    frames: int = 0  #: Camera images worked on, and those with a person detected.
     found: int = 0
-    dropped: int = 0
+    dropped: int = 0  #: Messages that could not be read.
+    #: From the arrival of each image to its command, for the last hour [ms]; number of commands in each mode.
     answer_ms: deque[float] = field(default_factory=lambda: deque(maxlen=_ANSWERS))
     modes: dict[str, int] = field(default_factory=dict)
 
@@ -168,7 +157,7 @@ def mounted(bus: Bus, inputs: Inputs, camera: str, robot: RobotGeometry) -> tupl
     found = bus.topics(0.5, enough=lambda found: static in found and bool(found[static].publishers))
     if static in found and found[static].publishers:
         frames = bus.subscription(names.TF_STATIC, names.TYPES[names.TF_STATIC], depth=100, kept=True)
-        until, base, file = time.monotonic() + SETTLED, frame_named(bus, "base_frame"), robot
+        until, base, file = time.monotonic() + SETTLED, frame_named(bus.node, "base_frame"), robot
         while not whole and time.monotonic() < until:
             bus.wait(CONTROL_PERIOD / 2)
             inputs.newest()
@@ -184,25 +173,26 @@ def mounted(bus: Bus, inputs: Inputs, camera: str, robot: RobotGeometry) -> tupl
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How to drive."""
+
+    seconds: float = math.inf  #: For how long [s].
+    robot: RobotGeometry = LIMO
+    moves: bool = True  #: Without, no command is sent: a planner drives to what is found.
+    without_lidar: bool = False
+    compressed: bool = False  #: Whether no raw images are asked for.
+    watch: Callable[[FrameLog], None] = lambda _: None  #: Called with each control period.
+    #: Told where the sensors sit, and which senses are there: some time after the first image, and when one more comes.
+    say: Callable[[str], None] = lambda _: None
+
+
 def drive(
-    bus: Bus,
-    controller: Controller[S],
-    detector: Detector,
-    seconds: float,
-    watch: Callable[[FrameLog], None] | None = None,
-    *,
-    moves: bool = True,
-    robot: RobotGeometry = LIMO,
-    without_lidar: bool = False,
-    compressed: bool = False,
-    say: Callable[[str], None] = lambda _: None,
-    report: Report | None = None,
+    bus: Bus, controller: Controller[S], detector: Detector, settings: Settings, report: Report | None = None
 ) -> Report:
     """Follow the person the camera sees until the time is up; the last command is always to stand.
 
-    With `moves` False no command is sent: a planner drives to what is found. With `compressed` no raw images are asked
-    for. `say` is told which senses are there, when all are, or some time after the first image, and whenever one more
-    has come. A `report` that is given is kept up to date, for a drive that is interrupted.
+    A `report` that is given is kept up to date, for a drive that is interrupted.
 
     Raises
     ------
@@ -211,45 +201,48 @@ def drive(
     RobotError
         As `mounted` has it.
     """
-    camera = camera_topic(bus, compressed=compressed)
-    inputs = Inputs(bus, camera, robot)
-    commands, findings = Commands(bus) if moves else None, Findings(bus)
-    robot, line = mounted(bus, inputs, camera, robot)
-    say(line)
-    follower = Follower(controller, detector, robot, without_lidar=without_lidar)
     report = Report() if report is None else report
-    first, said = math.inf, ""
-    began = heard = time.monotonic()
-    stamp = 0.0
+    camera = camera_topic(bus, compressed=settings.compressed)
+    inputs = Inputs(bus, camera, settings.robot)
+    commands, findings = Commands(bus) if settings.moves else None, Findings(bus)
+    robot, line = mounted(bus, inputs, camera, settings.robot)
+    settings.say(line)
+    follower = Follower(controller, detector, robot, without_lidar=settings.without_lidar)
+    settled, said, clock = math.inf, "", 0.0
     try:
-        while time.monotonic() - began < seconds:
-            bus.wait(CONTROL_PERIOD / 2)
-            came = time.monotonic()
-            frame = inputs.newest()
-            if frame is not None:
-                heard, stamp, first = came, frame.stamp, min(first, came)
-            elif came - heard > SILENT_AFTER:
-                why = f"; {inputs.dropped} messages were not read: {inputs.complaint}" if inputs.complaint else ""
-                where = f"{names.resolved(bus.node, camera)} in {bus.network}"
-                raise BusError(f"no image on {where}, for {SILENT_AFTER:g} s{why}")
-            elif not report.frames:
-                continue
-            line = inputs.senses.present(without_lidar=without_lidar)
-            if line != said and (came - first > SETTLED or "no" not in line.lower()):
+        for now, frame, clock in _heard(bus, inputs, camera, settings.seconds):
+            settled = min(settled, now + SETTLED)
+            line = inputs.senses.present(without_lidar=settings.without_lidar)
+            if line != said and (now > settled or "no" not in line.lower()):
                 said = line
-                say(line)
-            log = follower.tick(came, frame, inputs.senses.sensors)
+                settings.say(line)
+            log = follower.tick(now, frame, inputs.senses.sensors)
             if log is None:
                 continue
             if commands is not None:
-                # The camera's clock: the last image's stamp and the time since.
-                commands.publish(stamp + came - heard, log.decision.twist)
-            report.add(log, 1e3 * (time.monotonic() - came))
+                commands.publish(clock, log.decision.twist)
+            report.add(log, 1e3 * (time.monotonic() - now))
             report.dropped = inputs.dropped
-            findings.publish(log, inputs.senses.newest(stamp))
-            if watch is not None:
-                watch(log)
+            findings.publish(log, inputs.senses)
+            settings.watch(log)
     finally:
         if commands is not None:
-            commands.publish(stamp, Twist())
+            commands.publish(clock, Twist())
     return report
+
+
+def _heard(bus: Bus, inputs: Inputs, camera: str, seconds: float) -> Iterator[tuple[float, Frame | None, float]]:
+    """Yield from the first image on the time, an image that is new, and the time on the camera's clock [s]."""
+    began = heard = time.monotonic()
+    stamp: float | None = None
+    while time.monotonic() - began < seconds:
+        bus.wait(CONTROL_PERIOD / 2)
+        now, frame = time.monotonic(), inputs.newest()
+        if frame is not None:
+            heard, stamp = now, frame.stamp
+        elif now - heard > SILENT_AFTER:
+            why = f"; {inputs.dropped} messages were not read: {inputs.complaint}" if inputs.complaint else ""
+            where = f"{names.resolved(bus.node, camera)} in {bus.network}"
+            raise BusError(f"no image on {where}, for {SILENT_AFTER:g} s{why}")
+        if stamp is not None:
+            yield now, frame, stamp + now - heard

@@ -21,21 +21,11 @@ class BusError(LimoHogError):
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """What a participant may reach.
+    """What a participant may reach."""
 
-    Attributes
-    ----------
-    domain
-        The ROS domain.
-    reach
-        In words, for messages.
-    configuration
-        Cyclone DDS's, as XML; None where that is the environment's or the library's own.
-    """
-
-    domain: int
-    reach: str
-    configuration: str | None
+    domain: int  #: The ROS domain.
+    reach: str  #: In words, for messages.
+    configuration: str | None  #: Cyclone DDS's, as XML; None where that is the environment's or the library's own.
 
     def __str__(self) -> str:
         return f"ROS domain {self.domain}, {self.reach}"

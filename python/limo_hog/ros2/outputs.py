@@ -9,8 +9,10 @@ from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import Twist
 from limo_hog.imaging.drawing import annotate
 from limo_hog.ros2 import findings, messages, names
+from limo_hog.ros2.arguments import NodeNames
 from limo_hog.ros2.dds import Bus
 from limo_hog.ros2.network import BusError
+from limo_hog.ros2.senses import Senses
 
 #: While nothing listens to the commands, the robot's type is looked for again after so long [s]. Chosen: discovery
 #: takes about a second.
@@ -20,7 +22,7 @@ _LOOK_EVERY = 1.0
 FRAMES = {"base_frame": messages.BASE_FRAME, "camera_frame": messages.CAMERA_FRAME}
 
 
-def frame_named(bus: Bus, parameter: str) -> str:
+def frame_named(node: NodeNames, parameter: str) -> str:
     """Return a frame by its parameter.
 
     Raises
@@ -28,7 +30,7 @@ def frame_named(bus: Bus, parameter: str) -> str:
     BusError
         If the parameter is no text.
     """
-    frame = bus.node.parameters.get(parameter, FRAMES[parameter])
+    frame = node.parameters.get(parameter, FRAMES[parameter])
     if not isinstance(frame, str) or not frame:
         raise BusError(f"parameter {parameter} is {frame!r}; wanted is a frame's name such as {FRAMES[parameter]}")
     return frame
@@ -38,7 +40,7 @@ class Commands:
     """Publishes commands as `Twist`, or as `TwistStamped` where the robot subscribes to that."""
 
     def __init__(self, bus: Bus) -> None:
-        self._bus, self._base = bus, frame_named(bus, "base_frame")
+        self._bus, self._base = bus, frame_named(bus.node, "base_frame")
         self._looked = 0.0
         self._open(names.TYPES[names.COMMAND])
 
@@ -63,16 +65,17 @@ class Findings:
     """Publishes what was made of a camera image, each topic only while something listens to it."""
 
     def __init__(self, bus: Bus) -> None:
-        self._base, self._camera = frame_named(bus, "base_frame"), frame_named(bus, "camera_frame")
+        self._base, self._camera = frame_named(bus.node, "base_frame"), frame_named(bus.node, "camera_frame")
         self._annotated = bus.publisher(names.ANNOTATED, names.TYPES[names.ANNOTATED])
         self._publishers = {topic: bus.publisher(topic, kind) for topic, kind in names.FINDINGS.items()}
         self._frames = bus.publisher(names.TF, names.TYPES[names.TF], depth=100)
 
-    def publish(self, log: FrameLog, now: float) -> None:
-        """Send what was found in a frame; people's positions are as of `now`, the newest stamp of any sensor [s]."""
+    def publish(self, log: FrameLog, senses: Senses) -> None:
+        """Send what was found in a frame; people's positions are as of the newest stamp of any sense."""
         if log.frame is None:
             return
         stamp, found, belief = log.frame.stamp, log.detections, log.decision.belief
+        now = senses.newest(stamp)
         ids = {one.box: one.number for one in belief.people if one.box is not None}
         self._send(names.DETECTIONS, lambda: findings.detections_message(stamp, found, self._camera, ids))
         self._send(names.PEOPLE, lambda: findings.people_message(now, belief.people, self._base))

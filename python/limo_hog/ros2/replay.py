@@ -9,11 +9,12 @@ from typing import Any, TypeVar
 from limo_hog.detections import Detections, Detector
 from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, FrameLog
-from limo_hog.follow.robot import Twist
+from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Frame
 from limo_hog.ros2 import messages
 from limo_hog.ros2.arguments import NodeNames
 from limo_hog.ros2.bag import BagError, Record, to_detections
+from limo_hog.ros2.frames import Mounts
 from limo_hog.ros2.names import (
     CAMERA_INFO,
     COMMAND,
@@ -25,9 +26,11 @@ from limo_hog.ros2.names import (
     ODOMETRY,
     SCAN,
     STAMPED_COMMAND_TYPE,
+    TF_STATIC,
     TYPES,
     resolved,
 )
+from limo_hog.ros2.outputs import frame_named
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
 
 S = TypeVar("S")
@@ -38,32 +41,28 @@ SENSED = (CAMERA_INFO, DEPTH, DEPTH_LCAS, SCAN, ODOMETRY)
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """One camera frame, then and now.
+    """One camera frame, then and now."""
 
-    Attributes
-    ----------
-    frame
-        What the camera saw.
-    log
-        What is found and decided now.
-    recorded, recorded_twist
-        What was found and commanded then; None where that was not recorded.
-    """
-
-    frame: Frame
-    log: FrameLog
+    frame: Frame  #: What the camera saw.
+    log: FrameLog  #: What is found and decided now.
+    #: What was found and commanded then; None where that was not recorded.
     recorded: Detections | None
     recorded_twist: Twist | None
 
 
 def replay(
-    records: Iterable[Record], controller: Controller[S], detector: Detector, node: NodeNames | None = None
+    records: Iterable[Record],
+    controller: Controller[S],
+    detector: Detector,
+    node: NodeNames | None = None,
+    robot: RobotGeometry = LIMO,
 ) -> Iterator[Replayed]:
     """Let a follower look at a recording; what it decides moves nothing.
 
     A frame is worked on when the command that answered it comes, or the next frame; the other sensors' messages up
     to then are what the follower knows. A detector that raises is a fault of the frame, as on a robot. The topics have
-    the names that they have for `node`.
+    the names that they have for `node`; the robot's sensors sit where the transforms say that come before the first
+    image is worked on.
 
     Raises
     ------
@@ -71,17 +70,23 @@ def replay(
         If there are no images on the topic, or no camera info before the first.
     MessageError
         If an image or a depth image contradicts itself.
+    RobotError
+        As `Mounts.applied` has it.
     """
-    follower = Follower(controller, detector)
-    senses = Senses()
+    follower: Follower[S] | None = None
+    senses, mounts, lidar = Senses(robot), Mounts(), ""
     waiting: Any = None
     recorded: Detections | None = None
     topics: set[str] = set()
     frames = 0
     node = NodeNames("limo_hog_follower") if node is None else node
-    own = {resolved(node, topic): topic for topic in (*SENSED, IMAGE, IMAGE_COMPRESSED, COMMAND)}
+    own = {resolved(node, topic): topic for topic in (*SENSED, IMAGE, IMAGE_COMPRESSED, COMMAND, TF_STATIC)}
 
     def work(now: float, twist: Twist | None) -> Replayed:
+        nonlocal follower
+        if follower is None:
+            base = frame_named(node, "base_frame")
+            follower = Follower(controller, detector, mounts.applied(robot, base, waiting.header.frame_id, lidar)[0])
         if senses.focal_px is None:
             raise BagError("no camera info before the first image: its focal length is needed")
         frame = senses.frame(messages.to_seconds(waiting.header.stamp), picture_of(waiting))
@@ -99,13 +104,16 @@ def replay(
         if waiting is not None and (is_image or command is not None):
             yield work(time, command)
             waiting, recorded, frames = None, None, frames + 1
-        elif command is not None:
+        elif command is not None and follower is not None:
             follower.tick(time, None, senses.sensors)
         if is_image:
             waiting = message
         elif message.__msgtype__ == DETECTIONS_TYPE:
             recorded = to_detections(message)
+        elif name == TF_STATIC:
+            mounts.take(message)
         elif name in SENSED:
+            lidar = message.header.frame_id if name == SCAN else lidar
             senses.take(message)
     if waiting is not None:
         yield work(time, None)

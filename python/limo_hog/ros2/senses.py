@@ -18,7 +18,8 @@ from limo_hog.ros2.messages import MessageError
 #: A depth image belongs to a camera image if their stamps differ by no more than this [s]: half the period of the
 #: workshop's cameras, so that the depth image of the frame before, 0.1 s older, is never taken for it.
 SLOP = 0.05
-#: So many depth images are kept [1]: at 30 Hz a camera image may be 0.3 s late and still find its own.
+#: So many depth images are kept [1], each for as many camera images: at 30 Hz one may be 0.3 s late and still find its
+#: own; and what is left of a depth camera that died serves no camera whose clock is late.
 _DEPTHS = 10
 
 #: Encodings of a depth image: metres as float32, millimetres as uint16.
@@ -43,7 +44,8 @@ class Senses:
         self.focal_px: float | None = None
         self.scan: Scan | None = None
         self.odometry: Odometry | None = None
-        self._depths: deque[tuple[float, NDArray[np.float32]]] = deque(maxlen=_DEPTHS)
+        self._depths: deque[tuple[float, NDArray[np.float32], int]] = deque(maxlen=_DEPTHS)
+        self._images = 0
 
     def take(self, message: Any) -> None:
         """Take in a CameraInfo, LaserScan, Odometry or depth Image; other types are left alone.
@@ -64,7 +66,7 @@ class Senses:
         elif kind == "nav_msgs/msg/Odometry":
             self.odometry = messages.to_odometry(message)
         elif kind == "sensor_msgs/msg/Image":
-            self._depths.append((stamp_of(message), _metres(message)))
+            self._depths.append((stamp_of(message), _metres(message), self._images))
 
     def newest(self, stamp: float) -> float:
         """Return the newest of the stamps of an image, of the scan and of the odometry [s]."""
@@ -99,10 +101,16 @@ class Senses:
 
         Its depth image is the nearest by stamp, if it is of the same size and at most `SLOP` off.
         """
-        fitting = [(abs(at - stamp), depth) for at, depth in self._depths if depth.shape == image.shape[:2]]
+        fitting = [
+            (abs(at - stamp), depth)
+            for at, depth, images in self._depths
+            if depth.shape == image.shape[:2] and self._images - images < _DEPTHS
+        ]
+        self._images += 1
         gap, depth = min(fitting, key=lambda pair: pair[0], default=(math.inf, None))
         focal_px = self._robot.focal_px(image.shape[1]) if self.focal_px is None else self.focal_px
-        return Frame(stamp, image, focal_px, depth if gap <= SLOP else None)
+        newest = self._depths[-1][0] if self._depths else None
+        return Frame(stamp, image, focal_px, depth if gap <= SLOP else None, depth_stamp=newest)
 
 
 def stamp_of(message: Any) -> float:

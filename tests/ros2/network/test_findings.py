@@ -117,7 +117,7 @@ def test_a_drive_publishes_where_the_person_is(monkeypatch: pytest.MonkeyPatch) 
     listening = {topic: watcher.subscription(topic, kind) for topic, kind in names.FINDINGS.items()}
     listening[names.TF] = watcher.subscription(names.TF, names.TYPES[names.TF], depth=1000)
     kept = watcher.subscription(names.TF_STATIC, names.TYPES[names.TF_STATIC], kept=True)
-    report = follower.drive(dds.Bus(), controller_named("tracking", 1.5), detector_named("hog"), 7.0)
+    report = follower.drive(dds.Bus(), controller_named("tracking", 1.5), detector_named("hog"), follower.Settings(7.0))
     arena.join()
     found = {topic: reader.take() for topic, reader in listening.items()}
     assert report.found > 10
@@ -147,7 +147,7 @@ def test_a_robot_that_publishes_images_alone_is_told_what_is_missing_and_stands(
     logs: list[FrameLog] = []
     controller, detector = controller_named("tracking", 1.5), detector_named("hog")
     try:
-        follower.drive(dds.Bus(), controller, detector, 6.0, logs.append, say=said.append)
+        follower.drive(dds.Bus(), controller, detector, follower.Settings(6.0, watch=logs.append, say=said.append))
     finally:
         done.set()
         camera.join()

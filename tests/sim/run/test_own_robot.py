@@ -12,6 +12,7 @@ import pytest
 
 from limo_hog import PeopleDetector
 from limo_hog.follow import LIMO, Decision, Follower, Mode, RobotError, Twist
+from limo_hog.follow.sense.clearance import completed, scan_points
 from limo_hog.follow.sense.observation import Sensors
 from limo_sim.run.arena import Arena
 from limo_sim.run.provenance import scenario_hash
@@ -63,6 +64,23 @@ def test_the_lidar_looks_where_it_is_turned_and_the_follower_turns_it_back(tmp_p
     assert ranges[len(ranges) // 2] == pytest.approx(1.49 - 0.1, abs=5e-3)
     told = arena.scan().turned(scenario.robot.geometry.lidar_yaw)
     assert math.cos((told.angle_min + told.angle_max) / 2) == pytest.approx(-1.0)
+
+
+def test_where_the_lidar_does_not_look_the_depth_image_completes_the_scan(tmp_path: Path) -> None:
+    scenario = quiet(own(tmp_path))
+    arena, robot = Arena(scenario), scenario.robot.geometry
+    scan = completed(arena.scan().turned(robot.lidar_yaw), arena.frame(), arena.odometry(), robot)
+    angles = np.array([0.0, 0.4, -0.4, 0.8, np.pi])
+    assert scan.looks_at(angles).tolist() == [True, True, True, False, True]
+    points = scan_points(scan, robot)
+    ahead = points[np.abs(np.arctan2(points[:, 1], points[:, 0])) < 0.4]
+    assert len(ahead) > 50
+    assert ahead[:, 0] == pytest.approx(np.full(len(ahead), 3.0), abs=0.01)  # the wall, as far as it is
+
+
+def test_the_scan_of_a_lidar_that_looks_where_the_camera_does_stays_as_it_is(tmp_path: Path) -> None:
+    arena = Arena(quiet(own(tmp_path, "")))
+    assert completed(arena.scan(), arena.frame(), arena.odometry(), LIMO) is arena.scan()
 
 
 def test_wheels_do_what_the_file_says(tmp_path: Path) -> None:

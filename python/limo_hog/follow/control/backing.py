@@ -27,15 +27,9 @@ Poses: TypeAlias = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Other:
-    """Another person than the one followed.
+    """Another person than the one followed."""
 
-    Attributes
-    ----------
-    x, y, at
-        Where they were last measured, odometry frame [m], and when [s].
-    """
-
-    x: float
+    x: float  #: Where they were last measured, odometry frame [m], and when [s].
     y: float
     at: float
 

@@ -25,24 +25,14 @@ from limo_hog.follow.tracks.kalman import Track
 
 @dataclass(frozen=True, slots=True)
 class Walker:
-    """A person near the robot.
+    """A person near the robot."""
 
-    Attributes
-    ----------
-    x, y, vx, vy
-        Place and velocity in the base frame as it is now, which is taken to stand still [m, m/s].
-    followed
-        Whether this is the person followed.
-    measured
-        Whether they were measured just now; else they are where their velocity leads.
-    """
-
-    x: float
+    x: float  #: Place and velocity in the base frame as it is now, which is taken to stand still [m, m/s].
     y: float
     vx: float
     vy: float
-    followed: bool = False
-    measured: bool = True
+    followed: bool = False  #: Whether this is the person followed.
+    measured: bool = True  #: Whether they were measured just now; else they are where their velocity leads.
 
     def at_least(self, speed: float, slowest: float) -> Walker:
         """Return one who has set out, faster than `slowest`, at the speed at which they are known to walk [m/s].
@@ -65,21 +55,11 @@ def walker_of(track: Track, pose: Odometry, *, followed: bool = False, measured:
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """A way out: turn to a direction, and drive.
+    """A way out: turn to a direction, and drive."""
 
-    Attributes
-    ----------
-    turn
-        From the robot's present direction [rad].
-    speed
-        At which to drive once it is turned to, negative to back [m/s].
-    age
-        How long the robot has been on it [s].
-    """
-
-    turn: float
-    speed: float
-    age: float = 0.0
+    turn: float  #: From the robot's present direction [rad].
+    speed: float  #: At which to drive once it is turned to, negative to back [m/s].
+    age: float = 0.0  #: How long the robot has been on it [s].
 
 
 @dataclass(frozen=True, slots=True)

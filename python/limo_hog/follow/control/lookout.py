@@ -21,27 +21,15 @@ from limo_hog.follow.tracks.kalman import Track
 
 @dataclass(frozen=True, slots=True)
 class Hunt:
-    """What is remembered while looking for one person.
+    """What is remembered while looking for one person."""
 
-    Attributes
-    ----------
-    track
-        The person when last measured.
-    places
-        Where the person may be.
-    way
-        float64 (N, 2) [m], odometry frame: still to be driven; empty to turn in place.
-    facing
-        A point to turn to where there is no way [m], odometry frame; None to turn on and on.
-    planned
-        When the way was chosen [s].
-    """
-
-    track: Track
-    places: Places
+    track: Track  #: The person when last measured.
+    places: Places  #: Where the person may be.
+    #: float64 (N, 2) [m], odometry frame: still to be driven; empty to turn in place.
     way: Points = field(default_factory=lambda: np.empty((0, 2)))
+    #: A point to turn to where there is no way [m], odometry frame; None to turn on and on.
     facing: tuple[float, float] | None = None
-    planned: float = -math.inf
+    planned: float = -math.inf  #: When the way was chosen [s].
 
 
 @dataclass(frozen=True, slots=True)

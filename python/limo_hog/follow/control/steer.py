@@ -19,26 +19,14 @@ from limo_hog.follow.sense.observation import Odometry
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """The followed person at the time of the command, seen from the robot's centre.
+    """The followed person at the time of the command, seen from the robot's centre."""
 
-    Attributes
-    ----------
-    bearing, distance
-        Where the person is [rad, m].
-    bearing_rate, range_rate
-        How the person's own motion changes that [rad/s, m/s].
-    heading
-        Direction to drive in [rad]; None where none is free.
-    hidden
-        Whether something is on the line of sight.
-    """
-
-    bearing: float
+    bearing: float  #: Where the person is [rad, m].
     distance: float
-    bearing_rate: float
+    bearing_rate: float  #: How the person's own motion changes that [rad/s, m/s].
     range_rate: float
-    heading: float | None
-    hidden: bool
+    heading: float | None  #: Direction to drive in [rad]; None where none is free.
+    hidden: bool  #: Whether something is on the line of sight.
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,10 @@ class Arrivals:
         reasons += [f"no {name} for {abs(age):.1f} s" for name, age in ages.items() if abs(age) > max_age]
         return "; ".join(reasons)
 
+    def oldest(self, now: float) -> float:
+        """Return how long ago the sense that is silent for longest was heard [s]; 0 without any."""
+        return max((now - came for _, came in self.newest.values()), default=0.0)
+
     def disagreement(self, max_age: float, max_late: float) -> str:
         """Return which sense's stamps do not fit the others': readings may be `max_age`, images `max_late` [s] late."""
         # A depth image has its camera frame's stamp. What the others' clocks showed when the last reading came:

@@ -8,14 +8,14 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
+from limo_hog.follow.sense.observation import Frame, Odometry, Scan, beams_at
 
 Points = NDArray[np.float64]
 
@@ -55,6 +55,35 @@ def scan_points(scan: Scan, robot: RobotGeometry) -> Points:
     points[:, 0] += robot.lidar_x
     points.flags.writeable = False
     return points
+
+
+def completed(scan: Scan, frame: Frame, odometry: Odometry | None, robot: RobotGeometry) -> Scan:
+    """Return a scan all round: where the lidar does not look, what the depth image's middle row shows.
+
+    That row lies in the plane of a level camera, at the height of people's shins. The scan stays as it is where the
+    lidar looks wherever the camera does, and without depth. Angles are the robot's.
+    """
+    if frame.depth is None:
+        return scan
+    row = frame.depth[len(frame.depth) // 2].astype(np.float64)
+    left = (len(row) / 2 - np.arange(len(row)) - 0.5) / frame.focal_px
+    if scan.looks_at(np.arctan(left[[0, -1]])).all():
+        return scan
+    step = (scan.angle_max - scan.angle_min) / max(len(scan.ranges) - 1, 1)
+    count = max(math.floor(math.tau / step), len(scan.ranges))
+    ranges = np.full(count, np.nan)
+    here = odometry or Odometry()
+    known = (row > 0) & (row < np.inf)
+    late = scan.stamp - frame.stamp
+    moved = Odometry(x=here.linear * late, yaw=here.angular * late)
+    points = from_odometry(np.stack([robot.camera_x + row, left * row], axis=1)[known], moved) - (robot.lidar_x, 0.0)
+    angle_max = scan.angle_min + step * (count - 1)
+    beams = beams_at(np.arctan2(points[:, 1], points[:, 0]), scan.angle_min, angle_max, count).astype(np.int64)
+    np.fmin.at(ranges, beams % count, np.hypot(*points.T))
+    ranges[: len(scan.ranges)] = scan.ranges
+    measured = ~np.isnan(ranges)
+    measured[: len(scan.ranges)] = True
+    return replace(scan, ranges=ranges.astype(np.float32), angle_max=angle_max, measured=measured)
 
 
 @functools.lru_cache(maxsize=8)

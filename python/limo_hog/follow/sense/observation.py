@@ -29,6 +29,16 @@ class Scan:
     angle_max: float
     range_min: float  #: Limits between which a range is valid [m].
     range_max: float
+    #: bool (N,): the beams by which anything is measured; None where that is all of them.
+    measured: NDArray[np.bool_] | None = None
+
+    def looks_at(self, angles: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether each direction [rad] is measured, bool (N,)."""
+        if self.measured is not None:
+            beams = beams_at(angles, self.angle_min, self.angle_max, len(self.ranges)).astype(np.int64)
+            return np.asarray(self.measured[np.clip(beams, 0, len(self.ranges) - 1)])
+        off = angles - (self.angle_min + self.angle_max) / 2
+        return np.abs(off - math.tau * np.rint(off / math.tau)) <= (self.angle_max - self.angle_min) / 2
 
     def turned(self, yaw: float) -> Scan:
         """Return the scan of a lidar whose angle 0 looks `yaw` [rad] from straight ahead, by the robot's angles."""
@@ -75,6 +85,8 @@ class Frame:
     #: float32 (H, W), distance along the optical axis [m] of the same view; inf too far, -inf too near, NaN unknown
     #: (REP 118). None without a depth camera.
     depth: NDArray[np.float32] | None
+    #: Of the newest depth image, which may belong to a later frame [s]; None for `stamp`.
+    depth_stamp: float | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +121,7 @@ class Observation:
     remembered: NDArray[np.float64] | None = None
     #: When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
     clock: float | None = None
+    depth_stamp: float | None = None  #: Of the newest depth image that has come [s]; None for `stamp`.
     now: float = field(init=False)  #: The newest stamp of all sensors [s]: a camera frame may arrive late.
 
     def __post_init__(self) -> None:
@@ -148,6 +161,7 @@ def observed(
         clothes,
         between,
         clock=clock,
+        depth_stamp=frame.depth_stamp,
     )
 
 

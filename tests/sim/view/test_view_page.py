@@ -85,13 +85,13 @@ def _read_the_words_on_the_map(page: Page) -> None:
                 const [width, right] = [pen.measureText(text).width, pen.textAlign === "right"];
                 words.push([text, right ? x - width : x, right ? x : x + width]);
             };
-            now.believed = [[-4.9, 0, 0.99, 1], [4.9, 0, 0.98, 0.5]];
+            now.believed = [[-4.9, 0, 0.99, 1, 1], [4.9, 0, 0.98, 0.5, 2]];
             drawMap();
             delete pen.fillText;
         })()"""
     )
     drawn = {text: (left, right) for text, left, right in page.evaluate("words")}
-    assert {"person 99 %", "followed 100 %", "person 98 %", "followed 50 %"} <= set(drawn)
+    assert {"person 1: 99 %", "followed 100 %", "person 2: 98 %", "followed 50 %"} <= set(drawn)
     width = page.evaluate("document.getElementById('map').clientWidth")
     assert all(left >= 0 and right <= width for left, right in drawn.values())
 

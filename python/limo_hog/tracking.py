@@ -20,6 +20,9 @@ from limo_hog.extras import needed
 #: Class of each tracker in `trackers`.
 TRACKERS = MappingProxyType({"bytetrack": "ByteTrackTracker", "ocsort": "OCSORTTracker", "sort": "SORTTracker"})
 
+#: Boxes of so much less than the threshold continue a person who was seen before [SVM margin].
+FED = 0.5
+
 
 class Tracker:
     """Numbers the people of one film; its pictures are given in their order.
@@ -29,14 +32,9 @@ class Tracker:
     name
         "bytetrack", "ocsort" or "sort". docs/detect.md compares them.
     threshold
-        Least SVM margin of a box from which a person may be new. Boxes from `lowest` on only continue a person.
+        Least SVM margin of a box that may be a new person; other boxes only continue one.
     fps
         Pictures a second [Hz].
-
-    Attributes
-    ----------
-    lowest
-        Least SVM margin that is of use: the detector's threshold.
 
     Raises
     ------
@@ -51,15 +49,22 @@ class Tracker:
             raise ParameterError(f"tracker is {name!r}; one of {', '.join(TRACKERS)} is wanted")
         with needed(by="tracking people"):
             import trackers
-        self.lowest = threshold - 0.5
         settings: dict[str, Any] = {"lost_track_buffer": 30, "minimum_consecutive_frames": 2, "frame_rate": fps}
-        if name == "sort":
-            settings["track_activation_threshold"] = threshold
-        else:
-            settings["high_conf_det_threshold"] = threshold
-        if name == "bytetrack":
-            settings["track_activation_threshold"] = threshold
         self._tracker = getattr(trackers, TRACKERS[name])(**settings)
+        self.set_threshold(threshold)
+
+    @property
+    def lowest(self) -> float:
+        """Least SVM margin of a box that is of use: the detector's threshold."""
+        return self._threshold - FED
+
+    def set_threshold(self, threshold: float) -> None:
+        """Take new people from another SVM margin on, from the next picture on."""
+        self._threshold = threshold
+        # SORT has the first, OC-SORT the second, ByteTrack both.
+        for name in ("track_activation_threshold", "high_conf_det_threshold"):
+            if hasattr(self._tracker, name):
+                setattr(self._tracker, name, threshold)
 
     def update(self, found: Detections, time: float | None = None) -> Detections:
         """Return the people among `found` who were seen before, with their `ids`, best first.

@@ -2,8 +2,7 @@
 
     uv run --with trackeval python benches/tracking.py ../shared/data --frames TUD
 
-prints the table of docs/detect.md. TUD is a folder with frames 1 to 41 (docs/models.md says where they are). `--choose`
-runs a grid of parameters on other pictures: TUD's odd frames, and the arena with other seeds.
+prints the table of docs/detect.md. TUD is a folder with frames 1 to 41 (docs/models.md says where they are).
 """
 
 from __future__ import annotations
@@ -16,69 +15,68 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 from trackeval.metrics import CLEAR, HOTA, Identity
 
 from limo_hog import PeopleDetector
 from limo_hog.detections import Detections
 from limo_hog.suppression import intersection_over_union
-from limo_hog.tracking import TRACKERS, Tracker, Tracking
-from limo_sim.run.export import labelled_frames
+from limo_hog.tracking import TRACKERS, Tracker
+from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.world.scenario import Scenario
 
-SCENARIOS = ("workshop", "two_people", "crossing", "gathering", "furniture")
+SCENARIOS = ("two_people", "crossing", "gathering", "side_door", "sharp_turns")
 #: A person of whom less is seen need not be found, and is not counted false.
 WHOLE = 0.65
-#: Pictures of an arena sequence, and the time between two [s].
-PICTURES, EVERY_S = 200, 0.1
-#: Below all that a tracker is fed.
-LOWEST = -1.2
+#: Pictures of an arena sequence, taken by a robot that stands, and their rate [Hz].
+PICTURES, ARENA_HZ = 200, 10
+#: Smallest person: in TUD as docs/models.md has it [px].
+TUD_HEIGHT, ARENA_HEIGHT = 96.0, 64.0
 
 
 @dataclass(frozen=True)
 class Frame:
-    """What is found and what is true in one picture: boxes x, y, w, h [px] of people; those to `ignore` may be found."""
+    """What is found and what is true in one picture: ids, boxes x, y, w, h [px], and who need not be found."""
 
     found: Detections
-    ids: np.ndarray
-    boxes: np.ndarray
-    ignored: np.ndarray
+    ids: NDArray[np.int64]
+    boxes: NDArray[np.float64]
+    ignored: NDArray[np.bool_]
 
 
-def tud(pictures: Path, truth: Path, numbers: range) -> list[Frame]:
+def tud(pictures: Path, truth: Path, detector: PeopleDetector, numbers: range = range(1, 42)) -> Iterator[Frame]:
+    """Yield the frames of TUD-Stadtmitte; MOTChallenge counts pixels from 1."""
     rows = np.loadtxt(truth, delimiter=",", ndmin=2)
-    detector, frames = PeopleDetector(threshold=LOWEST), []
     for number in numbers:
         here = rows[rows[:, 0] == number]
-        boxes = here[:, 2:6] - [1, 1, 0, 0]  # MOTChallenge counts pixels from 1
-        found = detector.detect(pictures / f"{number:06d}.jpg")
-        frames.append(Frame(found, here[:, 1].astype(int), boxes, np.zeros(len(here), bool)))
-    return frames
+        found = detector.detect(cv2.imread(str(pictures / f"{number:06d}.jpg")))
+        yield Frame(found, here[:, 1].astype(int), here[:, 2:6] - [1, 1, 0, 0], np.zeros(len(here), bool))
 
 
-def arena(name: str, seed: int) -> list[Frame]:
-    detector, frames = PeopleDetector(threshold=LOWEST), []
-    for frame, things in labelled_frames(Scenario.load(name), seed, PICTURES, EVERY_S):
-        people = [thing for thing in things if thing.label == "person" and thing.visible > 0]
-        boxes = np.array([person.box for person in people], float).reshape(-1, 4)
-        ignored = np.array([person.visible < WHOLE for person in people], bool)
-        ids = np.array([person.identity for person in people], int)
-        frames.append(Frame(detector.detect(frame.image), ids, boxes, ignored))
-    return frames
+def arena(name: str, detector: PeopleDetector, seed: int = 0) -> Iterator[Frame]:
+    """Yield what a robot that stands sees of a scenario."""
+    arena = Arena(Scenario.load(name), seed)
+    for _ in range(PICTURES):
+        for _ in range(STEPS_PER_SECOND // ARENA_HZ):
+            arena.step()
+        frame = arena.frame()
+        seen = [(i, one) for i, one in enumerate(frame.truth.people) if one is not None and one.box and one.visible]
+        boxes = np.array([one.box for _, one in seen], float).reshape(-1, 4)
+        ignored = np.array([one.visible < WHOLE for _, one in seen], bool)
+        yield Frame(detector.detect(frame.image), np.array([i for i, _ in seen], int), boxes, ignored)
 
 
-def without(frames: list[Frame], threshold: float) -> Iterator[Detections]:
-    """Each box a person of its own: what a detector without a tracker says."""
-    numbers = itertools.count(1)
+def answers(frames: list[Frame], how: str, fps: float) -> Iterator[Detections]:
+    """Yield what a tracker says; by "none" each box is a person of its own."""
+    tracker, numbers = None if how == "none" else Tracker(how, fps=fps), itertools.count(1)
     for frame in frames:
-        found = frame.found[frame.found.scores >= threshold]
-        yield dataclasses.replace(found, ids=np.array([next(numbers) for _ in found.scores], np.int64))
-
-
-def tracked(frames: list[Frame], parameters: Tracking, fps: float) -> Iterator[Detections]:
-    tracker = Tracker(parameters, fps=fps)
-    for frame in frames:
-        yield tracker.update(frame.found)
+        if tracker:
+            yield tracker.update(frame.found)
+        else:
+            sure = frame.found[frame.found.scores >= 0]
+            yield dataclasses.replace(sure, ids=np.array([next(numbers) for _ in sure.scores], np.int64))
 
 
 def data_of(frames: list[Frame], answers: Iterator[Detections]) -> dict[str, Any]:
@@ -101,33 +99,31 @@ def data_of(frames: list[Frame], answers: Iterator[Detections]) -> dict[str, Any
 
 def figures(sequences: dict[str, dict[str, Any]]) -> dict[str, float]:
     """Return TrackEval's figures over all boxes of some sequences."""
-    quiet, row = {"PRINT_CONFIG": False}, {}
-    for metric in (HOTA(), CLEAR(quiet), Identity(quiet)):
+    row: dict[str, Any] = {}
+    for metric in (HOTA(), CLEAR({"PRINT_CONFIG": False}), Identity({"PRINT_CONFIG": False})):
         row |= metric.combine_sequences({name: metric.eval_sequence(data) for name, data in sequences.items()})
-    wanted = ("HOTA", "IDF1", "MOTA", "IDSW", "CLR_Re", "CLR_Pr", "CLR_FP")
+    wanted = ("HOTA", "IDF1", "MOTA", "CLR_Re", "CLR_Pr", "IDSW")
     return {name: float(np.mean(row[name])) for name in wanted}
 
 
 def main() -> None:
+    """Print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("data", type=Path)
     parser.add_argument("--frames", type=Path, required=True)
     args = parser.parse_args()
     truth = args.data / "real" / "annotations" / "TUD-Stadtmitte_gt.txt"
-    rates = {"TUD 1–41": 25.0} | dict.fromkeys(SCENARIOS, 1 / EVERY_S)
-    sets = {"TUD 1–41": tud(args.frames, truth, range(1, 42))} | {name: arena(name, 0) for name in SCENARIOS}
-    print("| | tracker | HOTA | IDF1 | MOTA | switches | recall | precision |\n|---|---|---|---|---|---|---|---|")
-    for names in ([name] for name in sets):
+    lowest = Tracker().lowest
+    street, room = (PeopleDetector(threshold=lowest, min_height=height) for height in (TUD_HEIGHT, ARENA_HEIGHT))
+    sets = {"TUD 1–41": (list(tud(args.frames, truth, street)), 25.0)}
+    sets |= {name: (list(arena(name, room)), float(ARENA_HZ)) for name in SCENARIOS}
+    groups = {**{name: [name] for name in sets}, "arena, all five": list(SCENARIOS)}
+    print("|  | tracker | HOTA | IDF1 | MOTA | recall | precision | switches |\n|---|---|---|---|---|---|---|---|")
+    for group, names in groups.items():
         for how in ("none", *TRACKERS):
-            parts = {}
-            for name in names:
-                frames = sets[name]
-                answers = without(frames, 0.0) if how == "none" else tracked(frames, Tracking(how), rates[name])
-                parts[name] = data_of(frames, answers)
-            row = figures(parts)
-            shares = (f"{row[n]:.3f}" for n in ("HOTA", "IDF1", "MOTA"))
-            rest = (f"{row['IDSW']:.0f}", f"{row['CLR_Re']:.3f}", f"{row['CLR_Pr']:.3f}")
-            print(f"| {', '.join(names)} | {how} |", " | ".join((*shares, *rest)), "|", flush=True)
+            row = figures({name: data_of(sets[name][0], answers(sets[name][0], how, sets[name][1])) for name in names})
+            *shares, switches = row.values()
+            print(f"| {group} | {how} |", " | ".join(f"{x:.3f}" for x in shares), f"| {switches:.0f} |", flush=True)
 
 
 if __name__ == "__main__":

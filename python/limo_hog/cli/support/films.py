@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -25,16 +26,14 @@ PIECE_S = 60.0
 class Newest(Generic[Item]):
     """The newest item of a source that does not wait: a thread takes them, and drops the one that nobody took.
 
-    A context manager, which stops the thread. What the source raises is raised after the items before it.
+    A context manager, which stops the thread. What the source raises is raised after the item before it.
     """
 
     def __init__(self, items: Callable[[threading.Event], Iterator[Item]]) -> None:
         self.dropped = 0
-        self._changed = threading.Condition()
-        self._held: list[Item] = []
-        self._end: BaseException | None = None
+        self._items, self._held = items, queue.Queue[tuple[Item] | BaseException](1)
         self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._take, args=(items,), name="limo-hog source", daemon=True)
+        self._thread = threading.Thread(target=self._take, name="limo-hog source", daemon=True)
 
     def __enter__(self) -> Newest[Item]:
         self._thread.start()
@@ -42,35 +41,36 @@ class Newest(Generic[Item]):
 
     def __exit__(self, *_: object) -> None:
         self._stopped.set()
+        with suppress(queue.Empty):
+            self._held.get_nowait()
         # A camera that sends nothing is left to the end of the process.
         self._thread.join(1.0)
 
-    def _take(self, items: Callable[[threading.Event], Iterator[Item]]) -> None:
+    def _take(self) -> None:
         end: BaseException = StopIteration()
         try:
-            for item in items(self._stopped):
-                with self._changed:
-                    self.dropped += len(self._held)
-                    self._held = [item]
-                    self._changed.notify()
+            for item in self._items(self._stopped):
+                with suppress(queue.Empty):
+                    self._held.get_nowait()
+                    self.dropped += 1
+                self._held.put((item,))
         except BaseException as error:
             end = error
-        with self._changed:
-            self._end = end
-            self._changed.notify()
+        if not self._stopped.is_set():
+            self._held.put(end)
 
     def __iter__(self) -> Iterator[Item]:
         while True:
-            with self._changed:
-                while not self._held and self._end is None:
-                    # Woken now and then, so that Ctrl-C works on every system.
-                    self._changed.wait(0.5)
-                if not self._held:
-                    if self._end is not None and not isinstance(self._end, StopIteration):
-                        raise self._end
-                    return
-                item = self._held.pop()
-            yield item
+            try:
+                # Woken now and then, so that Ctrl-C works on every system.
+                held = self._held.get(timeout=0.5)
+            except queue.Empty:
+                continue
+            if isinstance(held, StopIteration):
+                return
+            if isinstance(held, BaseException):
+                raise held
+            yield held[0]
 
 
 class Identities:

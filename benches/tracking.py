@@ -23,7 +23,7 @@ from trackeval.metrics import CLEAR, HOTA, Identity
 from limo_hog import PeopleDetector
 from limo_hog.detections import Detections
 from limo_hog.suppression import intersection_over_union
-from limo_hog.tracking import TRACKERS, Tracker
+from limo_hog.tracking import FED, TRACKERS, Tracker
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.world.scenario import Scenario
 
@@ -75,7 +75,7 @@ def answers(frames: list[Frame], how: str, fps: float) -> Iterator[Detections]:
         if tracker:
             yield tracker.update(frame.found)
         else:
-            sure = frame.found[frame.found.scores >= 0]
+            sure = frame.found[frame.found.scores >= Tracker().lowest + FED]
             yield dataclasses.replace(sure, ids=np.array([next(numbers) for _ in sure.scores], np.int64))
 
 

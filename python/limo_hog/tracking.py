@@ -16,6 +16,7 @@ import numpy as np
 from limo_hog.detections import Detections
 from limo_hog.exceptions import ParameterError
 from limo_hog.extras import needed
+from limo_hog.models import load_model
 
 #: Class of each tracker in `trackers`.
 TRACKERS = MappingProxyType({"bytetrack": "ByteTrackTracker", "ocsort": "OCSORTTracker", "sort": "SORTTracker"})
@@ -35,7 +36,7 @@ class Tracker:
     name
         "bytetrack", "ocsort" or "sort". docs/detect.md compares them.
     threshold
-        Least SVM margin of a box that may be a new person; other boxes only continue one.
+        Least SVM margin of a box that may be a new person; other boxes only continue one. None: that of our weights.
     fps
         Pictures a second [Hz].
 
@@ -47,13 +48,13 @@ class Tracker:
         `trackers` is not installed.
     """
 
-    def __init__(self, name: str = "bytetrack", threshold: float = 0.0, fps: float = 25.0) -> None:
+    def __init__(self, name: str = "bytetrack", threshold: float | None = None, fps: float = 25.0) -> None:
         if name not in TRACKERS:
             raise ParameterError(f"tracker is {name!r}; one of {', '.join(TRACKERS)} is wanted")
         with needed(by="tracking people"):
             import trackers
         self._tracker = getattr(trackers, TRACKERS[name])(frame_rate=fps, **_SETTINGS)
-        self.set_threshold(threshold)
+        self.set_threshold(load_model("limo").threshold if threshold is None else threshold)
 
     @property
     def lowest(self) -> float:

@@ -10,13 +10,15 @@ import csv
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 import av
@@ -62,6 +64,14 @@ SHORT = (
     "score --scenario empty --seeds 2 --seconds 1 --controller approach --json s.json --csv s.csv --plot s.png",
     "export --frames 3 --out yard --depth",
     "follow --scenario no_such",
+)
+#: Those that ask for a robot at work, which is `arena --ros2`.
+AT_A_ROBOT = (
+    "topic list",
+    "topic hz /scan --seconds 2",
+    "topic echo /odom --once",
+    "topic echo /odom --seconds 2",
+    "follow --ros2 --seconds 3 --json lines.json",
 )
 TERMINALS = (">&-", "2>&-", "<&-", ">&- 2>&-", "| head -1", "ascii")
 ASCII = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
@@ -148,31 +158,50 @@ def broken(path: Path) -> str:
 
 
 def terminals(_: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
-    """Each of `SHORT` in each terminal ends with the code and the files of an ordinary one, and tells as little."""
+    """Each short command in each terminal ends with the code and the files of an ordinary one, and tells as little."""
     material(folder)
     ends: Counter[str] = Counter()
     findings = []
-    for number, typed in enumerate(SHORT[:count]):
+    for number, typed in enumerate((*SHORT, *AT_A_ROBOT)[:count]):
         ordinary: tuple[int, list[str], int] | None = None
-        for how in ("", *TERMINALS):
-            place = _place(folder, f"{number} {how}".replace("/", ""))
-            shell = "" if how == "ascii" else how
-            command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", *LIMO_HOG, *typed.split()]
-            env = {**os.environ, **(ASCII if how == "ascii" else {})}
-            done = subprocess.run(command, check=False, capture_output=True, cwd=place, timeout=LATEST_S, env=env)
-            told = done.stderr.decode(errors="replace")
-            written = _written(place)
-            found = done.returncode, sorted(written), len(told.splitlines())
-            ordinary = ordinary or found
-            # What lists to a reader who leaves has done its work.
-            left = how == "| head -1" and not written and found[0] == 1
-            if (found[0] != ordinary[0] and not left) or found[1] != ordinary[1] or found[2] > max(1, ordinary[2]):
-                findings.append(f"{typed} {how}: {found}, ordinary {ordinary}: {told[-300:]}")
-            if "Traceback" in told or "Error" in told or (how == "ascii" and not done.stdout.isascii()):
-                findings.append(f"{typed} {how}: {told[-300:]}")
-            findings += [f"{typed} {how}: {name}: {why}" for name, path in written.items() if (why := broken(path))]
-            ends[str(done.returncode)] += 1
+        with _robot() if typed in AT_A_ROBOT else nullcontext():
+            for how in ("", *TERMINALS):
+                place = _place(folder, f"{number} {how}".replace("/", ""))
+                done = _in_terminal(how, typed, place)
+                told = done.stderr.decode(errors="replace")
+                written = _written(place)
+                # How often a follower changes its mind in three seconds is the run's.
+                lines = [line for line in told.splitlines() if not re.match(r"\d+\.\d s ", line)]
+                found = done.returncode, sorted(written), len(lines)
+                ordinary = ordinary or found
+                # What lists to a reader who leaves has done its work.
+                left = how == "| head -1" and not written and found[0] == 1
+                wrong = (found[0] != ordinary[0] and not left) or found[1] != ordinary[1]
+                if wrong or found[2] > max(1, ordinary[2]):
+                    findings.append(f"{typed} {how}: {found}, ordinary {ordinary}: {told[-300:]}")
+                if "Traceback" in told or "Error" in told or (how == "ascii" and not done.stdout.isascii()):
+                    findings.append(f"{typed} {how}: {told[-300:]}")
+                findings += [f"{typed} {how}: {name}: {why}" for name, path in written.items() if (why := broken(path))]
+                ends[str(done.returncode)] += 1
+                print(f"{typed} {how}: {found}", flush=True)
     return ends, findings
+
+
+def _in_terminal(how: str, typed: str, place: Path) -> subprocess.CompletedProcess[bytes]:
+    shell, env = ("", ASCII) if how == "ascii" else (how, {})
+    command = ["bash", "-c", f'set -o pipefail; "$@" {shell}', "-", *LIMO_HOG, *typed.split()]
+    surroundings = {**os.environ, **env}
+    return subprocess.run(command, check=False, capture_output=True, cwd=place, timeout=LATEST_S, env=surroundings)
+
+
+@contextmanager
+def _robot() -> Iterator[None]:
+    command = [*LIMO_HOG, "arena", "--ros2"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as robot:
+        assert robot.stdout is not None and b"is in ROS domain" in robot.stdout.readline()
+        yield
+        robot.terminate()
+        assert robot.wait(RUNS_ON_S) == 128 + signal.SIGTERM
 
 
 def _running(mark: str) -> list[int]:

@@ -10,8 +10,3 @@ def param(default: Any, unit: str, meaning: str, low: float | None = None, high:
     """Return a dataclass field: default, unit or "1", meaning, and the bounds it may be set within while driving."""
     about: dict[str, Any] = {"unit": "" if unit == "1" else unit, "tooltip": meaning}
     return dataclasses.field(default=default, metadata=about if high is None else about | {"low": low, "high": high})
-
-
-def bounded(default: float, low: float, high: float) -> Any:
-    """Return a dataclass field with a default and bounds; unit and meaning stand in the class's docstring."""
-    return dataclasses.field(default=default, metadata={"low": low, "high": high})

@@ -28,8 +28,8 @@ class Parameter:
     #: low, high: what it may be, both included
     low: float
     high: float
-    unit: str = ""  #: its unit, such as "m"; empty where it has none
-    tooltip: str = ""  #: what it does, in a sentence
+    unit: str  #: its unit, such as "m" or "frames"
+    tooltip: str  #: what it does, in a sentence
 
     @property
     def whole(self) -> bool:

@@ -111,7 +111,7 @@ def test_a_track_that_is_another_by_nine_in_ten_is_left_only_where_it_is_measure
 
 def test_a_track_that_is_just_as_likely_as_is_possible_is_kept() -> None:
     # Chances that no frame changes, and a bound that floating point holds exactly.
-    exact = replace(SELECTION, possible=0.25, identity=replace(SELECTION.identity, passes=0.0))
+    exact = replace(SELECTION, other_below=0.25, identity=replace(SELECTION.identity, passes=0.0))
     for chance, number in ((0.25, 1), (0.2499, None)):
         assert exact.choose(at(NOW, plain(1)), Choice(1, known(one=chance), NOW)).number == number
 

@@ -138,11 +138,11 @@ def test_every_few_frames_it_looks_at_the_whole_image() -> None:
     world = World()
     state = run(world, 3.0).state
     whole = []
-    for frame in range(CONTROLLER.full_every * 4):
+    for frame in range(CONTROLLER.whole_image_every * 4):
         decision = run(world, 0.1, state)
         state = decision.state
         whole += [frame] if decision.region is None else []
-    assert np.diff(whole).tolist() == [CONTROLLER.full_every] * 3
+    assert np.diff(whole).tolist() == [CONTROLLER.whole_image_every] * 3
 
 
 def test_a_late_frame_does_not_make_it_swing() -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 import socket
 import statistics
 import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -16,6 +17,7 @@ from tests.sim.logs import steps_of
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO
 from limo_hog.live.controls import Parameter, ParameterError
 from limo_hog.live.pace import Pace
@@ -69,9 +71,9 @@ def test_a_paused_run_goes_on_one_step_at_a_time() -> None:
 def test_a_parameter_changes_the_controller_and_keeps_its_kind() -> None:
     tunable: Tunable[Any] = Tunable(controller_named("tracking", None))
     tunable.set("target_distance", 2)
-    tunable.set("full_every", 5.0)
+    tunable.set("whole_image_every", 5.0)
     assert tunable.parameters["target_distance"].value == 2.0
-    assert type(tunable.parameters["full_every"].value) is int
+    assert type(tunable.parameters["whole_image_every"].value) is int
     tunable.set("steering.max_linear", 0.3)
     assert tunable.parameters["steering.max_linear"].value == 0.3
     assert tunable.parameters["steering.max_angular"].value == 1.5
@@ -123,33 +125,14 @@ def test_the_depth_scale_has_the_colours_of_the_depth_picture() -> None:
 
 @dataclass(frozen=True)
 class _Inner:
-    """Numbers of a part.
-
-    Attributes
-    ----------
-    shown, hidden
-        The first has bounds [m, s].
-    """
-
-    shown: float = field(default=2.0, metadata={"low": 1.0, "high": 3.0})
-    hidden: float = 1.0
+    shown: float = param(2.0, "m", "Has bounds.", 1.0, 3.0)
+    hidden: float = param(1.0, "s", "Has none.")
 
 
 @dataclass(frozen=True)
 class _Outer:
-    """A controller in name only.
-
-    Attributes
-    ----------
-    gain
-        Speed for each metre of
-        error [1/s].
-    name
-        No number.
-    """
-
-    gain: float = 0.5
-    count: int = field(default=4, metadata={"low": 1, "high": 9, "unit": "frames", "tooltip": "How many."})
+    gain: float = param(0.5, "1/s", "Speed for each metre of error.", 0, 5)
+    count: int = param(4, "frames", "How many.", 1, 9)
     name: str = "x"
     on: bool = True
     inner: _Inner = _Inner()
@@ -160,7 +143,7 @@ def test_a_parameter_brings_its_bounds_unit_and_tooltip() -> None:
     assert list(tunable.parameters.values()) == [
         Parameter("gain", 0.5, 0, 5.0, "1/s", "Speed for each metre of error."),
         Parameter("count", 4, 1, 9, "frames", "How many."),
-        Parameter("inner.shown", 2.0, 1.0, 3.0, "m", "The first has bounds."),
+        Parameter("inner.shown", 2.0, 1.0, 3.0, "m", "Has bounds."),
     ]
     tunable.set("inner.shown", 3)
     assert tunable.parameters["inner.shown"].value == 3.0
@@ -178,10 +161,12 @@ def test_a_parameter_brings_its_bounds_unit_and_tooltip() -> None:
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
-def test_every_parameter_of_ours_says_what_it_does(name: str) -> None:
-    for one in Tunable(controller_named(name, None)).parameters.values():
-        assert len(one.tooltip) > 10, one.name
-        assert one.low <= one.value <= one.high, one.name
+def test_every_slider_has_a_unit_bounds_and_one_sentence_of_its_own(name: str) -> None:
+    sliders = Tunable(controller_named(name, None)).parameters.values()
+    for one in sliders:
+        assert re.fullmatch(r"[A-Z][^.]{10,100}\.", one.tooltip), one.name
+        assert one.unit and one.low < one.high and one.low <= one.value <= one.high, one.name
+    assert len({one.tooltip for one in sliders}) == len(sliders)
 
 
 @pytest.mark.parametrize("bound", ["low", "high"])

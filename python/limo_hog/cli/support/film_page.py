@@ -42,7 +42,8 @@ class FilmPage(Live[Shown]):
 
     def __init__(self, threshold: float, set_threshold: Callable[[float], None], host: str, port: int) -> None:
         super().__init__("limo_hog.live", self._set, host, port)
-        self.threshold, self._use = Parameter("threshold", threshold, _LOWEST, _HIGHEST), set_threshold
+        about = ("SVM margin", "Least margin of a box that is shown.")
+        self.threshold, self._use = Parameter("threshold", threshold, _LOWEST, _HIGHEST, *about), set_threshold
         self._times: list[float] = []
 
     def watch(self, moment: Shown, at: float | None) -> None:

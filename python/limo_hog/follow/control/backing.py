@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.control.steer import Aim
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Margin, Points, places_behind, rooms_ahead, to_odometry
 from limo_hog.follow.sense.measurement import WALK
@@ -46,49 +46,47 @@ class Backing:
 
     Attributes
     ----------
-    remembers_s
-        How long ground seen to be free counts as known, and how long other people are remembered [s]. Chosen: a second
-        less than `Guard.memory_s`, so that `Guard` does not slow the robot down on ground taken for known.
-    lately_s
-        Where a person out of sight can be, it must have been seen within this [s]. Chosen: at .75 m/s a person comes
-        up from 3.5 m, the reach of the legs in the scan.
-    unseen_s, same, walk
-        A person not measured for longer than this is out of sight [s], and can be that far from where they were, and so
-        much further for each second since [m, m/s]. Chosen: as long as one is predicted; a body's width; a walk.
-    blind_speed
-        Onto ground that is not known, but where no person out of sight can be, it backs at this speed at most [m/s];
-        else not at all. Chosen: `Guard`'s limit.
-    glance_turn, glance_from
-        Turn rate to look behind before backing, and how much too near a person must be for that [rad/s, m]. Chosen:
-        82°, which shows the ground behind, in .7 s; nearer, HOG would miss the head. Until then it stands.
     depths
         So far behind the outline the ground must be known [m]. Chosen: from .5 m/s the robot stops within .26 m, from
         .6 m/s within .33 m, by its whole brakes.
     offs
         To back, the robot faces one of these directions beside the person's [rad]. Chosen: they stay in the image, half
         of which is .62 rad wide.
-    enough, aside
-        More room behind than this gains nothing, and a radian beside the person's direction costs so much of it [m].
-        Measured in 32 development runs of the corridor: with .5 m two end with a contact, with 1 m none; with .5 m a
-        radian a person comes as near as .32 m, with .2 m as .63 m.
     margins, shares
         The room is that within each of these margins, by these shares [1]. Chosen: what `Guard` keeps; and 6 cm more
         beside, since along a wall's end that is just outside of what `Guard` keeps an error of 4° stops the robot.
         The wider one alone ended one of 23 such runs with a contact.
     """
 
-    remembers_s: float = bounded(59.0, 0, 3600)
-    lately_s: float = bounded(5.0, 0, 600)
-    unseen_s: float = bounded(0.8, 0, 60)
-    same: float = bounded(0.5, 0, 5)
-    walk: float = bounded(WALK, 0, 5)
-    blind_speed: float = bounded(0.2, 0, 1)
-    glance_turn: float = bounded(3.0, 0, 6)
-    glance_from: float = bounded(0.25, 0, 2)
+    # Chosen: a second less than `Guard.memory_s`, so that `Guard` does not slow the robot down on ground taken for
+    # known.
+    memory_s: float = param(
+        59.0, "s", "How long ground seen to be free counts as known, and how long other people are remembered.", 0, 3600
+    )
+    # Chosen: at .75 m/s a person comes up from 3.5 m, the reach of the legs in the scan.
+    hidden_memory_s: float = param(
+        5.0, "s", "How long ground counts as known where a person out of sight can be by now.", 0, 600
+    )
+    # Chosen: as long as one is predicted, a body's width, a walk.
+    unseen_s: float = param(0.8, "s", "A person not measured for longer than this is out of sight.", 0, 60)
+    hidden_radius: float = param(0.5, "m", "A person out of sight can be this far from where they were.", 0, 5)
+    hidden_speed: float = param(WALK, "m/s", "Speed at which a person out of sight may have walked on.", 0, 5)
+    # Chosen: `Guard`'s limit.
+    unseen_speed: float = param(
+        0.2, "m/s", "Limit of the speed back onto ground that was not seen, where no person out of sight can be.", 0, 1
+    )
+    # Chosen: 82°, which shows the ground behind, in .7 s.
+    glance_turn: float = param(3.0, "rad/s", "Turn rate to look behind before backing.", 0, 6)
+    # Chosen: nearer, HOG would miss the head.
+    glance_excess: float = param(
+        0.25, "m", "How much too near a person must be for a look behind; until then the robot stands.", 0, 2
+    )
     depths: tuple[float, ...] = (0.1, 0.2, 0.3)
     offs: tuple[float, ...] = (0.0, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3, 0.4, -0.4, 0.5, -0.5)
-    enough: float = bounded(1.0, 0, 5)
-    aside: float = bounded(0.2, 0, 5)
+    # Measured in 32 development runs of the corridor: with .5 m two end with a contact, with 1 m none; with .5 m a
+    # radian a person comes as near as .32 m, with .2 m as .63 m.
+    enough_room: float = param(1.0, "m", "More room behind than this gains nothing.", 0, 5)
+    turn_cost: float = param(0.2, "m/rad", "Room behind that a radian beside the person's direction costs.", 0, 5)
     margins: tuple[Margin, ...] = (Margin(), Margin(beside=0.26))
     shares: tuple[float, ...] = (0.7, 0.3)
 
@@ -113,7 +111,8 @@ class Backing:
         left = [
             one
             for one in others
-            if now - one.at < self.remembers_s and all(math.dist(place, (one.x, one.y)) > self.same for place in own)
+            if now - one.at < self.memory_s
+            and all(math.dist(place, (one.x, one.y)) > self.hidden_radius for place in own)
         ]
         kept: list[Other] = []
         for x, y in seen.tolist():
@@ -123,7 +122,7 @@ class Backing:
             kept.append(Other(x, y, now))
         for one in left:
             gap, x, y = min(((math.dist((x, y), (one.x, one.y)), x, y) for x, y in legs), default=(math.inf, 0.0, 0.0))
-            kept.append(Other(x, y, now) if gap < self.same else one)
+            kept.append(Other(x, y, now) if gap < self.hidden_radius else one)
         return tuple(kept)
 
     def can_hold_other(self, others: tuple[Other, ...], places: Points, now: float) -> NDArray[np.bool_]:
@@ -153,7 +152,7 @@ class Backing:
         x = poses[..., 0, None] + behind[:, 0] * cos - behind[:, 1] * sin
         y = poses[..., 1, None] + behind[:, 0] * sin + behind[:, 1] * cos
         places = to_odometry(np.stack([x.ravel(), y.ravel()], axis=1), pose)
-        within = np.where(self.can_hold_other(others, places, ground.stamp), self.lately_s, self.remembers_s)
+        within = np.where(self.can_hold_other(others, places, ground.stamp), self.hidden_memory_s, self.memory_s)
         known = grid.is_free_since(ground, places, ground.stamp - within)
         return np.asarray(known.reshape(x.shape).all(axis=-1))
 
@@ -172,9 +171,9 @@ class Backing:
             Its outline.
         """
         offs = np.array(self.offs)
-        worth = -self.aside * np.abs(offs)
+        worth = -self.turn_cost * np.abs(offs)
         for share, margin in zip(self.shares, self.margins, strict=True):
-            worth += share * np.minimum(rooms_ahead(-points, bearing + offs, margin, robot), self.enough)
+            worth += share * np.minimum(rooms_ahead(-points, bearing + offs, margin, robot), self.enough_room)
         return bearing + self.offs[int(np.argmax(worth))]
 
     def is_blocked(self, pose: Odometry, grid: Grid, ground: Ground | None, robot: RobotGeometry) -> bool:
@@ -186,9 +185,9 @@ class Backing:
     def blind_limit(self, others: tuple[Other, ...], pose: Odometry, robot: RobotGeometry, now: float) -> float:
         """Return how fast to back onto unknown ground [m/s]."""
         if not self._out_of_sight(others, now):
-            return self.blind_speed
+            return self.unseen_speed
         behind = to_odometry(places_behind(self.depths, robot), pose)
-        return 0.0 if self.can_hold_other(others, behind, now).any() else self.blind_speed
+        return 0.0 if self.can_hold_other(others, behind, now).any() else self.unseen_speed
 
     def blindly(
         self, twist: Twist, limit: float, aim: Aim, too_far: float, walking: float, reason: str
@@ -213,7 +212,7 @@ class Backing:
         if limit > 0:
             return replace(twist, linear=max(twist.linear, -limit)), reason
         walks = max(abs(aim.range_rate), abs(aim.bearing_rate) * aim.distance) > walking
-        if walks or too_far > -self.glance_from:
+        if walks or too_far > -self.glance_excess:
             return Twist(0.0, twist.angular), reason
         side = -1.0 if aim.bearing > 0 else 1.0
         return Twist(0.0, side * self.glance_turn), "looking behind before backing"
@@ -222,7 +221,7 @@ class Backing:
         return [one for one in others if now - one.at > self.unseen_s]
 
     def _reach(self, one: Other, now: float) -> float:
-        return self.same + self.walk * (now - one.at)
+        return self.hidden_radius + self.hidden_speed * (now - one.at)
 
     def _gap(self, one: Other, x: float, y: float, now: float) -> float:
         """Return how much further off a place is than a person can have walked [m]."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.control.backing import Poses
 from limo_hog.follow.control.steer import advanced, all_advanced, stoppable_turn
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
@@ -88,29 +88,15 @@ class Company:
 
     Attributes
     ----------
-    notice_s
-        People who come near within this are given way to [s]. Chosen: at 1.5 m/s a person comes from 4 m away.
-    horizon_s, step_s
-        How far ways are compared, and in which steps [s]. Chosen: longer, since a person walks faster than the robot
-        backs and would catch up with it.
-    slowest
-        People slower than this do not come [m/s]. Chosen: twice what a standing person's estimate strays.
-    sway
-        Error of a person's velocity across their way [m/s]. Measured: up to .4 while the robot turns. Chosen: half.
+    step_s
+        Ways are compared in these steps [s].
     weights
-        Of the distances without, with and against this error [1]. Chosen: the prediction counts most.
-    clear
-        Distance wanted between the robot's outline and a person's axis [m]. Chosen: the .3 m of clearance asked for,
-        half a trunk of .15 m, and .2 m for the prediction: with .1 m, people who walked at the robot came up to .16 m
-        nearer.
-    notice_other_s, clear_other
-        The same of people who are not followed, who pass close by as people do [s, m]. Chosen: the time to stop or to
-        turn aside; .2 m of clearance.
+        Of the distances without, with and against `velocity_error` [1]. Chosen: the prediction counts most.
     wanted, wanted_other
         Of more distance than this nothing is gained: where the person followed comes, and where only others come [m].
-        Chosen: `clear` and `clear_other`, and half a trunk.
+        Chosen: `clearance` and `clearance_other`, and half a trunk.
     short
-        How often a distance short of `clear_other` counts besides, where only others come [1]. Chosen with `away`:
+        How often a distance short of `clearance_other` counts besides, where only others come [1]. Chosen with `away`:
         without it, the robot would keep looking at the person followed while another walks into it.
     walls
         Distance kept from everything else [m]. Chosen: `Guard` keeps more ahead and behind, where it can.
@@ -120,11 +106,11 @@ class Company:
     never
         What a way costs that ends at a wall or backs blindly [m]. Chosen: more than all distances together are worth.
     speeds, turns
-        Ways compared [m/s, rad]. Chosen: what the drive can do and `Guard` lets it back at, and `Backing.blind_speed`;
+        Ways compared [m/s, rad]. Chosen: what the drive can do and `Guard` lets it back at, and `Backing.unseen_speed`;
         directions half a person's width apart after half a metre, none from which a person ahead is out of the lidar's
         sight.
-    turn_gain, max_turn
-        Turn rate for each radian to turn [1/s], and its limit [rad/s]. Chosen: to a right angle in .8 s.
+    turn_gain
+        Turn rate for each radian to turn [1/s]. Chosen: to a right angle in .8 s.
     ease
         What a change of speed by 1 m/s, and a turn by 2.5 rad, are worth [m]. Chosen: of ways that clear people alike,
         to within the error of their places, the easiest.
@@ -144,15 +130,28 @@ class Company:
         [m]. Chosen: the Limo's; the error of a place that is not measured for a second.
     """
 
-    notice_s: float = bounded(2.8, 0, 10)
-    horizon_s: float = bounded(4.0, 0, 10)
+    # Chosen: at 1.5 m/s a person comes from 4 m away.
+    notice_s: float = param(2.8, "s", "People who come near within this time are given way to.", 0, 10)
+    # Chosen: longer than `notice_s`, since a person walks faster than the robot backs and would catch up with it.
+    horizon_s: float = param(4.0, "s", "How far ahead ways are compared.", 0, 10)
     step_s: float = 0.2
-    slowest: float = bounded(0.3, 0, 2)
-    sway: float = bounded(0.2, 0, 1)
+    # Chosen: twice what a standing person's estimate strays.
+    min_speed: float = param(0.3, "m/s", "People slower than this do not come near.", 0, 2)
+    # Measured: up to .4 while the robot turns. Chosen: half.
+    velocity_error: float = param(0.2, "m/s", "Error of a person's velocity across their way.", 0, 1)
     weights: tuple[float, float, float] = (0.7, 0.15, 0.15)
-    clear: float = bounded(0.65, 0, 3)
-    notice_other_s: float = bounded(1.5, 0, 10)
-    clear_other: float = bounded(0.35, 0, 3)
+    # Chosen: the .3 m of clearance asked for, half a trunk of .15 m, and .2 m for the prediction: with .1 m, people who
+    # walked at the robot came up to .16 m nearer.
+    clearance: float = param(
+        0.65, "m", "Distance wanted between the robot's outline and the axis of the person followed.", 0, 3
+    )
+    # Chosen: the time to stop or to turn aside; .2 m of clearance.
+    notice_other_s: float = param(
+        1.5, "s", "Other people who come near within this time are given way to: they pass close by.", 0, 10
+    )
+    clearance_other: float = param(
+        0.35, "m", "Distance wanted between the robot's outline and the axis of another person.", 0, 3
+    )
     wanted: float = 0.8
     wanted_other: float = 0.5
     short: float = 2.0
@@ -163,7 +162,7 @@ class Company:
     speeds: tuple[float, ...] = (-0.6, -0.2, 0.0, 0.3, 0.6)
     turns: tuple[float, ...] = (-1.6, -1.1, -0.5, 0.0, 0.5, 1.1, 1.6)
     turn_gain: float = 4.0
-    max_turn: float = bounded(3.0, 0, 6)
+    max_turn: float = param(3.0, "rad/s", "Limit of the turn rate while giving way.", 0, 6)
     ease: float = 0.06
     settle_s: float = 0.8
     stay: float = 0.35
@@ -207,7 +206,7 @@ class Company:
         """
         people = np.array([(one.x, one.y, one.vx, one.vy) for one in walkers]).reshape(-1, 4)
         pace = np.hypot(people[:, 2], people[:, 3])
-        coming = pace > self.slowest
+        coming = pace > self.min_speed
         # Those who come no nearer than they are, whatever the robot does, need no way.
         coming &= (people[:, :2] * people[:, 2:]).sum(axis=1) < 0
         if not coming.any():
@@ -218,7 +217,7 @@ class Company:
         straight = self._driven_on(wanted, now, acceleration, robot)
         places = self._places(people)
         gaps = _outline_gap(straight[:, :, None, None], places[None], robot)
-        clear = np.where(is_followed, self.clear, self.clear_other)
+        clear = np.where(is_followed, self.clearance, self.clearance_other)
         late = np.arange(gaps.shape[1])[:, None] * self.step_s >= np.where(
             is_followed, self.notice_s, self.notice_other_s
         )
@@ -244,7 +243,7 @@ class Company:
         only_others = not is_followed.any()
         worth = np.minimum(gaps, self.wanted_other if only_others else self.wanted) @ self.weights
         if only_others:
-            worth += self.short * np.minimum(worth - self.clear_other, 0.0)
+            worth += self.short * np.minimum(worth - self.clearance_other, 0.0)
             worth -= self.away * self._away(poses, goal, robot)
         worth -= effort + self.unseen * self._unseen(poses, places[:, 0])
         worth[self._room(poses, near, robot) < self.walls] -= self.never
@@ -319,7 +318,7 @@ class Company:
         """Return where N people are in T steps, float64 (T, 3, N, 2) [m]: as predicted, and to either side of that."""
         times = np.arange(1, round(self.horizon_s / self.step_s) + 1) * self.step_s
         velocity = people[:, 2:]
-        aside = velocity[:, ::-1] * (-1.0, 1.0) / np.hypot(*velocity.T)[:, None] * self.sway
+        aside = velocity[:, ::-1] * (-1.0, 1.0) / np.hypot(*velocity.T)[:, None] * self.velocity_error
         velocities = np.stack([velocity, velocity - aside, velocity + aside])
         return np.asarray(people[:, :2] + times[:, None, None, None] * velocities)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from limo_hog.follow.control.steer import Detour
 from limo_hog.follow.decision import Mode
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Points, from_odometry
 from limo_hog.follow.sense.observation import Odometry, Scan
@@ -50,13 +50,6 @@ class Lookout:
 
     Attributes
     ----------
-    after_s
-        A person who is not measured for so long is looked for [s]. Chosen: as long as `Steering` drives by the
-        prediction.
-    speed
-        At most, on the way [m/s]. Chosen: a little less than when following.
-    turn_gain, max_turn
-        Turn rate for each radian off the way [1/s], and its limit [rad/s]. Chosen: the search's rate, and half more.
     ahead
         The point of the way that is driven to is so far off [m]. Chosen: half of the tightest corridor's width.
     aside
@@ -80,14 +73,15 @@ class Lookout:
         frames.
     least
         A place that shows a smaller share of where the person may be is not worth driving to [1].
-    give_up_s
-        Then looking round ends, and the robot turns in place [s]. Chosen: a person is a room further by then.
     """
 
-    after_s: float = bounded(0.8, 0, 30)
-    speed: float = bounded(0.6, 0, 1)
-    turn_gain: float = bounded(2.0, 0, 10)
-    max_turn: float = bounded(1.2, 0, 3)
+    # Chosen: as long as `Steering` drives by the prediction.
+    after_s: float = param(0.8, "s", "A person who is not measured for this time is looked for.", 0, 30)
+    # Chosen: a little less than when following.
+    speed: float = param(0.6, "m/s", "Limit of the speed on the way to a place to look from.", 0, 1)
+    # Chosen: the search's rate, and half more.
+    turn_gain: float = param(2.0, "1/s", "Turn rate for each radian off the way.", 0, 10)
+    max_turn: float = param(1.2, "rad/s", "Limit of the turn rate on the way.", 0, 3)
     ahead: float = 0.5
     aside: float = 0.8
     arrived: float = 0.2
@@ -99,7 +93,8 @@ class Lookout:
     stay: float = 1.5
     settle_s: float = 1.5
     least: float = 0.05
-    give_up_s: float = bounded(60.0, 0, 3600)
+    # Chosen: a person is a room further by then.
+    give_up_s: float = param(60.0, "s", "After this time looking round ends, and the robot turns in place.", 0, 3600)
     wandering: Wandering = field(default_factory=Wandering)
     router: Router = field(default_factory=Router)
 
@@ -215,20 +210,15 @@ class Lookout:
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """Turns the robot until a person is found.
+    """Turns the robot until a person is found."""
 
-    Attributes
-    ----------
-    rate
-        Turn rate [rad/s]. Chosen: a full turn in 9 s; in it the image moves by 31 px a frame, and everything is in view
-        for 17 frames, more than the 12 that confirm a person.
-    after_s
-        How long to face the predicted position of an unmeasured person before searching [s]. Chosen: a person passes
-        behind a pillar within 2 s. Behind something wider than that, `Detour.hides` extends the wait.
-    """
-
-    rate: float = bounded(0.7, 0, 3)
-    after_s: float = bounded(2.0, 0, 30)
+    # Chosen: a full turn in 9 s; in it the image moves by 31 px a frame, and everything is in view for 17 frames, more
+    # than the 12 that confirm a person.
+    rate: float = param(0.7, "rad/s", "Turn rate of the search in place.", 0, 3)
+    # Chosen: a person passes behind a pillar within 2 s. Behind something wider, `Detour.hides` extends the wait.
+    after_s: float = param(
+        2.0, "s", "How long to face the predicted position of an unmeasured person before searching.", 0, 30
+    )
 
     def command(self, side: float, *, lost: bool, other_in_view: bool) -> tuple[Twist, Mode, str]:
         """Return the command, the mode and the reason.

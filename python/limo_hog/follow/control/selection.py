@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from limo_hog.follow.control.backing import Other
 from limo_hog.follow.control.lookout import Hunt
 from limo_hog.follow.decision import Believed
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import pose_at
@@ -53,43 +53,38 @@ class Selection:
 
     Attributes
     ----------
-    min_existence
-        Probability from which a person too far away for HOG is worth driving nearer, and waiting for [1]. Chosen: three
-        clear frames.
-    max_unconfirmed_frames
-        A track that is not confirmed after so many frames, and less likely than `min_existence`, is given up [1].
-        Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
-    reidentify_s
-        How long to look for a lost person before another is followed [s]. Chosen: two full turns of the search.
-    lead
-        Probability by which another must exceed the track that is faced already [1]. Chosen: one frame of evidence.
-    aside, further
-        What a person is less likely to be meant for each radian off straight ahead and for each metre of distance,
-        before one is followed [1]. Chosen: at the image's edge three frames of evidence; two metres are worth two.
-    likely
-        Probability of being the person followed from which a track in view is followed [1]. Chosen: more likely than
-        not.
-    odds
-        And it must be so many times as likely as any other in view; else it is not sure which of them it is [1].
-        Chosen: one wrong in four guesses would be too many.
-    possible
-        A track in view that is less likely than this is another person [1]. Chosen.
-    decide_s
-        After so long the likeliest is taken [s]. Chosen: people part within a few seconds, or leave the view.
     identity
         Which track the person followed is.
     """
 
-    min_existence: float = bounded(0.4, 0, 1)
-    max_unconfirmed_frames: int = bounded(30, 1, 1000)
-    reidentify_s: float = bounded(20.0, 0, 600)
-    lead: float = bounded(0.1, 0, 1)
-    aside: float = bounded(0.6, 0, 5)
-    further: float = bounded(0.1, 0, 5)
-    likely: float = bounded(0.5, 0, 1)
-    odds: float = bounded(3.0, 1, 100)
-    possible: float = bounded(0.1, 0, 1)
-    decide_s: float = bounded(4.0, 0, 60)
+    # Chosen: three clear frames.
+    min_existence: float = param(
+        0.4, "probability", "From this on a person too far away for HOG is worth driving nearer.", 0, 1
+    )
+    # Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
+    max_unconfirmed_frames: int = param(
+        30, "frames", "After these a track that is neither confirmed nor likely is given up.", 1, 1000
+    )
+    # Chosen: two full turns of the search.
+    reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
+    # Chosen: one frame of evidence.
+    switch_lead: float = param(0.1, "probability", "By this another must exceed the person who is faced already.", 0, 1)
+    # Chosen: at the image's edge three frames of evidence; two metres are worth two.
+    bearing_cost: float = param(
+        0.6, "1/rad", "Probability that each radian off straight ahead takes from whom to choose.", 0, 5
+    )
+    distance_cost: float = param(0.1, "1/m", "Probability that each metre of distance takes from whom to choose.", 0, 5)
+    # Chosen: more likely than not.
+    min_same: float = param(0.5, "probability", "From this on a track in view is taken for the person followed.", 0, 1)
+    # Chosen: one wrong in four guesses would be too many.
+    min_same_odds: float = param(
+        3.0, "times", "The surest track must be this much likelier than any other in view.", 1, 100
+    )
+    other_below: float = param(
+        0.1, "probability", "A track in view that is less likely than this is another person.", 0, 1
+    )
+    # Chosen: people part within a few seconds, or leave the view.
+    decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)
     identity: Identity = field(default_factory=Identity)
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
@@ -105,19 +100,19 @@ class Selection:
         likeness = self.identity.update(choice.likeness, tracks)
         choice = replace(choice, likeness=likeness)
         chances, measured = dict(likeness.chances), self.measured(tracks)
-        about = [one for one in measured if chances[one.number] >= self.possible]
+        about = [one for one in measured if chances[one.number] >= self.other_below]
         about.sort(key=lambda one: -chances[one.number])
         if about:
             best, *rest = about
             chance = chances[best.number]
             next_best = chances[rest[0].number] if rest else 0.0
-            if chance >= self.likely and chance >= self.odds * next_best:
+            if chance >= self.min_same and chance >= self.min_same_odds * next_best:
                 return Choice(best.number, likeness, best.measured if chance >= self.identity.sure else choice.measured)
             since = now if choice.unsure_at is None else choice.unsure_at
             choice = replace(choice, unsure_at=since)
-            if rest and sum(chances[one.number] for one in about) >= self.likely:
+            if rest and sum(chances[one.number] for one in about) >= self.min_same:
                 if now - since > self.decide_s:
-                    likeness = replace(likeness, chances=((best.number, self.likely),))
+                    likeness = replace(likeness, chances=((best.number, self.min_same),))
                     return Choice(best.number, likeness, choice.measured)
                 return replace(choice, candidates=tuple(one.number for one in about))
             if best.number != choice.number and now - since <= self.decide_s:
@@ -125,7 +120,7 @@ class Selection:
                 return replace(choice, candidates=(best.number,))
         choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)
         followed = tracks.person(choice.number)
-        if followed is not None and followed in measured and chances[followed.number] < self.possible:
+        if followed is not None and followed in measured and chances[followed.number] < self.other_below:
             # The track went over to another person.
             return replace(choice, number=None)
         if followed is not None and not self.is_candidate(followed):
@@ -151,8 +146,8 @@ class Selection:
 
         def rank(one: Person) -> float:
             off, distance = bearing_range(one.track, pose)
-            lead = self.lead * (one is followed)
-            return one.existence - self.aside * abs(off) - self.further * distance + lead
+            lead = self.switch_lead * (one is followed)
+            return one.existence - self.bearing_cost * abs(off) - self.distance_cost * distance + lead
 
         return replace(choice, number=max(candidates, key=rank).number)
 
@@ -162,7 +157,7 @@ class Selection:
 
     def is_stranger(self, person: Person, choice: Choice) -> bool:
         """Whether a person is not the one followed before."""
-        return choice.likeness is not None and choice.likeness.of(person.number) < self.likely
+        return choice.likeness is not None and choice.likeness.of(person.number) < self.min_same
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.decision import Mode
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Margin, Points, rooms_ahead
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
@@ -43,39 +43,27 @@ class Aim:
 
 @dataclass(frozen=True, slots=True)
 class Steering:
-    """Two proportional controllers, of bearing and of distance, with the person's motion added.
+    """Two proportional controllers, of bearing and of distance, with the person's motion added."""
 
-    Attributes
-    ----------
-    linear_gain, angular_gain
-        Speed for each metre, turn rate for each radian of error [1/s]. Chosen: errors halve in .9 and .3 s, slower than
-        the wheels' 1 m/s² and the camera's 10 Hz.
-    max_linear, max_angular
-        Limits of the command, either way [m/s, rad/s]. Chosen: .7 m/s is close to the workshop's walker, .75 m/s.
-    regain_angular
-        Limit of the turn rate while the person is out of the image [rad/s]. Chosen: half a turn a second.
-    distance_tolerance, bearing_tolerance
-        Smaller errors are not corrected [m, rad]. Chosen: a little more than one measurement strays.
-    steady_bearing_rate, steady_range_rate
-        A person whose bearing and range change more slowly stands [rad/s, m/s]. Chosen: at 1.5 m both are a walk of
-        less than .1 m/s.
-    coast_s
-        How long to drive by the prediction alone [s]. Chosen: .5 m at .6 m/s, within the margin of an obstacle.
-    doubt_speed
-        Share of `max_linear` at which to drive to a person who is not confirmed [1]. Chosen.
-    """
-
-    linear_gain: float = bounded(0.8, 0, 5)
-    angular_gain: float = bounded(2.5, 0, 10)
-    max_linear: float = bounded(0.7, 0, 1)
-    max_angular: float = bounded(1.5, 0, 3)
-    regain_angular: float = bounded(3.0, 0, 6)
-    distance_tolerance: float = bounded(0.08, 0, 1)
-    bearing_tolerance: float = bounded(0.02, 0, 0.5)
-    steady_bearing_rate: float = bounded(0.05, 0, 1)
-    steady_range_rate: float = bounded(0.1, 0, 1)
-    coast_s: float = bounded(0.8, 0, 5)
-    doubt_speed: float = bounded(0.5, 0, 1)
+    # Chosen: errors halve in .9 and .3 s, slower than the wheels' 1 m/s² and the camera's 10 Hz.
+    linear_gain: float = param(0.8, "1/s", "Speed for each metre of error.", 0, 5)
+    angular_gain: float = param(2.5, "1/s", "Turn rate for each radian of error.", 0, 10)
+    # Chosen: close to the workshop's walker, .75 m/s.
+    max_linear: float = param(0.7, "m/s", "Limit of the speed, either way.", 0, 1)
+    max_angular: float = param(1.5, "rad/s", "Limit of the turn rate, either way.", 0, 3)
+    # Chosen: half a turn a second.
+    regain_angular: float = param(3.0, "rad/s", "Limit of the turn rate while the person is out of the image.", 0, 6)
+    # Chosen: a little more than one measurement strays.
+    distance_tolerance: float = param(0.08, "m", "Smaller errors of the distance are not corrected.", 0, 1)
+    bearing_tolerance: float = param(0.02, "rad", "Smaller errors of the bearing are not corrected.", 0, 0.5)
+    # Chosen: at 1.5 m both are a walk of less than .1 m/s.
+    steady_bearing_rate: float = param(0.05, "rad/s", "A person whose bearing changes more slowly stands.", 0, 1)
+    steady_range_rate: float = param(0.1, "m/s", "A person whose range changes more slowly stands.", 0, 1)
+    # Chosen: .5 m at .6 m/s, within the margin of an obstacle.
+    coast_s: float = param(0.8, "s", "How long to drive by the prediction alone.", 0, 5)
+    unconfirmed_share: float = param(
+        0.5, "share", "Share of `max_linear` at which to drive to a person who is not confirmed.", 0, 1
+    )
 
     def command(
         self,
@@ -118,7 +106,7 @@ class Steering:
         if not confirmed and linear > 0:
             if not worth_nearing:
                 return Twist(0.0, angular), Mode.FOLLOW, "turning to a possible person"
-            linear = min(linear, self.max_linear * self.doubt_speed)
+            linear = min(linear, self.max_linear * self.unconfirmed_share)
             return Twist(linear, angular), Mode.FOLLOW, "driving nearer to a possible person"
         if abs(error) < self.distance_tolerance and abs(aim.range_rate) < self.steady_range_rate:
             if abs(aim.bearing) < self.bearing_tolerance and abs(aim.bearing_rate) < self.steady_bearing_rate:
@@ -251,8 +239,6 @@ class Wheels:
 
     Attributes
     ----------
-    acceleration
-        Of each wheel, until it is measured [m/s²]: the Limo's.
     least
         A lower measured one is not believed [m/s²]: `Guard` may have held the robot. Chosen: half of the weakest drive
         that was tried.
@@ -264,7 +250,7 @@ class Wheels:
         half a period late, and stronger wheels than believed show.
     """
 
-    acceleration: float = bounded(1.0, 0.05, 10)
+    acceleration: float = param(1.0, "m/s²", "Acceleration of each wheel, until it is measured.", 0.05, 10)
     least: float = 0.15
     raise_share: float = 0.5
     lower_share: float = 0.15

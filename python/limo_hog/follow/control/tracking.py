@@ -14,7 +14,7 @@ from limo_hog.follow.control.lookout import Lookout, Search
 from limo_hog.follow.control.selection import Choice, Selection, TrackingState, believed
 from limo_hog.follow.control.steer import Aim, Detour, Steering, Wheels, stoppable_turn
 from limo_hog.follow.decision import Belief, Decision, Mode
-from limo_hog.follow.parameters import bounded
+from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, Points, scan_points, to_odometry
 from limo_hog.follow.sense.detectors import Region, RegionSize
@@ -32,21 +32,6 @@ class TrackingController:
 
     Attributes
     ----------
-    target_distance
-        Distance to hold, as the depth image measures it [m].
-    full_every
-        Every so many frames the whole image is searched [1]. Chosen: another person is noticed within 1.5 s.
-    aside_s, brisk_share
-        A person who walks fast is kept off by so many seconds of their way, at 1 m/s² of the wheels, and what the image
-        is late [s]; share by which a faster frame, and a hundredth of that by which a slower one, moves the speed [1].
-        Computed: .2 s to notice a start, .7 s to turn aside, .8 s to drive .3 m; .2 s more, measured: of ten people at
-        1.5 m/s the nearest comes to .47 m, not .44. At a walk that is less than 1.6 m.
-    prompt_s
-        By what an image is later than this, its period included, a person who turns and the robot come nearer to each
-        other unseen: the least distance grows by their way in it [s]. The workshop's camera period.
-    near_hiding, foresight_s
-        Distance to hold to a person who will be out of sight after so long [m, s]. Chosen: the edge of Hall's personal
-        zone; the time in which the robot comes up by that much.
     steering
         From the followed person's position to a command.
     search
@@ -69,13 +54,34 @@ class TrackingController:
         Where camera and lidar sit.
     """
 
-    target_distance: float = bounded(1.5, 0.1, 8)
-    full_every: int = bounded(15, 1, 1000)
-    aside_s: float = bounded(1.9, 0, 5)
-    brisk_share: float = bounded(0.15, 0, 1)
-    prompt_s: float = bounded(0.1, 0, 5)
-    near_hiding: float = bounded(1.2, 0.5, 8)
-    foresight_s: float = bounded(1.0, 0, 5)
+    target_distance: float = param(1.5, "m", "Distance to hold, as the depth image measures it.", 0.1, 8)
+    # Chosen: another person is noticed within 1.5 s.
+    whole_image_every: int = param(
+        15,
+        "frames",
+        "Once in this many frames the whole image is searched, else a region.",
+        1,
+        1000,
+    )
+    # Computed, at 1 m/s² of the wheels: .2 s to notice a start, .7 s to turn aside, .8 s to drive .3 m; .2 s more,
+    # measured: of ten people at 1.5 m/s the nearest comes to .47 m, not .44. At a walk that is less than 1.6 m.
+    headway_s: float = param(1.9, "s", "The robot keeps off a fast walker by the way they walk in this time.", 0, 5)
+    speed_rise: float = param(
+        0.15,
+        "share",
+        "Share by which a faster frame raises a person's top speed; a slower one lowers it by a hundredth.",
+        0,
+        1,
+    )
+    # The workshop's camera period. In a longer one a person who turns and the robot come nearer to each other unseen.
+    usual_delay_s: float = param(
+        0.1, "s", "Delay of an image, its period included, up to which no distance is added.", 0, 5
+    )
+    # Chosen: the edge of Hall's personal zone; the time in which the robot comes up by that much.
+    hiding_distance: float = param(1.2, "m", "Distance to hold to a person who will soon be out of sight.", 0.5, 8)
+    hiding_foresight_s: float = param(
+        1.0, "s", "How far ahead it is foreseen that a person will be out of sight.", 0, 5
+    )
     steering: Steering = field(default_factory=Steering)
     search: Search = field(default_factory=Search)
     selection: Selection = field(default_factory=Selection)
@@ -141,7 +147,7 @@ class TrackingController:
             # Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
             known = person.track if person.confirmed and self._is_sure(person, choice) else state.known
             speed = math.hypot(*person.track.mean[2:])
-            share = self.brisk_share if speed > state.brisk else self.brisk_share / 100
+            share = self.speed_rise if speed > state.brisk else self.speed_rise / 100
             brisk = state.brisk + share * (speed - state.brisk)
             state = replace(state, side=self.steering.side_of(aim), known=known, hunt=None, brisk=brisk)
         can_look = state.ground is not None and state.known is not None and person.confirmed
@@ -180,7 +186,7 @@ class TrackingController:
                 twist = Twist(0.0, twist.angular)
             elif not seen_free:
                 limit = self.backing.blind_limit(others, pose, self.robot, observation.now)
-                twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.slowest, reason)
+                twist, reason = self.backing.blindly(twist, limit, aim, wanted, self.company.min_speed, reason)
         region = self._region(person, state, observation) if unseen_s == 0 else None
         state = replace(
             state,
@@ -215,7 +221,7 @@ class TrackingController:
 
         walkers = [
             walker_of(track, pose, followed=True, measured=age_s <= self.tracker.scan_period_s).at_least(
-                state.brisk, self.company.slowest
+                state.brisk, self.company.min_speed
             )
             if track is own
             else walker_of(track, pose)
@@ -364,14 +370,14 @@ class TrackingController:
             return self.target_distance
         least = self.tracker.visibility.least_distance(person.window, person.centre, observation.height)
         late_s = observation.now - observation.stamp + state.tracks.period
-        notice_s = late_s + self.aside_s / math.sqrt(state.acceleration)
-        least += 2 * state.brisk * max(late_s - self.prompt_s, 0.0)
+        notice_s = late_s + self.headway_s / math.sqrt(state.acceleration)
+        least += 2 * state.brisk * max(late_s - self.usual_delay_s, 0.0)
         keeps = max(self.target_distance, least - self.robot.camera_x, notice_s * state.brisk)
-        if keeps > self.near_hiding and state.ground is not None:
+        if keeps > self.hiding_distance and state.ground is not None:
             pose = pose_at(state.tracks.poses, observation.now)
-            soon = predict(person.track, observation.now + self.foresight_s, self.tracker.noise).place
+            soon = predict(person.track, observation.now + self.hiding_foresight_s, self.tracker.noise).place
             if self._hides(state.ground, pose, soon):
-                return self.near_hiding
+                return self.hiding_distance
         return keeps
 
     def _along(self, way: Points, obstacles: Points, pose: Odometry) -> float:
@@ -388,7 +394,7 @@ class TrackingController:
 
     def _region(self, person: Person, state: TrackingState, observation: Observation) -> Region | None:
         """Return where the person should be in the next frame; None to search all of it."""
-        if state.since_full + 1 >= self.full_every or not self.selection.is_candidate(person):
+        if state.since_full + 1 >= self.whole_image_every or not self.selection.is_candidate(person):
             return None
         if not self._is_sure(person, state.choice):
             # The person may be beside the one who is followed.

@@ -1,6 +1,6 @@
 // The page: a picture, the search in it, and the lesson on the window that was chosen.
 
-import { load, pixels } from "./engine.js";
+import { MODULE, load, pixels } from "./engine.js";
 import * as panels from "./panels.js";
 import { street } from "./sample.js";
 
@@ -9,7 +9,7 @@ const picture = Object.assign(document.createElement("canvas"), { width: 640, he
 const context = picture.getContext("2d", { willReadFrequently: true });
 const crop = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
 const MOST_PIXELS = 640 * 480;
-const state = { people: [], hits: [], chosen: 0, cell: 0, block: 0, sums: [], shares: [], camera: null };
+const state = { people: [], hits: [], chosen: 0, cell: 0, block: 0, sums: [], shares: [], hit: 0, camera: null };
 let engine, texts;
 
 /** A text of en.json with its {names} filled in. */
@@ -69,11 +69,20 @@ function lesson(image) {
   const { scale } = settings();
   const levels = panels.drawPyramid(at("pyramid"), picture, scale, engine.model);
   at("pyramid-says").textContent = say("pyramid-says", { levels, scale });
-  state.hits = engine.search(image, { ...settings(), padding: 16, group: 0 });
-  panels.drawRects(at("hits"), picture, state.hits, -1, 0.5);
+  state.hits = engine.search(image, { ...settings(), padding: 16, group: 0 }).sort((a, b) => b.weight - a.weight);
+  showHit(0);
   panels.drawRects(at("merged"), picture, state.people);
   at("hits-says").textContent = say("hits-says", { hits: state.hits.length, people: state.people.length });
   lessonOnWindow();
+}
+
+/** Marks a hit and tells its margin; the best hit is number 0. */
+function showHit(index) {
+  state.hit = index;
+  panels.drawRects(at("hits"), picture, state.hits, index, 0.5);
+  const { x, y, width, height, weight } = state.hits[index] ?? {};
+  const values = { index: index + 1, x, y, width, height, weight: weight?.toFixed(2) };
+  at("hit-says").textContent = width ? say("hit-says", values) : "";
 }
 
 /** The steps from the window's pixels to its margin. */
@@ -145,14 +154,12 @@ function showBlock(block) {
   at("share-says").textContent = say("share-says", { row: Math.floor(block / columns) + 1, column: (block % columns) + 1, share });
 }
 
-/** Lets a grid on a canvas be chosen from by pointer and arrow keys. */
-function grid(canvas, columns, count, chosen, show) {
+/** Lets one of `count()` things on a canvas be chosen: the one that `find` names, given where the pointer is as shares of
+ * the canvas, or one or a row of `columns()` further by the arrow keys. */
+function choice(canvas, find, columns, count, chosen, show) {
   const point = ({ clientX, clientY }) => {
     const box = canvas.getBoundingClientRect();
-    const rows = count() / columns();
-    const column = Math.floor(((clientX - box.left) / box.width) * columns());
-    const row = Math.floor(((clientY - box.top) / box.height) * rows);
-    const index = row * columns() + column;
+    const index = find((clientX - box.left) / box.width, (clientY - box.top) / box.height);
     if (index >= 0 && index < count() && index !== chosen()) show(index);
   };
   canvas.addEventListener("pointermove", point);
@@ -164,6 +171,21 @@ function grid(canvas, columns, count, chosen, show) {
     const next = chosen() + step;
     if (next >= 0 && next < count()) show(next);
   });
+}
+
+/** A choice of one of the squares of a grid. */
+function grid(canvas, columns, count, chosen, show) {
+  const find = (x, y) => Math.floor((y * count()) / columns()) * columns() + Math.floor(x * columns());
+  choice(canvas, find, columns, count, chosen, show);
+}
+
+/** Of `rects` around a point of the picture, given as shares of it, the one whose middle is nearest; -1 if there is none. */
+function nearest(rects, x, y) {
+  const off = (r) => Math.max(...[[x * picture.width - r.x, r.width], [y * picture.height - r.y, r.height]]
+    .map(([inside, side]) => Math.abs((2 * inside) / side - 1)));
+  const offs = rects.map(off);
+  const least = Math.min(...offs);
+  return least <= 1 ? offs.indexOf(least) : -1;
 }
 
 /** Takes a picture, shrunk to at most 640 × 480 px in area. */
@@ -234,33 +256,38 @@ function wire() {
   const columns = () => engine.model.width / 8;
   grid(at("cells"), columns, () => state.sums.length, () => state.cell, showCell);
   grid(at("shares"), () => columns() - 1, () => state.shares.length, () => state.block, showBlock);
-  at("picture").addEventListener("click", ({ clientX, clientY, target }) => {
-    const box = target.getBoundingClientRect();
-    const [x, y] = [((clientX - box.left) / box.width) * picture.width, ((clientY - box.top) / box.height) * picture.height];
-    const inside = (r) => x >= r.x && x < r.x + r.width && y >= r.y && y < r.y + r.height;
-    const index = state.people.findIndex(inside);
+  choice(at("hits"), (x, y) => nearest(state.hits, x, y), () => 1, () => state.hits.length, () => state.hit, showHit);
+  at("picture").addEventListener("click", ({ offsetX, offsetY, target }) => {
+    const index = nearest(state.people, offsetX / target.clientWidth, offsetY / target.clientHeight);
     if (index >= 0) choosePerson(index);
   });
 }
 
 function sample() {
   stopCamera();
-  Object.assign(picture, { width: 640, height: 480 });
-  street(context);
+  drawStreet();
   search();
 }
 
+function drawStreet() {
+  Object.assign(picture, { width: 640, height: 480 });
+  street(context);
+}
+
 async function begin() {
+  drawStreet();
+  panels.drawRects(at("picture"), picture, []);
+  performance.mark("picture-drawn");
   const words = fetch(new URL("en.json", import.meta.url)).then((file) => file.json());
   engine = await load();
   [texts] = await Promise.all([words, engine.choose("limo")]);
   document.querySelectorAll("[data-text]").forEach((element) => (element.textContent = texts[element.dataset.text]));
   document.querySelectorAll("[data-label]").forEach((element) => element.setAttribute("aria-label", texts[element.dataset.label]));
   wire();
-  sample();
+  search();
   window.lab = engine; // for the tests, and for the curious
   document.body.dataset.ready = "yes";
-  if ("serviceWorker" in navigator && location.protocol.startsWith("http")) navigator.serviceWorker.register("sw.js");
+  if ("serviceWorker" in navigator && location.protocol.startsWith("http")) navigator.serviceWorker.register(`sw.js?module=${MODULE}`);
 }
 
 begin().catch((error) => (at("found").textContent = String(error)));

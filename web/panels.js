@@ -93,22 +93,28 @@ export function drawShares(canvas, values, width, height, chosen) {
   frame(context, (chosen % columns) * side, Math.floor(chosen / columns) * side, side, side, "#fff");
 }
 
-/** The picture at every sixth level of the pyramid, with the window on each: always of the same size. */
+/** The picture at levels some way apart, from left to right, with the window on each: always of the same size. */
 export function drawPyramid(canvas, source, scale, model) {
-  size(canvas, 900, 330);
-  const context = canvas.getContext("2d");
-  let levels = 0, x = 0;
-  for (let factor = 1; ; factor *= scale, levels++) {
-    const width = source.width / factor, height = source.height / factor;
-    if (width < model.width || height < model.height || levels >= 64) break;
-    if (levels % Math.max(1, Math.round(Math.log(1.3) / Math.log(scale))) === 0 && x < canvas.width) {
-      const shown = 0.6;
-      context.drawImage(source, x, canvas.height - height * shown, width * shown, height * shown);
-      frame(context, x, canvas.height - model.height * shown, model.width * shown, model.height * shown, "#ff8a50");
-      x += width * shown + 10;
-    }
+  const [wide, gap] = [900, 10];
+  const factors = [];
+  for (let factor = 1; factors.length < 64; factor *= scale) {
+    if (source.width / factor < model.width || source.height / factor < model.height) break;
+    factors.push(factor);
   }
-  return levels;
+  const apart = Math.max(1, Math.round(Math.log(1.4) / Math.log(scale)));
+  const shown = factors.filter((_, level) => level % apart === 0);
+  const widths = shown.reduce((sum, factor) => sum + source.width / factor, 0);
+  const share = (wide - gap * (shown.length - 1)) / (widths || source.width);
+  size(canvas, wide, source.height * share);
+  const context = canvas.getContext("2d");
+  let x = 0;
+  for (const factor of shown) {
+    const [width, height] = [source.width, source.height].map((side) => (side / factor) * share);
+    context.drawImage(source, x, canvas.height - height, width, height);
+    frame(context, x + 2, canvas.height - model.height * share - 2, model.width * share, model.height * share, "#ff8a50");
+    x += width + gap;
+  }
+  return factors.length;
 }
 
 /** Rectangles on a picture. */
@@ -116,11 +122,11 @@ export function drawRects(canvas, source, rects, chosen = -1, alpha = 1) {
   size(canvas, source.width, source.height);
   const context = canvas.getContext("2d");
   context.drawImage(source, 0, 0);
-  rects.forEach(({ x, y, width, height }, index) => {
-    context.globalAlpha = alpha;
-    frame(context, x, y, width, height, index === chosen ? "#ffd54f" : "#ff7043", index === chosen ? 5 : 3);
-  });
+  context.globalAlpha = alpha;
+  rects.forEach(({ x, y, width, height }) => frame(context, x, y, width, height, "#ff7043"));
   context.globalAlpha = 1;
+  const { x, y, width, height } = rects[chosen] ?? {};
+  if (width) frame(context, x, y, width, height, "#ffd54f", 5);
 }
 
 function frame(context, x, y, width, height, colour, line = 3) {

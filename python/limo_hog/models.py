@@ -131,12 +131,7 @@ def _limo() -> Model:
 
 #: The folder of our own weights.
 _WEIGHTS = os.path.join(os.path.dirname(__file__), "weights")  # noqa: PTH118, PTH120 - as below
-_NAMED: dict[str, Callable[[], Model]] = {
-    "opencv": _opencv,
-    "default": _opencv,
-    "daimler": _daimler,
-    "limo": _limo,
-}
+_NAMED: dict[str, Callable[[], Model]] = {"opencv": _opencv, "default": _opencv, "daimler": _daimler, "limo": _limo}
 
 
 def is_named(model: object) -> bool:

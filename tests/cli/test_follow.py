@@ -20,9 +20,7 @@ KEYS = (
 ).split()
 
 
-def test_the_score_card_on_standard_output_has_every_figure_of_the_contract(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_score_card_on_standard_output_has_every_figure_of_the_contract(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["follow", "--scenario", "followable", "--seconds", "1", "--json", "-"]) == 0
     card = json.loads(capsys.readouterr().out)
     assert set(KEYS) <= set(card)

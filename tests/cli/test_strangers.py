@@ -41,16 +41,12 @@ def ended(
     )
 
 
-def tall_png(side: int) -> bytes:
-    """A small PNG file of side × side pixels: all black, and so squeezed to a thousandth."""
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    squeeze = zlib.compressobj(9)
-    rows = b"".join(squeeze.compress(bytes(1 + side)) for _ in range(side)) + squeeze.flush()
-    header = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
+def png_header(side: int) -> bytes:
+    """The beginning of a PNG file of side × side pixels."""
+    header = b"IHDR" + struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
+    pixels = b"IDAT" + zlib.compress(bytes(side))
+    parts = [struct.pack(">I", len(one) - 4) + one + struct.pack(">I", zlib.crc32(one)) for one in (header, pixels)]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
 def test_a_film_whose_name_is_not_utf8_is_searched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,7 +99,7 @@ def test_stopping_does_not_wait_for_a_reader_that_never_returns(pictures: Path, 
 
 
 def test_a_picture_of_too_many_pixels_is_refused_by_its_header(pictures: Path) -> None:
-    (pictures / "huge.png").write_bytes(tall_png(20_000))
+    (pictures / "huge.png").write_bytes(png_header(30_000))
     limited = f"ulimit -v 4000000; exec {LIMO_HOG} detect {pictures} --threads 1 --json -"
     done = subprocess.run(["bash", "-c", limited], check=False, capture_output=True, text=True, timeout=120)
     assert (done.returncode, len(lines_of(done.stdout))) == (1, 3)

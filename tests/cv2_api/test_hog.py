@@ -78,9 +78,7 @@ def test_none_stands_for_every_default() -> None:
     assert repr(HOGDescriptor(*GEOMETRY, *[None] * 7)) == repr(HOGDescriptor(*GEOMETRY))
     image = noise(200, 120)
     for one, other in zip(
-        people().detectMultiScale(image, None, None, None, None, None),
-        people().detectMultiScale(image),
-        strict=True,
+        people().detectMultiScale(image, None, None, None, None, None), people().detectMultiScale(image), strict=True
     ):
         np.testing.assert_array_equal(one, other)
 

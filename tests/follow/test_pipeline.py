@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from tests.follow.loop import FOCAL_PX, IMAGE, REGION, Loop
+import pytest
+from tests.follow.loop import DEPTH, FOCAL_PX, IMAGE, REGION, SENSORS, Loop
 from tests.follow.views import flat, scan, scan_of
 
-from limo_hog.follow import Decision, Frame, Mode, Odometry, Sensors, Twist
+from limo_hog.follow import Decision, Follower, Frame, Mode, Odometry, Sensors, TrackingController, Twist
+from limo_hog.follow.tracks.asking import WhomError
 
 
 def test_the_region_asked_for_is_searched_next_and_boxes_are_in_the_whole_image() -> None:
@@ -97,3 +99,16 @@ def test_a_clock_that_was_set_back_begins_a_period() -> None:
     loop = Loop()
     loop.frame(100.0)
     assert loop.tick(3.0, None) is not None
+
+
+def test_a_follower_is_asked_for_a_person_and_says_so_until_they_are_found() -> None:
+    loop = Loop()
+    follower = Follower(TrackingController(), loop)
+    follower.follow("left")
+    log = follower.tick(0.0, Frame(0.0, IMAGE, FOCAL_PX, DEPTH), SENSORS)
+    assert log is not None
+    assert log.decision.reason.endswith("; asked for the person furthest left, not found yet")
+    with pytest.raises(WhomError, match="got 'leftmost'"):
+        follower.follow("leftmost")
+    with pytest.raises(WhomError, match="Loop follows nobody in particular"):
+        Follower(loop, loop).follow(1)

@@ -109,10 +109,7 @@ def test_a_video_that_was_cut_off_gives_its_frames_and_then_says_so(tmp_path: Pa
     writer.release()
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     seen: list[int] = []
-    with (
-        pytest.raises(ReadError, match=r"cut off: \d+ of 40 frames"),
-        open_video(find_sources(str(path))[0]) as video,
-    ):
+    with pytest.raises(ReadError, match=r"cut off: \d+ of 40 frames"), open_video(find_sources(str(path))[0]) as video:
         seen.extend(number for number, _ in video.frames())
     assert 5 < len(seen) < 40
 

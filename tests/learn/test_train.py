@@ -99,12 +99,7 @@ def test_the_same_command_writes_the_same_bytes(trained: Path, bollards: Path, t
     ],
 )
 def test_bad_data_is_named_in_one_line_and_nothing_is_written(
-    arguments: list[str],
-    code: int,
-    complaint: str,
-    bollards: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    arguments: list[str], code: int, complaint: str, bollards: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_image(tmp_path / "crops" / "a.png", np.zeros((64, 64), np.uint8))
     (tmp_path / "empty").mkdir()

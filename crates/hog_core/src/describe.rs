@@ -18,6 +18,15 @@ impl Hog {
     /// [`Hog::compute`] gives.
     ///
     /// Crops are windows: rows of interleaved pixels without gaps, crop after crop.
+    ///
+    /// ```
+    /// use hog_core::{Hog, HogParams, Interrupt};
+    /// let hog = Hog::new(&HogParams::default(), None)?;
+    /// let crops = vec![128; 10 * 64 * 128 * 3];
+    /// let mut descriptors = vec![0.0; 10 * hog.spec().descriptor_len()];
+    /// hog.describe(&crops, 3, 2, &Interrupt::NEVER, &mut descriptors)?; // in colour, on two threads
+    /// # Ok::<(), hog_core::HogError>(())
+    /// ```
     pub fn describe(
         &self,
         pixels: &[u8],

@@ -100,6 +100,19 @@ impl Hog {
     }
 
     /// The gradient of that image as OpenCV returns it, into `out`, which has a place for each of its pixels.
+    ///
+    /// ```
+    /// use hog_core::exact::RowVotes;
+    /// use hog_core::{Hog, HogParams, ImageView, Interrupt};
+    /// let hog = Hog::new(&HogParams::default(), None)?;
+    /// let ramp: Vec<u8> = (0..64).map(|i| 16 * (i % 8)).collect();
+    /// let image = ImageView::new(&ramp, 8, 8, 1, 8)?;
+    /// let pixels = Hog::gradient_size(image, [0; 4])?.area();
+    /// let (mut shares, mut bins) = (vec![[0.0; 2]; pixels], vec![[0; 2]; pixels]);
+    /// hog.gradient(image, [0; 4], &Interrupt::NEVER, RowVotes { shares: &mut shares, bins: &mut bins })?;
+    /// assert_eq!(bins[9], [8, 0]); // brighter to the right: half of the vote for either bin beside 0°
+    /// # Ok::<(), hog_core::HogError>(())
+    /// ```
     pub fn gradient(
         &self,
         image: ImageView,
@@ -134,6 +147,17 @@ impl Hog {
     /// Writes the descriptors whose elements [`Hog::compute_len`] counts, one after the other, into `out`.
     ///
     /// A location whose window leaves the padded image has a descriptor of zeros.
+    ///
+    /// ```
+    /// use hog_core::{Hog, HogParams, ImageView, Interrupt, Search};
+    /// let hog = Hog::new(&HogParams::default(), None)?;
+    /// let window = vec![128; 64 * 128];
+    /// let image = ImageView::new(&window, 64, 128, 1, 64)?;
+    /// let mut descriptor = vec![0.0; hog.compute_len(image, &Search::default(), None)?];
+    /// hog.compute(image, &Search::default(), None, &Interrupt::NEVER, &mut descriptor)?;
+    /// assert_eq!(descriptor.len(), 3780);
+    /// # Ok::<(), hog_core::HogError>(())
+    /// ```
     pub fn compute(
         &self,
         image: ImageView,
@@ -164,6 +188,17 @@ impl Hog {
     /// The windows that are hits, of those at `locations` (of all, if none are given), in their order.
     ///
     /// A location whose window leaves the padded image is passed over. The stride (0, 0) is the cell size.
+    ///
+    /// ```
+    /// use hog_core::{Hog, HogParams, ImageView, Interrupt, Search, model};
+    /// let people = Hog::new(&HogParams::default(), Some(model::default_people()))?;
+    /// let grey = vec![128; 320 * 240];
+    /// let image = ImageView::new(&grey, 320, 240, 1, 320)?;
+    /// let all = Search { hit_threshold: f64::NEG_INFINITY, ..Search::default() };
+    /// let scores = people.detect_windows(image, &all, Some(&[(0, 0), (64, 40)]), &Interrupt::NEVER)?;
+    /// assert_eq!((scores[1].x, scores[1].y), (64, 40));
+    /// # Ok::<(), hog_core::HogError>(())
+    /// ```
     pub fn detect_windows(
         &self,
         image: ImageView,

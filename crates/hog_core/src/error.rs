@@ -5,6 +5,13 @@ use thiserror::Error;
 use crate::geometry::Size;
 
 /// Every way in which a call can fail: its input is refused, its memory cannot be had, or its caller ends it.
+///
+/// ```
+/// use hog_core::error::ImageError;
+/// use hog_core::{HogError, ImageView};
+/// let refused = ImageView::new(&[0; 8], 2, 2, 2, 4).unwrap_err();
+/// assert_eq!(refused, HogError::Image(ImageError::Channels { got: 2 }));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum HogError {
     /// Window, block, stride and cell sizes do not fit together.
@@ -226,3 +233,70 @@ pub enum BackendError {
 
 /// Shorthand for this crate's results.
 pub type Result<T> = std::result::Result<T, HogError>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_error_says_what_came_and_what_is_wanted() {
+        let (axis, most, size) = ("width", 99, Size::new);
+        let (width, height) = (7, 9);
+        let available = vec!["sse41", "scalar"];
+        let texts: [(HogError, &str); 17] = [
+            (
+                HogError::DetectorSize { got: 5, wanted: 8 },
+                "the detector has 5 coefficients; this geometry needs 8 or 9 (with bias last)",
+            ),
+            (
+                HogError::Memory { bytes: 12 },
+                "12 bytes of memory are wanted, and cannot be had; use a smaller image, padding or geometry",
+            ),
+            (HogError::Interrupted, "the call was interrupted"),
+            (
+                GeometryError::Side { name: "cellSize", x: 0, y: 8, most }.into(),
+                "cellSize is (0, 8); both sides must be 1 to 99 pixels",
+            ),
+            (GeometryError::Bins { got: 0 }.into(), "nbins is 0; it must be 1 to 256"),
+            (
+                GeometryError::Cells { block: size(16, 9), cell: size(8, 8) }.into(),
+                "blockSize (16, 9) must be a multiple of cellSize (8, 8)",
+            ),
+            (GeometryError::Levels { got: 0 }.into(), "nlevels is 0; it must be at least 1"),
+            (
+                GeometryError::Stride { axis, window: 65, block: 16, stride: 8 }.into(),
+                "window width 65 minus block width 16 must be a multiple of block stride 8",
+            ),
+            (ImageError::Channels { got: 2 }.into(), "the image has 2 channels; 1 or 3 are wanted"),
+            (ImageError::Empty { width: 0, height }.into(), "the image is empty: 0 x 9 pixels"),
+            (
+                ImageError::Data { len: 3, row_stride: 7, width, height, channels: 1 }.into(),
+                "3 bytes with a row stride of 7 do not hold 7 x 9 x 1 pixels",
+            ),
+            (
+                ParameterError::WinStride { x: 0, y: 8 }.into(),
+                "winStride is (0, 8); both must be 1 pixel or more",
+            ),
+            (
+                ParameterError::Padding { got: 100, most }.into(),
+                "padding is 100; at most 99 pixels are allowed",
+            ),
+            (
+                ParameterError::PaddedSide { axis, got: -1 }.into(),
+                "the padded width would be -1 pixels; at least 1 is wanted",
+            ),
+            (
+                ParameterError::Descriptors { windows: 7, elements: 9 }.into(),
+                "7 windows of 9 elements are too many for one array; use a larger winStride",
+            ),
+            (
+                BackendError::Unknown { variable: "V", name: "sse9".into(), available }.into(),
+                "V is \"sse9\"; this machine has auto, sse41, scalar",
+            ),
+            (BackendError::Missing { name: "neon" }.into(), "this machine has no neon"),
+        ];
+        for (error, text) in texts {
+            assert_eq!(error.to_string(), text);
+        }
+    }
+}

@@ -1,6 +1,11 @@
 //! Sizes, rectangles and parts of an image.
 
 /// Width and height \[px\] (or a stride or padding along x and y).
+///
+/// ```
+/// use hog_core::Size;
+/// assert_eq!(Size::new(64, 128).area(), 8192);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Size {
     /// Along x.

@@ -7,6 +7,17 @@ use crate::geometry::Size;
 pub(crate) const SIDE_MAX: usize = i32::MAX as usize / 4;
 
 /// A borrowed 8-bit image: rows of interleaved pixels, `row_stride` bytes apart.
+///
+/// ```
+/// use hog_core::ImageView;
+/// // Two rows of three pixels in colour, each row padded to 12 bytes.
+/// let data = [0; 24];
+/// let image = ImageView::new(&data, 3, 2, 3, 12)?;
+/// assert_eq!(image.row(1).len(), 9);
+/// // An image that does not lie within its data is refused.
+/// assert!(ImageView::new(&data, 3, 3, 3, 12).is_err());
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct ImageView<'a> {
     data: &'a [u8],

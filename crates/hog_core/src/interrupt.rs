@@ -5,6 +5,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::error::{HogError, Result};
 
 /// What ends a call before it is done.
+///
+/// ```
+/// use std::time::{Duration, Instant};
+/// use hog_core::{Hog, HogError, HogParams, ImageView, Interrupt, SearchOptions, model};
+/// let people = Hog::new(&HogParams::default(), Some(model::default_people()))?;
+/// let grey = vec![128; 640 * 480];
+/// let image = ImageView::new(&grey, 640, 480, 1, 640)?;
+/// let began = Instant::now();
+/// let is_late = || began.elapsed() >= Duration::ZERO;
+/// let found = people.detect(image, &SearchOptions::default(), &Interrupt::when(&is_late));
+/// assert_eq!(found, Err(HogError::Interrupted));
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Clone, Copy)]
 pub struct Interrupt<'a> {
     /// Asks the caller; the threads that help the calling one have none.

@@ -3,12 +3,25 @@
 use std::sync::OnceLock;
 
 /// OpenCV's default people detector: 3780 weights of the 64 × 128 window, then the bias.
+///
+/// ```
+/// use hog_core::{Hog, HogParams, model};
+/// let people = Hog::new(&HogParams::default(), Some(model::default_people()))?;
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 pub fn default_people() -> &'static [f32] {
     static COEFFICIENTS: OnceLock<Vec<f32>> = OnceLock::new();
     COEFFICIENTS.get_or_init(|| parse(include_str!("../models/default_people_64x128.txt")))
 }
 
 /// OpenCV's Daimler people detector: 1980 weights of the 48 × 96 window, then the bias.
+///
+/// ```
+/// use hog_core::{Hog, HogParams, model};
+/// let geometry = HogParams { win_size: (48, 96), ..HogParams::default() };
+/// let people = Hog::new(&geometry, Some(model::daimler_people()))?;
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 pub fn daimler_people() -> &'static [f32] {
     static COEFFICIENTS: OnceLock<Vec<f32>> = OnceLock::new();
     COEFFICIENTS.get_or_init(|| parse(include_str!("../models/daimler_people_48x96.txt")))

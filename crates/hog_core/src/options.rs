@@ -4,6 +4,11 @@ use crate::geometry::Size;
 use crate::guided::Guide;
 
 /// Where and how densely to look on one level.
+///
+/// ```
+/// use hog_core::Search;
+/// let strict = Search { hit_threshold: 0.5, win_stride: (8, 8), padding: (16, 16) };
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Search {
     /// A window whose score is at least this is a hit.

@@ -4,6 +4,12 @@ use crate::error::{GeometryError, Result};
 use crate::geometry::Size;
 
 /// The constructor arguments of `cv2.HOGDescriptor`, unchecked; sizes are (x, y) \[px\].
+///
+/// ```
+/// use hog_core::HogParams;
+/// let finer = HogParams { nbins: 12, ..HogParams::default() };
+/// assert_eq!(finer.effective_win_sigma(), 4.0);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct HogParams {
     /// Detection window.
@@ -58,6 +64,15 @@ impl HogParams {
 }
 
 /// A checked geometry with its derived counts. Functions that take a `HogSpec` cannot fail on geometry.
+///
+/// ```
+/// use hog_core::{HogParams, HogSpec, Size};
+/// let spec = HogSpec::new(&HogParams::default())?;
+/// assert_eq!((spec.blocks, spec.descriptor_len()), (Size::new(7, 15), 3780));
+/// let odd = HogParams { cell_size: (5, 5), ..HogParams::default() };
+/// assert!(HogSpec::new(&odd).unwrap_err().to_string().contains("16"));
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct HogSpec {
     /// Detection window \[px\].

@@ -41,7 +41,7 @@ pub(crate) struct Scorer<'a> {
     pub separable: Option<&'a separable::Plan>,
     /// A window whose score is at least this is a hit.
     pub hit_threshold: f64,
-    /// Windows whose fast score, or that by sums that separate, is no further than this from the threshold are scored again by the exact path.
+    /// The exact path scores again what `fast` or `separable` scored no further than this from the threshold.
     pub margin: f64,
 }
 
@@ -68,42 +68,36 @@ impl Scorer<'_> {
         interrupt: &Interrupt,
     ) -> Result<Vec<Hit>> {
         let LevelWindows { size, grid, found } = level;
-        let hit = |&(x, y, score): &Found| Hit::new(grid, (x, y), score);
         let is_hit = |&&(_, _, score): &&Found| score >= self.hit_threshold;
-        let Some(found) = found else {
-            let level = LevelImage::new(image, *size)?;
-            if let Some(plan) = self.separable {
-                let least = self.hit_threshold - plan.score_error_bound();
-                let found = separable::search(
-                    level.view()?,
-                    grid,
-                    self.spec,
-                    self.tables.kernel,
-                    plan,
-                    least,
-                    interrupt,
-                )?;
-                return memory::collect(
-                    self.rescored(level.view()?, *size, grid, found, interrupt)?
-                        .iter()
-                        .filter(is_hit)
-                        .map(hit),
-                );
+        let hit = |&(x, y, score): &Found| Hit::new(grid, (x, y), score);
+        let found = match found {
+            Some(found) if !self.is_needed(level) => {
+                return memory::collect(found.iter().filter(is_hit).map(hit));
             }
-            let scores = exact::scores(level.view()?, grid, self.spec, self.tables, self.svm, interrupt)?;
-            let place = |index: usize, score: f64| {
-                let (column, row) = (index % grid.windows.width, index / grid.windows.width);
-                (column * grid.stride.width, row * grid.stride.height, score)
-            };
-            let all = scores.into_iter().enumerate().map(|(index, score)| place(index, score));
-            return memory::collect(all.filter(|found| is_hit(&found)).map(|found| hit(&found)));
+            Some(found) => {
+                let found = memory::collect(found.iter().copied())?;
+                self.rescored(image, *size, grid, found, interrupt)?
+            }
+            None => self.searched(LevelImage::new(image, *size)?.view()?, grid, interrupt)?,
         };
-        if !found.iter().any(|found| self.is_close(found)) {
-            return memory::collect(found.iter().filter(is_hit).map(hit));
+        memory::collect(found.iter().filter(is_hit).map(hit))
+    }
+
+    /// The hits of a level without a fast path, and perhaps some windows more.
+    fn searched(&self, level: ImageView, grid: &Grid, interrupt: &Interrupt) -> Result<Vec<Found>> {
+        let Self { spec, tables, svm, .. } = *self;
+        if let Some(plan) = self.separable {
+            let least = self.hit_threshold - plan.score_error_bound();
+            let found = separable::search(level, grid, spec, tables.kernel, plan, least, interrupt)?;
+            return self.rescored(level, level.size(), grid, found, interrupt);
         }
-        let found = memory::collect(found.iter().copied())?;
-        let rescored = self.rescored(image, *size, grid, found, interrupt)?;
-        memory::collect(rescored.iter().filter(is_hit).map(hit))
+        let scores = exact::scores(level, grid, spec, tables, svm, interrupt)?;
+        let place = |(index, score): (usize, f64)| {
+            let (column, row) = (index % grid.windows.width, index / grid.windows.width);
+            (column * grid.stride.width, row * grid.stride.height, score)
+        };
+        let hits = scores.into_iter().enumerate().filter(|&(_, score)| score >= self.hit_threshold);
+        memory::collect(hits.map(place))
     }
 
     /// Whether the fast score is too near to the threshold; one that is not a number is never sure.

@@ -58,9 +58,7 @@ fn every_module_uses_only_those_below_it_and_no_file_or_folder_is_too_long() {
         let top = Path::new(place.iter().next().unwrap()).file_stem().unwrap().to_str().unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(up(top, &text), Vec::<String>::new(), "{}", place.display());
-        // Kernels and tables may be longer.
-        let may_be_long = top == "fast" || place.ends_with("tables.rs");
-        assert!(text.lines().count() <= 400 || may_be_long, "{}", place.display());
+        assert!(text.lines().count() <= 400, "{}", place.display());
         let beside = path.parent().unwrap().read_dir().unwrap();
         assert!(beside.filter(|entry| entry.as_ref().unwrap().path().is_file()).count() <= 13);
     }

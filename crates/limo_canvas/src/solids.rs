@@ -57,11 +57,38 @@ impl Sun {
     }
 }
 
-/// A tapered capsule.
-pub struct Strip {
+/// A parallel projection, in which a strip and an ellipse are balls: the pixel of its origin, the light in its axes.
+struct Parallel {
     bounds: [f64; 4],
     u: f32,
     v: f32,
+    sun: [f32; 3],
+    base: f32,
+}
+
+impl Parallel {
+    /// `towards`: to the sun along the projection's x and y, and away from the camera.
+    fn new(bounds: [f64; 4], [part, u, v]: [f64; 3], sun: &Sun, towards: [f64; 3]) -> Self {
+        let sun_along = towards.map(|along| (sun.gain * along) as f32);
+        Self { bounds, u: u as f32, v: v as f32, sun: sun_along, base: sun.base_of(part) }
+    }
+
+    /// From the origin to a pixel [px].
+    #[inline(always)]
+    fn offset(&self, x: f32, y: f32) -> (f32, f32) {
+        (x - self.u, y - self.v)
+    }
+
+    /// How much of the light falls on a ball's surface at x and y, `root` in front of its centre; per unit of its radius.
+    #[inline(always)]
+    fn facing(&self, x: f32, y: f32, root: f32) -> f32 {
+        self.sun[0] * x + self.sun[1] * y - self.sun[2] * root
+    }
+}
+
+/// A tapered capsule.
+pub struct Strip {
+    projection: Parallel,
     axis_u: f32,
     axis_v: f32,
     length: f32,
@@ -73,8 +100,6 @@ pub struct Strip {
     lean: f32,
     leans: bool,
     per_width: f32,
-    sun: [f32; 3],
-    base: f32,
 }
 
 impl Strip {
@@ -84,15 +109,15 @@ impl Strip {
         let [part, u, v, axis_u, axis_v, length, radius, taper, near, slope, metre, lean] = row;
         let (end_u, end_v, end_radius) = (u + axis_u * length, v + axis_v * length, radius + taper * length);
         let [x, y, z] = sun.towards;
+        let bounds = [
+            (u - radius).min(end_u - end_radius),
+            (v - radius).min(end_v - end_radius),
+            (u + radius).max(end_u + end_radius),
+            (v + radius).max(end_v + end_radius),
+        ];
+        let towards = [x * axis_u + y * axis_v, y * axis_u - x * axis_v, z];
         Self {
-            bounds: [
-                (u - radius).min(end_u - end_radius),
-                (v - radius).min(end_v - end_radius),
-                (u + radius).max(end_u + end_radius),
-                (v + radius).max(end_v + end_radius),
-            ],
-            u: u as f32,
-            v: v as f32,
+            projection: Parallel::new(bounds, [part, u, v], sun, towards),
             axis_u: axis_u as f32,
             axis_v: axis_v as f32,
             length: length as f32,
@@ -104,24 +129,18 @@ impl Strip {
             lean: lean as f32,
             leans: lean.abs() > UPRIGHT,
             per_width: (1.0 / (radius + end_radius)) as f32,
-            sun: [
-                (sun.gain * (x * axis_u + y * axis_v)) as f32,
-                (sun.gain * (y * axis_u - x * axis_v)) as f32,
-                (sun.gain * z) as f32,
-            ],
-            base: sun.base_of(part),
         }
     }
 }
 
 impl Solid for Strip {
     fn bounds(&self) -> [f64; 4] {
-        self.bounds
+        self.projection.bounds
     }
 
     #[inline(always)]
     fn cast(&self, x: f32, y: f32) -> Hit {
-        let (dx, dy) = (x - self.u, y - self.v);
+        let (dx, dy) = self.projection.offset(x, y);
         let along = self.axis_u * dx + self.axis_v * dy;
         let across = self.axis_u * dy - self.axis_v * dx;
         let mut on_axis = along.max(0.0).min(self.length);
@@ -137,24 +156,25 @@ impl Solid for Strip {
             root = (room - beyond * beyond).max(0.0).sqrt();
         }
         let depth = self.slope * on_axis + self.near - self.metre * root;
-        let facing = beyond * self.sun[0] + across * self.sun[1] - self.sun[2] * root;
-        Hit { depth, is_hit: inner >= 0.0, cover: inner * self.per_width, tone: facing / radii + self.base }
+        let facing = self.projection.facing(beyond, across, root);
+        Hit {
+            depth,
+            is_hit: inner >= 0.0,
+            cover: inner * self.per_width,
+            tone: facing / radii + self.projection.base,
+        }
     }
 }
 
 /// An ellipsoid.
 pub struct Ellipse {
-    bounds: [f64; 4],
-    u: f32,
-    v: f32,
+    projection: Parallel,
     whitening: [f32; 3],
     per_size: f32,
     centre: f32,
     slope_x: f32,
     slope_y: f32,
     bulge: f32,
-    sun: [f32; 3],
-    base: f32,
 }
 
 impl Ellipse {
@@ -162,38 +182,35 @@ impl Ellipse {
     /// depth [m], depth per canonical x and y, bulge [m].
     pub fn new(row: [f64; 12], sun: &Sun) -> Self {
         let [part, u, v, w00, w10, w11, half_h, half_w, centre, slope_x, slope_y, bulge] = row;
+        let bounds = [u - half_w, v - half_h, u + half_w, v + half_h];
         Self {
-            bounds: [u - half_w, v - half_h, u + half_w, v + half_h],
-            u: u as f32,
-            v: v as f32,
+            projection: Parallel::new(bounds, [part, u, v], sun, sun.towards),
             whitening: [w00 as f32, w10 as f32, w11 as f32],
             per_size: (0.25 * (half_w + half_h)) as f32,
             centre: centre as f32,
             slope_x: slope_x as f32,
             slope_y: slope_y as f32,
             bulge: bulge as f32,
-            sun: sun.towards.map(|part| (sun.gain * part) as f32),
-            base: sun.base_of(part),
         }
     }
 }
 
 impl Solid for Ellipse {
     fn bounds(&self) -> [f64; 4] {
-        self.bounds
+        self.projection.bounds
     }
 
     #[inline(always)]
     fn cast(&self, x: f32, y: f32) -> Hit {
-        let (dx, dy) = (x - self.u, y - self.v);
+        let (dx, dy) = self.projection.offset(x, y);
         let [w00, w10, w11] = self.whitening;
         let x = w00 * dx;
         let y = w10 * dx + w11 * dy;
         let inner = 1.0 - x * x - y * y;
         let root = inner.sqrt();
         let depth = self.slope_x * x + self.centre + self.slope_y * y - self.bulge * root;
-        let facing = self.sun[0] * x + self.sun[1] * y - self.sun[2] * root;
-        Hit { depth, is_hit: inner >= 0.0, cover: inner * self.per_size, tone: facing + self.base }
+        let tone = self.projection.facing(x, y, root) + self.projection.base;
+        Hit { depth, is_hit: inner >= 0.0, cover: inner * self.per_size, tone }
     }
 }
 
@@ -204,6 +221,14 @@ pub struct Pinhole {
     pub focal: f32,
     /// Principal point [px].
     pub centre: [f32; 2],
+}
+
+impl Pinhole {
+    /// The ray through a pixel: to the right and down, per unit ahead.
+    #[inline(always)]
+    fn ray(&self, x: f32, y: f32) -> (f32, f32) {
+        ((x - self.centre[0]) / self.focal, (y - self.centre[1]) / self.focal)
+    }
 }
 
 /// An upright cone or cylinder.
@@ -252,8 +277,7 @@ impl Solid for Frustum {
 
     #[inline(always)]
     fn cast(&self, x: f32, y: f32) -> Hit {
-        let Pinhole { focal, centre } = self.pinhole;
-        let (right, down) = ((x - centre[0]) / focal, (y - centre[1]) / focal);
+        let (focal, (right, down)) = (self.pinhole.focal, self.pinhole.ray(x, y));
         let lift = self.taper * down;
         let a = right * right + (1.0 - lift * lift);
         let b = right * self.x + (self.z - self.level * lift);
@@ -314,8 +338,7 @@ impl Solid for Slab {
 
     #[inline(always)]
     fn cast(&self, x: f32, y: f32) -> Hit {
-        let Pinhole { focal, centre } = self.pinhole;
-        let (right, down) = ((x - centre[0]) / focal, (y - centre[1]) / focal);
+        let (right, down) = self.pinhole.ray(x, y);
         let [[to_x, turn_x], [to_y, turn_y]] = self.directions;
         let [in_x, out_x] = Self::layer(self.sides[0], to_x + turn_x * right);
         let [in_y, out_y] = Self::layer(self.sides[1], to_y + turn_y * right);

@@ -15,7 +15,7 @@ from rich import box
 from rich.table import Table
 
 import limo_hog
-from limo_hog.cli.support.arguments import add_json, size, threads
+from limo_hog.cli.support.arguments import add_json, add_search, size, threads
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.environment import environment
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
@@ -63,12 +63,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--size", type=size, nargs="+", metavar="WxH", help="image sizes (640x480 1280x720 1920x1080)")
     parser.add_argument("--channels", choices=["gray", "bgr"], help="only this kind of image (both)")
     parser.add_argument("--threads", type=threads, nargs="+", metavar="N", help="thread counts, 0 for all cores (1 0)")
-    parser.add_argument(
-        "--search",
-        choices=("exact", "guided"),
-        default="exact",
-        help="guided: PeopleDetector's faster search, whose rectangles may differ (exact)",
-    )
+    add_search(parser)
     parser.add_argument("--image", type=Path, metavar="FILE", help="a picture instead of the drawn street")
     add_json(parser, "the result as JSON")
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from limo_hog.atomic import is_stream
 from limo_hog.cli.support import arguments
-from limo_hog.cli.support.arguments import MODEL, add_json, output_file
+from limo_hog.cli.support.arguments import MODEL, add_json, add_search, output_file
 from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.cli.support.page import HERE, PORT, address, announce
 from limo_hog.cli.support.results import Result, json_lines, write_coco, write_csv, write_mot
@@ -61,12 +61,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "faster than real time then",
     )
     parser.add_argument("--model", default=PeopleDetector.model, metavar="NAME|FILE", help=f"{MODEL} (%(default)s)")
-    parser.add_argument(
-        "--search",
-        choices=("exact", "guided"),
-        default="exact",
-        help="guided: about twice as fast, a raw hit in two hundred is missed (exact)",
-    )
+    add_search(parser)
     parser.add_argument(
         "--threshold", type=arguments.score, metavar="T", help="least SVM margin of a hit (the model's own)"
     )

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limo_hog.cli.support.arguments import MODEL, add_json, least_height, score
+from limo_hog.cli.support.arguments import MODEL, add_json, add_labels, least_height, score
 from limo_hog.cli.support.output import STDOUT, write_json
 
 if TYPE_CHECKING:
@@ -28,8 +28,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="labels: a folder of VOC XML or YOLO text files, a COCO JSON, CVAT XML or imglab XML file, or boxes.json",
     )
     parser.add_argument("--against", nargs="+", default=[], metavar="MODEL", help="other detectors, for comparison")
-    parser.add_argument("--label", metavar="NAME", help="which label is sought, where there are several")
-    parser.add_argument("--pictures", type=Path, metavar="DIR", help="where the pictures lie, if not beside the labels")
+    add_labels(parser)
     parser.add_argument(
         "--min-height",
         type=least_height,
@@ -123,7 +122,5 @@ def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters)
         sure = "" if low <= 0 <= high else ", unlikely to be chance"
         names = f"{evaluations[0].name} minus {other.name}"
         screen.print(
-            f"LAMR of {names}: {lamr.difference:+.3f} ({low:+.3f} to {high:+.3f}){sure}",
-            soft_wrap=True,
-            markup=False,
+            f"LAMR of {names}: {lamr.difference:+.3f} ({low:+.3f} to {high:+.3f}){sure}", soft_wrap=True, markup=False
         )

@@ -82,7 +82,7 @@ def _turn(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """Drive the robot that publishes the workshop's topics, then print how it went."""
-    controller = controller_named(args.controller, args.target)
+    controller = controller_named(args.controller, args.target, args.person)
     robot = load_robot(args.robot) if args.robot else LIMO
     robot = replace(robot, max_speed=min(robot.max_speed, args.max_speed), max_turn=min(robot.max_turn, args.max_turn))
     detector = detector_named(args.detector)

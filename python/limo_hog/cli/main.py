@@ -106,8 +106,7 @@ def _answered(arguments: list[str]) -> int:
 def _run(arguments: list[str]) -> int:
     wanted = next((argument for argument in arguments if not argument.startswith("-")), None)
     parser = _Parser(
-        prog="limo-hog",
-        description="OpenCV's HOG people detector, many times faster, and a robot arena to try it on.",
+        prog="limo-hog", description="OpenCV's HOG people detector, many times faster, and a robot arena to try it on."
     )
     parser.add_argument("--version", action="store_true", help="print the version and stop")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limo_hog.cli.support.arguments import count, file_ending, number, seed, size
+from limo_hog.cli.support.arguments import add_labels, count, file_ending, number, seed, size
 from limo_hog.cli.support.output import UsageError
 
 if TYPE_CHECKING:
@@ -43,8 +43,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--validate", type=Path, metavar="DATA", help="labels to measure on, instead of a share of DATA held out"
     )
     parser.add_argument("--held-out", type=_share, default=0.2, metavar="SHARE", help="share held out (%(default)s)")
-    parser.add_argument("--label", metavar="NAME", help="which label is meant, where there are several")
-    parser.add_argument("--pictures", type=Path, metavar="DIR", help="where the pictures lie, if not beside the labels")
+    add_labels(parser)
     parser.add_argument(
         "--window", type=size, metavar="WxH", help="window size [px], multiples of 8 (chosen from DATA)"
     )

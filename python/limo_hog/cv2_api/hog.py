@@ -26,6 +26,10 @@ class HOGDescriptor:
     default. `HOGDescriptor(filename)` loads a file. Sizes are (width, height) [px]. The geometry is checked at its
     first use: what does not fit raises `GeometryError`. Images are uint8 (H, W), (H, W, 1) or (H, W, 3).
 
+    Of every search, `winStride` is the distance of neighbouring windows (x, y) [px], by default the cell size (in
+    `detectMultiScale` the block stride), `padding` a border around the image or level (x, y) [px], mirrored, and
+    `locations` are top left corners (x, y) of windows [px], by default the whole grid, row by row.
+
     Threads may share one: a search is of the geometry and coefficients that were in force together when it began.
     """
 
@@ -181,15 +185,6 @@ class HOGDescriptor:
     ) -> NDArray[np.float32] | Nothing:
         """Descriptors of the windows of an image.
 
-        Parameters
-        ----------
-        winStride
-            Distance of neighbouring windows (x, y) [px]; by default the cell size.
-        padding
-            Border around the image (x, y) [px], mirrored.
-        locations
-            Top left corners (x, y) of the windows [px]; by default the whole grid, row by row.
-
         Returns
         -------
         descriptors
@@ -259,12 +254,6 @@ class HOGDescriptor:
         ----------
         hitThreshold
             Least score of a hit.
-        winStride
-            Distance of neighbouring windows (x, y) [px]; by default the cell size.
-        padding
-            Border around the image (x, y) [px], mirrored.
-        searchLocations
-            Top left corners (x, y) of the windows to look at [px]; by default the whole grid.
 
         Returns
         -------
@@ -302,17 +291,12 @@ class HOGDescriptor:
         ----------
         hitThreshold
             Least score of a hit.
-        winStride
-            Distance of neighbouring windows (x, y) [px of each level]; by default the block stride.
-        padding
-            Border around each level (x, y) [px], mirrored.
         scale
             How much each level is smaller than the one before; 1 or less searches the image's own size alone.
         groupThreshold, finalThreshold
             Similar rectangles must be more than this to count; below 1 every hit is returned. With
-            `useMeanshiftGrouping`, the least weight of a mode. The second is the old name; it counts when given.
-        useMeanshiftGrouping
-            Group by mean-shift instead.
+            `useMeanshiftGrouping`, which groups by mean-shift, the least weight of a mode. The second is the old
+            name; it counts when given.
 
         Returns
         -------

@@ -16,6 +16,7 @@ from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.safety import Guard
 from limo_hog.follow.sense.detectors import Region, detect_in
 from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors, observed
+from limo_hog.follow.tracks.asking import Whom
 
 S = TypeVar("S")
 
@@ -104,6 +105,14 @@ class Follower(Generic[S]):
         if not begins:
             return None
         return self._see(now, frame, sensors) if frame is not None and new else self._recheck(now, sensors)
+
+    def follow(self, whom: Whom) -> None:
+        """Ask to follow one person of several in view: "nearest", "left", "right", "largest", or a number.
+
+        Numbers are those of `Decision.belief.people`. Until then the followed person stays the same, and the reason
+        says who is asked for. Raises `WhomError` for anything else, and for a controller that cannot be asked.
+        """
+        self._state = self._guard.ask(whom, self._state)
 
     def _see(self, now: float, frame: Frame, sensors: Sensors) -> FrameLog:
         region = self._region

@@ -178,19 +178,11 @@ def _name_for_opencv(source: Source) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class Video:
-    """An open video file, camera or stream.
-
-    Attributes
-    ----------
-    fps
-        Frames a second by the file's header; 25 where it has none.
-    frame_count
-        Number of frames by the file's header; 0 where it has none, and for a camera.
-    """
+    """An open video file, camera or stream."""
 
     source: Source
-    fps: float
-    frame_count: int
+    fps: float  #: frames a second by the file's header; 25 where it has none
+    frame_count: int  #: number of frames by the file's header; 0 where it has none, and for a camera
     _capture: cv2.VideoCapture
 
     @property

@@ -15,15 +15,7 @@ from limo_hog import _core
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.exceptions import ImageError
 from limo_hog.learn.labels import LabelWarning
-from limo_hog.learn.windows import (
-    Jitter,
-    Region,
-    WindowShape,
-    cut,
-    positive_crops,
-    random_boxes,
-    read_gray,
-)
+from limo_hog.learn.windows import Jitter, Region, WindowShape, cut, positive_crops, random_boxes, read_gray
 from limo_hog.parallel import in_order
 from limo_hog.suppression import intersection_over_union, nms
 

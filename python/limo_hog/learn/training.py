@@ -59,10 +59,7 @@ class Round:
 
 
 def train(
-    data: TrainingData,
-    parameters: TrainingParameters,
-    workers: int,
-    progress: Progress = lambda _stage, _steps: None,
+    data: TrainingData, parameters: TrainingParameters, workers: int, progress: Progress = lambda _stage, _steps: None
 ) -> Iterator[Round]:
     """Train, and yield each round as it is done.
 

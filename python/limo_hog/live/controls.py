@@ -1,11 +1,10 @@
-"""Control messages of a page: pause, resume, step, speed, and the value of a parameter."""
+"""Control messages of a page: pause, resume, step, speed, whom to follow, and the value of a parameter."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from limo_hog.cv2_api.arguments import shown
 from limo_hog.exceptions import LimoHogError
@@ -57,22 +56,31 @@ class Parameter:
 SPEED = Parameter("speed", 1.0, 0.0, 100.0, "×", "Simulated seconds in a second; 0 is as fast as it can.")
 
 
-def apply(text: str, pace: Pace, set_: Callable[[str, Any], None] | None) -> str | None:
-    """Apply a control message; returns what is wrong with it, None where it was applied.
+class Settable(Protocol):
+    """What has parameters; a follower has `follow(whom)`, too."""
 
-    `set_` gives a parameter, by its name, a value; None where there is none to set.
-    """
+    def set(self, name: str, value: Any) -> None:
+        """Give a parameter a value; raises `ParameterError`."""
+        ...
+
+
+def apply(text: str, pace: Pace, controller: Settable | None) -> str | None:
+    """Apply a control message; returns what is wrong with it, None where it was applied."""
     try:
         message = json.loads(text)
         if "set" in message:
-            if set_ is None:
+            if controller is None:
                 return "this run has no parameters"
-            set_(message["set"], message["value"])
+            controller.set(message["set"], message["value"])
+        elif "follow" in message:
+            if controller is None or not hasattr(controller, "follow"):
+                return "this run has no follower of ours"
+            controller.follow(message["follow"])
         elif message["do"] == "speed":
             pace.set_speed(SPEED.checked(message["value"]))
         else:
             {"pause": pace.pause, "resume": pace.resume, "step": pace.step}[message["do"]]()
-    except ParameterError as error:
+    except LimoHogError as error:
         return str(error)
     except (ValueError, KeyError, TypeError, RecursionError):
         return f"not understood: {text[:100]}"

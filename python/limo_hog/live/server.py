@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from limo_hog.atomic import json_text
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
-from limo_hog.live.controls import MAX_BYTES, apply
+from limo_hog.live.controls import MAX_BYTES, Settable, apply
 from limo_hog.live.pace import Pace
 
 with needed(by="the live page"):
@@ -95,8 +95,8 @@ class Live(ABC, Generic[Moment]):
     ----------
     package
         Whose folder `page` has the page's files.
-    set_parameter
-        Gives a parameter a value that the page asks for; None where there is none to set.
+    controller
+        Whose parameters the page sets; None where there are none.
     host, port
         Where to listen; port 0 takes any free one. Anything but loopback lets others on the network steer.
     pace
@@ -111,12 +111,12 @@ class Live(ABC, Generic[Moment]):
     def __init__(
         self,
         package: str,
-        set_parameter: Callable[[str, Any], None] | None,
+        controller: Settable | None,
         host: str = LOOPBACK,
         port: int = 0,
         pace: Pace | None = None,
     ) -> None:
-        self._package, self._set_parameter = package, set_parameter
+        self._package, self._controls = package, controller
         self._host, self._port = host, port
         self.pace = pace or Pace()
         self._newest: Moment | None = None
@@ -241,7 +241,7 @@ class Live(ABC, Generic[Moment]):
                 if message.type is WSMsgType.ERROR:
                     break  # longer than any control message, or against the protocol
                 text = message.data if message.type is WSMsgType.TEXT else ""
-                complaint = apply(text, self.pace, self._set_parameter)
+                complaint = apply(text, self.pace, self._controls)
                 if complaint:
                     page.complaints.append(complaint)
         finally:

@@ -48,16 +48,6 @@ def picture(card: ScoreCard) -> Panel:
         ("near anybody", f"intimate {_percent(near[0])}", "", f"personal {_percent(near[1])}"),
     ):
         figures.add_row(*row)
-    bars = Table.grid(padding=(0, 2))
-    bars.add_column(no_wrap=True)
-    bars.add_column(no_wrap=True)
-    bars.add_column(justify="right", no_wrap=True)
-    bars.add_row(Text("distance zones", style="bold"), "", "")
-    for zone, style in _ZONE_STYLES.items():
-        bars.add_row(*_bar(zone, getattr(card, f"zone_{zone}"), style))
-    bars.add_row(Text("mode", style="bold"), "", "")
-    for mode, share in card.modes.items():
-        bars.add_row(*_bar(mode, share, _MODE_STYLES[mode]))
     reasons = Table.grid(padding=(0, 2))
     reasons.add_column(justify="right", style="dim", no_wrap=True)
     reasons.add_column(overflow="fold")
@@ -66,13 +56,26 @@ def picture(card: ScoreCard) -> Panel:
     detection = f"{card.detect_ms_p50:.1f} ms a frame" if card.detect_ms_p50 is not None else "no frame"
     names = (Text(card.scenario, style="bold"), card.controller, card.detector, f"seed {card.seed}")
     return Panel(
-        Group(figures, "", bars, "", Text("most frequent reasons", style="bold"), reasons),
+        Group(figures, "", _bars(card), "", Text("most frequent reasons", style="bold"), reasons),
         title=Text(" · ").join(Text.assemble(name) for name in names),
         subtitle=f"{card.seconds:g} s, {card.real_time_factor:.1f}× real time · detection {detection}",
         box=box.ROUNDED,
         padding=(1, 2),
         expand=False,
     )
+
+
+def _bars(card: ScoreCard) -> Table:
+    bars = Table.grid(padding=(0, 2))
+    for justify in ("left", "left", "right"):
+        bars.add_column(justify=justify, no_wrap=True)
+    bars.add_row(Text("distance zones", style="bold"), "", "")
+    for zone, style in _ZONE_STYLES.items():
+        bars.add_row(*_bar(zone, getattr(card, f"zone_{zone}"), style))
+    bars.add_row(Text("mode", style="bold"), "", "")
+    for mode, share in card.modes.items():
+        bars.add_row(*_bar(mode, share, _MODE_STYLES[mode]))
+    return bars
 
 
 def _bar(name: str, share: float | None, style: str) -> tuple[str, Text, str]:

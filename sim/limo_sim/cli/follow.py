@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     if shown_unasked(args):
         args.view = HERE, 0
     scenario = of_run(Scenario.load(args.scenario, args.robot), args.seed)
-    controller = Tunable(controller_named(args.controller, args.target))
+    controller = Tunable(controller_named(args.controller, args.target, args.person))
     detector = detector_named(args.detector)
     with observing(args, scenario, controller) as observers:
         with progress("s") as bar:

@@ -131,13 +131,10 @@ def run(args: argparse.Namespace) -> int:
         comparisons = compare(cards, args.against, groups)
         comparisons += compare(cards, args.against, {card.scenario: "all" for card in cards})
     if args.json:
-        result = {
-            "runs": [card.to_json() for card in cards],
-            "summary": [asdict(one) for one in summaries],
-            "groups": [asdict(one) for one in of_groups],
-            "comparison": [asdict(one) for one in comparisons],
-        }
-        write_json(args.json, result)
+        tables: dict[str, Sequence[Summary | Comparison]]
+        tables = {"summary": summaries, "groups": of_groups, "comparison": comparisons}
+        result = {name: [asdict(one) for one in rows] for name, rows in tables.items()}
+        write_json(args.json, {"runs": [card.to_json() for card in cards], **result})
     if args.csv:
         _write_csv(args.csv, cards)
     if args.plot:

@@ -77,7 +77,7 @@ def in_front(world: World) -> Iterator[None]:
     sys.modules.update(modules)
     refuser = _Refuser()
     sys.meta_path.append(refuser)
-    context.enter(world)
+    context.enter(context.Context(world))
     try:
         with in_turns(world.turns, lambda: world.time):
             yield
@@ -90,9 +90,7 @@ def in_front(world: World) -> Iterator[None]:
 
 
 def _modules() -> dict[str, ModuleType]:
-    made: dict[str, ModuleType] = {}
-    for name, content in offered().items():
-        made[name] = _Module(name, content)
+    made: dict[str, ModuleType] = {name: _Module(name, content) for name, content in offered().items()}
     for name, module in made.items():
         parent, _, child = name.rpartition(".")
         if parent:

@@ -10,7 +10,6 @@ from limo_sim.ros.companions import bridge, camera_model, filters, packages, qua
 from limo_sim.ros.lockstep import turns
 from limo_sim.ros.rclpy_stub import (
     clock,
-    context,
     executors,
     future,
     groups,
@@ -22,6 +21,7 @@ from limo_sim.ros.rclpy_stub import (
     services,
     topics,
 )
+from limo_sim.ros.rclpy_stub.context import default_context
 
 
 def offered() -> dict[str, dict[str, Any]]:
@@ -120,24 +120,20 @@ def _init(
     domain_id: int | None = None,  # noqa: ARG001
     signal_handler_options: Any = None,  # noqa: ARG001
 ) -> Any:
-    run = _current()
-    run.init(args)
+    default_context().init(args)
     ended = contextlib.ExitStack()
     ended.callback(_try_shutdown)
     return ended
 
 
 def _shutdown(*, context: Any = None, uninstall_handlers: bool | None = None) -> None:  # noqa: ARG001
-    _current().shutdown()
+    default_context().shutdown()
 
 
 def _try_shutdown(*, context: Any = None, uninstall_handlers: bool | None = None) -> None:  # noqa: ARG001
-    if _current().is_initialized:
-        _current().shutdown()
+    if default_context().is_initialized:
+        default_context().shutdown()
 
 
 def _ok(*, context: Any = None) -> bool:  # noqa: ARG001 — rclpy's signature
-    return _current().ok()
-
-
-_current = context.current
+    return default_context().ok()

@@ -15,7 +15,6 @@ from limo_sim.ros.lockstep.records import Fault, StubError
 from limo_sim.ros.lockstep.turns import ExternalShutdownException, RunOver
 from limo_sim.ros.lockstep.windows import watched_cv2
 from limo_sim.ros.lockstep.world import World
-from limo_sim.ros.rclpy_stub.context import Context
 
 _HERE = Path(__file__).parent
 
@@ -30,7 +29,7 @@ def run_script(world: World, arguments: Sequence[str] = ()) -> Fault | None:
     sys.path[:0] = [str(folder) for folder in (here, *packages, *(folder.parent for folder in packages))]
     with in_front(world), watched_cv2(world):
         try:
-            with world.patience.watching(), world.turns.main(Context(world)):
+            with world.patience.watching(), world.turns.main():
                 _check_encoding(world.script)
                 runpy.run_path(str(world.script), run_name="__main__")
         except (RunOver, ExternalShutdownException):

@@ -97,8 +97,7 @@ class Stage:
         self.script = script
         self.arena = Arena(scenario, seed)
         self.seconds = seconds
-        self.log = log
-        self.watch = watch
+        self.log, self.watch = log, watch
         self._witness = witness or Witness()
         # (An hour's: 28 bytes each.)
         self._driven, self._lines = array("d"), array("i")
@@ -241,14 +240,13 @@ class Stage:
         """Name each subscription to a topic that nobody publishes, and each unanswered client, once."""
         for kind, name in [key for key, at in self._due.items() if self.time >= at - 1e-9]:
             del self._due[kind, name]
-            line = getattr(self.calls, kind)[name]
+            line, how = getattr(self.calls, kind)[name], "subscribed to" if kind == "readers" else "asked for"
+            where = "" if line is None else f", {how} at line {line}"
             if kind == "readers" and name not in PUBLISHED and name not in self.calls.writers:
-                where = "" if line is None else f", subscribed to at line {line}"
                 said = f"nobody publishes {name!r}{where}; did you mean "
                 said += f"{nearest_topic(name, self.calls.types.get(name, ''))!r}?"
                 self.log(self.time, "WARN", LOGGER, said)
             if kind == "clients" and name not in self.calls.services:
-                where = "" if line is None else f", asked for at line {line}"
                 there = ", ".join(sorted(self.calls.services)) or "none"
                 self.log(self.time, "WARN", LOGGER, f"no node offers the service {name!r}{where}; offered: {there}")
 
@@ -259,11 +257,8 @@ class Stage:
             self._render_ms = 1e3 * (time.perf_counter() - drawing)
             self._frame, self.found = frame, []
             self._witness.frame(self.time, frame)
-        return [
-            (topic, serialize(make()))
-            for topic, make in self._outlet.new()
-            if topic in wanted or topic == names.TF_STATIC
-        ]
+        wanted = {*wanted, names.TF_STATIC}
+        return [(topic, serialize(make())) for topic, make in self._outlet.new() if topic in wanted]
 
     def _log(self) -> None:
         """Log the control period that ends now."""

@@ -22,21 +22,13 @@ CENTRE_X, CENTRE_Y = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
 
 @dataclass(frozen=True, slots=True)
 class CameraPose:
-    """Where the camera is in the arena's frame and which way it looks, level [m, m, rad]; by default a Limo's.
-
-    Attributes
-    ----------
-    height
-        Above the floor [m].
-    focal_px
-        Its focal length [px].
-    """
+    """Where the camera is in the arena's frame and which way it looks, level [m, m, rad]; by default a Limo's."""
 
     x: float
     y: float
     yaw: float
-    height: float = LIMO.camera_z
-    focal_px: float = LIMO.focal_px(WIDTH)
+    height: float = LIMO.camera_z  #: above the floor [m]
+    focal_px: float = LIMO.focal_px(WIDTH)  #: its focal length [px]
 
     @classmethod
     def on_robot(cls, robot: RobotGeometry, x: float, y: float, yaw: float) -> CameraPose:

@@ -16,20 +16,11 @@ GRAVITY = 9.80665
 
 @dataclass(frozen=True, slots=True)
 class ImuReading:
-    """One sample.
+    """One sample."""
 
-    Attributes
-    ----------
-    stamp
-        When it was taken [s].
-    angular_velocity
-        About x, y, z [rad/s].
-    acceleration
-        Along x, y, z, gravity's reaction included: a robot at rest reads +9.8 on z [m/s²].
-    """
-
-    stamp: float
-    angular_velocity: tuple[float, float, float]
+    stamp: float  #: when it was taken [s]
+    angular_velocity: tuple[float, float, float]  #: about x, y, z [rad/s]
+    #: Along x, y, z, gravity's reaction included: a robot at rest reads +9.8 on z [m/s²].
     acceleration: tuple[float, float, float]
 
 

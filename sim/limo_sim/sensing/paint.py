@@ -39,24 +39,12 @@ _PAPERS = ((222, 226, 228), (186, 206, 216), (150, 190, 214), (206, 190, 160))
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One side of a wall.
+    """One side of a wall."""
 
-    Attributes
-    ----------
-    start
-        Left end of the side for who stands before it [m].
-    along
-        Unit vector from there to the right.
-    length
-        Of the side [m].
-    grey
-        Its brightness, 0 … 255.
-    """
-
-    start: tuple[float, float]
-    along: tuple[float, float]
-    length: float
-    grey: float
+    start: tuple[float, float]  #: left end of the side for who stands before it [m]
+    along: tuple[float, float]  #: unit vector from there to the right
+    length: float  #: of the side [m]
+    grey: float  #: its brightness, 0 … 255
 
 
 def sides_of(half: float, walls: Sequence[Rectangle], greys: Sequence[float]) -> list[Side]:
@@ -254,19 +242,8 @@ def _poster(picture: U8, middle: float, light: float, random: np.random.Generato
     motif = int(random.integers(6))
     if motif > 2:  # the sign of a person, as on doors of lavatories
         ball(0.5, 0.16, 0.075)
-        polygon(
-            [
-                (0.3, 0.28),
-                (0.7, 0.28),
-                (0.72, 0.56),
-                (0.62, 0.58),
-                (0.62, 0.92),
-                (0.38, 0.92),
-                (0.38, 0.58),
-                (0.28, 0.56),
-            ],
-            ink,
-        )
+        arms, legs = [(0.3, 0.28), (0.7, 0.28), (0.72, 0.56), (0.62, 0.58)], [(0.62, 0.92), (0.38, 0.92)]
+        polygon([*arms, *legs, (0.38, 0.58), (0.28, 0.56)], ink)
     elif motif == 0:  # a carafe with a stopper
         ball(0.5, 0.16, 0.07)
         neck, shoulder, foot = [(0.44, 0.2), (0.56, 0.2)], [(0.58, 0.3), (0.7, 0.38)], [(0.66, 0.92), (0.34, 0.92)]

@@ -59,18 +59,11 @@ _NEAR = -_FAR
 
 @dataclass(frozen=True, slots=True)
 class Earlier:
-    """What the camera saw before.
+    """What the camera saw before."""
 
-    Attributes
-    ----------
-    before
-        Camera, people and movers so many seconds before the stamp.
-    turn_rate
-        Of the camera [rad/s].
-    """
-
+    #: Camera, people and movers so many seconds before the stamp.
     before: Callable[[float], tuple[CameraPose, Sequence[Pose | None], Sequence[Furniture]]]
-    turn_rate: float
+    turn_rate: float  #: of the camera [rad/s]
 
 
 class Renderer:

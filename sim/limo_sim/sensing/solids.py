@@ -58,23 +58,15 @@ class Sun:
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """A body as the camera sees it: parts as rounded strips or ellipses in the image, ready to be cast.
+    """A body as the camera sees it: parts as rounded strips or ellipses in the image, ready to be cast."""
 
-    Attributes
-    ----------
-    strips
-        float64 (N, 12), per capsule: part, u, v, axis u, axis v, length, radius [px], taper, depth [m], depth per px,
-        m per px, sine of the angle between axis and image.
-    ellipses
-        float64 (M, 12), per ellipsoid: part, u, v, the three entries of the lower-triangular whitening matrix, half
-        height and half width [px], depth [m], depth per canonical x and y, bulge [m].
-    bounds
-        Of all of it.
-    """
-
+    #: float64 (N, 12), per capsule: part, u, v, axis u, axis v, length, radius [px], taper, depth [m], depth per px, m
+    #: per px, sine of the angle between axis and image.
     strips: NDArray[np.float64]
+    #: float64 (M, 12), per ellipsoid: part, u, v, the three entries of the lower-triangular whitening matrix, half
+    #: height and half width [px], depth [m], depth per canonical x and y, bulge [m].
     ellipses: NDArray[np.float64]
-    bounds: Bounds
+    bounds: Bounds  #: of all of it
 
 
 def outline(body: BodyMesh, camera: CameraPose) -> Outline | None:

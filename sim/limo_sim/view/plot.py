@@ -26,12 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _ROBOT, _PERSON, _INK, _FAINT = "#1f6feb", "#d1242f", "#1d2329", "#8a949e"
-_ZONES = {
-    Zone.INTIMATE: "#d1242f",
-    Zone.PERSONAL: "#e8a317",
-    Zone.SOCIAL: "#2da44e",
-    Zone.PUBLIC: "#8a949e",
-}
+_ZONES = {Zone.INTIMATE: "#d1242f", Zone.PERSONAL: "#e8a317", Zone.SOCIAL: "#2da44e", Zone.PUBLIC: "#8a949e"}
 
 
 def plot(episode: Episode, steps: Sequence[Step], path: Path) -> None:

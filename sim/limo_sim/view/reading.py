@@ -109,7 +109,7 @@ def hits(scan: Scan | None, robot: RobotGeometry, poses: list[tuple[float, float
 
 
 def believed(step: Step) -> list[list[float | None]]:
-    """Return where the follower takes people to be, x, y [m] in the arena's frame, with two probabilities.
+    """Return where the follower takes people to be, x, y [m] in the arena's frame, two probabilities and a number.
 
     They are of being a person, and of being the person followed; None for that before one was followed.
     """
@@ -121,6 +121,7 @@ def believed(step: Step) -> list[list[float | None]]:
             round(y + sin * one.x + cos * one.y, 2),
             round(one.probability, 2),
             None if one.same is None else round(one.same, 2),
+            one.number,
         ]
         for one in step.log.decision.belief.people
     ]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections import deque
 from dataclasses import asdict
 from typing import Any
 
 from limo_hog.follow.decision import Mode
+from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.sense.measurement import ZONE_ENDS
 from limo_hog.imaging.writing import jpeg
 from limo_hog.live.pace import Pace
@@ -26,6 +28,9 @@ from limo_sim.view.reading import (
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.furniture import Disc
 from limo_sim.world.scenario import Scenario
+
+#: Somebody not found for so long cannot be clicked on [s]: longer than between two searches of the whole image.
+_BOX_S = 2.0
 
 
 class View(Live[Step]):
@@ -49,8 +54,10 @@ class View(Live[Step]):
         port: int = 0,
         pace: Pace | None = None,
     ) -> None:
-        super().__init__("limo_sim.view", controller.set if controller else None, host, port, pace)
+        super().__init__("limo_sim.view", controller, host, port, pace)
         self._scenario, self._controller = scenario, controller
+        # The newest box of each tracked person, by number: the follower searches the whole image now and then.
+        self._boxes: dict[int, tuple[float, list[int]]] = {}
         # Index of the person followed last; None before, and during a search.
         self._followed: int | None = None
         # Time and pose of the last control periods: a scan is as old as it is.
@@ -61,6 +68,8 @@ class View(Live[Step]):
         log, robot = step.log, step.truth.robot
         if log.frame is not None:
             self._pictured = self._written, step
+            boxes, tracked = log.detections.boxes, log.decision.belief.people
+            self._boxes |= {one.number: (log.time, boxes[one.box].tolist()) for one in tracked if one.box is not None}
         people = [(None, None) if p is None else (p.x, p.y) for p in step.truth.people]
         self._rows.append([*figures(step).values(), measured_m(log), *robot, *itertools.chain(*people)])
         if log.decision.mode is Mode.SEARCH:
@@ -105,10 +114,21 @@ class View(Live[Step]):
             "scan": hits(log.sensors.scan, self._scenario.robot.geometry, list(self._poses)),
             "detect_ms": log.detect_ms or None,
             "boxes": len(log.detections),
+            "choices": self._choices(log) if self._controller else [],
             "contacts": asdict(step.truth.contacts),
             "paused": self.pace.paused,
             "speed": self.pace.speed,
         }
+
+    def _choices(self, log: FrameLog) -> list[list[int]]:
+        """Return who can be clicked on: number, whether followed, and the newest box x, y, w, h [px] of each."""
+        belief = log.decision.belief
+        boxes = {one.number: self._boxes.get(one.number, (-math.inf, [])) for one in belief.people}
+        return [
+            [number, number == belief.followed, *box]
+            for number, (at, box) in sorted(boxes.items())
+            if log.time - at < _BOX_S
+        ]
 
     def _pictures(self, step: Step) -> list[bytes]:
         """Encode the pictures of a step: the camera's, the depth's and a node's windows; a letter tells which."""

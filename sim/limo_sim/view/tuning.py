@@ -10,6 +10,7 @@ from typing import Any, Generic, TypeVar
 from limo_hog.cv2_api.arguments import shown
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.sense.observation import Observation
+from limo_hog.follow.tracks.asking import Whom, WhomError, checked
 from limo_hog.live.controls import Parameter, ParameterError
 
 S = TypeVar("S")
@@ -23,6 +24,7 @@ class Tunable(Generic[S]):
 
     def __init__(self, controller: Controller[S]) -> None:
         self._controller = controller
+        self._asked: Whom | None = None
 
     def start(self) -> S:
         """Return the state before the first observation."""
@@ -30,7 +32,16 @@ class Tunable(Generic[S]):
 
     def step(self, observation: Observation, state: S) -> Decision[S]:
         """Decide as the controller with today's parameters does."""
-        return self._controller.step(observation, state)
+        asked, self._asked = self._asked, None
+        controller: Any = self._controller
+        decision: Decision[S] = controller.step(observation, state if asked is None else controller.ask(asked, state))
+        return decision
+
+    def follow(self, whom: Whom) -> None:
+        """Ask to follow a person from the next step on, as `Follower.follow`; raises `WhomError`."""
+        if not hasattr(self._controller, "ask"):
+            raise WhomError(f"{type(self._controller).__name__} follows nobody in particular")
+        self._asked = checked(whom)
 
     @property
     def target_distance(self) -> float | None:

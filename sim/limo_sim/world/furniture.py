@@ -90,9 +90,7 @@ _LEGS = ((-0.14, -0.13), (-0.14, 0.13), (0.14, -0.13), (0.14, 0.13))
 
 KINDS: dict[str, Piece] = {
     "pillar": Piece(
-        solids=(Frustum(0, 0, 0.0, 1.1, 0.15, 0.15, _STONE),),
-        footprint=Disc(0, 0, 0.15),
-        scanned=(Disc(0, 0, 0.15),),
+        solids=(Frustum(0, 0, 0.0, 1.1, 0.15, 0.15, _STONE),), footprint=Disc(0, 0, 0.15), scanned=(Disc(0, 0, 0.15),)
     ),
     "cone": Piece(
         solids=(

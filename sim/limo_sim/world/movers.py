@@ -14,21 +14,11 @@ from limo_sim.world.schema import WIDEST, one_of, required, within
 
 @dataclass(frozen=True, slots=True)
 class Mover:
-    """A piece of furniture that moves along a closed route, as a person with a timetable walks.
+    """A piece of furniture that moves along a closed route, as a person with a timetable walks."""
 
-    Attributes
-    ----------
-    kind
-        As of `Furniture`.
-    route
-        Corners (x, y, pause) [m, m, s].
-    speed
-        On the way [m/s].
-    """
-
-    kind: str = one_of(tuple(KINDS))
-    route: tuple[tuple[float, float, float], ...] = required(-WIDEST, 3600.0)
-    speed: float = within(0.3, 0.05, 2.0)
+    kind: str = one_of(tuple(KINDS))  #: as of `Furniture`
+    route: tuple[tuple[float, float, float], ...] = required(-WIDEST, 3600.0)  #: corners (x, y, pause) [m, m, s]
+    speed: float = within(0.3, 0.05, 2.0)  #: on the way [m/s]
 
     @property
     def timetable(self) -> Person:

@@ -29,51 +29,30 @@ SOCIAL_FORCE = "social_force"
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person who walks a closed route again and again.
+    """A person who walks a closed route again and again."""
 
-    Attributes
-    ----------
-    route
-        Corners (x, y, pause): walked in order, then from the last to the first again, with `pause` seconds at
-        each on arrival [m, m, s]. One corner: the person stands there.
-    speed
-        Walking speed [m/s].
-    height
-        Stature [m]; the whole body scales with it.
-    girth
-        Breadth of limbs and trunk, relative to that of `person.body`.
-    arrives_s
-        The person is not in the arena before this time [s].
-    leaves_s
-        Nor from this time on [s]; with "social_force" it is when the person sets out for the door.
-    facing
-        Direction in which a person whose route has a single corner faces [rad].
-    behaviour
-        "route": keeps to the timetable, whatever is in the way. "social_force": walks the same corners, finds ways
-        round obstacles, and gives way to people, walls and the robot (`social_force`).
-    reaction
-        To the robot, with "social_force": "avoid" (keeps clear of it, as of any obstacle), "ignore", "approach" (comes
-        up to it) or "block" (stands in its way).
-    enters
-        Door in an outer wall, with "social_force": x, y [m]. A person who arrives comes in by it, a person who leaves
-        goes out by it; without it, by the door nearest to the first corner.
-    sits
-        Whether a person whose route has a single corner sits there, on a stool.
-    shirt, trousers, skin, hair
-        Colours, red, green, blue, 0 … 255.
-    """
-
+    #: Corners (x, y, pause): walked in order, then from the last to the first again, with `pause` seconds at each on
+    #: arrival [m, m, s]. One corner: the person stands there.
     route: tuple[tuple[float, float, float], ...] = required(-WIDEST, 3600.0)
-    speed: float = within(0.75, 0.05, 2.0)
-    height: float = within(0.9, 0.6, 2.0)
-    girth: float = within(1.0, 0.7, 1.4)
-    arrives_s: float = within(0.0, 0.0, 3600.0)
+    speed: float = within(0.75, 0.05, 2.0)  #: walking speed [m/s]
+    height: float = within(0.9, 0.6, 2.0)  #: stature [m]; the whole body scales with it
+    girth: float = within(1.0, 0.7, 1.4)  #: breadth of limbs and trunk, relative to that of `person.body`
+    arrives_s: float = within(0.0, 0.0, 3600.0)  #: the person is not in the arena before this time [s]
+    #: Nor from this time on [s]; with "social_force" it is when the person sets out for the door.
     leaves_s: float = within(math.inf, 0.0, math.inf)
+    #: Direction in which a person whose route has a single corner faces [rad].
     facing: float = within(math.pi, -2 * math.pi, 2 * math.pi)
+    #: "route": keeps to the timetable, whatever is in the way. "social_force": walks the same corners, finds ways round
+    #: obstacles, and gives way to people, walls and the robot (`social_force`).
     behaviour: str = one_of(("route", SOCIAL_FORCE), "route")
+    #: To the robot, with "social_force": "avoid" (keeps clear of it, as of any obstacle), "ignore", "approach" (comes
+    #: up to it) or "block" (stands in its way).
     reaction: str = one_of(("avoid", "ignore", "approach", "block"), "avoid")
+    #: Door in an outer wall, with "social_force": x, y [m]. A person who arrives comes in by it, a person who leaves
+    #: goes out by it; without it, by the door nearest to the first corner.
     enters: tuple[float, ...] = within((), -WIDEST, WIDEST)
-    sits: bool = False
+    sits: bool = False  #: whether a person whose route has a single corner sits there, on a stool
+    #: shirt, trousers, skin, hair: colours, red, green, blue, 0 … 255
     shirt: tuple[float, float, float] = within((34, 52, 128), 0, 255)
     trousers: tuple[float, float, float] = within((38, 42, 56), 0, 255)
     skin: tuple[float, float, float] = within((198, 154, 124), 0, 255)
@@ -102,47 +81,26 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class Vary:
-    """How much the people of a run differ from the scenario's, drawn from the run's seed.
+    """How much the people of a run differ from the scenario's, drawn from the run's seed."""
 
-    Attributes
-    ----------
-    clothes
-        Whether colours and girth are drawn.
-    height, speed
-        By up to this share of the scenario's [1].
-    place
-        By how much each corner of a route is moved along x and y, at most [m].
-    """
-
-    clothes: bool = False
+    clothes: bool = False  #: whether colours and girth are drawn
+    #: height, speed: by up to this share of the scenario's [1]
     height: float = within(0.0, 0.0, 0.5)
     speed: float = within(0.0, 0.0, 0.9)
-    place: float = within(0.0, 0.0, 2.0)
+    place: float = within(0.0, 0.0, 2.0)  #: by how much each corner of a route is moved along x and y, at most [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """People who stand in a circle and look at its middle; `[[groups]]` in a file becomes so many `[[people]]`.
+    """People who stand in a circle and look at its middle; `[[groups]]` in a file becomes so many `[[people]]`."""
 
-    Attributes
-    ----------
-    x, y
-        The circle's middle [m].
-    size
-        How many people.
-    radius
-        From the middle to each person [m].
-    height
-        Their stature [m].
-    behaviour, reaction
-        As of a `Person`; "social_force" steps aside and comes back.
-    """
-
+    #: x, y: the circle's middle [m]
     x: float = required(-WIDEST, WIDEST)
     y: float = required(-WIDEST, WIDEST)
-    size: int = within(3, 2, 12)
-    radius: float = within(0.5, 0.2, 3.0)
-    height: float = within(0.9, 0.6, 2.0)
+    size: int = within(3, 2, 12)  #: how many people
+    radius: float = within(0.5, 0.2, 3.0)  #: from the middle to each person [m]
+    height: float = within(0.9, 0.6, 2.0)  #: their stature [m]
+    #: behaviour, reaction: as of a `Person`; "social_force" steps aside and comes back
     behaviour: str = one_of(("route", SOCIAL_FORCE), "route")
     reaction: str = one_of(("avoid", "ignore", "approach", "block"), "avoid")
 

@@ -186,3 +186,22 @@ def test_strangers_are_those_who_are_less_likely_than_not_the_person_followed_be
         assert SELECTION.is_stranger(plain(1), Choice(None, known(one=chance), 1.0)) == stranger
     assert SELECTION.is_stranger(plain(3), Choice(None, known(one=0.9), 1.0))
     assert not SELECTION.is_stranger(plain(1), Choice())
+
+
+def test_a_word_takes_the_person_meant_once_people_were_looked_at_for_a_second() -> None:
+    asked, both = Choice(asked="left"), (plain(1, -0.8), plain(2, 0.8))
+    first = choose(asked, *both)
+    assert (first.number, first.likeness, first.asked, first.unsure_at) == (2, None, "left", NOW)
+    assert choose(replace(first, unsure_at=NOW - 0.9), *both).likeness is None
+    after = choose(replace(first, unsure_at=NOW - 1.0), *both)
+    assert (after.number, after.likeness is not None, after.asked) == (2, True, None)
+
+
+def test_until_the_person_asked_for_is_in_view_nobody_else_is_begun_with_and_nobody_is_left() -> None:
+    assert choose(Choice(asked=7), plain(1)).number is None
+    follows = Choice(1, known(one=1.0), NOW)
+    for asked in (7, "left"):
+        unmet = choose(replace(follows, asked=asked), plain(1), unproved(7, 0.5))
+        assert (unmet.number, unmet.asked) == (1, asked if asked == 7 else None)
+    # A number needs no second look; whoever is asked for is followed at once, however sure the first is.
+    assert choose(replace(follows, asked=7), plain(1), plain(7, 1.0)).number == 7

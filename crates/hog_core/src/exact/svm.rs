@@ -5,6 +5,15 @@ use crate::memory;
 use crate::params::HogSpec;
 
 /// A linear SVM over window descriptors.
+///
+/// ```
+/// use hog_core::exact::Svm;
+/// use hog_core::{HogParams, HogSpec, model};
+/// let spec = HogSpec::new(&HogParams::default())?;
+/// assert_eq!(Svm::new(model::default_people(), &spec)?.weights().len(), 3780);
+/// assert!(Svm::new(model::daimler_people(), &spec).is_err()); // of another window
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Svm {
     weights: Vec<f32>,

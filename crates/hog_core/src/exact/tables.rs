@@ -30,6 +30,11 @@ impl Tables {
 }
 
 /// The value of each pixel after gamma correction: its square root, or itself.
+///
+/// ```
+/// use hog_core::exact::gamma_table;
+/// assert_eq!((gamma_table(true)[144], gamma_table(false)[144]), (12.0, 144.0));
+/// ```
 pub fn gamma_table(gamma_correction: bool) -> [f32; 256] {
     std::array::from_fn(|value| if gamma_correction { (value as f32).sqrt() } else { value as f32 })
 }

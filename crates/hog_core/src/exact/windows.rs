@@ -112,6 +112,19 @@ pub fn descriptors(
 }
 
 /// The scores of all windows, row by row.
+///
+/// ```
+/// use hog_core::exact::{Svm, Tables, scores};
+/// use hog_core::pyramid::Steps;
+/// use hog_core::{HogParams, HogSpec, ImageView, Interrupt, model};
+/// let spec = HogSpec::new(&HogParams::default())?;
+/// let (tables, svm) = (Tables::new(&spec)?, Svm::new(model::default_people(), &spec)?);
+/// let image = ImageView::new(&[128; 64 * 128], 64, 128, 1, 64)?;
+/// let grid = Steps::new((8, 8), (0, 0), spec.stride, &spec)?.grid(image.size(), &spec);
+/// let scores = scores(image, &grid, &spec, &tables, &svm, &Interrupt::NEVER)?;
+/// assert_eq!(scores, [f64::from(svm.bias())]); // an even grey has no gradient
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 pub fn scores(
     image: ImageView,
     grid: &Grid,

@@ -5,6 +5,13 @@ use std::sync::OnceLock;
 use crate::error::{BackendError, Result};
 
 /// An instruction set that the kernels are compiled for.
+///
+/// ```
+/// use hog_core::{Backend, Hog, HogParams};
+/// assert!(Backend::current()?.is_available());
+/// let plain = Hog::with_backend(&HogParams::default(), None, Backend::Scalar)?;
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
     /// The architecture's baseline.
@@ -17,6 +24,8 @@ pub enum Backend {
     Avx512,
     /// NEON.
     Neon,
+    /// WebAssembly's vectors of 128 bits.
+    Simd128,
 }
 
 /// The variable that forces a backend.
@@ -24,7 +33,8 @@ const VARIABLE: &str = "LIMO_HOG_BACKEND";
 
 impl Backend {
     /// All of them, the fastest first.
-    pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Sse41, Self::Neon, Self::Scalar];
+    pub const ALL: [Self; 6] =
+        [Self::Avx512, Self::Avx2, Self::Sse41, Self::Neon, Self::Simd128, Self::Scalar];
 
     /// The name that `LIMO_HOG_BACKEND` knows it by.
     pub const fn name(self) -> &'static str {
@@ -34,6 +44,7 @@ impl Backend {
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
             Self::Neon => "neon",
+            Self::Simd128 => "simd128",
         }
     }
 
@@ -57,6 +68,8 @@ impl Backend {
             }
             #[cfg(target_arch = "aarch64")]
             Self::Neon => true,
+            // Nothing can be asked at run time: a module that has such instructions does not load without them.
+            Self::Simd128 => cfg!(all(target_arch = "wasm32", target_feature = "simd128")),
             #[allow(unreachable_patterns, reason = "which are left depends on the architecture")]
             _ => false,
         }

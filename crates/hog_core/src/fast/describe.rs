@@ -6,6 +6,12 @@
 //! descriptors:  [block row][element][lane] → [crop][block column][block row][element]
 //! ```
 //!
+//! A row of a plane, of which there are two more than a crop has; lane x of a row of blocks begins at cell x of it:
+//!
+//! ```text
+//! | LEFT | crop 0 | crop 1 | … | up to 16 cells | OVERREAD | up to a multiple of 64 |
+//! ```
+//!
 //! A crop of 64 × 128 fills half a vector of 16: two side by side cost what one does.
 
 use crate::error::Result;

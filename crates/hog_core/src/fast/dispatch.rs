@@ -12,6 +12,8 @@ use super::lane::Lane;
 #[cfg(target_arch = "aarch64")]
 use super::lane::neon::Neon;
 use super::lane::portable::Portable;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+use super::lane::simd128::Simd128;
 #[cfg(target_arch = "x86_64")]
 use super::lane::{Kernel, avx2::Avx2, avx512::Avx512, sse41::Sse41};
 use super::plan::{Geometry, Plan};
@@ -86,6 +88,9 @@ pub(super) fn on_lane<W: OnLane>(backend: Backend, work: W) -> W::Output {
         #[cfg(target_arch = "aarch64")]
         // SAFETY: every aarch64 CPU that Rust's standard targets run on has NEON.
         Backend::Neon => work.run(unsafe { Neon::new() }),
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        // SAFETY: the module has simd128.
+        Backend::Simd128 => work.run(unsafe { Simd128::new() }),
         _ => work.run(Portable),
     }
 }
@@ -102,6 +107,9 @@ pub(crate) fn fill_planes(backend: Backend, planes: &mut Planes, image: ImageVie
         #[cfg(target_arch = "aarch64")]
         // SAFETY: as in `on_lane`.
         Backend::Neon => planes.fill(unsafe { Neon::new() }, image),
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        // SAFETY: as in `on_lane`.
+        Backend::Simd128 => planes.fill(unsafe { Simd128::new() }, image),
         _ => planes.fill(Portable, image),
     }
 }

@@ -1,14 +1,17 @@
-//! The kernels: the exact path's pipeline on vectors of cells, for one instruction set each, and nearly all of the crate's `unsafe`.
+//! The kernels: the exact path's pipeline on vectors of cells, compiled for each instruction set; nearly all of the crate's
+//! `unsafe`.
 //!
-//! `layout` and `lane` hold the constants and the vector that every kernel uses; `plan` holds a detector's constants; `rows`, `strip`
-//! and `score` are the stages, which `tile` composes; `search` shares tiles among threads; `describe` serves
-//! crops, `votes` the exact path's gradients; `dispatch` chooses the instruction set.
+//! `layout` and `lane` hold the constants and the vector that every kernel uses; `plan` holds a detector's constants; `rows`,
+//! `strip` over `bins`, and `score` are the stages, which `tile` composes; `search` shares tiles among threads; `describe`
+//! serves crops, `votes` the exact path's gradients; `dispatch` chooses the instruction set.
 //! docs/simd.md explains how they work.
 #![allow(unsafe_code, reason = "intrinsics, and pointers into rows that overlap")]
 
 mod backend;
+mod bins;
 mod describe;
 mod dispatch;
+#[allow(unused_macros, reason = "an architecture may have no lane but the portable one")]
 mod lane;
 mod layout;
 mod plan;

@@ -6,7 +6,8 @@
 //! Band::fill:    each row of the level = mix of two rows of the plane (down), of two columns (across), mirrored outwards
 //! ```
 //!
-//! A band's row, for each channel one after the other, `plane` bytes apart:
+//! Planes are `[channel][y][x]`, a byte each, without gaps, [`SLACK`] bytes behind the last. A band is `[row][channel]` of
+//! these, `plane` bytes from channel to channel and `stride` from row to row:
 //!
 //! ```text
 //! | slack, ≥ 16 | mirrored | made: pixels of the level | mirrored | OVERREAD | up to a multiple of 64 |

@@ -10,8 +10,16 @@
 //!     found.push(window, score)
 //! ```
 //!
-//! Data: `blocks` is `[block row][element 0..36][lane]`, `bytes` the same as `[block row][word 0..9][lane]`, four elements a
-//! word; lane x is the block column x of the tile, and the first one of window x.
+//! ```text
+//! blocks     [block row][element 0..36][lane]          lane x: block column x of the tile, the first one of window x
+//! bytes      [block row][word 0..9][lane]              the same, 4 elements in a word, 255 for 1
+//! weights    [block row][element][block column]        of the window, columns padded with 0 to a multiple of 8
+//! words      [block column][word][8 + block row + 8]   the weights as bytes; 8 rows of 0 above and below
+//! multiples  [block column][8 + block row + 8]         what a block's sum of bytes is multiplied by
+//! masks      [window row][vector of windows]           a bit for each lane
+//! ```
+//!
+//! `blocks` and `bytes` come in two parts: the rows of a band, and those of the band below.
 //!
 //! Tricks, each with what it gains (figures: docs/simd.md):
 //!

@@ -2,26 +2,29 @@
 //!
 //! ```text
 //! for each row of cells:
-//!     for each of its 8 rows of pixels:     fill: load, gamma; 10 vectors, the columns -1..=8 of every cell
+//!     for each of its 8 rows of pixels:     fill: load, gamma → pixels
 //!     for each of its 8 columns of pixels:
-//!         for each row:                     strongest channel's dx, dy → vote: two bins, two shares of the magnitude
-//!         for each bin:                     spread: Σ over the rows of weight down[y] × vote → carry, sums
+//!         for each row:                     strongest channel's dx, dy → votes
+//!         for each bin:                     Σ over the rows of weight down[y] × vote → carry, sums
 //!     finish: Σ over the columns of across[x] × sums → the 4 cells of each block → L2-Hys → blocks, bytes
 //! ```
 //!
-//! A block is 2 × 2 cells. A row of cells is the lower one of the blocks that end in it and the upper one of those that
-//! begin in it; a pixel's vote reaches both cells of a block, the nearer one more:
-//!
 //! ```text
-//!              blocks that end here     blocks that begin here
-//! cell above   upper    ← rows 0..4     (not in them)
-//! this cell    lower    ← all rows      upper    ← all rows
-//! cell below   (not in them)            lower    ← rows 4..8
+//! pixels     [row -1..=8][channel][column -1..=8]                                 after gamma (colour: 3 rows, in turns)
+//! gradients  [column][row][dx, dy]                                                (colour alone)
+//! votes      [row]                                                                one column's, see `bins`
+//! carry      [column][bin][2]                                                     the two sums that `bins` hands down
+//! sums       [upper cell, lower cell][bin][column]                                of the blocks that end here
+//! block      [left cell, right cell][upper cell, lower cell][bin]                 its 36 elements
 //! ```
 //!
-//! So a row of pixels reaches three of these four sums; `down[y]` has its weights in the order this cell as upper, the cell
-//! above or below, this cell as lower. `carry` keeps the two sums of the blocks that begin here for the next row of cells,
-//! which completes them.
+//! Each of these is a vector: lane x belongs to cell x of the strip. In memory, of the whole tile:
+//!
+//! ```text
+//! blocks     [block row][element][lane]                                           lane x: the block whose left cell is x
+//! bytes      [block row][element / 4][lane]                                       4 elements in a word
+//! edge       [block row][element], one number each                                what a strip adds to the block left of it
+//! ```
 //!
 //! Tricks, each with what it gains (figures: docs/simd.md):
 //!
@@ -29,19 +32,17 @@
 //!    cells. Every stage works lane by lane, without a gather; only where a block joins two cells a lane looks at the next.
 //! 2. A weight is a Gaussian times a bilinear share, both products of a function of x and one of y. Summing down the rows
 //!    first leaves an eighth of the work for the sums across.
-//! 3. Of two neighbouring bins one is even and one odd. With votes kept by parity a bin looks at one vote, not two
-//!    ([`LaneVotes`]); bins 8 and 0, of equal parity, look at both.
-//! 4. Strips are made from right to left: `edge` takes what a strip's first cells add to the block left of them, so that no
+//! 3. Strips are made from right to left: `edge` takes what a strip's first cells add to the block left of them, so that no
 //!    strip is visited twice.
-//! 5. In colour three rows of square roots are kept in turn, and of each gradient only dx and dy: all channels of ten rows
+//! 4. In colour three rows of square roots are kept in turn, and of each gradient only dx and dy: all channels of ten rows
 //!    would not leave room for the rest in the first-level cache.
 
 #![allow(clippy::needless_range_loop, reason = "indices that are known when compiling name registers")]
 
-use std::hint::black_box;
 use std::ops::Range;
 
-use super::lane::{Kernel, Lane, ODD};
+use super::bins::{spread_all, vote};
+use super::lane::{Kernel, Lane};
 use super::layout::{BINS, BLOCK, CARRY, CELL, Gamma};
 use super::plan::Geometry;
 
@@ -83,17 +84,6 @@ struct Room<L: Lane, const CHANNELS: usize> {
 
 /// Words per lane that a strip needs as room.
 pub(super) const ROOM: usize = (CELL + 2) * 3 * (CELL + 2) + 2 * CELL * CELL + 2 * BINS * CELL;
-
-/// A gradient's two votes. Of two neighbouring bins one is even and one is odd, so each vote is kept by parity and a
-/// bin has to look at one of them only. Bins 8 and 0 are neighbours too: there the odd vote belongs to the other one.
-///
-/// Even bin b has slot b / 2, odd bin b has slot `ODD` + (b + 1) / 2; `ODD` stands for bin 8, `ODD` + 5 for bin 0.
-#[derive(Clone, Copy)]
-pub(super) struct LaneVotes<L: Lane> {
-    pub even: L::F,
-    pub odd: L::F,
-    pub slots: L::Slots,
-}
 
 /// Computes the blocks of the strip of cells that begins at lane `first`.
 ///
@@ -155,8 +145,7 @@ unsafe fn blocks_of_strip<L: Lane, const CHANNELS: usize, const CROPS: bool>(
     first: usize,
 ) {
     let zero = l.splat(0.0);
-    // Two rows from the cell above, eight of the cell, each with one neighbour on both sides. In colour only the last
-    // three are kept, in turn in three places: all would not leave room for the rest in the first-level cache.
+    // Rows -1..=8 of a cell; the last two are the first two of the cell below. In colour only three are kept, in turn.
     // In scratch memory, as zeroing them would take a fiftieth of the time.
     // SAFETY: aligned room for one strip is the caller's promise; any bits are numbers, and all are written before they
     // are read.
@@ -301,125 +290,6 @@ fn derive<L: Lane, const CHANNELS: usize>(
 #[inline(always)]
 fn square<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> L::F {
     l.add(l.mul(dx, dx), l.mul(dy, dy))
-}
-
-/// The votes of one pixel of every cell.
-#[inline(always)]
-pub(super) fn vote<L: Lane>(l: L, [dx, dy]: [L::F; 2]) -> LaneVotes<L> {
-    let (xx, yy) = (l.mul(dx, dx), l.mul(dy, dy));
-    let squared = l.add(xx, yy);
-    let magnitude = l.sqrt_approx(squared);
-    // OpenCV's polynomial for the arctangent of 0..=1, in units of two bins.
-    let c = l.div_approx(l.min_abs(dx, dy), l.max_abs(dx, dy));
-    let cc = l.mul(c, c);
-    let p = l.mul_add(cc, l.splat(ARC[3]), l.splat(ARC[2]));
-    let p = l.mul_add(p, cc, l.splat(ARC[1]));
-    let p = l.mul_add(p, cc, l.splat(ARC[0]));
-    // The position along the bins is 2.5 ± (arc − 2.25) up to 45°, 2.5 ∓ arc beyond, where the signs of dx and dy
-    // are (not) equal; half a bin is added so that bin b lies around (b + 1) / 2.
-    let steep = l.less(xx, yy);
-    let arc = l.mul_add(p, l.negate_where(steep, c), l.zero_where(steep, l.splat(-2.25)));
-    let position = l.add(l.splat(2.5), l.flip_by_signs(arc, dx, dy));
-    // A triangle wave: how near the even bin is. Votes are halved here, the weights doubled.
-    let (share, slots) = l.slots(position);
-    let even = l.mul(magnitude, share);
-    LaneVotes { even, odd: l.mul_sub(magnitude, l.splat(0.5), even), slots }
-}
-
-/// The polynomial's coefficients: radians to units of two bins of π/9.
-const ARC: [f32; 4] = {
-    const UNIT: f64 = 4.5 / std::f64::consts::PI;
-    [
-        (0.9997878412794807 * UNIT) as f32,
-        (-0.3258083974640975 * UNIT) as f32,
-        (0.1555786518463281 * UNIT) as f32,
-        (-0.04432655554792128 * UNIT) as f32,
-    ]
-};
-
-/// Sums the votes of all bins, as many at a time as there are registers for.
-#[inline(always)]
-pub(super) fn spread_all<L: Lane>(
-    l: L,
-    weights: &[[f32; 3]; CELL],
-    votes: &[LaneVotes<L>; CELL],
-    carry: &mut [[L::F; 2]; BINS],
-    sums: &mut [[L::F; CELL]; 2 * BINS],
-    phase: usize,
-) {
-    if L::WIDE {
-        spread::<L, 1, 2, 4>(l, weights, votes, carry, sums, phase);
-        spread::<L, 0, 2, 5>(l, weights, votes, carry, sums, phase);
-    } else {
-        spread::<L, 1, 2, 2>(l, weights, votes, carry, sums, phase);
-        spread::<L, 5, 2, 2>(l, weights, votes, carry, sums, phase);
-        spread::<L, 0, 8, 2>(l, weights, votes, carry, sums, phase);
-        spread::<L, 2, 2, 3>(l, weights, votes, carry, sums, phase);
-    }
-}
-
-/// Sums the votes of `COUNT` bins, `STEP` apart, of one pixel column down a cell's rows, weighted.
-///
-/// `carry` holds the sums of the row of cells above for the row of blocks that begins there. This row of cells completes
-/// them: they go to `sums`, and the sums for the row of blocks that begins here go to `carry`.
-#[inline(always)]
-fn spread<L: Lane, const FROM: usize, const STEP: usize, const COUNT: usize>(
-    l: L,
-    weights: &[[f32; 3]; CELL],
-    votes: &[LaneVotes<L>; CELL],
-    carry: &mut [[L::F; 2]; BINS],
-    sums: &mut [[L::F; CELL]; 2 * BINS],
-    phase: usize,
-) {
-    let zero = l.splat(0.0);
-    // Per bin, in the order of `down`: this cell as the upper one of the blocks that begin here; the cell above (rows 0..4)
-    // or below (rows 4..8), the table at the head of this file; this cell as the lower one of the blocks that end here.
-    let mut acc = [[zero; 3]; COUNT];
-    for i in 0..COUNT {
-        acc[i] = [zero, carry[FROM + STEP * i][0], carry[FROM + STEP * i][1]];
-    }
-    for half in 0..2 {
-        // A length that the compiler cannot see keeps the loop rolled; unrolled, its sums spill.
-        let rows: (&[LaneVotes<L>], &[[f32; 3]]) =
-            black_box((&votes[CELL / 2 * half..][..CELL / 2], &weights[CELL / 2 * half..][..CELL / 2]));
-        for (votes, weights) in rows.0.iter().zip(rows.1) {
-            let w = [l.splat(weights[0]), l.splat(weights[1]), l.splat(weights[2])];
-            let vote = if FROM.is_multiple_of(2) { votes.even } else { votes.odd };
-            let products = [l.mul(vote, w[0]), l.mul(vote, w[1]), l.mul(vote, w[2])];
-            for i in 0..COUNT {
-                let bin = FROM + STEP * i;
-                let kept = of_bin(l, votes, bin);
-                for k in 0..3 {
-                    acc[i][k] = if bin.is_multiple_of(8) || (bin == 1 && k == 2) {
-                        l.mul_add_masked(kept, w[k], acc[i][k])
-                    } else {
-                        l.add_product(kept, products[k], w[k], acc[i][k])
-                    };
-                }
-            }
-        }
-        if half == 0 {
-            for i in 0..COUNT {
-                sums[FROM + STEP * i][phase] = acc[i][1];
-                acc[i][1] = zero;
-            }
-        }
-    }
-    for i in 0..COUNT {
-        carry[FROM + STEP * i] = [acc[i][0], acc[i][1]];
-        sums[BINS + FROM + STEP * i][phase] = acc[i][2];
-    }
-}
-
-/// The votes for `bin`.
-#[inline(always)]
-fn of_bin<L: Lane>(l: L, votes: &LaneVotes<L>, bin: usize) -> L::Masked {
-    match bin {
-        0 => l.keep_either(votes.slots, (votes.even, 0), (votes.odd, ODD + 5)),
-        8 => l.keep_either(votes.slots, (votes.even, 4), (votes.odd, ODD)),
-        _ if bin.is_multiple_of(2) => l.keep(votes.even, votes.slots, bin / 2),
-        _ => l.keep(votes.odd, votes.slots, ODD + bin.div_ceil(2)),
-    }
 }
 
 /// Sums across the columns of each block's two cells, normalises (L2-Hys) and stores the blocks of one row.

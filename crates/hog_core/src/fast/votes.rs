@@ -5,7 +5,13 @@
 //! share: for each vector of columns: position → two bins; magnitude → two shares, interleaved
 //! ```
 //!
-//! Lanes are neighbouring pixels. 1. Two loops: the steps from a pixel to its votes are too many for a CPU to overlap two
+//! ```text
+//! neighbours           3 rows (above, here, below) of [channel][column -1..=columns]   square roots, or pixels
+//! magnitude, position  [column]                                                        between the two loops
+//! shares, bins         [column][first bin, second bin]                                 what is given back
+//! ```
+//!
+//! Lanes are neighbouring columns. 1. Two loops: the steps from a pixel to its votes are too many for a CPU to overlap two
 //! vectors' of one loop. 2. The last vector ends at the last column and makes some votes again: no rest loop. 3. The two bins
 //! are the bytes of one whole number, so that wrapping them takes comparisons that do not wait for each other.
 

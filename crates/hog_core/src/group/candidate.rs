@@ -14,6 +14,13 @@ pub struct Candidate {
 }
 
 /// The part of each rectangle inside an image of `width` by `height`; those outside are dropped with their weights.
+///
+/// ```
+/// use hog_core::{Rect, group};
+/// let rect = Rect { x: -5, y: 2, width: 10, height: 20 };
+/// let inside = Rect { x: 0, y: 2, width: 5, height: 14 };
+/// assert_eq!(group::clip(vec![(rect, 1.5)], 32, 16), [(inside, 1.5)]);
+/// ```
 pub fn clip(found: Vec<(Rect, f64)>, width: i32, height: i32) -> Vec<(Rect, f64)> {
     // (Collected in the memory of `found`.)
     let clipped = found.into_iter().filter_map(|(rect, weight)| {

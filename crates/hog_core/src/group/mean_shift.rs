@@ -18,6 +18,14 @@ fn bandwidth(log_scale: f64) -> Place {
 /// The modes of the candidates' density whose weight exceeds `threshold`, as rectangles of the window `win`.
 ///
 /// Non-maximum suppression after Dalal's thesis (2006), chapter 5, with OpenCV's bandwidths and rounding.
+///
+/// ```
+/// use hog_core::{Candidate, Interrupt, Rect, group};
+/// let at = |x, weight| Candidate { rect: Rect { x, y: 0, width: 64, height: 128 }, weight, scale: 1.0 };
+/// let found = group::mean_shift(&[at(0, 1.0), at(4, 1.0), at(300, 1.0)], 0.0, (64, 128), &Interrupt::NEVER)?;
+/// assert_eq!(found.len(), 2);
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 pub fn mean_shift(
     candidates: &[Candidate],
     threshold: f64,

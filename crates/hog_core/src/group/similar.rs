@@ -12,6 +12,14 @@ pub const HOG_EPS: f64 = 0.2;
 
 /// Groups detections as `HOGDescriptor::groupRectangles` does: the mean rectangle and the largest weight of each
 /// group of more than `threshold` members. A threshold below 1 changes nothing.
+///
+/// ```
+/// use hog_core::{Candidate, Interrupt, Rect, group};
+/// let at = |x, weight| Candidate { rect: Rect { x, y: 0, width: 64, height: 128 }, weight, scale: 1.0 };
+/// let found = group::group_candidates(&[at(0, 0.5), at(8, 0.9), at(300, 2.0)], 1, &Interrupt::NEVER)?;
+/// assert_eq!(found, [(Rect { x: 4, y: 0, width: 64, height: 128 }, 0.9)]); // the third one is alone
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 pub fn group_candidates(
     candidates: &[Candidate],
     threshold: i32,
@@ -33,6 +41,13 @@ pub fn group_candidates(
 }
 
 /// `cv2.groupRectangles`: the mean rectangle of each group of more than `threshold` members, and how many they were.
+///
+/// ```
+/// use hog_core::{Interrupt, Rect, group};
+/// let at = |x| Rect { x, y: 0, width: 64, height: 128 };
+/// assert_eq!(group::group_rectangles(&[at(0), at(8), at(300)], 1, 0.2, &Interrupt::NEVER)?, [(at(4), 2)]);
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 pub fn group_rectangles(
     rects: &[Rect],
     threshold: i32,

@@ -18,6 +18,15 @@ pub struct Grid {
 }
 
 /// Window stride and padding in (x, y) pixels as the user gave them, checked.
+///
+/// ```
+/// use hog_core::pyramid::Steps;
+/// use hog_core::{HogParams, HogSpec, Size};
+/// let spec = HogSpec::new(&HogParams::default())?;
+/// let grid = Steps::new((8, 8), (8, 8), spec.stride, &spec)?.grid(Size::new(64, 128), &spec);
+/// assert_eq!((grid.windows, grid.to_image(0, 0)), (Size::new(3, 3), (-8, -8)));
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Steps {
     stride: Size,

@@ -19,6 +19,16 @@ pub struct Level {
 ///
 /// A step that does not shrink (≤ 1, NaN, infinite) leaves level 0 alone. Level 0 is there even if the image is
 /// smaller than the window.
+///
+/// ```
+/// use hog_core::pyramid::levels;
+/// use hog_core::{HogParams, HogSpec, Interrupt, Size};
+/// let spec = HogSpec::new(&HogParams::default())?;
+/// let levels = levels(Size::new(640, 480), 2.0, &spec, &Interrupt::NEVER)?;
+/// assert_eq!(levels[1].size, Size::new(320, 240));
+/// assert_eq!(levels.len(), 2); // 160 × 120 is lower than the window
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 pub fn levels(image: Size, step: f64, spec: &HogSpec, interrupt: &Interrupt) -> Result<Vec<Level>> {
     let mut levels = memory::with_room(at_most(image, step, spec))?;
     levels.push(Level { scale: 1.0, size: image });

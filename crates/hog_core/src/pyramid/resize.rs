@@ -19,6 +19,12 @@ pub struct Tap {
 }
 
 /// The taps of OpenCV's INTER_LINEAR_EXACT from `from` pixels to `to`, those of the pixels `wanted`.
+///
+/// ```
+/// use hog_core::pyramid::{Tap, taps};
+/// // Pixel 1 of two, made of four: half of pixel 2 and half of pixel 3.
+/// assert_eq!(taps(4, 2, 1..2).next(), Some(Tap { first: 2, second: 3, weight: 128 }));
+/// ```
 pub fn taps(from: usize, to: usize, wanted: Range<usize>) -> impl ExactSizeIterator<Item = Tap> + Clone {
     let step = 1.0 / (to as f64 / from as f64);
     let tap = move |index: usize| {
@@ -49,6 +55,13 @@ pub(crate) fn check(size: Size) -> Result<()> {
 }
 
 /// `image` at `size`, bit for bit as OpenCV's INTER_LINEAR_EXACT; rows without gaps, channels interleaved.
+///
+/// ```
+/// use hog_core::{ImageView, Size, pyramid};
+/// let image = ImageView::new(&[0, 100, 0, 100], 4, 1, 1, 4)?;
+/// assert_eq!(pyramid::resize(image, Size::new(2, 1))?, [50, 50]);
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 pub fn resize(image: ImageView, size: Size) -> Result<Vec<u8>> {
     resize_part(image, size, 0..size.width, 0..size.height)
 }

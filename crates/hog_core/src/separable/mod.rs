@@ -1,5 +1,10 @@
 //! The scores of any geometry by sums that are taken first down the rows, then across the columns.
 //!
+//! Kept for `HOGDescriptor` and `PeopleDetector` of a geometry other than the people models'. Without it the exact path takes
+//! 2.2 to 2.9 times as long for a level of 640 × 480 in gray, and 1.9 to 2.3 times for a pyramid: cells of 4 and of 16 px,
+//! blocks of 32 px, 12 bins, 18 signed bins (one thread, AVX-512, processor time, interleaved). Where weights are so large that
+//! every hit is weighed by the exact path, and hundreds of windows are hits, it is slower: 0.75 times as fast.
+//!
 //! A pixel's weight in a cell, Gaussian times bilinear share, is a product of a function of x and one of y. So the votes
 //! of the exact path need not be summed for each block that holds them: a row of strides (`lattice`) is summed down once,
 //! for all the blocks and cells it lies in, and the sums across then cost little. Scores differ from the exact path's

@@ -88,6 +88,22 @@ def add_json(parser: ArgumentParser, what: str) -> None:
     parser.add_argument("--json", type=output_file, metavar="FILE", help=f"write {what}; - is standard output")
 
 
+def add_labels(parser: ArgumentParser) -> None:
+    """Add --label and --pictures, which say what of the labels is meant."""
+    parser.add_argument("--label", metavar="NAME", help="which label is meant, where there are several")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="where the pictures lie, if not beside the labels")
+
+
+def add_search(parser: ArgumentParser) -> None:
+    """Add --search."""
+    parser.add_argument(
+        "--search",
+        choices=("exact", "guided"),
+        default="exact",
+        help="guided: about twice as fast, a raw hit in two hundred is missed (%(default)s)",
+    )
+
+
 def score(text: str) -> float:
     """Read an SVM margin."""
     return number(text, -100, 100, "score")
@@ -120,6 +136,26 @@ def add_follower(parser: ArgumentParser) -> None:
 
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="the controller (%(default)s)")
     add_target_and_detector(parser)
+    add_person(parser)
+
+
+def add_person(parser: ArgumentParser) -> None:
+    """Add --person."""
+    from limo_hog.follow.tracks.asking import WORDS
+
+    parser.add_argument(
+        "--person", type=whom, metavar="|".join((*WORDS, "N")), help="whom of several to follow; N is a person's number"
+    )
+
+
+def whom(text: str) -> str | int:
+    """Read whom to follow."""
+    from limo_hog.follow.tracks.asking import WhomError, checked
+
+    try:
+        return checked(text)
+    except WhomError as error:
+        raise ArgumentTypeError(str(error)) from None
 
 
 def add_target_and_detector(parser: ArgumentParser) -> None:

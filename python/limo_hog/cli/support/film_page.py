@@ -41,7 +41,7 @@ class FilmPage(Live[Shown]):
     """
 
     def __init__(self, threshold: float, set_threshold: Callable[[float], None], host: str, port: int) -> None:
-        super().__init__("limo_hog.live", self._set, host, port)
+        super().__init__("limo_hog.live", self, host, port)
         about = ("SVM margin", "Least margin of a box that is shown.")
         self.threshold, self._use = Parameter("threshold", threshold, _LOWEST, _HIGHEST, *about), set_threshold
         self._times: list[float] = []
@@ -53,7 +53,8 @@ class FilmPage(Live[Shown]):
         self._written += 1
         self.pace.wait(time.monotonic() if at is None else at)
 
-    def _set(self, name: str, value: Any) -> None:
+    def set(self, name: str, value: Any) -> None:
+        """Set the threshold; raises `ParameterError`."""
         if name != "threshold":
             raise ParameterError(f"no parameter {shown(name)}; threshold is the only one")
         self.threshold = dataclasses.replace(self.threshold, value=self.threshold.checked(value))

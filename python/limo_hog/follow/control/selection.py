@@ -16,6 +16,7 @@ from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import pose_at
 from limo_hog.follow.space.grid import Ground
+from limo_hog.follow.tracks.asking import Whom, picked
 from limo_hog.follow.tracks.identity import Identity, Likeness
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, predict
 from limo_hog.follow.tracks.person import Person
@@ -38,6 +39,8 @@ class Choice:
         Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
     unsure_at
         Since when that is not sure [s]; None where it is.
+    asked
+        Who is asked for and was not in view yet; None where nobody is.
     """
 
     number: int | None = None
@@ -45,6 +48,7 @@ class Choice:
     measured: float | None = None
     candidates: tuple[int, ...] = ()
     unsure_at: float | None = None
+    asked: Whom | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,7 @@ class Selection:
 
     # Chosen: three clear frames.
     min_existence: float = param(
-        0.4, "probability", "From this on a person too far away for HOG is worth driving nearer.", 0, 1
+        0.4, "of 1", "Probability of being a person from which one too far away for HOG is approached.", 0, 1
     )
     # Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
     max_unconfirmed_frames: int = param(
@@ -68,27 +72,39 @@ class Selection:
     # Chosen: two full turns of the search.
     reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
     # Chosen: one frame of evidence.
-    switch_lead: float = param(0.1, "probability", "By this another must exceed the person who is faced already.", 0, 1)
+    switch_lead: float = param(
+        0.1, "of 1", "Probability by which another must exceed the person who is faced already.", 0, 1
+    )
     # Chosen: at the image's edge three frames of evidence; two metres are worth two.
     bearing_cost: float = param(
         0.6, "1/rad", "Probability that each radian off straight ahead takes from whom to choose.", 0, 5
     )
     distance_cost: float = param(0.1, "1/m", "Probability that each metre of distance takes from whom to choose.", 0, 5)
     # Chosen: more likely than not.
-    min_same: float = param(0.5, "probability", "From this on a track in view is taken for the person followed.", 0, 1)
+    min_same: float = param(
+        0.5, "of 1", "Probability from which a track in view is taken for the person followed.", 0, 1
+    )
     # Chosen: one wrong in four guesses would be too many.
     min_same_odds: float = param(
         3.0, "times", "The surest track must be this much likelier than any other in view.", 1, 100
     )
-    other_below: float = param(
-        0.1, "probability", "A track in view that is less likely than this is another person.", 0, 1
-    )
+    other_below: float = param(0.1, "of 1", "Probability below which a track in view is another person.", 0, 1)
     # Chosen: people part within a few seconds, or leave the view.
     decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)
+    # Chosen: HOG misses a person in several frames of ten.
+    settles_s: float = param(
+        1.0, "s", "People are looked at for this time before one asked for by a word is taken.", 0, 60
+    )
     identity: Identity = field(default_factory=Identity)
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
-        """Follow the track that is the person followed so far; before there is one, the likeliest person in view."""
+        """Follow the person asked for, then whoever is followed so far; before there is one, the likeliest in view."""
+        if choice.asked is None:
+            return self._known(tracks, choice)
+        answer = self._asked(choice.asked, tracks, choice)
+        return replace(self._known(tracks, choice), asked=choice.asked) if answer is None else answer
+
+    def _known(self, tracks: Tracks, choice: Choice) -> Choice:
         now = tracks.stamp or 0.0
         if choice.likeness is None or choice.measured is None or now - choice.measured > self.reidentify_s:
             choice = self._anybody(tracks, choice)
@@ -131,6 +147,21 @@ class Selection:
         """Return the people who may be followed and were measured just now."""
         now, lately = tracks.stamp or 0.0, self.identity.unseen_s
         return [one for one in tracks.people if now - one.measured <= lately and self.is_candidate(one)]
+
+    def _asked(self, whom: Whom, tracks: Tracks, choice: Choice) -> Choice | None:
+        """Take the person asked for once they are in view; None where somebody else is followed until then."""
+        now, follows = tracks.stamp or 0.0, choice.likeness is not None
+        people = [one for one in self.measured(tracks) if one.confirmed or not follows]
+        one = picked(whom, people, pose_at(tracks.poses, now))
+        if one is None:
+            return None if follows else replace(choice, number=None)
+        if follows and one.number == choice.number:
+            return replace(choice, asked=None)
+        since = now if choice.unsure_at is None else choice.unsure_at
+        settled = follows or isinstance(whom, int) or now - since >= self.settles_s
+        if settled and one.confirmed and one.seen == now:
+            return Choice(one.number, self.identity.begin(one), one.measured)
+        return None if follows else replace(choice, number=one.number, unsure_at=since)
 
     def _anybody(self, tracks: Tracks, choice: Choice) -> Choice:
         """Take the likeliest person in view, and of two the one straight ahead and near."""

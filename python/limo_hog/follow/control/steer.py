@@ -61,7 +61,7 @@ class Steering:
     steady_range_rate: float = param(0.1, "m/s", "A person whose range changes more slowly stands.", 0, 1)
     # Chosen: .5 m at .6 m/s, within the margin of an obstacle.
     coast_s: float = param(0.8, "s", "How long to drive by the prediction alone.", 0, 5)
-    unconfirmed_share: float = param(
+    unconfirmed_speed: float = param(
         0.5, "share", "Share of `max_linear` at which to drive to a person who is not confirmed.", 0, 1
     )
 
@@ -106,7 +106,7 @@ class Steering:
         if not confirmed and linear > 0:
             if not worth_nearing:
                 return Twist(0.0, angular), Mode.FOLLOW, "turning to a possible person"
-            linear = min(linear, self.max_linear * self.unconfirmed_share)
+            linear = min(linear, self.max_linear * self.unconfirmed_speed)
             return Twist(linear, angular), Mode.FOLLOW, "driving nearer to a possible person"
         if abs(error) < self.distance_tolerance and abs(aim.range_rate) < self.steady_range_rate:
             if abs(aim.bearing) < self.bearing_tolerance and abs(aim.bearing_rate) < self.steady_bearing_rate:

@@ -21,6 +21,7 @@ from limo_hog.follow.sense.detectors import Region, RegionSize
 from limo_hog.follow.sense.observation import Observation, Odometry, Scan, pose_at
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.routes import point_ahead
+from limo_hog.follow.tracks.asking import Whom, named
 from limo_hog.follow.tracks.kalman import Track, bearing_range, predict, rates
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.tracker import Tracker
@@ -52,6 +53,8 @@ class TrackingController:
         How to look for a lost person, how the ground is mapped, and which depth pixels are looked at for it.
     robot
         Where camera and lidar sit.
+    person
+        Whom to follow first; None for who is ahead and near.
     """
 
     target_distance: float = param(1.5, "m", "Distance to hold, as the depth image measures it.", 0.1, 8)
@@ -95,6 +98,7 @@ class TrackingController:
     grid: Grid = field(default_factory=Grid)
     depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))
     robot: RobotGeometry = LIMO
+    person: Whom | None = None
 
     def __post_init__(self) -> None:
         tracker = self.tracker
@@ -104,7 +108,11 @@ class TrackingController:
 
     def start(self) -> TrackingState:
         """Return the state before the first observation: no people."""
-        return TrackingState(acceleration=self.wheels.acceleration)
+        return TrackingState(choice=Choice(asked=self.person), acceleration=self.wheels.acceleration)
+
+    def ask(self, whom: Whom, state: TrackingState) -> TrackingState:
+        """Return the state in which a person is asked for: they are followed once they are in view."""
+        return replace(state, choice=replace(state.choice, asked=whom))
 
     def step(self, observation: Observation, state: TrackingState) -> Decision[TrackingState]:
         """Follow a person, give way to all, and ask of the wheels what they can do."""
@@ -118,6 +126,8 @@ class TrackingController:
         decision, person = self._follow(observation, points, state)
         people = believed(decision.state, observation.now, self.tracker.noise)
         decision = replace(decision, belief=replace(decision.belief, people=people))
+        if (asked := decision.state.choice.asked) is not None:
+            decision = replace(decision, reason=f"{decision.reason}; asked for {named(asked)}, not found yet")
         return self._give_way(decision, person, observation, points)
 
     def _follow(
@@ -396,8 +406,8 @@ class TrackingController:
         """Return where the person should be in the next frame; None to search all of it."""
         if state.since_full + 1 >= self.whole_image_every or not self.selection.is_candidate(person):
             return None
-        if not self._is_sure(person, state.choice):
-            # The person may be beside the one who is followed.
+        if state.choice.asked is not None or not self._is_sure(person, state.choice):
+            # The person asked for, or the right one, may be beside the one who is followed.
             return None
         stamp = observation.stamp + state.tracks.period
         pose = pose_at(state.tracks.poses, stamp)

@@ -80,15 +80,7 @@ def _page(
     pictures: int, objects: int, evaluations: Sequence[Evaluation], how: EvaluationParameters, mistakes: bool
 ) -> str:
     share = f"{how.confidence:.0%}"
-    rows = [
-        (
-            one.name,
-            *(_with_interval(one, figure) for figure in ("lamr", "recall_01", "recall_1", "ap")),
-            f"{one.threshold_01:.2f}",
-            f"{one.ms:.1f}",
-        )
-        for one in evaluations
-    ]
+    rows = [_row(one) for one in evaluations]
     heights = [
         (f"{one.name}, {_range(row.low, row.high)}", row.objects, f"{row.recall_01:.2f}", f"{row.recall_1:.2f}")
         for one in evaluations
@@ -128,8 +120,9 @@ def _page(
     return "\n".join([*parts, "</html>", ""])
 
 
-def _with_interval(one: Evaluation, figure: str) -> str:
-    return f"{getattr(one.figures, figure):.3f} {_interval(one.intervals[figure], '.2f')}"
+def _row(one: Evaluation) -> tuple[str, ...]:
+    figures = [f"{getattr(one.figures, name):.3f} {_interval(one.intervals[name], '.2f')}" for name in _FIGURES]
+    return one.name, *figures, f"{one.threshold_01:.2f}", f"{one.ms:.1f}"
 
 
 def _interval(ends: tuple[float, float], form: str) -> str:

@@ -11,7 +11,7 @@ from limo_sim.ros.companions.quaternions import IDENTITY, Rigid, rigid_of, slerp
 from limo_sim.ros.interfaces import Message, message_class
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.clock import Duration, Time
-from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.context import default_context
 from limo_sim.ros.rclpy_stub.groups import ReentrantCallbackGroup
 from limo_sim.ros.rclpy_stub.node import Node
 from limo_sim.ros.rclpy_stub.partial import PartialApi
@@ -164,7 +164,7 @@ class Buffer(PartialApi, missing=_MISSING):
 
     def _wait(self, target: str, source: str, time: Time, timeout: Duration | None) -> None:
         if timeout is not None and timeout.nanoseconds > 0:
-            world = current().world
+            world = default_context().world
             until = world.time + timeout.nanoseconds * 1e-9
             world.turns.wait(lambda: not self._why_not(target, source, time), until)
 

@@ -1,4 +1,12 @@
-"""Python's own waits, for one run: in a thread of the script they give the turn away and take simulated time."""
+"""Python's own waits, for one run: in a thread of the script they give the turn away and take simulated time.
+
+CPython's privates are touched here alone. A run goes on without one of them, less exact:
+
+- `threading._time`, `queue.time`, the clock that timeouts are compared with: these timeouts are the wall's;
+- `Condition._waiters`, `_release_save` and `_acquire_restore`, by which `notify` releases a waiter: waits are real, and
+  one for a thread of the script ends as hung;
+- `Thread._target`, which tells a pool's thread from the script's: a wait for a pool ends as hung.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +15,7 @@ import threading
 import time
 from _thread import allocate_lock
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from limo_sim.ros.lockstep.turns import Turns
@@ -57,7 +65,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         if not turns.inside or (timeout is None and turns.alone):
             # A thread of no other kind can notify the script's only one: that takes no simulated time, or hangs.
             return real_wait(condition, timeout)
-        # As threading does it, with the turn given away where that blocks.
+        # As `Condition.wait` of CPython, with the turn given away where that blocks.
         waiter = allocate_lock()
         waiter.acquire()
         condition._waiters.append(waiter)
@@ -75,21 +83,19 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         (time, "sleep", sleep),
         (time, "time", clock(time.time)),
         (time, "monotonic", monotonic),
-        # Modules that imported it by name: their timeouts are compared with it.
         (threading, "_time", monotonic),
         (queue, "time", monotonic),
         (threading.Thread, "start", start),
         (threading.Thread, "join", join),
-        (threading.Condition, "wait", wait),
     ]
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in replaced]
-    for owner, name, value in replaced:
-        setattr(owner, name, value)
-    try:
+    if all(hasattr(threading.Condition(), name) for name in ("_waiters", "_release_save", "_acquire_restore")):
+        replaced.append((threading.Condition, "wait", wait))
+    with ExitStack() as stack:
+        for owner, name, value in replaced:
+            if hasattr(owner, name):
+                stack.callback(setattr, owner, name, getattr(owner, name))
+                setattr(owner, name, value)
         yield
-    finally:
-        for owner, name, value in before:
-            setattr(owner, name, value)
 
 
 def _until(now: Callable[[], float], timeout: float | None) -> tuple[float, ...]:

@@ -12,7 +12,6 @@ import threading
 from _thread import allocate_lock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 
 class RunOver(KeyboardInterrupt):
@@ -32,14 +31,11 @@ class Seat:
 
     Attributes
     ----------
-    owner
-        The rclpy context; a new thread inherits it.
     daemon
         Whether the script's end waits for the thread.
     """
 
-    def __init__(self, owner: Any, *, daemon: bool) -> None:
-        self.owner = owner
+    def __init__(self, *, daemon: bool) -> None:
         self.daemon = daemon
         self.ready: Callable[[], bool] = lambda: True
         self.until = math.inf
@@ -94,9 +90,9 @@ class Turns:
         return len(self._order) == 1
 
     @contextmanager
-    def main(self, owner: Any) -> Iterator[None]:
+    def main(self) -> Iterator[None]:
         """Make the calling thread the script's first; at the end the others are waited for, daemons are ended."""
-        seat = Seat(owner, daemon=False)
+        seat = Seat(daemon=False)
         self._order.append(seat)
         self._current = seat
         self._seats[threading.get_ident()] = seat
@@ -120,7 +116,8 @@ class Turns:
             raise ThreadEnded
         me.ready, me.until = ready, until
         while (chosen := self._next(self._order.index(me) + 1)) is None:
-            self._step(me)
+            with self.outside():
+                self._advance()
         if chosen is not me:
             self._hand_to(chosen)
             me.turn.acquire()
@@ -134,7 +131,7 @@ class Turns:
 
     def start(self, thread: threading.Thread, start: Callable[[threading.Thread], None]) -> None:
         """Start a thread of the script; it runs when its turn comes."""
-        seat = Seat(self._seats[threading.get_ident()].owner, daemon=thread.daemon)
+        seat = Seat(daemon=thread.daemon)
         run = thread.run
 
         def run_in_turn() -> None:
@@ -176,16 +173,10 @@ class Turns:
         finally:
             seat.outside -= 1
 
-    def _step(self, seat: Seat) -> None:
-        seat.outside += 1
+    def _step_or_break(self) -> None:
         try:
-            self._advance()
-        finally:
-            seat.outside -= 1
-
-    def _step_or_break(self, seat: Seat) -> None:
-        try:
-            self._step(seat)
+            with self.outside():
+                self._advance()
         except BaseException as error:  # whatever a page raises ends the run
             self._failed(error)
             self._broken = True
@@ -207,7 +198,7 @@ class Turns:
             at = self._order.index(me)
             self._order.remove(me)
             while (chosen := self._next(at)) is None:
-                self._step_or_break(me)
+                self._step_or_break()
             self._hand_to(chosen)
         del self._seats[threading.get_ident()]
 

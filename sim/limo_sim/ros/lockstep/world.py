@@ -7,12 +7,11 @@ arena itself is on the other side of a link.
 from __future__ import annotations
 
 import copy
+import inspect
 import math
-import sys
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Any, Protocol
 
 from limo_hog.ros2 import names
@@ -87,7 +86,7 @@ class World:
 
     def line(self) -> int | None:
         """Return the line of the script that runs now; None where the script is not in the call."""
-        frame: FrameType | None = sys._getframe(1)
+        frame = inspect.currentframe()
         while frame is not None and frame.f_code.co_filename != str(self.script):
             frame = frame.f_back
         return None if frame is None else frame.f_lineno

@@ -10,7 +10,7 @@ from typing import Any
 from limo_sim.ros.interfaces import message_class
 from limo_sim.ros.lockstep.calls import UNHEARD_AFTER
 from limo_sim.ros.lockstep.records import StubError
-from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.context import default_context
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.partial import PartialApi
 
@@ -122,19 +122,20 @@ class Clock(PartialApi, missing=("create_jump_callback", "ros_time_is_active", "
 
     def __init__(self, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> None:
         self.clock_type = clock_type
+        self._context = default_context()
 
     def now(self) -> Time:
         """Return the time."""
-        return Time(nanoseconds=round(current().world.time * 1e9), clock_type=self.clock_type)
+        return Time(nanoseconds=round(self._context.world.time * 1e9), clock_type=self.clock_type)
 
     def sleep_for(self, rel_time: Duration, context: Any = None) -> bool:  # noqa: ARG002 — rclpy's signature
         """Let time pass."""
-        current().world.sleep(rel_time.nanoseconds * 1e-9)
+        self._context.world.sleep(rel_time.nanoseconds * 1e-9)
         return True
 
     def sleep_until(self, until: Time, context: Any = None) -> bool:  # noqa: ARG002 — rclpy's signature
         """Let time pass until a point in time."""
-        world = current().world
+        world = self._context.world
         world.sleep(until.nanoseconds * 1e-9 - world.time)
         return True
 
@@ -149,14 +150,14 @@ class Timer(PartialApi, missing=("handle",)):
         timer_period_ns: int,
         clock: Clock,
         *,
-        context: Any = None,  # noqa: ARG002 — rclpy's signature
+        context: Any = None,
         autostart: bool = True,
     ) -> None:
         self.callback, self.callback_group, self.clock = callback, callback_group, clock
         self.timer_period_ns = timer_period_ns
         self._period = max(timer_period_ns * 1e-9, 0.0)
         self._cancelled = not autostart
-        self._world = current().world
+        self._world = (context or default_context()).world
         self._called = self._world.time
         self._due = self._world.time + self._period
 
@@ -205,8 +206,8 @@ class Timer(PartialApi, missing=("handle",)):
 class Rate:
     """Sleeps until the next period of a timer, which an executor in another thread must run, as in ROS."""
 
-    def __init__(self, timer: Timer, *, context: Any = None) -> None:  # noqa: ARG002 — rclpy's signature
-        self._timer = timer
+    def __init__(self, timer: Timer, *, context: Any = None) -> None:
+        self._timer, self._context = timer, context or default_context()
         self._calls = 0
         timer.callback = self._call
 
@@ -221,7 +222,7 @@ class Rate:
         StubError
             If nothing spins the node, where ROS would wait for ever.
         """
-        world, before = current().world, self._calls
+        world, before = self._context.world, self._calls
         patience = 2 * self._timer.timer_period_ns * 1e-9 + UNHEARD_AFTER
         if not world.turns.wait(lambda: self._calls != before, world.time + patience):
             raise StubError(

@@ -1,4 +1,4 @@
-"""The run a script belongs to."""
+"""The run a script belongs to: nodes hand it down to all they make."""
 
 from __future__ import annotations
 
@@ -14,11 +14,26 @@ class Context:
     """The state that `rclpy.init` makes and `rclpy.shutdown` ends."""
 
     def __init__(self, world: World) -> None:
-        self.world = world
+        self._world = world
         self.is_initialized = False
         self.arguments = RosArguments()
         #: The executor of `rclpy.spin` without one.
         self.executor: Any = None
+
+    @property
+    def world(self) -> World:
+        """The run, for the script's own threads.
+
+        Raises
+        ------
+        StubError
+            In a thread that the script did not start with `threading.Thread`.
+        """
+        if self._world.turns.seat() is None:
+            raise StubError(
+                "limo-hog run offers rclpy in the main thread and in those of threading.Thread, not in a pool's"
+            )
+        return self._world
 
     def init(self, args: list[str] | None) -> None:
         """Begin, with the command line's arguments unless others are given."""
@@ -45,29 +60,24 @@ class Context:
         return self.is_initialized and not self.world.over
 
 
-_world: World | None = None
+#: As in rclpy, the context of calls that name none, such as `rclpy.ok()`; None outside a run.
+_default: Context | None = None
 
 
-def enter(world: World | None) -> None:
-    """Set the run that scripts belong to; None when it is over."""
-    global _world
-    _world = world
+def enter(context: Context | None) -> None:
+    """Set the default context when a run begins; None when it is over."""
+    global _default
+    _default = context
 
 
-def current() -> Context:
-    """Return the context of the program that calls.
+def default_context() -> Context:
+    """Return the default context, for what a script calls without a node.
 
     Raises
     ------
     StubError
-        Outside a run, or in a thread that the script did not start with `threading.Thread`.
+        Outside a run.
     """
-    if _world is None:
+    if _default is None:
         raise StubError("this rclpy works inside `limo-hog run` alone")
-    seat = _world.turns.seat()
-    if seat is None:
-        raise StubError(
-            "limo-hog run offers rclpy in the main thread and in those of threading.Thread, not in a pool's"
-        )
-    context: Context = seat.owner
-    return context
+    return _default

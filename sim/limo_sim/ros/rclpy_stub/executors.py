@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from limo_sim.ros.lockstep.turns import ExternalShutdownException
-from limo_sim.ros.rclpy_stub.context import Context, current
+from limo_sim.ros.rclpy_stub.context import default_context
 from limo_sim.ros.rclpy_stub.future import Future, Task
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.node import Node
@@ -50,7 +51,7 @@ class Executor(PartialApi, missing=_MISSING):
     """Runs the callbacks of its nodes, one at a time."""
 
     def __init__(self, *, context: Any = None) -> None:
-        self.context = context or current()
+        self.context = context or default_context()
         self._nodes: list[Node] = []
         self._tasks: list[Task] = []
         self._is_shutdown = self._spins = False
@@ -217,40 +218,36 @@ class MultiThreadedExecutor(Executor):
 
 def global_executor() -> Executor:
     """Return the executor of `rclpy.spin` without one: one for each context."""
-    context: Context = current()
-    if context.executor is None:
-        context.executor = SingleThreadedExecutor()
-    executor: Executor = context.executor
+    executor: Executor = default_context().executor or SingleThreadedExecutor()
+    default_context().executor = executor
     return executor
+
+
+@contextmanager
+def _serving(node: Node, executor: Executor | None) -> Iterator[Executor]:
+    executor = executor or global_executor()
+    executor.add_node(node)
+    try:
+        yield executor
+    finally:
+        executor.remove_node(node)
 
 
 def spin(node: Node, executor: Executor | None = None) -> None:
     """Run a node's callbacks until the run is over."""
-    executor = executor or global_executor()
-    executor.add_node(node)
-    try:
-        executor.spin()
-    finally:
-        executor.remove_node(node)
+    with _serving(node, executor) as serving:
+        serving.spin()
 
 
 def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None) -> None:
     """Run one callback of a node."""
-    executor = executor or global_executor()
-    executor.add_node(node)
-    try:
-        executor.spin_once(timeout_sec=timeout_sec)
-    finally:
-        executor.remove_node(node)
+    with _serving(node, executor) as serving:
+        serving.spin_once(timeout_sec=timeout_sec)
 
 
 def spin_until_future_complete(
     node: Node, future: Future, executor: Executor | None = None, timeout_sec: float | None = None
 ) -> None:
     """Run a node's callbacks until a future is done, or simulated time is up."""
-    executor = executor or global_executor()
-    executor.add_node(node)
-    try:
-        executor.spin_until_future_complete(future, timeout_sec)
-    finally:
-        executor.remove_node(node)
+    with _serving(node, executor) as serving:
+        serving.spin_until_future_complete(future, timeout_sec)

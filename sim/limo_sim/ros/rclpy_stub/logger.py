@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
+import inspect
 from enum import IntEnum
 from typing import Any
 
-from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.context import Context, default_context
 from limo_sim.ros.rclpy_stub.partial import PartialApi
 
 
@@ -27,13 +27,13 @@ _levels: dict[str, LoggingSeverity] = {}
 class Logger(PartialApi, missing=("log", "is_enabled_for", "get_logger_name")):
     """Speaks under a name."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self._said: dict[tuple[str, int], float] = {}
+    def __init__(self, name: str, context: Context) -> None:
+        self.name, self._context = name, context
+        self._said: dict[tuple[str, int] | None, float] = {}
 
     def get_child(self, name: str) -> Logger:
         """Return a logger below this one."""
-        return Logger(f"{self.name}.{name}")
+        return Logger(f"{self.name}.{name}", self._context)
 
     def set_level(self, level: LoggingSeverity) -> None:
         """Leave out what is below a level."""
@@ -77,10 +77,11 @@ class Logger(PartialApi, missing=("log", "is_enabled_for", "get_logger_name")):
     ) -> bool:
         if level < self.get_effective_level():
             return False
-        world = current().world
+        world = self._context.world
         # A place in the script is throttled by itself, as in ROS.
-        caller = sys._getframe(2)
-        place = (caller.f_code.co_filename, caller.f_lineno)
+        here = inspect.currentframe()
+        caller = here and here.f_back and here.f_back.f_back
+        place = caller and (caller.f_code.co_filename, caller.f_lineno)
         last = self._said.get(place)
         if throttle_duration_sec or once or skip_first:
             if last is not None and (once or world.time - last < throttle_duration_sec):
@@ -94,9 +95,9 @@ class Logger(PartialApi, missing=("log", "is_enabled_for", "get_logger_name")):
 
 def get_logger(name: str) -> Logger:
     """Return a logger."""
-    return Logger(name)
+    return Logger(name, default_context())
 
 
 def set_logger_level(name: str, level: LoggingSeverity, detailed_error: bool = False) -> None:  # noqa: ARG001
     """Suppress the lines of a logger below a level."""
-    Logger(name).set_level(level)
+    get_logger(name).set_level(level)

@@ -10,7 +10,7 @@ from limo_hog.ros2.arguments import RosArguments
 from limo_sim.ros.interfaces import Message
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.clock import Clock, ClockType, Rate, Timer
-from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.context import default_context
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from limo_sim.ros.rclpy_stub.logger import Logger
 from limo_sim.ros.rclpy_stub.naming import (
@@ -70,7 +70,7 @@ class Node(PartialApi, missing=_MISSING):
         unknown = ", ".join(repr(name) for name in options if name not in _WITHOUT_EFFECT)
         if unknown:
             raise TypeError(f"rclpy's Node has no option {unknown}")
-        context = current()
+        context = self._context = default_context()
         if not context.is_initialized:
             raise NotInitializedException("rclpy.init() has not been called")
         if cli_args is not None:
@@ -90,7 +90,7 @@ class Node(PartialApi, missing=_MISSING):
         )
         if not self._parameters.has("use_sim_time"):
             self._parameters.declare("use_sim_time", False)
-        self._logger = Logger(self.get_fully_qualified_name().strip("/").replace("/", "."))
+        self._logger = Logger(self.get_fully_qualified_name().strip("/").replace("/", "."), context)
         self._clock = Clock(clock_type=ClockType.ROS_TIME)
         self.default_callback_group = MutuallyExclusiveCallbackGroup()
         self._publishers: list[Publisher] = []
@@ -160,7 +160,7 @@ class Node(PartialApi, missing=_MISSING):
     ) -> Publisher:
         """Return a new publisher of a topic."""
         check_type(msg_type)
-        publisher = Publisher(msg_type, self.resolve_topic_name(topic), to_profile(qos_profile))
+        publisher = Publisher(msg_type, self.resolve_topic_name(topic), to_profile(qos_profile), self._context)
         check_topic(publisher.topic, msg_type)
         self._publishers.append(publisher)
         return publisher
@@ -181,11 +181,12 @@ class Node(PartialApi, missing=_MISSING):
         if raw:
             raise StubError("limo-hog run does not offer create_subscription(raw=True): callbacks get messages")
         group = self._group(callback_group)
-        subscription = Subscription(msg_type, self.resolve_topic_name(topic), callback, to_profile(qos_profile), group)
+        name, qos = self.resolve_topic_name(topic), to_profile(qos_profile)
+        subscription = Subscription(msg_type, name, callback, qos, group, self._context)
         check_topic(subscription.topic, msg_type)
         self._subscriptions.append(subscription)
         group.add_entity(subscription)
-        current().world.subscribe(subscription)
+        self._context.world.subscribe(subscription)
         return subscription
 
     def create_timer(
@@ -199,7 +200,8 @@ class Node(PartialApi, missing=_MISSING):
         """Call back every so many seconds."""
         nanoseconds = int(float(timer_period_sec) * 1e9)
         group = self._group(callback_group)
-        timer = Timer(callback, group, nanoseconds, clock or self._clock, autostart=autostart)
+        clock = clock or self._clock
+        timer = Timer(callback, group, nanoseconds, clock, context=self._context, autostart=autostart)
         group.add_entity(timer)
         self._timers.append(timer)
         return timer
@@ -208,7 +210,8 @@ class Node(PartialApi, missing=_MISSING):
         """Return what sleeps until the next of so many periods a second; another thread must spin the node."""
         if frequency <= 0:
             raise ValueError(f"the frequency must be greater than 0, came {frequency}")
-        return Rate(self.create_timer(1.0 / frequency, _nothing, ReentrantCallbackGroup(), clock))
+        timer = self.create_timer(1.0 / frequency, _nothing, ReentrantCallbackGroup(), clock)
+        return Rate(timer, context=self._context)
 
     def create_service(
         self,
@@ -222,11 +225,11 @@ class Node(PartialApi, missing=_MISSING):
         """Answer requests by `callback(request, response)`, which returns the response."""
         _check_service(srv_type)
         name, group = self.resolve_service_name(srv_name), self._group(callback_group)
-        service = Service(srv_type, (srv_name, name), callback, group, qos_profile)
+        service = Service(srv_type, (srv_name, name), callback, group, qos_profile, self._context)
         group.add_entity(service)
         self._services.append(service)
-        current().world.services[name] = service
-        current().world.called("services", name)
+        self._context.world.services[name] = service
+        self._context.world.called("services", name)
         return service
 
     def create_client(
@@ -240,10 +243,10 @@ class Node(PartialApi, missing=_MISSING):
         """Return what sends requests to a service."""
         _check_service(srv_type)
         name, group = self.resolve_service_name(srv_name), self._group(callback_group)
-        client = Client(srv_type, (srv_name, name), qos_profile, group)
+        client = Client(srv_type, (srv_name, name), qos_profile, group, self._context)
         group.add_entity(client)
         self._clients.append(client)
-        current().world.called("clients", name)
+        self._context.world.called("clients", name)
         return client
 
     def _group(self, given: CallbackGroup | None) -> CallbackGroup:
@@ -251,18 +254,15 @@ class Node(PartialApi, missing=_MISSING):
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """End a publisher."""
-        publisher.destroy()
-        return _take_out(self._publishers, publisher)
+        return _destroyed(self._publishers, publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
         """End a subscription."""
-        subscription.destroy()
-        return _take_out(self._subscriptions, subscription)
+        return _destroyed(self._subscriptions, subscription)
 
     def destroy_timer(self, timer: Timer) -> bool:
         """End a timer."""
-        timer.cancel()
-        return _take_out(self._timers, timer)
+        return _destroyed(self._timers, timer)
 
     def destroy_rate(self, rate: Rate) -> bool:
         """End a rate."""
@@ -270,13 +270,11 @@ class Node(PartialApi, missing=_MISSING):
 
     def destroy_service(self, service: Service) -> bool:
         """End a service."""
-        service.destroy()
-        return _take_out(self._services, service)
+        return _destroyed(self._services, service)
 
     def destroy_client(self, client: Client) -> bool:
         """End a client."""
-        client.destroy()
-        return _take_out(self._clients, client)
+        return _destroyed(self._clients, client)
 
     def destroy_node(self) -> None:
         """End everything the node has."""
@@ -289,16 +287,16 @@ class Node(PartialApi, missing=_MISSING):
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:  # noqa: ARG002
         """Return every topic of the arena and of the script."""
-        topics = names.TYPES | current().world.published
+        topics = names.TYPES | self._context.world.published
         return [(name, [kind]) for name, kind in sorted(topics.items())]
 
     def count_publishers(self, topic_name: str) -> int:
         """Return how many publish on a topic, the arena being one."""
-        return publishers_of(topic_name)
+        return publishers_of(topic_name, self._context)
 
     def count_subscribers(self, topic_name: str) -> int:
         """Return how many listen to a topic, the robot being one."""
-        readers = current().world.readers
+        readers = self._context.world.readers
         return sum(reader.topic == topic_name for reader in readers) + (topic_name == names.COMMAND)
 
     def declare_parameter(
@@ -373,7 +371,8 @@ def _nothing() -> None:
     """Do nothing, until a rate puts its own callback in place of this one."""
 
 
-def _take_out(items: list[Any], item: Any) -> bool:
+def _destroyed(items: list[Any], item: Any) -> bool:
+    item.destroy()
     if item not in items:
         return False
     items.remove(item)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from limo_sim.ros.lockstep.records import StubError
-from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.context import Context
 from limo_sim.ros.rclpy_stub.future import Future
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.partial import PartialApi
@@ -30,7 +30,9 @@ class Service(PartialApi, missing=("send_response", "configure_introspection", "
         callback: Callable[[Any, Any], Any],
         callback_group: CallbackGroup,
         qos_profile: QoSProfile,
+        context: Context,
     ) -> None:
+        self._context = context
         self.srv_type, (self.srv_name, self.service_name) = srv_type, names
         self.callback, self.callback_group, self.qos_profile = callback, callback_group, qos_profile
         self._requests: deque[tuple[Any, Client, Future]] = deque()
@@ -69,28 +71,29 @@ class Service(PartialApi, missing=("send_response", "configure_introspection", "
 
     def destroy(self) -> None:
         """End the service."""
-        current().world.services.pop(self.service_name, None)
+        self._context.world.services.pop(self.service_name, None)
 
 
 class Client(PartialApi, missing=("configure_introspection", "handle", "logger_name", "get_pending_request")):
     """Sends requests."""
 
     def __init__(
-        self, srv_type: Any, names: tuple[str, str], qos_profile: QoSProfile, callback_group: CallbackGroup
+        self, srv_type: Any, names: tuple[str, str], qos: QoSProfile, group: CallbackGroup, context: Context
     ) -> None:
+        self._context = context
         self.srv_type, (self.srv_name, self.service_name) = srv_type, names
         #: The executor that last served it: it runs the done callbacks of its futures.
         self.executor: Any = None
-        self.qos_profile, self.callback_group = qos_profile, callback_group
+        self.qos_profile, self.callback_group = qos, group
         self._responses: deque[tuple[Any, Future]] = deque()
 
     def service_is_ready(self) -> bool:
         """Whether a node offers the service."""
-        return self.service_name in current().world.services
+        return self.service_name in self._context.world.services
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait until a node offers the service; False when simulated time is up before."""
-        world = current().world
+        world = self._context.world
         until = math.inf if timeout_sec is None else world.time + timeout_sec
         return world.turns.wait(self.service_is_ready, until)
 
@@ -101,7 +104,7 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
                 f"the service {self.srv_name!r} takes a {self.srv_type.__name__}.Request, came {type(request).__name__}"
             )
         future = Future()
-        server = current().world.services.get(self.service_name)
+        server = self._context.world.services.get(self.service_name)
         if server is not None:
             server.request(copy.deepcopy(request), self, future)
         return future
@@ -115,7 +118,7 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
             If the answer can never come, where ROS would wait for ever.
         """
         future = self.call_async(request)
-        world = current().world
+        world = self._context.world
         limit = NEVER_AFTER if timeout_sec is None else timeout_sec
         if world.turns.wait(future.done, world.time + limit):
             return future.result()

@@ -12,7 +12,7 @@ from limo_hog.ros2.messages import to_seconds
 from limo_sim.ros.interfaces import Message
 from limo_sim.ros.lockstep.calls import PUBLISHED, incompatible
 from limo_sim.ros.lockstep.records import StubError
-from limo_sim.ros.rclpy_stub.context import current
+from limo_sim.ros.rclpy_stub.context import Context
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -27,13 +27,14 @@ class Publisher(
 ):
     """Sends messages of one type to one topic."""
 
-    def __init__(self, msg_type: type[Message], topic: str, qos: QoSProfile) -> None:
+    def __init__(self, msg_type: type[Message], topic: str, qos: QoSProfile, context: Context) -> None:
+        self._context = context
         self.msg_type = msg_type
         self.topic_name = self.topic = topic
         self.qos_profile = qos
         self._kept: deque[Message] | None = None
         self._destroyed = False
-        world = current().world
+        world = self._context.world
         if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
             self._kept = deque(maxlen=max(qos.depth, 1))
             world.kept.append((topic, self._kept))
@@ -64,17 +65,17 @@ class Publisher(
             raise InvalidHandle(f"the publisher of {self.topic} was destroyed")
         if self._kept is not None:
             self._kept.append(copy.deepcopy(msg))
-        current().world.publish(self.topic, msg, reliable=self._reliable, kept=self._kept is not None)
+        self._context.world.publish(self.topic, msg, reliable=self._reliable, kept=self._kept is not None)
 
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions; the robot is one to /cmd_vel."""
-        world = current().world
+        world = self._context.world
         return sum(reader.topic == self.topic for reader in world.readers) + (self.topic == names.COMMAND)
 
     def destroy(self) -> None:
         """End the publisher."""
         self._destroyed = True
-        world = current().world
+        world = self._context.world
         world.kept = [one for one in world.kept if one[1] is not self._kept]
         if self.topic in world.writers:
             world.writers.remove(self.topic)
@@ -95,7 +96,9 @@ class Subscription(
         callback: Callable[[Any], Any],
         qos: QoSProfile,
         callback_group: CallbackGroup,
+        context: Context,
     ) -> None:
+        self._context = context
         self.msg_type = msg_type
         self.topic_name = self.topic = topic
         self.callback, self.callback_group = callback, callback_group
@@ -108,7 +111,7 @@ class Subscription(
         self.reliable = qos.reliability not in (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.BEST_AVAILABLE)
         self._deaf = self.keeps and volatile
         if self._deaf and topic in PUBLISHED:
-            current().world.called("unmatched", incompatible(topic, "DURABILITY", reads=True))
+            self._context.world.called("unmatched", incompatible(topic, "DURABILITY", reads=True))
 
     def offer(self, message: Message) -> None:
         """Queue a message; the oldest gives way."""
@@ -123,23 +126,23 @@ class Subscription(
         """Return the work of giving the oldest message to the callback."""
         message: Any = self._queue.popleft()
         if self.topic in (names.IMAGE, names.IMAGE_COMPRESSED):
-            current().world.link.tell("given", to_seconds(message.header.stamp))
+            self._context.world.link.tell("given", to_seconds(message.header.stamp))
         return lambda: self.callback(message)
 
     def get_publisher_count(self) -> int:
         """Return how many publish on the topic, the arena being one."""
-        return publishers_of(self.topic)
+        return publishers_of(self.topic, self._context)
 
     def destroy(self) -> None:
         """End the subscription."""
-        world = current().world
+        world = self._context.world
         if self in world.readers:
             world.readers.remove(self)
 
 
-def publishers_of(topic: str) -> int:
+def publishers_of(topic: str, context: Context) -> int:
     """Return how many publish on a topic, the arena being one."""
-    return current().world.writers.count(topic) + (topic in PUBLISHED)
+    return context.world.writers.count(topic) + (topic in PUBLISHED)
 
 
 def check_type(msg_type: Any) -> None:

@@ -56,6 +56,7 @@ function state(next, rows) {
   $("pause").textContent = now.paused ? "Go on" : "Pause";
   if (document.activeElement !== $("speed")) $("speed").value = String(now.speed);
   $("boxes").textContent = now.boxes;
+  choose();
   if (now.detect_ms !== null) put("detect", now.detect_ms, 1, "ms");
   $("contacts").textContent = now.contacts.person + now.contacts.wall;
   if (!past && history.length) numbers(history.at(-1));
@@ -102,6 +103,37 @@ function putPicture(picture, jpeg) {
   picture.src = URL.createObjectURL(jpeg);
   if (old) URL.revokeObjectURL(old);
 }
+
+// Whom to follow: a button for each person in the picture, by number, or a click on them.
+
+function choose() {
+  const row = $("choices");
+  const shown = now.choices.map(([number]) => number).sort((a, b) => a - b);
+  $("whom").hidden = shown.length < 2 && !row.childElementCount;
+  // Buttons that stay are kept: one that is replaced loses the focus, and a click on it.
+  if (row.dataset.shown !== String(shown)) {
+    row.dataset.shown = String(shown);
+    for (const old of [...row.children]) if (!shown.includes(Number(old.value))) old.remove();
+    shown.forEach((number, i) => {
+      if (row.children[i]?.value === String(number)) return;
+      const button = document.createElement("button");
+      button.value = button.textContent = number;
+      button.onclick = () => send({ follow: number });
+      row.insertBefore(button, row.children[i] || null);
+    });
+  }
+  const followed = now.choices.filter(([, followed]) => followed).map(([number]) => String(number));
+  for (const button of row.children) button.setAttribute("aria-pressed", followed.includes(button.value));
+}
+
+$("camera").onclick = ({ offsetX, offsetY, target }) => {
+  if (past || !now) return;
+  const [x, y] = [(offsetX * target.naturalWidth) / target.clientWidth, (offsetY * target.naturalHeight) / target.clientHeight];
+  const hit = now.choices.filter(([, , left, top, w, h]) => x >= left && x < left + w && y >= top && y < top + h);
+  // Of people before each other, whose box is smaller is meant.
+  hit.sort((a, b) => a[4] * a[5] - b[4] * b[5]);
+  if (hit.length) send({ follow: hit[0][0] });
+};
 
 // The timeline
 
@@ -319,14 +351,14 @@ function drawMap() {
   // Where the follower takes people to be: a ring, how sure it is, and how likely this is the person followed.
   pen.lineWidth = 1.5;
   pen.setLineDash([4, 3]);
-  for (const [x, y, probability, same] of past ? [] : now.believed) {
+  for (const [x, y, probability, same, id] of past ? [] : now.believed) {
     disc(x, y, 0.3);
     pen.strokeStyle = pen.fillStyle = colours.believed;
     pen.stroke();
     // On the side where the room is wider: the map's edge cuts nothing off.
     pen.textAlign = x > 0 ? "right" : "left";
     const [edge, line] = at(x + (x > 0 ? -0.36 : 0.36), y);
-    pen.fillText(`person ${percent(probability)}`, edge, line - 2);
+    pen.fillText(`person ${id}: ${percent(probability)}`, edge, line - 2);
     if (same !== null) pen.fillText(`followed ${percent(same)}`, edge, line + 12);
   }
   pen.setLineDash([]);

@@ -17,20 +17,24 @@ use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::threads::for_each;
 
-/// How a block is normalised; each adds 1e-5 to the norm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Norm {
-    /// Divided by the sum.
-    L1,
-    /// Divided by the sum, then the square root.
-    L1Sqrt,
-    /// Divided by the root of the squares' sum.
-    L2,
-    /// As `L2`, cut off at 0.2, as `L2` again.
-    L2Hys,
-}
+mod norm;
+
+pub use norm::Norm;
+use norm::normalise;
 
 /// What is computed of images of one size.
+///
+/// ```
+/// use hog_core::Interrupt;
+/// use hog_core::skimage::{Layout, Norm};
+/// let layout =
+///     Layout { size: (16, 16), channels: 1, bins: 9, cell: (8, 8), block: (2, 2), norm: Norm::L2Hys };
+/// let image: Vec<u8> = (0..=255).collect();
+/// let mut descriptor = vec![0.0; layout.descriptor_len()];
+/// layout.describe(&image, 1, &Interrupt::NEVER, &mut descriptor)?;
+/// assert_eq!(descriptor.len(), 36);
+/// # Ok::<(), hog_core::HogError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Layout {
     /// Rows and columns of an image \[px\].
@@ -358,43 +362,4 @@ fn nearest(x: f64, y: f64, round: Round) -> u32 {
     let is_inside = ((long >= RANGE.start) & (a + b < RANGE.end)) | (a + b == 0.0);
     let is_told = (is_exact | !is_near) & is_inside;
     (ROUND + if is_told { bin } else { f64::from(u32::MAX) }).to_bits() as u32
-}
-
-/// Added to a norm, so that a block without gradients is 0.
-const EPSILON: f64 = 1e-5;
-
-fn normalise(norm: Norm, block: &mut [f64]) {
-    match norm {
-        Norm::L1 | Norm::L1Sqrt => {
-            let factor = 1.0 / (sum(block, |value| value) + EPSILON);
-            block.iter_mut().for_each(|value| *value *= factor);
-            if norm == Norm::L1Sqrt {
-                block.iter_mut().for_each(|value| *value = value.sqrt());
-            }
-        }
-        Norm::L2 | Norm::L2Hys => {
-            let scale = |block: &[f64]| 1.0 / (sum(block, |value| value * value) + EPSILON * EPSILON).sqrt();
-            let factor = scale(block);
-            block.iter_mut().for_each(|value| *value *= factor);
-            if norm == Norm::L2Hys {
-                // (NaN stays, as `min` would not let it.)
-                block.iter_mut().for_each(|value| *value = if *value > 0.2 { 0.2 } else { *value });
-                let factor = scale(block);
-                block.iter_mut().for_each(|value| *value *= factor);
-            }
-        }
-    }
-}
-
-/// The sum over a block, eight numbers at a time.
-#[inline(always)]
-fn sum(block: &[f64], of: impl Fn(f64) -> f64) -> f64 {
-    let (eights, rest) = block.as_chunks::<8>();
-    let mut sums = [0.0; 8];
-    for eight in eights {
-        for (sum, &value) in sums.iter_mut().zip(eight) {
-            *sum += of(value);
-        }
-    }
-    sums.iter().sum::<f64>() + rest.iter().map(|&value| of(value)).sum::<f64>()
 }

@@ -1,0 +1,92 @@
+"""The browser lab, served from target/web, in headless Chromium."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page
+from tests.sim.view.browser import CHROMIUM, chromium
+
+BUILT = Path(__file__).parents[2] / "target/web"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def built() -> Path:
+    """Where the page is."""
+    if not (BUILT / "hog-scalar.wasm").exists():
+        pytest.skip("target/web is not there: .ci/web builds it")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium")
+    return BUILT
+
+
+class Handler(http.server.SimpleHTTPRequestHandler):
+    """The page's files, in silence."""
+
+    protocol_version = "HTTP/1.1"
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+@contextmanager
+def served() -> Iterator[str]:
+    """The page's address while it is served."""
+    handler = functools.partial(Handler, directory=BUILT)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_address[1]}/"
+        server.shutdown()
+
+
+@dataclass
+class Lab:
+    """The open page, the addresses it asked for, and its errors."""
+
+    page: Page
+    asked: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+    def text(self, name: str) -> str:
+        """What the element of this id says."""
+        return self.page.locator(f"#{name}").text_content() or ""
+
+    def people(self) -> int:
+        """How many people are listed."""
+        return self.page.locator("#people button").count()
+
+    def wait(self, condition: str) -> None:
+        """Wait until a condition in JavaScript holds."""
+        self.page.wait_for_function(f"() => {condition}")
+
+
+def opened(browser: Browser | BrowserContext, address: str) -> Lab:
+    """The lab in a new tab, ready."""
+    lab = Lab(browser.new_page())
+    lab.page.set_default_timeout(60_000)  # the machine may be busy
+    lab.page.on("request", lambda request: lab.asked.append(request.url))
+    lab.page.on("pageerror", lambda error: lab.errors.append(str(error)))
+    lab.page.goto(address)
+    lab.page.wait_for_selector("body[data-ready=yes]")
+    return lab
+
+
+@pytest.fixture(scope="session")
+def address(built: Path) -> Iterator[str]:
+    with served() as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
+def browser(built: Path, request: pytest.FixtureRequest) -> Iterator[Browser]:
+    """A browser; a module may name its flags in `FLAGS`."""
+    with chromium(*getattr(request.module, "FLAGS", ())) as browser:
+        yield browser

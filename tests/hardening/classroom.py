@@ -1,6 +1,6 @@
 """A class of hundreds, a tenth of it hostile: every other mark is as when graded alone, and nothing is left running.
 
-`python -m tests.hardening.classroom --count 300` (ten minutes on two cores).
+`python -m tests.hardening.classroom --count 300` (half an hour on two cores).
 """
 
 from __future__ import annotations
@@ -39,8 +39,10 @@ def main() -> None:
     """Grade each node alone, then the class, and compare."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=300)
-    count = parser.parse_args().count
+    parser.add_argument("--kinds", type=int, default=60, help="how many different honest nodes")
+    count, kinds = vars(parser.parse_args()).values()
     honest = [source(one) for one in (*RIGHT.values(), *WRONG.values()) if one[0] == ""]
+    honest = honest[:: max(len(honest) // kinds, 1)]
     hostile = [HEAD + node(THEN + body) for body, _ in IN_A_CALLBACK.values()] + [text for text, _ in FILES.values()]
     with tempfile.TemporaryDirectory() as scratch:
         exercise = Path(scratch) / "three.toml"

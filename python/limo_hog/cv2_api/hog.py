@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, SupportsFloat, SupportsIndex
+from typing import Any, ClassVar, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -273,6 +273,9 @@ class HOGDescriptor:
         )
         return (found, weights) if len(found) else ((), ())
 
+    #: The guide of a search, by its scale (`_core.Hog.detect_multi_scale`): OpenCV has none.
+    _guide: ClassVar[Any] = lambda _self, _scale: None
+
     def detectMultiScale(
         self,
         img: NDArray[np.uint8],
@@ -317,6 +320,7 @@ class HOGDescriptor:
             scale=real("scale", scale, 1.05),
             similar=None if modes else threshold,
             mean_shift=threshold if modes else None,
+            guide=self._guide(real("scale", scale, 1.05)),
         )
         return (boxes, weights) if len(boxes) else ((), ())
 

@@ -102,7 +102,9 @@ def run(args: argparse.Namespace) -> int:
             from limo_sim.workshop.html_report import to_html
             from limo_sim.workshop.report import to_gradescope, to_json
         # What the node prints must not mix with the report or the JSON.
-        examination = examine(args.file, node, said=lambda _, text: print(text, end="", file=sys.stderr))
+        examination = examine(
+            args.file, node, said=lambda _, text: print(text, end="", file=sys.stderr), workers=min(cores(), 2)
+        )
         verdicts = examination.verdicts
         if args.html:
             write_text(Path(args.html), to_html(args.file, node, examination))

@@ -266,8 +266,8 @@ class _Run:
             whole = HEAD.size + said + size
             if len(self._received) < whole:
                 return False
-            text = bytes(self._received[HEAD.size : HEAD.size + said])
-            data = bytes(self._received[HEAD.size + said : whole])
+            with memoryview(self._received) as view:
+                text, data = bytes(view[HEAD.size : HEAD.size + said]), bytes(view[HEAD.size + said : whole])
             del self._received[:whole]
             try:
                 told, *content = json.loads(text)
@@ -285,20 +285,20 @@ class _Run:
                 if told != "advance":
                     self._stage.tell(told, *content, data=data)
                     continue
-                topics, target = _asked(*content)
+                asked = _asked(*content)
             except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError) as error:
                 raise _StoppedError(f"it sent what is no message of a node: {error}") from error
             if self._stage.over:
                 raise _StoppedError("it asked for a step after the end of the run")
-            self._advance(topics, target)
+            self._advance(*asked)
         return False
 
-    def _advance(self, wanted: Collection[str], target: float | None) -> None:
-        now, news = self._stage.advance(wanted, target)
-        sizes = [(topic, len(data)) for topic, data in news]
+    def _advance(self, wanted: Collection[str], target: float | None, until: float) -> None:
+        now, news = self._stage.advance(wanted, target, until)
+        sizes = [(topic, len(data), len(pixels)) for topic, data, pixels in news]
+        parts = [part for _, *both in news for part in both if len(part)]
         with suppress(BrokenPipeError, ConnectionResetError):  # the node is gone: its link will say so
-            # (Images are not copied together.)
-            for part in (packed([now, sizes], more=sum(len(data) for _, data in news)), *(data for _, data in news)):
+            for part in (packed([now, sizes], sum(len(part) for part in parts)), *parts):
                 self._ends[-1].sendall(part)
         self._wait()
 
@@ -307,8 +307,8 @@ class _Run:
         self._wait_until = time.monotonic() + self._limits.patience + GRACE_S
 
 
-def _asked(wanted: list[str], target: float | None) -> tuple[Collection[str], float | None]:
-    return frozenset(wanted), None if target is None else float(target)
+def _asked(wanted: list[str], target: float | None, until: float) -> tuple[Collection[str], float | None, float]:
+    return frozenset(wanted), None if target is None else float(target), float(until)
 
 
 def _fault(how: str, message: str, traceback: str, line: int | None) -> Fault:

@@ -26,6 +26,7 @@ from limo_hog.ros2.messages import serialize
 from limo_sim.ros.lockstep.calls import LOGGER, PUBLISHED, UNHEARD_AFTER, Calls, nearest_topic
 from limo_sim.ros.lockstep.records import Callback, Command, Fault, Found, Log, Shown
 from limo_sim.ros.outlet import Outlet
+from limo_sim.ros.wire import News
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import Episode, score
 from limo_sim.run.log import Passed, Step, Watch
@@ -35,6 +36,11 @@ from limo_sim.world.scenario import Scenario
 
 #: Simulated time after a script's failure, in which the watchdog stops the robot [s]: 0.5 s and 1 m/s over 1 m/s².
 _AFTERMATH = 2.0
+#: Figures of the score card that are unknown where the node's detector is.
+_OF_DETECTIONS = (
+    "first_detection_s detected best_box_wrong longest_gap_s found_again time_to_find_again_s follows_first "
+    "identity_switches detect_ms_p50 detect_ms_p95 detect_ms_mean"
+).split()
 #: What a node may tell in one step of the arena; a loop that publishes tells so much in seconds. Chosen.
 _MOST_TOLD = 10_000
 
@@ -128,7 +134,7 @@ class Stage:
             "command": self._command,
             "found": self._find,
             "given": lambda stamp: self.calls.images.append(float(stamp)),
-            "log": lambda *line: self.log(self.time, *(str(part) for part in line)),
+            "log": lambda *line: self.log(self.time, *map(str, line)),
             "looked": self._looked,
             "published": lambda topic: self.published.add(str(topic)),
             "read": lambda line: setattr(self.calls, "solution_read", int(line or 0)),
@@ -167,9 +173,11 @@ class Stage:
         self._handlers[told](*content, **({"data": data} if data else {}))
 
     def advance(
-        self, wanted: Collection[str] = (), target: float | None = None
-    ) -> tuple[float, list[tuple[str, bytes]]]:
-        """Advance by one step; return the time [s], and the new messages of the topics that are wanted, as CDR.
+        self, wanted: Collection[str] = (), target: float | None = None, until: float = 0.0
+    ) -> tuple[float, list[News]]:
+        """Advance to `until` [s] or to the next message of a topic that is wanted, at least by a step.
+
+        Returns the time [s], and the new messages of these topics.
 
         Raises
         ------
@@ -179,13 +187,17 @@ class Stage:
         if self.over:
             raise ValueError("a step after the end of the run")
         self.target_distance, self._told = target, 0
-        if self._collected:
-            self._passed.append(Passed(self.time, self.arena.odometry(), self.arena.imu()))
-            self._log()
-            self.arena.step()
-        self._collected = True
-        news = self._collect(wanted)
-        self._warn()
+        news: list[News] = []
+        while not news and not self.over:
+            if self._collected:
+                self._passed.append(Passed(self.time, self.arena.odometry(), self.arena.imu()))
+                self._log()
+                self.arena.step()
+            self._collected = True
+            news = self._collect(wanted)
+            self._warn()
+            if self.time >= until - 1e-9:
+                break
         return self.time, news
 
     def _called(self, kind: str, name: str, line: int | None, type_name: str = "") -> None:
@@ -250,15 +262,15 @@ class Stage:
                 there = ", ".join(sorted(self.calls.services)) or "none"
                 self.log(self.time, "WARN", LOGGER, f"no node offers the service {name!r}{where}; offered: {there}")
 
-    def _collect(self, wanted: Collection[str]) -> list[tuple[str, bytes]]:
+    def _collect(self, wanted: Collection[str]) -> list[News]:
         drawing = time.perf_counter()
         frame = self.arena.frame()
         if self._frame is None or frame.stamp > self._frame.stamp:
             self._render_ms = 1e3 * (time.perf_counter() - drawing)
             self._frame, self.found = frame, []
             self._witness.frame(self.time, frame)
-        wanted = {*wanted, names.TF_STATIC}
-        return [(topic, serialize(make())) for topic, make in self._outlet.new() if topic in wanted]
+        new = self._outlet.new()
+        return [_news(topic, make()) for topic, make in new if topic in wanted or topic == names.TF_STATIC]
 
     def _log(self) -> None:
         """Log the control period that ends now."""
@@ -339,6 +351,13 @@ class Stage:
         return ""
 
 
+def _news(topic: str, message: Any) -> News:
+    if message.__msgtype__ != "sensor_msgs/msg/Image":
+        return topic, serialize(message), b""
+    # (Pixels are not copied into the message: the node's process does that.)
+    return topic, serialize(replace(message, data=message.data[:0])), message.data
+
+
 @dataclass(frozen=True)
 class Ended:
     """How a run ended.
@@ -381,19 +400,5 @@ def score_of(outcome: Ended) -> ScoreCard:
         card = replace(card, success=False, failure=failure)
     if outcome.used_hog:
         return card
-    return replace(
-        card,
-        modes={"drive": driving, "stand": 1.0 - driving},
-        first_detection_s=None,
-        detected=None,
-        best_box_wrong=None,
-        longest_gap_s=None,
-        lost=0,
-        found_again=None,
-        time_to_find_again_s=None,
-        follows_first=None,
-        identity_switches=None,
-        detect_ms_p50=None,
-        detect_ms_p95=None,
-        detect_ms_mean=None,
-    )
+    unknown: dict[str, Any] = dict.fromkeys(_OF_DETECTIONS)
+    return replace(card, modes={"drive": driving, "stand": 1.0 - driving}, lost=0, **unknown)

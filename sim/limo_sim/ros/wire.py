@@ -12,6 +12,8 @@ from typing import Any
 HEAD = struct.Struct("<II")
 #: Whether a node's process is a copy of one that has imported everything.
 FORKS = sys.platform == "linux"
+#: A topic, its message as CDR, and the pixels of an Image, whose message comes without them.
+News = tuple[str, Any, Any]
 
 
 def prctl(option: int, value: int) -> None:
@@ -20,8 +22,8 @@ def prctl(option: int, value: int) -> None:
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
-def packed(content: Any, data: bytes = b"", more: int = 0) -> bytes:
-    """Return a message: JSON, and bytes that are none; as many as `more` says are to follow it."""
+def packed(content: Any, size: int = 0) -> bytes:
+    """Return a message's JSON; as many bytes as `size` says are to follow it, which are not copied into it."""
     # A node may command NaN, which Python's JSON carries: the arena refuses it.
     said = json.dumps(content).encode()  # noqa: TID251
-    return HEAD.pack(len(said), len(data) + more) + said + data
+    return HEAD.pack(len(said), size) + said

@@ -216,14 +216,13 @@ class Arena:
     def imu(self) -> tuple[imu.ImuReading, ...]:
         """Return the readings of the last step, oldest first."""
         before, now = self._before, self._state
-        gained = [(new - old) / STEP_S for new, old in zip(now.velocity, before.velocity, strict=True)]
+        (was_x, was_y), (is_x, is_y) = before.velocity, now.velocity
+        gained_x, gained_y = (is_x - was_x) / STEP_S, (is_y - was_y) / STEP_S
         cos, sin = math.cos(now.yaw), math.sin(now.yaw)
-        forward, sideways = cos * gained[0] + sin * gained[1], cos * gained[1] - sin * gained[0]
+        forward, sideways = cos * gained_x + sin * gained_y, cos * gained_y - sin * gained_x
         noise = np.random.default_rng([self.seed, IMU_STREAM, now.step])
-        return tuple(
-            imu.sample(now.time - early, now.turn_rate, forward, sideways, self.scenario.imu, noise)
-            for early in (1 / imu.RATE_HZ, 0.0)
-        )
+        true = now.turn_rate, forward, sideways, self.scenario.imu, noise
+        return imu.sample(now.time - 1 / imu.RATE_HZ, *true), imu.sample(now.time, *true)
 
     def truth(self) -> Truth:
         """Return the truth now (`TrueFrame.truth`: at the frame's stamp); free once this instant's frame is drawn."""

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from limo_sim.ros.runner import Limits, Said
+from limo_sim.ros.worker import no_nodes
 from limo_sim.workshop.exercises import Checkpoint, Exercise, exercise
 from limo_sim.workshop.mistakes import Finding, Source, camera_read, no_command, no_detection, no_picture
+from limo_sim.workshop.scenes import Scene
 from limo_sim.workshop.sights import found
 from limo_sim.workshop.stretch import red_on_person
 from limo_sim.workshop.takes import Look, Take, judge_by_truth, play
@@ -78,32 +82,68 @@ def check(script: Path, name: str = "follower") -> list[Verdict]:
 
 
 def examine(
-    script: Path, name: str = "follower", limits: Limits | None = None, said: Said = lambda *_: None
+    script: Path,
+    name: str = "follower",
+    limits: Limits | None = None,
+    said: Said = lambda *_: None,
+    *,
+    workers: int = 1,
 ) -> Examination:
     """Try a node in an exercise's scenes, and if all checkpoints hold there, in its last ones.
 
     A node that raises, hangs or dies in a scene has one more verdict, the first, that says so; its checkpoints are
     judged by what it did before, and in the other scenes. `limits` are those of all scenes together; `said` is given
-    what the node prints.
+    what the node prints. `workers` scenes are played at once; with several, no other thread may run a node meanwhile.
     """
     wanted = exercise(name)
     limits = replace(limits or Limits(), began=time.monotonic())
     source = Source(script)
     takes: list[Take] = []
-    for scene in wanted.scenes:
-        if not scene.last:
-            takes.append(play(script, scene, limits, said))
-            if _is_hopeless(takes[-1]):
-                break
-    by_truth = judge_by_truth(takes)
-    fault = _fault(source, takes)
-    late = [point for point in wanted.checkpoints if _is_late(point, wanted)]
-    first = [point for point in wanted.checkpoints if point not in late]
-    verdicts = [_verdict(point, _judged(source, point, wanted, takes, by_truth)) for point in first]
-    ready = fault is None and all(verdict.holds for verdict in verdicts)
-    takes += [play(script, scene, limits, said) for scene in wanted.scenes if ready and scene.last]
+    with _player(script, wanted.scenes, limits, said, workers) as played:
+        for scene in wanted.scenes:
+            if not scene.last:
+                takes.append(played(scene))
+                if _is_hopeless(takes[-1]):
+                    break
+        by_truth = judge_by_truth(takes)
+        fault = _fault(source, takes)
+        late = [point for point in wanted.checkpoints if _is_late(point, wanted)]
+        first = [point for point in wanted.checkpoints if point not in late]
+        verdicts = [_verdict(point, _judged(source, point, wanted, takes, by_truth)) for point in first]
+        ready = fault is None and all(verdict.holds for verdict in verdicts)
+        takes += [played(scene) for scene in wanted.scenes if ready and scene.last]
     verdicts += [_verdict(point, point.judge(_where(point, wanted, takes)) if ready else LAST) for point in late]
     return Examination(_marked([*([] if fault is None else [fault]), *verdicts], takes), takes)
+
+
+@contextmanager
+def _player(
+    script: Path, scenes: Sequence[Scene], limits: Limits, said: Said, workers: int
+) -> Iterator[Callable[[Scene], Take]]:
+    """Give what returns the take of a scene. Several workers begin all scenes at once; at the end, they are ended."""
+    if workers == 1:
+        yield lambda scene: play(script, scene, limits, said)
+        return
+    printed: dict[str, list[tuple[str, str]]] = {scene.name: [] for scene in scenes}
+
+    def played(scene: Scene) -> Take:
+        take = ahead[scene.name].result()
+        for text in printed[scene.name]:
+            said(*text)
+        return take
+
+    with ThreadPoolExecutor(workers) as pool:
+        # (The first may tell that there is no hope; of the others, the longest first.)
+        order = [scenes[0], *sorted(scenes[1:], key=lambda scene: -scene.seconds)]
+        ahead = {
+            scene.name: pool.submit(play, script, scene, limits, lambda *text, of=scene.name: printed[of].append(text))
+            for scene in order
+        }
+        try:
+            yield played
+        finally:
+            with no_nodes():
+                pool.shutdown(cancel_futures=True)
 
 
 def _is_hopeless(take: Take) -> bool:

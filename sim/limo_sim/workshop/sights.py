@@ -23,7 +23,7 @@ from limo_sim.workshop.checkpoints import (
     surest,
 )
 from limo_sim.workshop.mistakes import Finding
-from limo_sim.workshop.takes import SILENCE, Look, Picture, Take, alike
+from limo_sim.workshop.takes import SILENCE, Look, Picture, Take, is_swapped
 
 #: Boxes of one person, of which a node may keep the surest alone, overlap by more (intersection over union).
 _SAME_PERSON = 0.3
@@ -60,7 +60,7 @@ def _not_shown(take: Take, look: Look) -> Finding:
         said += f"a grey or depth picture {picture.shape}, not the camera's colour image"
     elif picture.shape != look.image.shape:
         said += f"{picture.shape}; wanted is the camera's size {look.image.shape}"
-    elif alike(picture, np.asarray(look.image[..., ::-1])) > 0.5:
+    elif is_swapped(picture, look.image):
         said += "red and blue swapped: convert with imgmsg_to_cv2(message, 'bgr8')"
     else:
         said += (

@@ -7,6 +7,7 @@ command and a line of the log belong to the image that was searched last.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import cv2
@@ -40,7 +41,7 @@ _OLDEST = 4.0
 _THUMBNAIL = (160, 120)
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(eq=False)
 class Look:
     """One camera image, and what the node made of it.
 
@@ -73,7 +74,12 @@ class Look:
     pictures: list[Picture] = field(default_factory=list)
     _place: tuple[float, int, int] = (1.0, 0, 0)
 
-    @property
+    # The image for comparisons: every fourth row and column, without colours, and small.
+    thin = cached_property(lambda look: _thin(look.image))
+    grey = cached_property(lambda look: _grey(look.image))
+    thumbnail = cached_property(lambda look: _thumbnail(look.image))
+
+    @cached_property
     def people(self) -> Detections:
         """The people in the image, by the arena's truth: outlines, and their heights as scores."""
         seen = [p.box for p in self.truth.people if p is not None and p.box is not None and p.visible > 0.5]
@@ -125,6 +131,7 @@ class Take(Witness):
     path: list[tuple[float, float, float, float]] = field(default_factory=list)
     answers: list[tuple[Command, Look, list[Look]]] = field(default_factory=list)
     unplaced: set[tuple[int, ...]] = field(default_factory=set)
+    _corners: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     outcome: Ended | None = None
     _answered: Look | None = None
 
@@ -154,7 +161,7 @@ class Take(Witness):
 
     def found(self, time: float, found: Found, picture: Picture) -> None:
         """Note a search."""
-        look, place = _located(picture, self._recent(time))
+        look, place = _located(picture, self._recent(time), self._corners)
         if look is None:
             self.unplaced.add(found.shape)
             return
@@ -207,28 +214,39 @@ def judge_by_truth(takes: list[Take]) -> bool:
     return True
 
 
-def alike(shown: Picture, image: Picture) -> float:
-    """Return the share of pixels that are alike, of every fourth row and column."""
-    if shown.shape != image.shape:
-        return 0.0
-    return float((cv2.absdiff(shown[::4, ::4], image[::4, ::4]).max(axis=2) <= _ALIKE).mean())
+def _thin(picture: Picture) -> Picture:
+    return np.ascontiguousarray(picture[::4, ::4])
+
+
+def _share(one: Picture, other: Picture, tolerance: int) -> float:
+    """Return the share of pixels no channel of which differs by more."""
+    within = cv2.inRange(cv2.absdiff(one, other), (0, 0, 0), (tolerance,) * 3)
+    return cv2.countNonZero(within) / within.size
+
+
+def is_swapped(shown: Picture, image: Picture) -> bool:
+    """Whether a picture shows an image with red and blue in each other's place."""
+    return _share(_thin(shown), _thin(image[..., ::-1]), _ALIKE) > 0.5
 
 
 def _shown_in(picture: Picture, looks: list[Look]) -> Look | None:
     """Return the look whose image a picture shows, with things drawn on it; None if it shows none."""
-    for look in looks:
-        if picture.shape == look.image.shape:
-            same = [
-                float((picture[::4, ::4] == image[::4, ::4]).all(axis=2).mean())
-                for image in (look.image, look.image[..., ::-1])
-            ]
-            if same[0] > 0.5 and same[0] >= same[1]:
-                return look
-    # Of compressed images no pixel is the same.
-    best = max(looks, key=lambda look: alike(picture, look.image), default=None)
-    if best is None or alike(picture, best.image) <= 0.5:
+    looks = [look for look in looks if look.image.shape == picture.shape]
+    if not looks:
         return None
-    return None if alike(picture, best.image) < alike(picture, np.asarray(best.image[..., ::-1])) else best
+    thin = _thin(picture)
+    swapped = np.ascontiguousarray(thin[..., ::-1])
+    for look in looks:
+        same = _share(thin, look.thin, 0)
+        if same > 0.5 and same >= _share(swapped, look.thin, 0):
+            return look
+    # Of compressed images no pixel is the same.
+    share, best = max(((_share(thin, look.thin, _ALIKE), look) for look in looks), key=lambda pair: pair[0])
+    return best if share > 0.5 and share >= _share(swapped, best.thin, _ALIKE) else None
+
+
+def _thumbnail(picture: Picture) -> Picture:
+    return _grey(np.asarray(cv2.resize(picture, _THUMBNAIL, interpolation=cv2.INTER_AREA), np.uint8))
 
 
 def _grey(picture: Picture) -> Picture:
@@ -236,21 +254,28 @@ def _grey(picture: Picture) -> Picture:
     return np.ascontiguousarray(grey)
 
 
-def _located(picture: Picture, looks: list[Look]) -> tuple[Look | None, tuple[float, int, int]]:
-    """Return the look whose image was searched, and the picture's place in it; None if it is part of none."""
-    for look in looks:
-        if np.array_equal(picture, look.image):
-            return look, (1.0, 0, 0)
+def _located(
+    picture: Picture, looks: list[Look], corners: list[tuple[int, int]]
+) -> tuple[Look | None, tuple[float, int, int]]:
+    """Return the look whose image was searched, and the picture's place in it; None if it is part of none.
+
+    `corners`: where parts of earlier images began, the newest last; a part that is found elsewhere is added.
+    """
     height, width = picture.shape[:2]
+    for look in looks:
+        for x, y in reversed(corners):
+            if np.array_equal(picture, look.image[y : y + height, x : x + width]):
+                return look, (1.0, x, y)
     best: tuple[float, Look | None, tuple[float, int, int]] = (_CORRELATED, None, (1.0, 0, 0))
-    grey = _grey(picture)
+    whole: Picture | None = None
     for look in looks:
         scale = look.image.shape[0] / height
         if abs(width * scale - look.image.shape[1]) <= max(scale, 1.0):
-            one, other = (cv2.resize(g, _THUMBNAIL, interpolation=cv2.INTER_AREA) for g in (grey, _grey(look.image)))
-            match, place = float(cv2.matchTemplate(one, other, cv2.TM_CCOEFF_NORMED)[0, 0]), (scale, 0, 0)
+            whole = _thumbnail(picture) if whole is None else whole
+            match = float(cv2.matchTemplate(whole, look.thumbnail, cv2.TM_CCOEFF_NORMED)[0, 0])
+            place = (scale, 0, 0)
         elif height <= look.image.shape[0] and width <= look.image.shape[1] and min(height, width) >= 64:
-            found = cv2.matchTemplate(_grey(look.image), grey, cv2.TM_CCOEFF_NORMED)
+            found = cv2.matchTemplate(look.grey, _grey(picture), cv2.TM_CCOEFF_NORMED)
             _, match, _, (x, y) = cv2.minMaxLoc(found)
             place = (1.0, int(x), int(y))
         else:
@@ -258,5 +283,6 @@ def _located(picture: Picture, looks: list[Look]) -> tuple[Look | None, tuple[fl
         if match > best[0] + 1e-6:
             best = (match, look, place)
         if place[0] == 1.0 and match > 0.9999:
+            corners.append((place[1], place[2]))
             break
     return best[1], best[2]

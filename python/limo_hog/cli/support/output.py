@@ -102,6 +102,8 @@ def refuse_to_overwrite(paths: Iterable[Path], resume: str = "") -> None:
 
 def printable(text: str) -> str:
     """Return text in one line that a terminal shows and does not obey: other characters are escaped."""
+    if text.isprintable():
+        return text
     return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
 
 

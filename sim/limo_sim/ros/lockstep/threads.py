@@ -10,6 +10,7 @@ CPython's privates are touched here alone. A run goes on without one of them, le
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
@@ -37,7 +38,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
 
     def sleep(seconds: float) -> None:
         if turns.inside:
-            turns.wait(lambda: False, now() + seconds)
+            turns.wait(lambda: False, now() + seconds, lambda: math.inf)
         else:
             real_sleep(seconds)
 
@@ -56,7 +57,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
     def join(thread: threading.Thread, timeout: float | None = None) -> None:
         seat = getattr(thread, "limo_seat", None)
         if turns.inside and seat is not None:
-            if turns.wait(lambda: not turns.alive(seat), *_until(now, timeout)):
+            if turns.wait(lambda: not turns.alive(seat), _until(now, timeout)):
                 real_join(thread)
         else:
             real_join(thread, timeout)
@@ -71,7 +72,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         condition._waiters.append(waiter)
         saved = condition._release_save()
         try:
-            notified = turns.wait(lambda: not waiter.locked(), *_until(now, timeout))
+            notified = turns.wait(lambda: not waiter.locked(), _until(now, timeout))
         finally:
             condition._acquire_restore(saved)
             if waiter.locked():
@@ -98,5 +99,5 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         yield
 
 
-def _until(now: Callable[[], float], timeout: float | None) -> tuple[float, ...]:
-    return () if timeout is None else (now() + max(timeout, 0.0),)
+def _until(now: Callable[[], float], timeout: float | None) -> float:
+    return math.inf if timeout is None else now() + max(timeout, 0.0)

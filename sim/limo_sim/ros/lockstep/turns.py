@@ -26,6 +26,11 @@ class ExternalShutdownException(Exception):  # noqa: N818 — rclpy's name
     """The context was shut down during a wait."""
 
 
+def at_once() -> float:
+    """Say of a wait that any step of simulated time may end it."""
+    return 0.0
+
+
 class Seat:
     """One thread of the script.
 
@@ -33,12 +38,15 @@ class Seat:
     ----------
     daemon
         Whether the script's end waits for the thread.
+    ready, until, wakes
+        What it waits for, how long [s], and the time before which that can come with a message alone [s].
     """
 
     def __init__(self, *, daemon: bool) -> None:
         self.daemon = daemon
         self.ready: Callable[[], bool] = lambda: True
         self.until = math.inf
+        self.wakes: Callable[[], float] = at_once
         self.ended = False
         #: Above zero while the run's own code works in this thread: its sleeps and locks are real.
         self.outside = 0
@@ -52,7 +60,7 @@ class Turns:
     Parameters
     ----------
     advance
-        Lets one step of simulated time pass.
+        Lets a step of simulated time pass, or several, as long as no message comes and this time is not reached [s].
     now
         Simulated time [s].
     over
@@ -63,7 +71,7 @@ class Turns:
 
     def __init__(
         self,
-        advance: Callable[[], None],
+        advance: Callable[[float], None],
         now: Callable[[], float],
         over: Callable[[], bool],
         failed: Callable[[BaseException], None],
@@ -103,8 +111,10 @@ class Turns:
             self._end_others(seat)
             del self._seats[threading.get_ident()]
 
-    def wait(self, ready: Callable[[], bool], until: float = math.inf) -> bool:
+    def wait(self, ready: Callable[[], bool], until: float = math.inf, wakes: Callable[[], float] = at_once) -> bool:
         """Give the turn away until `ready()` holds or simulated time reaches `until` [s]; returns `ready()`.
+
+        Before the time `wakes()` [s], `ready()` changes by a message or by another thread alone.
 
         Raises
         ------
@@ -114,10 +124,9 @@ class Turns:
         me = self._seats[threading.get_ident()]
         if me.ended:
             raise ThreadEnded
-        me.ready, me.until = ready, until
+        me.ready, me.until, me.wakes = ready, until, wakes
         while (chosen := self._next(self._order.index(me) + 1)) is None:
-            with self.outside():
-                self._advance()
+            self._step()
         if chosen is not me:
             self._hand_to(chosen)
             me.turn.acquire()
@@ -173,10 +182,13 @@ class Turns:
         finally:
             seat.outside -= 1
 
+    def _step(self) -> None:
+        with self.outside():
+            self._advance(min(min(other.until, other.wakes()) for other in self._order))
+
     def _step_or_break(self) -> None:
         try:
-            with self.outside():
-                self._advance()
+            self._step()
         except BaseException as error:  # whatever a page raises ends the run
             self._failed(error)
             self._broken = True

@@ -22,6 +22,10 @@ with needed(by="limo-hog run"):
 #: No screen is larger, nor a JPEG [px].
 _LARGEST = 16_384
 _MISSING = object()
+_WITHOUT_EFFECT = (
+    "namedWindow moveWindow resizeWindow setWindowTitle setWindowProperty setMouseCallback startWindowThread "
+    "createTrackbar"
+).split()
 _TRACKER = re.compile(r"Tracker\w+_create")
 
 
@@ -58,7 +62,7 @@ def _windows(world: World) -> dict[str, Callable[..., Any]]:
             raise cv2.error(f"imshow: want a title and at most {_LARGEST} px a side, came {winname!r}, {mat.shape}")
         picture = _as_shown(mat)
         world.called("windows", str(winname))
-        world.link.tell("shown", str(winname), picture.shape, data=picture.tobytes())
+        world.link.tell("shown", str(winname), picture.shape, data=picture)
 
     def wait_key(delay: int = 0) -> int:  # noqa: ARG001 — OpenCV's signature
         return -1
@@ -74,26 +78,17 @@ def _windows(world: World) -> dict[str, Callable[..., Any]]:
 
     return {
         "imshow": imshow,
-        "waitKey": wait_key,
-        "waitKeyEx": wait_key,
-        "pollKey": wait_key,
         "destroyWindow": destroy_window,
         "destroyAllWindows": destroy_all,
-        "namedWindow": nothing,
-        "moveWindow": nothing,
-        "resizeWindow": nothing,
-        "setWindowTitle": nothing,
-        "setWindowProperty": nothing,
-        "setMouseCallback": nothing,
-        "startWindowThread": nothing,
-        "createTrackbar": nothing,
+        **dict.fromkeys(("waitKey", "waitKeyEx", "pollKey"), wait_key),
+        **dict.fromkeys(_WITHOUT_EFFECT, nothing),
     }
 
 
 def _as_shown(picture: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return a copy as imshow draws it: 8 bits as they are, 16 bits divided by 256, numbers from 0 to 1 times 255."""
+    """Return it as imshow draws it: 8 bits as they are, 16 bits divided by 256, numbers from 0 to 1 times 255."""
     if picture.dtype == np.uint8:
-        return np.array(picture, np.uint8)
+        return np.ascontiguousarray(picture)
     scaled = picture / 256 if picture.dtype == np.uint16 else picture * 255.0
     shown: NDArray[np.uint8] = np.clip(np.nan_to_num(scaled), 0, 255).astype(np.uint8)
     return shown
@@ -142,7 +137,7 @@ def _found(
     """Tell what was found in a picture, and where the arena wants to see it, the picture."""
     seen = world.checked and isinstance(img, np.ndarray) and img.dtype == np.uint8
     if hog or seen:
-        world.link.tell("found", np.shape(img), boxes, scores, ms, hog, data=img.tobytes() if seen else b"")
+        world.link.tell("found", np.shape(img), boxes, scores, ms, hog, data=np.ascontiguousarray(img) if seen else b"")
 
 
 def _watched_detect(detect: Callable[..., Any], world: World) -> Callable[..., Any]:

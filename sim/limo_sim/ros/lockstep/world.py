@@ -20,17 +20,18 @@ from limo_sim.ros.interfaces import Message, from_wire
 from limo_sim.ros.lockstep.patience import Patience
 from limo_sim.ros.lockstep.records import Reader, StubError
 from limo_sim.ros.lockstep.turns import RunOver, ThreadEnded, Turns
+from limo_sim.ros.wire import News
 
 
 class Link(Protocol):
     """The way to the arena; plain data alone."""
 
-    def tell(self, told: str, *content: Any, data: bytes = b"") -> None:
-        """Tell what the script does: numbers, texts, None and lists of them, and the bytes of a picture."""
+    def tell(self, told: str, *content: Any, data: Any = b"") -> None:
+        """Tell what the script does: numbers, texts, None and lists of them, and a picture, an array in C order."""
         ...
 
-    def advance(self, wanted: Sequence[str], target: float | None) -> tuple[float, list[tuple[str, memoryview]]]:
-        """Let one step pass; returns the time [s], and the new messages of the topics that are wanted, as CDR."""
+    def advance(self, wanted: Sequence[str], target: float | None, until: float) -> tuple[float, list[News]]:
+        """Let time pass, to `until` [s] or to the next message; returns the time [s], and the topics' messages."""
         ...
 
 
@@ -96,8 +97,8 @@ class World:
         """Whether the run's time is up."""
         return self.time >= self.seconds - 1e-9
 
-    def advance(self) -> None:
-        """Advance the arena by one step; new readings are offered to the subscriptions.
+    def advance(self, until: float = 0.0) -> None:
+        """Advance the arena to `until` [s], or to the next reading, at least by a step; offer it to the subscriptions.
 
         Raises
         ------
@@ -107,15 +108,18 @@ class World:
         if self.over:
             raise RunOver
         with self.patience.suspended():
-            self.time, news = self.link.advance(sorted({reader.topic for reader in self.readers}), self._target())
+            wanted = sorted({reader.topic for reader in self.readers})
+            self.time, news = self.link.advance(wanted, self._target(), min(until, self.seconds))
         self.advances += 1
-        for topic, data in news:
+        for topic, data, pixels in news:
             message = deserialize(data, names.TYPES[topic])
             if topic == names.TF_STATIC:
                 self.kept.append((topic, deque([from_wire(message)])))
             for reader in self.readers:
                 if reader.topic == topic:
-                    reader.offer(from_wire(message))
+                    reader.offer(given := from_wire(message))
+                    if pixels:
+                        given.data.frombytes(pixels)  # type: ignore[attr-defined]
 
     def _target(self) -> float | None:
         """Return the node's parameter `target_distance` [m], None where no node has one that is a distance."""
@@ -124,7 +128,7 @@ class World:
 
     def sleep(self, seconds: float) -> None:
         """Let simulated time pass, as a script's `time.sleep` does: messages are queued, callbacks wait."""
-        self.turns.wait(lambda: False, self.time + seconds)
+        self.turns.wait(lambda: False, self.time + seconds, lambda: math.inf)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Call back into the script; an exception is kept in `fault`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from enum import IntEnum
 from functools import total_ordering
@@ -161,9 +162,14 @@ class Timer(PartialApi, missing=("handle",)):
         self._called = self._world.time
         self._due = self._world.time + self._period
 
+    @property
+    def due(self) -> float:
+        """When the next call is due [s]; infinite where it is cancelled."""
+        return math.inf if self._cancelled else self._due
+
     def is_ready(self) -> bool:
         """Whether the call is due."""
-        return not self._cancelled and self._world.time >= self._due - 1e-9
+        return self._world.time >= self.due - 1e-9
 
     def take(self) -> Callable[[], Any]:
         """Set the next call and return this one."""

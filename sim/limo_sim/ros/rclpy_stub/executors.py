@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from limo_sim.ros.lockstep.turns import ExternalShutdownException
+from limo_sim.ros.lockstep.turns import ExternalShutdownException, at_once
 from limo_sim.ros.rclpy_stub.context import default_context
 from limo_sim.ros.rclpy_stub.future import Future, Task
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
@@ -130,8 +130,8 @@ class Executor(PartialApi, missing=_MISSING):
                 return ended or enough() or bool(self._ready()) or self._failed() is not None
 
             polls, before = timeout <= 0 and not wanted(), world.advances
-            until = math.inf if polls else world.time + timeout
-            world.turns.wait(lambda: wanted() or (polls and world.advances > before), until)
+            until, wakes = (math.inf, at_once) if polls else (world.time + timeout, self._wakes)
+            world.turns.wait(lambda: wanted() or (polls and world.advances > before), until, wakes)
             failure = self._failed()
             if failure is not None:
                 raise failure
@@ -163,9 +163,12 @@ class Executor(PartialApi, missing=_MISSING):
         self._tasks = [task for task in self._tasks if not _ended(task)]
         due: list[_Due] = [(None, task) for task in reversed(self._tasks) if task.is_ready()]
         for node in self._nodes:
-            for kind in ("timers", "subscriptions", "clients", "services"):
-                due += [(one.callback_group, one) for one in getattr(node, kind) if _may_run(one.callback_group, one)]
+            due += [(one.callback_group, one) for one in node.entities if _may_run(one.callback_group, one)]
         return due
+
+    def _wakes(self) -> float:
+        """Return when the next timer is due [s]."""
+        return min((timer.due for node in self._nodes for timer in node.timers), default=math.inf)
 
     def _next(self) -> _Due | None:
         """Return what runs next: as in ROS, what is due together runs once each before any of it runs again."""

@@ -146,6 +146,11 @@ class Node(PartialApi, missing=_MISSING):
         """The node's clients."""
         return iter(self._clients)
 
+    @property
+    def entities(self) -> tuple[Any, ...]:
+        """All that has callbacks, in the order in which executors run them."""
+        return (*self._timers, *self._subscriptions, *self._clients, *self._services)
+
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         """Return a topic's full name, after the command line's remaps unless `only_expand`."""
         checked(topic, InvalidTopicNameException)

@@ -23,12 +23,12 @@ from tests.sim.view.browser import CHROMIUM, chromium
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.robot import LIMO
+from limo_hog.live.pace import Pace
 from limo_sim.run.arena import Arena
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
 from limo_sim.sensing.camera import CameraPose
 from limo_sim.sensing.renderer import Renderer
-from limo_sim.view.pace import Pace
 from limo_sim.view.reading import annotated, depth_picture
 from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable

@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 
 from limo_hog.cv2_api.arguments import pixels
 from limo_hog.exceptions import HogError, LimoHogError
-from limo_hog.models import PERSON_BOX, Calibration, PersonBox
+from limo_hog.extras import needed
+from limo_hog.models import PERSON_BOX, WHOLE_WINDOW, Calibration, PersonBox
+
+#: Columns of a table, as `detect --csv` has them: x, y, width and height [px] of boxes and of windows.
+BOX_COLUMNS, WINDOW_COLUMNS = tuple("xywh"), tuple(f"window_{side}" for side in "xywh")
 
 
 def people(count: int) -> str:
@@ -42,6 +46,9 @@ class Detections:
         Where the person stands in a window, as shares of it.
     calibration
         How the model's margins become probabilities; None where that was never measured.
+    ids
+        int64 (N,): number of each person, the same in all pictures of a film, from 1 on (`limo_hog.tracking`); None
+        where nobody is tracked.
     """
 
     windows: NDArray[np.int32]
@@ -50,6 +57,7 @@ class Detections:
     calibration: Calibration | None = None
     #: What was searched, for `_repr_html_`: a file's name, or a reference that keeps no image alive.
     _searched: Any = field(default=None, repr=False, compare=False)
+    ids: NDArray[np.int64] | None = None
 
     @classmethod
     def none(cls) -> Detections:
@@ -74,7 +82,8 @@ class Detections:
         return hash(self._held())
 
     def _held(self) -> tuple[Any, ...]:
-        return self.windows.tobytes(), self.scores.tobytes(), self.person_box, self.calibration
+        ids = None if self.ids is None else self.ids.tobytes()
+        return self.windows.tobytes(), self.scores.tobytes(), self.person_box, self.calibration, ids
 
     def __iter__(self) -> Iterator[tuple[NDArray[np.int32], float]]:
         for box, score in zip(self.boxes, self.scores, strict=True):
@@ -90,7 +99,8 @@ class Detections:
         scores = self.scores[index]
         if scores.ndim == 0:
             return self.boxes[index], float(scores)
-        return dataclasses.replace(self, windows=self.windows[index], scores=scores)
+        ids = None if self.ids is None else self.ids[index]
+        return dataclasses.replace(self, windows=self.windows[index], scores=scores, ids=ids)
 
     @property
     def boxes(self) -> NDArray[np.int32]:
@@ -117,10 +127,15 @@ class Detections:
 
     @property
     def labels(self) -> list[str]:
-        """What pictures and tables say of each box: its probability, such as "97 %"; without calibration its margin."""
+        """What pictures and tables say of each box: its probability, such as "97 %"; without calibration its margin.
+
+        A person's number comes first, such as "3: 97 %".
+        """
         if self.calibration is None:
-            return [f"{score:.2f}" for score in self.scores]
-        return [f"{100 * share:.0f} %" for share in self.probabilities]
+            said = [f"{score:.2f}" for score in self.scores]
+        else:
+            said = [f"{100 * share:.0f} %" for share in self.probabilities]
+        return said if self.ids is None else [f"{who}: {word}" for who, word in zip(self.ids, said, strict=True)]
 
     def draw(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Draw the people's boxes and labels into a copy of the image.
@@ -144,9 +159,92 @@ class Detections:
         return annotate(pixels(image), self.boxes, self.labels)
 
     def to_dict(self) -> dict[str, list[Any]]:
-        """Return lists of plain numbers for JSON: boxes, windows, scores, and probabilities if calibrated."""
+        """Return lists of plain numbers for JSON: boxes, windows, scores; probabilities and ids where known."""
         held = {"boxes": self.boxes.tolist(), "windows": self.windows.tolist(), "scores": self.scores.tolist()}
-        return held if self.calibration is None else {**held, "probabilities": self.probabilities.tolist()}
+        if self.calibration is not None:
+            held["probabilities"] = self.probabilities.tolist()
+        return held if self.ids is None else {**held, "ids": self.ids.tolist()}
+
+    def to_supervision(self) -> Any:
+        """Return them as `supervision.Detections`: boxes, `tracker_id`, class 0, probabilities as `confidence`.
+
+        Without calibration the margins are the `confidence`. Windows and margins are in `data`.
+
+        Raises
+        ------
+        MissingExtraError
+            supervision is not installed.
+        """
+        with needed(by="to_supervision"):
+            from supervision import Detections as Supervisions
+        return Supervisions(
+            xyxy=self.xyxy.astype(np.float32),
+            confidence=self.scores if self.calibration is None else self.probabilities,
+            class_id=np.zeros(len(self), int),
+            tracker_id=self.ids,
+            data={"class_name": np.full(len(self), "person"), "window": self.windows, "score": self.scores},
+            metadata={"person_box": self.person_box, "calibration": self.calibration},
+        )
+
+    @classmethod
+    def from_supervision(cls, found: Any) -> Detections:
+        """Return `supervision.Detections`, best first: what `to_supervision` made, or another detector's.
+
+        Another detector's boxes are their own windows, its `confidence` the scores.
+
+        Raises
+        ------
+        HogError
+            They have no confidence.
+        """
+        if found.confidence is None and "score" not in found.data:
+            raise HogError("these supervision.Detections have no confidence; give each box one")
+        boxes = np.hstack([found.xyxy[:, :2], found.xyxy[:, 2:] - found.xyxy[:, :2]])
+        windows, scores = found.data.get("window"), found.data.get("score", found.confidence)
+        return cls._best_first(boxes, windows, scores, found.tracker_id, found.metadata)
+
+    def to_pandas(self) -> Any:
+        """Return a `pandas.DataFrame`, a line a person, with the columns of `detect --csv`.
+
+        Raises
+        ------
+        MissingExtraError
+            pandas is not installed.
+        """
+        with needed(by="to_pandas"):
+            from pandas import DataFrame
+        table = DataFrame(np.hstack([self.boxes, self.windows]), columns=[*BOX_COLUMNS, *WINDOW_COLUMNS])
+        shares = np.nan if self.calibration is None else self.probabilities
+        table = table.assign(score=self.scores, probability=shares, **({} if self.ids is None else {"id": self.ids}))
+        table.attrs |= {"person_box": self.person_box, "calibration": self.calibration}
+        return table
+
+    @classmethod
+    def from_pandas(cls, table: Any) -> Detections:
+        """Return the people of a `pandas.DataFrame`, best first; it needs the columns x, y, w, h and score.
+
+        A table that `to_pandas` did not make tells nothing of a model: its boxes are their own windows.
+
+        Raises
+        ------
+        HogError
+            A column is missing.
+        """
+        if missing := [name for name in (*BOX_COLUMNS, "score") if name not in table]:
+            raise HogError(f"the table has no column {', '.join(missing)}; x, y, w, h and score are wanted")
+        windows = table[[*WINDOW_COLUMNS]].to_numpy() if {*WINDOW_COLUMNS} <= {*table} and table.attrs else None
+        ids = table["id"].to_numpy() if "id" in table else None
+        return cls._best_first(table[[*BOX_COLUMNS]].to_numpy(), windows, table["score"].to_numpy(), ids, table.attrs)
+
+    @classmethod
+    def _best_first(cls, boxes: Any, windows: Any, scores: Any, ids: Any, model: Any) -> Detections:
+        """Return them in the order of their scores; without windows the boxes are whole windows, of no model."""
+        order = np.argsort(-np.asarray(scores, np.float64), kind="stable")
+        ids = None if ids is None else np.asarray(ids, np.int64)[order]
+        known = windows is not None
+        person_box, calibration = (model["person_box"], model["calibration"]) if known else (WHOLE_WINDOW, None)
+        windows = np.rint(windows if known else boxes).astype(np.int32)[order]
+        return cls(windows, np.asarray(scores, np.float64)[order], person_box, calibration, ids=ids)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the picture that was searched, with the people's boxes; the path's ending says its format.
@@ -215,7 +313,7 @@ class Detections:
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         # A copy in another process does not know the image.
-        return Detections, (self.windows, self.scores, self.person_box, self.calibration)
+        return Detections, (self.windows, self.scores, self.person_box, self.calibration, None, self.ids)
 
 
 class Detector(Protocol):

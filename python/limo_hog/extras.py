@@ -14,6 +14,7 @@ class MissingExtraError(LimoHogError):
 
 #: Libraries of the extras, by the name they are imported by: what they are called, and the extra.
 _LIBRARIES = {
+    "aiohttp": ("aiohttp", "view"),
     "av": ("PyAV", "video"),
     "cv2": ("OpenCV", "cv"),
     "cyclonedds": ("Cyclone DDS", "ros2"),
@@ -21,11 +22,14 @@ _LIBRARIES = {
     "lz4": ("LZ4", "record"),
     "matplotlib": ("matplotlib", "plot"),
     "mcap": ("mcap", "record"),
+    "pandas": ("pandas", "pandas"),
     "rosbags": ("rosbags", "record"),
     "scipy": ("SciPy", "train"),
+    "supervision": ("supervision", "track"),
     "shtab": ("shtab", "completion"),
-    "tomli": ("tomli", "ros2"),
     "threadpoolctl": ("threadpoolctl", "train"),
+    "tomli": ("tomli", "ros2"),
+    "trackers": ("trackers", "track"),
     "zstandard": ("Zstandard", "record"),
 }
 

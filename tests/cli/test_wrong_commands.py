@@ -14,7 +14,7 @@ import pytest
 from limo_hog.cli.main import main
 
 
-@pytest.mark.parametrize("word", ["--show", "--track", "--quiet"])
+@pytest.mark.parametrize("word", ["--show", "--quiet"])
 def test_an_option_is_suggested_only_where_it_is_alike(word: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["detect", "a.jpg", word]) == 2
     assert "did you mean" not in capsys.readouterr().err
@@ -211,7 +211,7 @@ MISSING = [
     ("cyclonedds", "arena --ros2", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
     ("cyclonedds", "topic list", "ROS 2 over the network needs Cyclone DDS: pip install 'limo-hog[ros2]'"),
     ("shtab", "completion bash", "limo-hog completion needs shtab: pip install 'limo-hog[completion]'"),
-    ("aiohttp", "follow --view", "needs the module aiohttp, which is not installed: install limo-hog anew"),
+    ("aiohttp", "follow --view", "the live page needs aiohttp: pip install 'limo-hog[view]'"),
 ]
 
 

@@ -12,7 +12,9 @@ from tests.examples.pages import ROOT, Page
 
 import limo_hog
 from limo_hog.cli.support.scene import street
-from limo_hog.imaging.writing import write_image
+from limo_hog.imaging.writing import video_writer, write_image
+from limo_sim.run.arena import STEPS_PER_SECOND, Arena
+from limo_sim.world.scenario import Scenario
 
 cv2: Any = typed_cv2  # its types do not know `ml`
 
@@ -116,3 +118,21 @@ def test_coming_from_other_libraries(folder: Path) -> None:
     again = cv2.HOGDescriptor()
     assert again.load(str(folder / "mine.yml"))
     assert np.array_equal(again.svmDetector, limo_hog.HOGDescriptor("mine.yml").svmDetector)
+
+
+def test_people_in_a_film_of_the_arena_are_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("trackers", reason="needs limo-hog[track]")
+    arena = Arena(Scenario.load("sharp_turns"), 0)
+    with video_writer(folder / "walk.mp4", fps=10) as write:
+        for _ in range(150):
+            for _ in range(STEPS_PER_SECOND // 10):
+                arena.step()
+            frame = arena.frame()
+            write(frame.image)
+    (person,) = frame.truth.people
+    assert person is not None and person.box is not None and person.box[0] + person.box[2] < 320
+    (block,) = [block for block in Page(ROOT / "docs" / "detect.md").python if "LineZone" in block]
+    assert len(block.replace("\n\n", "\n").splitlines()) <= 15
+    exec(compile(block, "docs/detect.md", "exec"), {})
+    # By the arena's truth the person crosses the middle to the left, to the right, and to the left again.
+    assert capsys.readouterr().out == "1 to the right, 2 to the left, 0 on the right\n"

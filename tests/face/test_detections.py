@@ -169,3 +169,40 @@ def test_on_a_street_no_box_is_on_what_is_no_person() -> None:
         found = PeopleDetector().detect(frame)
         overlap = intersection_over_union(found.boxes, np.array(labels[f"pedestrians/{frame.name}"])).max(axis=1)
         assert (overlap > 0.3).all() and (overlap > 0.5).sum() >= 4
+
+
+@pytest.mark.parametrize("library", ["supervision", "pandas"])
+@pytest.mark.parametrize("tracked", [False, True])
+@pytest.mark.parametrize("count", [0, 2])
+@pytest.mark.parametrize("calibration", [None, Calibration(2.0, -1.0)])
+def test_detections_come_back_equal_from_other_libraries(
+    library: str, tracked: bool, count: int, calibration: Calibration | None
+) -> None:
+    pytest.importorskip(library, reason=f"needs {library}")
+    ids = np.array([7, 3], np.int64)[:count] if tracked else None
+    given = replace(some()[:count], ids=ids, calibration=calibration)
+    other = getattr(given, f"to_{library}")()
+    assert len(other) == count
+    back = getattr(Detections, f"from_{library}")
+    assert back(other) == given
+    assert back(other[np.arange(count) < 1]) == given[:1]
+    assert given != replace(given, ids=np.arange(count)) or not count
+
+
+def test_another_detectors_boxes_are_their_own_windows_best_first() -> None:
+    supervision = pytest.importorskip("supervision", reason="needs supervision")
+    xyxy = np.array([[1, 2, 11, 22], [5, 6, 25, 46]], np.float32)
+    found = Detections.from_supervision(supervision.Detections(xyxy, confidence=np.array([0.2, 0.9])))
+    assert found.boxes.tolist() == [[5, 6, 20, 40], [1, 2, 10, 20]]
+    assert found.scores.tolist() == [0.9, 0.2]
+    with pytest.raises(HogError, match=r"no confidence; give each box one"):
+        Detections.from_supervision(supervision.Detections(xyxy))
+
+
+def test_a_table_read_from_a_file_needs_boxes_and_scores(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas", reason="needs pandas")
+    some().to_pandas().to_csv(tmp_path / "a.csv")
+    read = pandas.read_csv(tmp_path / "a.csv")
+    assert np.array_equal(Detections.from_pandas(read).boxes, some().boxes)
+    with pytest.raises(HogError, match=r"no column w, score; x, y, w, h and score are wanted"):
+        Detections.from_pandas(read.drop(columns=["w", "score"]))

@@ -27,11 +27,11 @@ import numpy as np
 import limo_hog
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
+from limo_hog.live.pace import Pace
 from limo_sim.ros.runner import run_node
 from limo_sim.ros.stage import Stage, score_of
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.log import Step
-from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Scenario
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import os
 import sys
 import time
@@ -14,9 +15,12 @@ from limo_hog.atomic import is_stream
 from limo_hog.cli.support import arguments
 from limo_hog.cli.support.arguments import MODEL, add_json, add_search, output_file
 from limo_hog.cli.support.output import STDOUT, UsageError
-from limo_hog.cli.support.results import Result, json_lines, write_coco, write_csv
+from limo_hog.cli.support.page import HERE, PORT, address, announce
+from limo_hog.cli.support.results import Result, json_lines, write_coco, write_csv, write_mot
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
+from limo_hog.models import load_model
+from limo_hog.tracking import FED, TRACKERS
 
 #: What the results of a run depend on, and its JSON lines hold.
 PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "every", "search")
@@ -37,6 +41,25 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_json(parser, "one JSON object a line")
     parser.add_argument("--csv", type=output_file, metavar="FILE", help="write a table, a line a person")
     parser.add_argument("--coco", type=output_file, metavar="FILE", help="write COCO's JSON of images and annotations")
+    parser.add_argument(
+        "--mot", type=output_file, metavar="FILE", help="write one film's people as MOTChallenge's lines (with --track)"
+    )
+    parser.add_argument(
+        "--track",
+        nargs="?",
+        const="bytetrack",
+        choices=tuple(TRACKERS),
+        help="number each person of a film, or of pictures in their order at 25/s, and draw trails (bytetrack)",
+    )
+    parser.add_argument(
+        "--view",
+        nargs="?",
+        const=(HERE, PORT),
+        type=address,
+        metavar="[HOST:]PORT",
+        help=f"show pictures, boxes and the rate on a live page ({PORT}), with a pause and the threshold; films are no "
+        "faster than real time then",
+    )
     parser.add_argument("--model", default=PeopleDetector.model, metavar="NAME|FILE", help=f"{MODEL} (%(default)s)")
     add_search(parser)
     parser.add_argument(
@@ -79,11 +102,14 @@ def _tables(args: argparse.Namespace) -> Mapping[Path, Callable[[Path, Iterable[
     kept = args.json not in (None, STDOUT) and not is_stream(Path(args.json))
     if args.resume and not kept and args.out is None:
         raise UsageError("--resume goes on from what --json FILE or --out DIR holds: give one of them")
-    tables = {Path(name): write for name, write in ((args.csv, write_csv), (args.coco, write_coco)) if name}
-    if any(name == STDOUT for name in (args.csv, args.coco)):
-        raise UsageError("--csv and --coco want a file's name; standard output is for --json -")
+    wanted = ((args.csv, write_csv), (args.coco, write_coco), (args.mot, write_mot))
+    tables = {Path(name): write for name, write in wanted if name}
+    if any(name == STDOUT for name, _ in wanted):
+        raise UsageError("--csv, --coco and --mot want a file's name; standard output is for --json -")
+    if args.mot and not args.track:
+        raise UsageError("--mot writes the numbers that --track gives: add --track")
     if args.resume and tables and not kept:
-        raise UsageError("--resume with --csv or --coco takes the earlier results from --json FILE: give it")
+        raise UsageError("--resume with --csv, --coco or --mot takes the earlier results from --json FILE: give it")
     return tables
 
 
@@ -94,6 +120,10 @@ def run(args: argparse.Namespace) -> int:
         detector = PeopleDetector(**{name: value for name, value in parameters.items() if name != "every"})
     except ParameterError as error:
         raise UsageError(str(error)) from error
+    threshold = load_model(args.model).threshold if args.threshold is None else args.threshold
+    if args.track:
+        parameters["track"] = args.track
+        detector = dataclasses.replace(detector, threshold=threshold - FED)
     tables = _tables(args)
     # The error names a broken file in one line; the decoders' own lines are switched off.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
@@ -109,8 +139,14 @@ def run(args: argparse.Namespace) -> int:
             from limo_hog.cli.support.progress import progress
 
             bar = stack.enter_context(progress("pictures"))
-        run = Run(args, detector, bar)
+        run = Run(args, detector, threshold, bar)
         run.find(stack)
+        if args.view:
+            # Imported here: the server is an extra.
+            from limo_hog.cli.support.film_page import FilmPage
+
+            run.page = stack.enter_context(FilmPage(threshold, run.set_threshold, *args.view))
+            announce(run.page.url)
         only = args.out is None and not tables
         results = stack.enter_context(json_lines(args.json, parameters, args.resume, args.overwrite, only))
         start = time.perf_counter()
@@ -120,5 +156,8 @@ def run(args: argparse.Namespace) -> int:
             # Also when stopped: what is done is kept.
             for path, write in tables.items():
                 write(path, run.results or [])
-            print(run.summary(time.perf_counter() - start), file=sys.stderr)
+            summary = run.summary(time.perf_counter() - start)
+            if run.page:
+                run.page.end({"summary": summary})
+            print(summary, file=sys.stderr)
     return 1 if run.failed else 0

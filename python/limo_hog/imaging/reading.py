@@ -8,8 +8,10 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Container, Iterator
-from contextlib import ExitStack, contextmanager
+import threading
+import time
+from collections.abc import Callable, Container, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -34,6 +36,8 @@ STDIN = "-"
 _MOST_BYTES = 3 * 2**28 + 2**20
 #: How long a stream may take to open, or to send its next frame [s]; cameras on a network take one or two.
 STREAM_TIMEOUT_S = 10
+#: How long is waited before a live source that broke off is opened again [s]: after the last of them it is given up.
+RETRY_AFTER_S = (1, 2, 4, 8, 16, 32)
 
 
 class ReadError(ImageError):
@@ -181,6 +185,11 @@ class Video:
     frame_count: int  #: number of frames by the file's header; 0 where it has none, and for a camera
     _capture: cv2.VideoCapture
 
+    @property
+    def live(self) -> bool:
+        """Whether it is a camera, or a stream whose end nobody knows: one that does not wait for its reader."""
+        return self.source.kind in (Kind.CAMERA, Kind.STREAM) and not self.frame_count
+
     def frames(self, every: int = 1, skip: Container[int] = frozenset()) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Yield (number, uint8 (height, width, 3) BGR) of every `every`-th frame not in `skip`.
 
@@ -242,3 +251,41 @@ def open_video(source: Source) -> Iterator[Video]:
             raise ReadError(f"{source.name}: {wanted}")
         frames = 0 if source.kind is Kind.CAMERA else max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
         yield Video(source, capture.get(cv2.CAP_PROP_FPS) or 25.0, frames, capture)
+
+
+def live_frames(
+    video: Video, opened: ExitStack, every: int, tell: Callable[[str], None], stopped: threading.Event
+) -> Iterator[tuple[int, NDArray[np.uint8], float]]:
+    """Yield (number, uint8 (height, width, 3) BGR, time [s]) of a camera or a stream, until `stopped`.
+
+    Where it breaks off it is opened again, after growing pauses; numbers go on. `opened` closes the open video.
+
+    Raises
+    ------
+    ReadError
+        It never sent a frame, or did not come back.
+    """
+    source, first, waits = video.source, 0, iter(RETRY_AFTER_S)
+    while True:
+        number = -1
+        try:
+            with opened:
+                for number, image in video.frames(every):
+                    if stopped.is_set():
+                        return
+                    yield first + number, image, time.monotonic()
+        except ReadError:
+            if not first:
+                raise
+        if number >= 0:
+            first, waits = first + number + 1, iter(RETRY_AFTER_S)
+            tell(f"{source.name}: broke off after {first} frames; trying again for {sum(RETRY_AFTER_S)} s")
+        for wait in waits:
+            if stopped.wait(wait):
+                return
+            with suppress(ReadError, OSError):
+                opened = ExitStack()
+                video = opened.enter_context(open_video(source))
+                break
+        else:
+            raise ReadError(f"{source.name}: broke off after {first} frames, and did not come back")

@@ -54,8 +54,10 @@ def jpeg(image: NDArray[np.uint8], quality: int = 80) -> bytes:
 
 
 @contextmanager
-def video_writer(path: Path, fps: float) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
+def video_writer(path: Path, fps: float) -> Iterator[Callable[..., None]]:
     """Give a function that appends one uint8 (height, width, 3) BGR frame to an H.264 video.
+
+    A second argument is the frame's time in the film [s], for one whose rate is not steady.
 
     All frames have the size of the first. H.264 wants even sizes: an odd one gets one more row or column, a
     copy of the last. The file has its name only after the last frame; an error before leaves nothing behind.
@@ -80,17 +82,20 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[[NDArray[np.uint8]
         stream.pix_fmt = "yuv420p"
         stream.thread_count = _THREADS
         stream.options = {"preset": "veryfast", "crf": "20"}
-        written = 0
+        written, shown_at = 0, -1
 
-        def write(image: NDArray[np.uint8]) -> None:
-            nonlocal written
+        def write(image: NDArray[np.uint8], at: float | None = None) -> None:
+            nonlocal written, shown_at
             height, width = image.shape[:2]
             if height % 2 or width % 2:
                 image = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
             if not written:
                 stream.height, stream.width = image.shape[:2]
+            shown_at = max(shown_at + 1, 0 if at is None else round(at * fps))
             with about(path):
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
+                frame = av.VideoFrame.from_ndarray(image, format="bgr24")
+                frame.pts = shown_at
+                container.mux(stream.encode(frame))
             written += 1
 
         yield write

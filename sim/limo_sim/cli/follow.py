@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from limo_hog.cli.support.arguments import add_follower, add_json
 from limo_hog.cli.support.output import STDOUT
+from limo_hog.cli.support.page import HERE, PORT
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.cli.options import add_scenario
-from limo_sim.cli.watching import HERE, PORT, add_watching, finish, observing, shown_unasked
+from limo_sim.cli.watching import add_watching, finish, observing, shown_unasked
 
 if TYPE_CHECKING:
     from limo_sim.run.log import Step

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
-import sys
-import webbrowser
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -14,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import file_ending
 from limo_hog.cli.support.output import STDOUT, write_json
+from limo_hog.cli.support.page import HERE, PORT, address, announce, has_display
 from limo_hog.exceptions import LimoHogError
 from limo_hog.signals import held
 
@@ -25,8 +23,6 @@ if TYPE_CHECKING:
     from limo_sim.view.tuning import Tunable
     from limo_sim.world.scenario import Scenario
 
-HERE, PORT = "127.0.0.1", 8488
-
 
 def add_watching(parser: argparse.ArgumentParser, *, plot: bool = True) -> None:
     """Add the options; --plot is not shown where a run has no end at which to draw."""
@@ -35,7 +31,7 @@ def add_watching(parser: argparse.ArgumentParser, *, plot: bool = True) -> None:
         "--view",
         nargs="?",
         const=(HERE, PORT),
-        type=_address,
+        type=address,
         metavar="[HOST:]PORT|off",
         help=f"show the run, in real time, on a page ({PORT}), which opens where there is a display; without HOST to "
         "this machine alone. `follow` shows it unasked where nothing else is asked for",
@@ -67,21 +63,6 @@ def finish(args: argparse.Namespace, card: ScoreCard) -> None:
         show(card)
         if written := [str(one) for one in (args.json, args.video, args.record, args.plot) if one is not None]:
             print(f"written: {', '.join(written)}")
-
-
-def _address(text: str) -> tuple[str, int] | tuple[()]:
-    if text == "off":
-        return ()
-    host, _, port = text.rpartition(":")
-    if not port.isdecimal() or int(port) > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} is no [HOST:]PORT such as {PORT} or 0.0.0.0:{PORT}")
-    return host.strip("[]") or HERE, int(port)
-
-
-def has_display() -> bool:
-    """Whether somebody sits at a terminal beside whom a browser's window can open."""
-    graphical = sys.platform in ("darwin", "win32") or any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY"))
-    return graphical and sys.stderr.isatty() and "SSH_CONNECTION" not in os.environ
 
 
 def shown_unasked(args: argparse.Namespace) -> bool:
@@ -153,9 +134,7 @@ def observing(
                 from limo_sim.view.server import View
 
                 observers.view = stack.enter_context(View(scenario, controller, *args.view))
-                print(f"watch the run at {observers.view.url}", file=sys.stderr)
-                if has_display():
-                    webbrowser.open(observers.view.url)
+                announce(observers.view.url)
             try:
                 yield observers
             except KeyboardInterrupt as error:

@@ -8,51 +8,12 @@ from collections.abc import Iterator
 from typing import Any, Generic, TypeVar
 
 from limo_hog.cv2_api.arguments import shown
-from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.sense.observation import Observation
 from limo_hog.follow.tracks.asking import Whom, WhomError, checked
+from limo_hog.live.controls import Parameter, ParameterError
 
 S = TypeVar("S")
-
-
-class ParameterError(LimoHogError):
-    """A controller has no such parameter, or it cannot have that value."""
-
-
-@dataclasses.dataclass(frozen=True, slots=True)
-class Parameter:
-    """A number that can be set."""
-
-    name: str  #: of the controller's field; of a field of a field with a dot between them
-    value: float  #: what it is now; a whole number stays one
-    #: low, high: what it may be, both included
-    low: float
-    high: float
-    unit: str  #: its unit, such as "m" or "frames"
-    tooltip: str  #: what it does, in a sentence
-
-    @property
-    def whole(self) -> bool:
-        """Whether it is a whole number."""
-        return isinstance(self.value, int)
-
-    def checked(self, value: Any) -> float:
-        """Return `value` as a number of this parameter's kind.
-
-        Raises
-        ------
-        ParameterError
-            It is no number within the bounds.
-        """
-        # A bool is an int to Python, and an int may be too long for a float; NaN is within no bounds.
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not self.low <= value <= self.high or (self.whole and value != int(value)):
-            kind, unit = "whole number" if self.whole else "number", f" {self.unit}" if self.unit else ""
-            raise ParameterError(
-                f"{self.name}: got {shown(value)}, want a {kind} from {self.low:g} to {self.high:g}{unit}"
-            )
-        return type(self.value)(value)
 
 
 class Tunable(Generic[S]):

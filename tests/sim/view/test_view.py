@@ -19,12 +19,13 @@ from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO
+from limo_hog.live.controls import Parameter, ParameterError
+from limo_hog.live.pace import Pace
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
-from limo_sim.view.pace import Pace
 from limo_sim.view.reading import depth_colours, depth_picture, figures, followed_person, measured_m
 from limo_sim.view.server import View
-from limo_sim.view.tuning import Parameter, ParameterError, Tunable
+from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
 
 WORKSHOP = Scenario.load("workshop")

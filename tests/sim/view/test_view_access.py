@@ -17,10 +17,11 @@ import aiohttp
 import pytest
 
 from limo_hog.follow.control.naming import controller_named
-from limo_sim.view.access import Access
-from limo_sim.view.pace import Pace
+from limo_hog.live.access import Access
+from limo_hog.live.controls import ParameterError
+from limo_hog.live.pace import Pace
 from limo_sim.view.server import View
-from limo_sim.view.tuning import ParameterError, Tunable
+from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
 
 WORKSHOP = Scenario.load("workshop")

@@ -20,9 +20,9 @@ from tests.sim.view.stalled import HANDSHAKE, stalled
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
+from limo_hog.live.pace import Pace
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
-from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
 from limo_sim.world.scenario import Scenario
 
@@ -89,7 +89,7 @@ def test_a_run_ends_within_2_s_with_50_stalled_clients(request_: str, steps: lis
 def test_a_client_that_does_not_read_is_dropped_and_one_that_does_is_served(
     steps: list[Step], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("limo_sim.view.server.STALL_S", 1.0)
+    monkeypatch.setattr("limo_hog.live.server.STALL_S", 1.0)
 
     async def pictures(view: View, seconds: float) -> int:
         async with aiohttp.ClientSession() as session, session.ws_connect(view.url + "live", max_msg_size=0) as page:

@@ -14,8 +14,8 @@ from tests.sim.view.browser import CHROMIUM, chromium
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
+from limo_hog.live.pace import Pace
 from limo_sim.run.episode import run_episode, score
-from limo_sim.view.pace import Pace
 from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario

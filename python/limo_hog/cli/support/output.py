@@ -18,7 +18,7 @@ from limo_hog.exceptions import LimoHogError
 #: The file name that stands for standard output.
 STDOUT = "-"
 #: Arguments that name files or folders to write, and those that name what is read.
-WRITTEN = ("json", "csv", "coco", "out", "video", "record", "plot", "html", "gradescope", "report")
+WRITTEN = ("json", "csv", "coco", "mot", "out", "video", "record", "plot", "html", "gradescope", "report")
 _READ = ("inputs", "model", "against", "data", "negatives", "validate", "scenario", "file", "node", "image")
 
 

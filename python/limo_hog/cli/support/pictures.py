@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import os
+import math
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import limo_hog
+from limo_hog.cli.support.copies import copies_of, real, written
+from limo_hog.cli.support.films import PIECE_S, Identities, Newest, pieces
 from limo_hog.cli.support.output import UsageError, emit, one_line, printable, refuse_to_overwrite
 from limo_hog.cli.support.results import Result, Results
 from limo_hog.detections import Detections, people
@@ -29,18 +31,27 @@ from limo_hog.imaging.reading import (
     Kind,
     ReadError,
     Source,
+    Video,
     find_sources,
+    live_frames,
     open_video,
     read_image,
     standard_input,
 )
-from limo_hog.imaging.writing import WriteError, video_writer, write_image
+from limo_hog.imaging.writing import WriteError, write_image
 from limo_hog.parallel import cores, in_order
+from limo_hog.tracking import FED
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    from limo_hog.cli.support.film_page import FilmPage
+
 Image = NDArray[np.uint8]
+#: Number, image and time [s].
+Frame = tuple[int, Image, float]
+#: Pictures that are tracked are taken for a film of this rate [Hz].
+_PICTURES_HZ = 25.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,7 @@ class Row:
     height: int
     people: Detections
     ms: float
+    at: float  #: its time in the film [s]; that of a clock for a live source
 
     def result(self) -> Result:
         """Return it as plain values; a model without calibration has None for each probability."""
@@ -66,6 +78,7 @@ class Row:
             "windows": people.windows.tolist(),
             "scores": people.scores.tolist(),
             "probabilities": people.probabilities.round(4).tolist() if people.calibration else [None] * len(people),
+            **({} if people.ids is None else {"ids": people.ids.tolist()}),
             "ms": self.ms,
         }
 
@@ -73,17 +86,22 @@ class Row:
 class Run:
     """One `detect` run: its options and its results so far; `bar` shows them on a terminal."""
 
-    def __init__(self, args: argparse.Namespace, detector: PeopleDetector, bar: Progress | None) -> None:
-        self._args, self._detector, self._bar = args, detector, bar
+    def __init__(
+        self, args: argparse.Namespace, detector: PeopleDetector, threshold: float, bar: Progress | None
+    ) -> None:
+        self._args, self._detector, self._threshold, self._bar = args, detector, threshold, bar
         self._sources: list[Source] = []
         self._copies: dict[Source, Path] = {}
         self._workers = 1
         self._write: Callable[[Result], None]
         self._done: dict[str, set[int]] | None = None
         #: The result of each picture, kept if a table is written at the end.
-        self.results: list[Result] | None = [] if args.csv or args.coco else None
+        self.results: list[Result] | None = [] if args.csv or args.coco or args.mot else None
+        #: The live page, where one is wanted.
+        self.page: FilmPage | None = None
+        self._identities: Identities | None = None
         self._task = bar.add_task("looking", total=0) if bar else None
-        self.pictures = self.peopled = self.people = self.failed = self.known = 0
+        self.pictures = self.peopled = self.people = self.failed = self.known = self.dropped = 0
         self._ms = 0.0
         self._films = False
 
@@ -102,14 +120,26 @@ class Run:
                 named.setdefault(_identity(source), source)
         self._sources = list(named.values())
         self._films = any(source.kind is not Kind.IMAGE for source in self._sources)
+        if self._args.mot and self._films and len(self._sources) > 1:
+            raise UsageError(
+                f"--mot is for one film, or for pictures that are one; these are {len(self._sources)} inputs"
+            )
         if self._args.out is not None:
-            self._copies = _copies(self._sources, self._args.out, self._args.format)
-            own = {_real(source.path) for source in self._sources}
+            self._copies = copies_of(self._sources, self._args.out, self._args.format)
+            own = {real(source.path) for source in self._sources}
             for copy in self._copies.values():
-                if _real(copy) in own:
+                if real(copy) in own:
                     raise UsageError(f"{copy} is itself an input: choose another folder for --out")
             if not self._args.resume and not self._args.overwrite:
-                refuse_to_overwrite(self._copies.values(), ", --resume makes only what is missing")
+                refuse_to_overwrite(written(self._copies), ", --resume makes only what is missing")
+
+    def set_threshold(self, threshold: float) -> None:
+        """Report people from another SVM margin on, from the next picture on."""
+        self._threshold = threshold
+        if self._identities is not None:
+            self._identities.tracker.set_threshold(threshold)
+        fed = FED if self._args.track else 0.0
+        self._detector = replace(self._detector, threshold=threshold - fed)
 
     def look(self, results: Results) -> None:
         """Search every input."""
@@ -140,6 +170,8 @@ class Run:
             words[-1] += f", with reading and writing {1e3 * seconds / self.pictures:.1f} ms"
         if self.known:
             words.append(f"{self.known} done before")
+        if self.dropped:
+            words.append(f"{self.dropped} frames dropped, as they came faster")
         if self.failed:
             words.append(f"{self.failed} could not be read")
         return "; ".join(words)
@@ -150,10 +182,10 @@ class Run:
         except (ReadError, OSError) as error:
             self._fail(one_line(error))
             return []
-        out = self._args.out and _real(self._args.out)
-        if out and _real(Path(name)) in out.parents:
+        out = self._args.out and real(self._args.out)
+        if out and real(Path(name)) in out.parents:
             # Copies of an earlier run, in a folder below the pictures', are no inputs.
-            found = [source for source in found if out not in _real(source.path).parents]
+            found = [source for source in found if out not in real(source.path).parents]
         return found
 
     def _share_cores(self, sources: list[Source]) -> None:
@@ -165,22 +197,30 @@ class Run:
         cv2.setNumThreads(1 if many else threads)
 
     def _look_at_images(self, sources: list[Source]) -> None:
-        def work(source: Source) -> Row | str:
+        self._identities = self._identities_at(_PICTURES_HZ)
+
+        def work(place: int, source: Source) -> tuple[Source, Row, Image | None] | str:
             try:
-                found, picture = self._find(source, 0, read_image(source))
+                found, picture = self._find(source, 0, read_image(source), place / _PICTURES_HZ)
             except (ImageError, OSError, MemoryError) as error:
                 return _named(source, error)
-            if picture is not None:
+            if picture is not None and source in self._copies and not self._identities:
                 write_image(self._copies[source], picture)
-            return found
+            return source, found, picture
 
-        new = [source for source in sources if not self._is_done(source)]
+        # Where people are numbered, pictures that are done are searched again.
+        new = [source for source in sources if self._identities or not self._is_done(source)]
         self.known += len(sources) - len(new)
-        for found in in_order(work, new, self._workers):
-            if isinstance(found, str):
-                self._fail(found)
-            elif found.frame not in self._done_of(found.source):
-                self._keep(found)
+        for result in in_order(lambda job: work(*job), enumerate(new), self._workers):
+            if isinstance(result, str):
+                self._fail(result)
+            else:
+                source, found, picture = result
+                found, picture = self._finished(found, picture, None)
+                if picture is not None and source in self._copies and self._identities:
+                    write_image(self._copies[source], picture)
+                if found.frame not in self._done_of(found.source):
+                    self._keep(found)
             self._advance()
 
     def _look_at_video(self, source: Source) -> None:
@@ -203,33 +243,23 @@ class Run:
             except OSError as error:
                 self._fail(_named(source, error))
                 return
-            every, done = self._args.every, self._done_of(source.name)
-            write = copy and stack.enter_context(video_writer(copy, video.fps / every))
-            # An annotated copy always starts at the first frame.
-            skip = set() if write else done
+            rate, done = video.fps / self._args.every, self._done_of(source.name)
+            newest = self._newest(video, stack) if video.live else None
+            write = copy and stack.enter_context(pieces(copy, rate, PIECE_S if newest else math.inf))
+            self._identities = self._identities_at(rate)
+            work = partial(self._work, source)
+            # An annotated copy, and people's numbers, always start at the first frame.
+            skip = set() if write or self._identities else done
             self.known += len(skip)
-            self._expect(max(0, -(-video.frame_count // every) - len(skip)))
-
-            def frames() -> Iterator[tuple[int, Image]]:
-                try:
-                    yield from video.frames(every, skip)
-                except ReadError as error:
-                    self._fail(str(error))
-
-            def work(job: tuple[int, Image]) -> tuple[Row, Image | None] | str:
-                try:
-                    return self._find(source, *job)
-                except (ImageError, MemoryError) as error:
-                    return _named(source, error)
-
+            frames = self._frames(video, skip)
             try:
-                for result in in_order(work, frames(), self._workers):
+                for result in map(work, newest) if newest else in_order(work, frames, self._workers):
                     if isinstance(result, str):
                         self._fail(result)
                         break  # the other frames are as large
-                    found, picture = result
+                    found, picture = self._finished(*result, newest)
                     if write and picture is not None:
-                        write(picture)
+                        write(picture, found.at)
                     if found.frame not in done:
                         self._keep(found, film=True)
                     self._advance()
@@ -237,14 +267,57 @@ class Run:
                 # Ctrl-C is how a camera's or a stream's run ends: its copy is complete.
                 if source.kind not in (Kind.CAMERA, Kind.STREAM):
                     raise
+            finally:
+                self.dropped += newest.dropped if newest else 0
 
-    def _find(self, source: Source, frame: int, image: Image) -> tuple[Row, Image | None]:
+    def _frames(self, video: Video, skip: set[int]) -> Iterator[Frame]:
+        """Yield number, image and time [s] of a film's frames."""
+        self._expect(max(0, -(-video.frame_count // self._args.every) - len(skip)))
+        try:
+            for number, image in video.frames(self._args.every, skip):
+                yield number, image, number / video.fps
+        except ReadError as error:
+            self._fail(str(error))
+
+    def _newest(self, video: Video, stack: ExitStack) -> Newest[Frame]:
+        """Let a thread read a live source, which is its own from now on."""
+        frames = partial(live_frames, video, stack.pop_all(), self._args.every, self._tell)
+        return stack.enter_context(Newest(frames))
+
+    def _identities_at(self, rate: float) -> Identities | None:
+        return Identities(self._args.track, self._threshold, rate) if self._args.track else None
+
+    def _work(self, source: Source, frame: Frame) -> tuple[Row, Image | None] | str:
+        try:
+            return self._find(source, *frame)
+        except (ImageError, MemoryError) as error:
+            return _named(source, error)
+
+    def _find(self, source: Source, frame: int, image: Image, at: float) -> tuple[Row, Image | None]:
         start = time.perf_counter()
         detections = self._detector.detect(image)
         ms = 1e3 * (time.perf_counter() - start)
         height, width = image.shape[:2]
-        found = Row(source.name, frame, width, height, detections, round(ms, 3))
-        return found, detections.draw(image) if source in self._copies else None
+        found = Row(source.name, frame, width, height, detections, round(ms, 3), at)
+        if source not in self._copies and self.page is None:
+            return found, None
+        # Numbers are known later, so that boxes are drawn later then.
+        return found, image if self._args.track else detections.draw(image)
+
+    def _finished(self, found: Row, picture: Image | None, newest: Newest[Frame] | None) -> tuple[Row, Image | None]:
+        """Give the people of the next picture their numbers, draw them, and show it on the page."""
+        if self._identities is not None:
+            people = self._identities.tracker.update(found.people, found.at if newest else None)
+            found = replace(found, people=people)
+            picture = None if picture is None else self._identities.draw(people, picture)
+        if self.page and picture is not None:
+            # Imported here: the server is an extra.
+            from limo_hog.cli.support.film_page import Shown
+
+            dropped = newest.dropped if newest else 0
+            shown = Shown(found.source, found.frame, found.people, picture, found.ms, dropped)
+            self.page.watch(shown, None if newest else found.at)
+        return found, picture
 
     def _is_done(self, source: Source) -> bool:
         if not self._args.resume:
@@ -281,6 +354,9 @@ class Run:
 
     def _fail(self, line: str) -> None:
         self.failed += 1
+        self._tell(line)
+
+    def _tell(self, line: str) -> None:
         line = f"limo-hog: {printable(line)}"
         if self._bar:
             self._bar.console.print(line, highlight=False, markup=False, soft_wrap=True)
@@ -292,11 +368,6 @@ def _of(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
-def _real(path: Path) -> Path:
-    """Return a path without links; one that leads to itself stays, where `Path.resolve` raises."""
-    return Path(os.path.realpath(path))
-
-
 def _named(source: Source, error: Exception) -> str:
     """Return an error in one line that names its picture."""
     line = one_line(error)
@@ -306,30 +377,5 @@ def _named(source: Source, error: Exception) -> str:
 def _identity(source: Source) -> object:
     """Return what two spellings of one picture or video file have in common; a link to it is one of its own."""
     if source.kind in (Kind.IMAGE, Kind.VIDEO):
-        return _real(source.path.parent) / source.path.name, source.kind
+        return real(source.path.parent) / source.path.name, source.kind
     return source
-
-
-def _copies(sources: list[Source], folder: Path, wanted: str | None) -> dict[Source, Path]:
-    """Name each source's annotated copy: its place below what all sources have in common, in `folder`.
-
-    Images are of the `wanted` format, or else JPEG where the source is, and PNG where not.
-    """
-    # Without `..`, which would lead out of `folder`.
-    folders = {
-        source: Path(os.path.normpath(source.path.absolute().parent)) for source in sources if source.name != STDIN
-    }
-    root = os.path.commonpath(folders.values()) if folders else ""
-    names: dict[Source, Path] = {}
-    for source in sources:
-        like_source = "jpg" if source.path.suffix.lower() in (".jpg", ".jpeg") else "png"
-        suffix = f".{wanted or like_source}" if source.kind is Kind.IMAGE else ".mp4"
-        place = folder / folders[source].relative_to(root) if source in folders else folder
-        stem = "stdin" if source.name == STDIN else source.path.stem
-        names[source] = place / f"{stem}{suffix}"
-    # Two pictures of one stem, such as a.jpg and a.png, keep their whole names.
-    taken = Counter(names.values())
-    return {
-        source: path if taken[path] == 1 else path.with_name(source.path.name + path.suffix)
-        for source, path in names.items()
-    }

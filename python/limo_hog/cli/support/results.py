@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 
 from limo_hog.atomic import about, json_text, part_of, write_text
 from limo_hog.cli.support.output import STDOUT, emit, refuse_to_overwrite
+from limo_hog.detections import BOX_COLUMNS, WINDOW_COLUMNS
 from limo_hog.exceptions import LimoHogError
 
-#: One line: source, frame, width, height, boxes, windows, scores, probabilities, ms, parameters.
+#: One line: source, frame, width, height, boxes, windows, scores, probabilities, ids if tracked, ms, parameters.
 Result = dict[str, Any]
 #: What of a line is read back.
 _KINDS = {
@@ -130,7 +131,9 @@ def _is_result(line: Any) -> bool:
     return (
         isinstance(line, dict)
         and all(isinstance(line.get(name), kind) for name, kind in _KINDS.items())
-        and len({len(line[name]) for name in _EACH}) == 1
+        and isinstance(line.get("ids", []), list)
+        and len({len(line[name]) for name in (*_EACH, "ids") if name in line}) == 1
+        and all(isinstance(number, int) for number in line.get("ids", []))
         and all(isinstance(box, list) and len(box) == 4 for box in (*line["boxes"], *line["windows"]))
         and all(
             isinstance(number, (int, float))
@@ -141,9 +144,10 @@ def _is_result(line: Any) -> bool:
     )
 
 
-def _people(result: Result) -> Iterator[tuple[list[int], list[int], float, float | None]]:
-    """Yield box, window, margin and probability of each person."""
-    return zip(*(result[name] for name in _EACH), strict=True)
+def _people(result: Result) -> Iterator[tuple[list[int], list[int], float, float | None, int | None]]:
+    """Yield box, window, margin, probability and number of each person; without a tracker the number is None."""
+    ids = result.get("ids", [None] * len(result["boxes"]))
+    return zip(*(result[name] for name in _EACH), ids, strict=True)
 
 
 def _difference(was: dict[str, Any], now: dict[str, Any]) -> str:
@@ -152,32 +156,48 @@ def _difference(was: dict[str, Any], now: dict[str, Any]) -> str:
 
 
 def write_csv(path: Path, results: Iterable[Result]) -> None:
-    """Write a line a person: source, frame, width, height of the picture; box and window [px]; score, probability."""
+    """Write a line a person: source, frame and size of the picture; box and window [px]; score, probability, number."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    heads = ("window_x", "window_y", "window_w", "window_h")
-    table.writerow(("source", "frame", "width", "height", "x", "y", "w", "h", *heads, "score", "probability"))
+    results = list(results)
+    known = ("id",) if any("ids" in result for result in results) else ()
+    heads = (*BOX_COLUMNS, *WINDOW_COLUMNS, "score", "probability", *known)
+    table.writerow(("source", "frame", "width", "height", *heads))
     for result in results:
         about_picture = [result[name] for name in ("source", "frame", "width", "height")]
-        for box, window, score, probability in _people(result):
-            table.writerow((*about_picture, *box, *window, score, probability))
+        for box, window, score, probability, number in _people(result):
+            table.writerow((*about_picture, *box, *window, score, probability, *([number] if known else ())))
     write_text(path, text.getvalue())
 
 
 def write_coco(path: Path, results: Iterable[Result]) -> None:
     """Write one JSON object of images, annotations and the category person, as COCO has them.
 
-    Each annotation has its `score`, the SVM's margin, and, beyond COCO, its `probability` and HOG's `window`.
+    Each annotation has its `score`, the SVM's margin, and, beyond COCO, its `probability`, HOG's `window` and, where
+    people are tracked, `track_id`.
     """
     images: list[Result] = []
     annotations: list[Result] = []
     for number, result in enumerate(results, 1):
         size = {"width": result["width"], "height": result["height"]}
         images.append({"id": number, "file_name": result["source"], "frame": result["frame"], **size})
-        for box, window, score, probability in _people(result):
+        for box, window, score, probability, who in _people(result):
             annotation = {"id": len(annotations) + 1, "image_id": number, "category_id": 1, "bbox": box}
             annotation |= {"area": box[2] * box[3], "iscrowd": 0, "score": score}
+            annotation |= {} if who is None else {"track_id": who}
             annotations.append(annotation | {"probability": probability, "window": window})
     categories = [{"id": 1, "name": "person"}]
     table = {"images": images, "annotations": annotations, "categories": categories}
     write_text(path, json_text(table) + "\n")
+
+
+def write_mot(path: Path, results: Iterable[Result]) -> None:
+    """Write MOTChallenge's lines: frame, id, left, top, width, height, score, -1, -1, -1; it counts from 1."""
+    results = list(results)
+    film = any(result["frame"] for result in results)
+    lines = [
+        f"{result['frame'] + 1 if film else place},{who},{x + 1},{y + 1},{w},{h},{score:.4f},-1,-1,-1\n"
+        for place, result in enumerate(results, 1)
+        for (x, y, w, h), _, score, _, who in _people(result)
+    ]
+    write_text(path, "".join(lines))

@@ -1,0 +1,91 @@
+"""Identities: the same number for the same person in all pictures of a film, by the trackers of Roboflow's `trackers`.
+
+>>> tracker = Tracker(fps=25)
+>>> detector = PeopleDetector(threshold=tracker.lowest)
+>>> people = [tracker.update(detector.detect(image)) for image in film]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from limo_hog.detections import Detections
+from limo_hog.exceptions import ParameterError
+from limo_hog.extras import needed
+from limo_hog.models import load_model
+
+#: Class of each tracker in `trackers`.
+TRACKERS = MappingProxyType({"bytetrack": "ByteTrackTracker", "ocsort": "OCSORTTracker", "sort": "SORTTracker"})
+
+#: Boxes of so much less than the threshold continue a person who was seen before [SVM margin].
+FED = 0.3
+#: A person is numbered in the second picture, and waited for for 1 s (in 1/30 s); IoU of a box with where the person is
+#: expected. Chosen, with `FED`, on the odd ones of TUD's frames 1 to 41.
+_SETTINGS = {"minimum_consecutive_frames": 2, "lost_track_buffer": 30, "minimum_iou_threshold": 0.3}
+
+
+class Tracker:
+    """Numbers the people of one film; its pictures are given in their order.
+
+    Parameters
+    ----------
+    name
+        "bytetrack", "ocsort" or "sort". docs/detect.md compares them.
+    threshold
+        Least SVM margin of a box that may be a new person; other boxes only continue one. None: that of our weights.
+    fps
+        Pictures a second [Hz].
+
+    Raises
+    ------
+    ParameterError
+        There is no tracker of this name.
+    MissingExtraError
+        `trackers` is not installed.
+    """
+
+    def __init__(self, name: str = "bytetrack", threshold: float | None = None, fps: float = 25.0) -> None:
+        if name not in TRACKERS:
+            raise ParameterError(f"tracker is {name!r}; one of {', '.join(TRACKERS)} is wanted")
+        with needed(by="tracking people"):
+            import trackers
+        self._tracker = getattr(trackers, TRACKERS[name])(frame_rate=fps, **_SETTINGS)
+        self.set_threshold(load_model("limo").threshold if threshold is None else threshold)
+
+    @property
+    def lowest(self) -> float:
+        """Least SVM margin of a box that is of use: the detector's threshold."""
+        return self._threshold - FED
+
+    def set_threshold(self, threshold: float) -> None:
+        """Take new people from another SVM margin on, from the next picture on."""
+        self._threshold = threshold
+        # SORT has the first, OC-SORT the second, ByteTrack both.
+        for name in ("track_activation_threshold", "high_conf_det_threshold"):
+            if hasattr(self._tracker, name):
+                setattr(self._tracker, name, threshold)
+
+    def update(self, found: Detections, time: float | None = None) -> Detections:
+        """Return the people among `found` who were seen before, with their `ids`, best first.
+
+        Parameters
+        ----------
+        found
+            All that the detector finds from `lowest` on in the next picture.
+        time
+            When the picture was taken [s], for a film without a steady rate.
+        """
+        from supervision import Detections as Supervisions
+
+        places: Any = {"place": np.arange(len(found))}
+        given = Supervisions(found.xyxy.astype(np.float64), confidence=found.scores, data=places)
+        told = self._tracker.update(given, timestamp=time)
+        ids = np.full(len(found), -1, np.int64)
+        if len(told):
+            ids[told.data["place"]] = told.tracker_id
+        known = ids >= 0
+        return dataclasses.replace(found[known], ids=ids[known] + 1)

@@ -356,18 +356,18 @@ def test_the_wheels_stand_a_second_after_the_last_reading(lost: str, speed: Twis
         for sense, every in (("camera", 5), ("scan", 6), ("odometry", 1)):
             if step % every == 0 and (step < steps or sense != lost):
                 heard[sense] = now
-        readings = {"scan": scan(stamp=heard["scan"]), "odometry": Odometry(heard["odometry"])}
+        turn, wheels = scan(stamp=heard["scan"]), Odometry(heard["odometry"])
         if step % 5 == 0:
             if heard["camera"] == now:
-                decision = guard.step(whole(now, **readings), state)
+                decision = guard.step(whole(now, scan=turn, odometry=wheels), state)
             else:
-                decision = guard.recheck(now, *readings.values(), state)  # type: ignore[arg-type]
+                decision = guard.recheck(now, turn, wheels, state)
             state = decision.state
             drive.command(decision.twist, now)
         drive.advance(now, 0.02)
         if step == steps - 1:
             assert abs(drive.left) + abs(drive.right) > 0.2  # it drives
-    assert (drive.left, drive.right) == (pytest.approx(0.0, abs=1e-9),) * 2
+    assert [drive.left, drive.right] == pytest.approx([0.0, 0.0], abs=1e-9)
     assert f"no {lost}" in decision.reason
 
 

@@ -42,30 +42,15 @@ _TAIL = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one node may use.
+    """What one node may use."""
 
-    Attributes
-    ----------
-    patience
-        Wall time without simulated time passing [s].
-    seconds
-        Wall time [s].
-    began
-        When that began, on `time.monotonic` [s]; None: with the run.
-    memory_mb
-        Address space [MB], where the system limits it (not on Windows). Python with OpenCV reserves 1.5 GB; chosen.
-    printed_mb
-        What it may print and log [MB].
-    folder
-        Where it runs; None for this process's folder.
-    """
-
-    patience: float = 20.0
-    seconds: float = 1e9
-    began: float | None = None
+    patience: float = 20.0  #: wall time without simulated time passing [s]
+    seconds: float = 1e9  #: wall time [s]
+    began: float | None = None  #: when that began, on `time.monotonic` [s]; None: with the run
+    #: Address space [MB], where the system limits it (not on Windows). Python with OpenCV reserves 1.5 GB; chosen.
     memory_mb: int = 4000
-    printed_mb: int = 50
-    folder: Path | None = None
+    printed_mb: int = 50  #: what it may print and log [MB]
+    folder: Path | None = None  #: where it runs; None for this process's folder
 
 
 #: Is given what a node prints: "stdout" or "stderr", and the text.

@@ -21,33 +21,19 @@ from limo_sim.world.truth import Contacts
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """A run that has ended.
+    """A run that has ended."""
 
-    Attributes
-    ----------
-    scenario, controller, detector, seed
-        What was run; the controller and the detector by name.
-    seconds
-        Simulated time [s].
-    scorer
-        Has measured every control period.
-    contacts
-        How often the robot touched a person, and a wall or furniture.
-    wall_seconds
-        How long the run took [s].
-    target_distance
-        Distance that the controller held at the end, from the camera to the person's surface [m]; None where it holds
-        none.
-    """
-
+    #: scenario, controller, detector, seed: what was run; the controller and the detector by name.
     scenario: Scenario
     controller: str
     detector: str
     seed: int
-    seconds: float
-    scorer: Scorer
+    seconds: float  #: simulated time [s]
+    scorer: Scorer  #: has measured every control period
     contacts: Contacts
-    wall_seconds: float
+    wall_seconds: float  #: how long the run took [s]
+    #: Distance that the controller held at the end, from the camera to the person's surface [m]; None where it holds
+    #: none.
     target_distance: float | None = None
 
 

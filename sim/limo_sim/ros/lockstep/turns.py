@@ -51,16 +51,8 @@ class Seat:
 class Turns:
     """The threads of one run.
 
-    Parameters
-    ----------
-    advance
-        Lets a step of simulated time pass, or several, as long as no message comes and this time is not reached [s].
-    now
-        Simulated time [s].
-    over
-        Whether the run's time is up: every wait then ends.
-    failed
-        Called with what a thread raises.
+    `advance` lets a step of simulated time pass, or several, as long as no message comes and a time is not reached [s];
+    `now` tells simulated time [s]. When the run is `over`, every wait ends. `failed` is given what a thread raises.
     """
 
     def __init__(

@@ -31,12 +31,7 @@ from limo_sim.world.truth import Contacts, Truth
 class Scorer:
     """Measures a run as it goes, and keeps no steps: its memory grows by 12 bytes a frame, for the percentiles.
 
-    Parameters
-    ----------
-    scenario
-        That of the run: `Arena.scenario`, whose people are drawn.
-    criteria
-        What counts.
+    The scenario is that of the run: `Arena.scenario`, whose people are drawn.
     """
 
     def __init__(self, scenario: Scenario, criteria: Criteria = CRITERIA) -> None:

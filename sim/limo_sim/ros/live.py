@@ -25,25 +25,10 @@ _STAMPED = names.STAMPED_COMMAND_TYPE
 _CATCH_UP = 0.2
 
 
-def run_live(
-    scenario: Scenario,
-    seed: int,
-    seconds: float,
-    bus: Bus | None,
-    watch: Watch | None = None,
-) -> Arena:
-    """Run the arena in real time, with its topics on the bus.
+def run_live(scenario: Scenario, seed: int, seconds: float, bus: Bus | None, watch: Watch | None = None) -> Arena:
+    """Run the arena in real time for a duration [s], inf until interrupted, with its topics on the bus.
 
-    Parameters
-    ----------
-    scenario, seed
-        The arena and its random numbers.
-    seconds
-        Duration [s]; inf until interrupted.
-    bus
-        Carries the topics; None for an arena without ROS.
-    watch
-        Called with every camera frame.
+    Without a bus the arena has no ROS. `watch` is called with every camera frame.
 
     Raises
     ------

@@ -42,30 +42,15 @@ _TAIL = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one node may use.
+    """What one node may use."""
 
-    Attributes
-    ----------
-    patience
-        Wall time without simulated time passing [s].
-    seconds
-        Wall time [s].
-    began
-        When that began, on `time.monotonic` [s]; None: with the run.
-    memory_mb
-        Address space [MB], where the system limits it (not on Windows). Python with OpenCV reserves 1.5 GB; chosen.
-    printed_mb
-        What it may print and log [MB].
-    folder
-        Where it runs; None for this process's folder.
-    """
-
-    patience: float = 20.0
-    seconds: float = 1e9
-    began: float | None = None
+    patience: float = 20.0  #: wall time without simulated time passing [s]
+    seconds: float = 1e9  #: wall time [s]
+    began: float | None = None  #: when that began, on `time.monotonic` [s]; None: with the run
+    #: Address space [MB], where the system limits it (not on Windows). Python with OpenCV reserves 1.5 GB; chosen.
     memory_mb: int = 4000
-    printed_mb: int = 50
-    folder: Path | None = None
+    printed_mb: int = 50  #: what it may print and log [MB]
+    folder: Path | None = None  #: where it runs; None for this process's folder
 
 
 #: Is given what a node prints: "stdout" or "stderr", and the text.
@@ -82,19 +67,8 @@ def run_node(
 ) -> Ended:
     """Run the stage's script as `python SCRIPT ARGUMENTS` would, with the arena behind its topics.
 
-    Parameters
-    ----------
-    stage
-        The arena.
-    arguments
-        Command line of the script; what follows --ros-args is ROS's.
-    limits
-        What the node may use.
-    said
-        Is given what the node prints.
-    checked
-        Whether the stage's witness is shown what detectors are given; limo-hog's HOG then stands in for OpenCV's: the
-        same boxes in less time.
+    Of the arguments, what follows --ros-args is ROS's. `said` is given what the node prints. With `checked` the stage's
+    witness is shown what detectors are given; limo-hog's HOG then stands in for OpenCV's: the same boxes in less time.
 
     Raises
     ------
@@ -182,29 +156,25 @@ class _Run:
             except TimeoutError:
                 self._worker.end(b"w")
                 self._drain(selector)
-                return Fault("hung", self._silence(), line=self._place())
+                patience = f"{self._limits.patience:g} s, and it took no interrupt"
+                said = f"no simulated time has passed for {patience}: its process was stopped"
+                return Fault("hung", said, line=self._place())
             left = self._worker.is_alone(_END_S)
             status = self._worker.end()
             self._drain(selector)
             return self._death(status, left)
 
-    def _silence(self) -> str:
-        patience = f"{self._limits.patience:g} s, and it took no interrupt"
-        return f"no simulated time has passed for {patience}: its process was stopped"
-
     def _death(self, status: int | None, by_itself: bool) -> Fault | None:
         """Say what became of a node whose link was closed before it had reported its end."""
         if status is None:
             return Fault("died", "it ended the process that watches it")
-        if self._exited:
-            if status == 0 and self._stage.over:
-                return None
+        if self._exited and status == 0 and self._stage.over:
+            return None
+        if not (self._exited or by_itself):
+            return Fault("died", "it closed its connection to the arena: its process was stopped")
+        if self._exited or status >= 0:
             said = f"its process ended with status {status} before the run was over, as by os._exit"
             return Fault("died", said, line=self._exits)
-        if not by_itself:
-            return Fault("died", "it closed its connection to the arena: its process was stopped")
-        if status >= 0:
-            return Fault("died", f"its process ended with status {status} before the run was over, as by os._exit")
         try:
             name = signal.Signals(-status).name
         except ValueError:

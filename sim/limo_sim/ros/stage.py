@@ -64,23 +64,6 @@ class Witness:
 class Stage:
     """One run: the arena, and the log that is scored.
 
-    Attributes
-    ----------
-    found
-        What the script's detector found since the last camera frame.
-    detector_inputs
-        Types and shapes of the images given to the detector, as "uint8 (480, 640, 3)", each once.
-    longest
-        The callback that slept longest; None while none has slept.
-    calls
-        What the script called, and where.
-    shown
-        The newest picture of each window with its time; closing a window removes it.
-    published
-        The topics on which the script has published.
-    target_distance
-        The node's parameter of that name [m]; None where no node has one.
-
     Raises
     ------
     ScenarioError
@@ -107,12 +90,14 @@ class Stage:
         self._witness = witness or Witness()
         # (An hour's: 28 bytes each.)
         self._driven, self._lines = array("d"), array("i")
-        self.found: list[Found] = []
-        self.shown: dict[str, Shown] = {}
+        self.found: list[Found] = []  #: what the script's detector found since the last camera frame
+        self.shown: dict[str, Shown] = {}  #: the newest picture of each window; closing a window removes it
         self.calls = Calls()
-        self.longest: Callback | None = None
+        self.longest: Callback | None = None  #: the callback that slept longest; None while none has slept
+        #: Types and shapes of the images given to the detector, as "uint8 (480, 640, 3)", each once.
         self.detector_inputs: list[str] = []
-        self.published: set[str] = set()
+        self.published: set[str] = set()  #: the topics on which the script has published
+        #: The node's parameter of that name [m]; None where no node has one.
         self.target_distance: float | None = None
         self._due: dict[tuple[str, str], float] = {}
         self._outlet = Outlet(self.arena)
@@ -360,24 +345,12 @@ def _news(topic: str, message: Any) -> News:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run ended.
+    """How a run ended."""
 
-    Attributes
-    ----------
-    episode
-        The log that is scored.
-    failure
-        One line that names the fault; "" without one.
-    fault
-        Why the script ended before its time; None where it did not.
-    stage
-        The run, with what the node did.
-    """
-
-    episode: Episode
-    failure: str
-    fault: Fault | None
-    stage: Stage
+    episode: Episode  #: the log that is scored
+    failure: str  #: one line that names the fault; "" without one
+    fault: Fault | None  #: why the script ended before its time; None where it did not
+    stage: Stage  #: the run, with what the node did
 
     @property
     def traceback(self) -> str:

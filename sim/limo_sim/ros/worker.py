@@ -68,10 +68,7 @@ class Worker:
     def end(self, how: bytes = b"k") -> int | None:
         """End the node, with all that it started; return its status, None where that is not known.
 
-        Parameters
-        ----------
-        how
-            b"w": its fault handler tells where it was; b"k": it is killed.
+        It is killed; with `how` b"w", its fault handler tells first where it was.
         """
         if self.status is not None:
             return self.status

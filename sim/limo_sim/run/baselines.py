@@ -33,10 +33,7 @@ _FORGET_S = 5.0
 def controller_of(name: str, target: float | None = None) -> Controller[Any]:
     """Return a controller by its name, with another distance to hold [m] where one is given.
 
-    Parameters
-    ----------
-    name
-        One of `limo_hog.follow.control.naming.CONTROLLERS` or `BASELINES`, or "policy:FILE.npz".
+    The name is one of `limo_hog.follow.control.naming.CONTROLLERS` or `BASELINES`, or "policy:FILE.npz".
 
     Raises
     ------

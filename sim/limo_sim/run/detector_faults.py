@@ -157,14 +157,7 @@ class FaultySearch:
     """Searches an arena's frames with the faults of its scenario; boxes on people of whom nothing is known pass.
 
     It stands in for `detect_in`. What it does depends on the seed and the number of the frame alone, so that another
-    detector or controller meets the same misses and the same false boxes.
-
-    Parameters
-    ----------
-    scenario, seed
-        Those of the run.
-    truth
-        Returns what the newest frame shows.
+    detector or controller meets the same misses and the same false boxes. `truth` returns what the newest frame shows.
     """
 
     def __init__(self, scenario: Scenario, seed: int, truth: Callable[[], Truth]) -> None:

@@ -21,33 +21,19 @@ from limo_sim.world.truth import Contacts
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """A run that has ended.
+    """A run that has ended."""
 
-    Attributes
-    ----------
-    scenario, controller, detector, seed
-        What was run; the controller and the detector by name.
-    seconds
-        Simulated time [s].
-    scorer
-        Has measured every control period.
-    contacts
-        How often the robot touched a person, and a wall or furniture.
-    wall_seconds
-        How long the run took [s].
-    target_distance
-        Distance that the controller held at the end, from the camera to the person's surface [m]; None where it holds
-        none.
-    """
-
+    #: scenario, controller, detector, seed: what was run; the controller and the detector by name.
     scenario: Scenario
     controller: str
     detector: str
     seed: int
-    seconds: float
-    scorer: Scorer
+    seconds: float  #: simulated time [s]
+    scorer: Scorer  #: has measured every control period
     contacts: Contacts
-    wall_seconds: float
+    wall_seconds: float  #: how long the run took [s]
+    #: Distance that the controller held at the end, from the camera to the person's surface [m]; None where it holds
+    #: none.
     target_distance: float | None = None
 
 
@@ -74,23 +60,12 @@ def run_episode(
     names: tuple[str, str] = ("controller", "detector"),
     watch: Watch = lambda _: None,
 ) -> Episode:
-    """Let a controller drive the robot, behind the safety layer.
+    """Let a controller drive the robot, behind the safety layer, for some seconds of simulated time.
 
-    Parameters
-    ----------
-    scenario, seed
-        The arena and its random numbers: the same two give the same run.
-    controller
-        Steers by what the detector finds.
-    detector
-        Finds people in uint8 (H, W, 3) BGR images; the scenario's faults come on top. If it raises, the robot stops and
-        says so.
-    seconds
-        Simulated time [s].
-    names
-        What the log calls the controller and the detector.
-    watch
-        Called with every control period. The run keeps none, so its memory does not grow.
+    The same scenario and seed give the same run. The detector finds people in uint8 (H, W, 3) BGR images; the
+    scenario's faults come on top. If it raises, the robot stops and says so. `names` is what the log calls the
+    controller and the detector. `watch` is called with every control period: the run keeps none, so its memory does not
+    grow.
     """
     arena = Arena(scenario, seed)
     search: Search = detect_in
@@ -121,12 +96,5 @@ def play(
             scorer.add(step)
             watch(step)
         arena.step()
-    return Episode(
-        arena.scenario,
-        *names,
-        arena.seed,
-        arena.time,
-        scorer,
-        arena.contacts,
-        time.perf_counter() - began,
-    )
+    wall_seconds = time.perf_counter() - began
+    return Episode(arena.scenario, *names, arena.seed, arena.time, scorer, arena.contacts, wall_seconds)

@@ -155,11 +155,8 @@ def in_processes(task: Callable[[R], C], runs: Sequence[R], workers: int) -> Ite
 def summarise(cards: Sequence[ScoreCard], groups: Mapping[str, str] | None = None) -> list[Summary]:
     """Sum up the cards of each scenario and controller, in the order these first occur.
 
-    Parameters
-    ----------
-    groups
-        The group of each scenario: each group is summed up instead, its scenarios counting alike. The mean over a group
-        is taken seed by seed, and the interval is that of the seeds.
+    With the group of each scenario, each group is summed up instead, its scenarios counting alike. The mean over a
+    group is taken seed by seed, and the interval is that of the seeds.
     """
     return [
         Summary(label, controller, len(group), {name: _estimate(_by_seed(_values(group, name))) for name in MEASURES})

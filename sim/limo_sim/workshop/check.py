@@ -24,35 +24,17 @@ _LONGEST = 4000
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a checkpoint holds.
-
-    Attributes
-    ----------
-    task, checkpoint
-        Which it is.
-    holds
-        None where it could not be tried, for the reason in `evidence`.
-    evidence
-        What the node did, or its likely mistake.
-    points, worth
-        Points won, and points to win.
-    line
-        Line of the student's file that the evidence is about, where it is known.
-    hints
-        From vague to plain.
-    look
-        The image that the evidence is about, where it is one.
-    """
+    """Whether a checkpoint holds."""
 
     task: int
     checkpoint: str
-    holds: bool | None
-    evidence: str
-    points: int = 0
-    worth: int = 0
-    line: int | None = None
-    hints: tuple[str, ...] = ()
-    look: Look | None = None
+    holds: bool | None  #: None where it could not be tried, for the reason in `evidence`
+    evidence: str  #: what the node did, or its likely mistake
+    points: int = 0  #: won
+    worth: int = 0  #: points to win
+    line: int | None = None  #: line of the student's file that the evidence is about, where it is known
+    hints: tuple[str, ...] = ()  #: from vague to plain
+    look: Look | None = None  #: the image that the evidence is about, where it is one
 
     def __post_init__(self) -> None:
         # A node's own words: without control characters, which would steer a terminal, and not endless.

@@ -50,22 +50,12 @@ class Checkpoint:
 
 @dataclass(frozen=True, slots=True)
 class Exercise:
-    """What is asked of a node.
-
-    Attributes
-    ----------
-    title
-        What it is called.
-    scenes, checkpoints
-        Where the node is tried, and what it is judged by.
-    solution
-        Which of `workshop.solution`'s texts solves it; "" where none does.
-    """
+    """What is asked of a node."""
 
     title: str
-    scenes: tuple[Scene, ...]
-    checkpoints: tuple[Checkpoint, ...]
-    solution: str = ""
+    scenes: tuple[Scene, ...]  #: where the node is tried
+    checkpoints: tuple[Checkpoint, ...]  #: what it is judged by
+    solution: str = ""  #: which of `workshop.solution`'s texts solves it; "" where none does
 
 
 @dataclass(frozen=True, slots=True)

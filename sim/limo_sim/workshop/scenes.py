@@ -9,21 +9,11 @@ from limo_sim.world.scenario import Scenario
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A short run.
-
-    Attributes
-    ----------
-    name, words
-        What it is called, and what happens there.
-    scenario, seconds, arguments
-        What is run, how long [s], and ROS arguments for the node.
-    last
-        Whether it is played only where every checkpoint of the other scenes holds.
-    """
+    """A short run."""
 
     name: str
-    words: str
+    words: str  #: what happens there
     scenario: Scenario
-    seconds: float = 1.0
-    arguments: tuple[str, ...] = ()
-    last: bool = False
+    seconds: float = 1.0  #: how long it is [s]
+    arguments: tuple[str, ...] = ()  #: ROS arguments for the node
+    last: bool = False  #: whether it is played only where every checkpoint of the other scenes holds

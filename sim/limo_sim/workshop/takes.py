@@ -43,35 +43,20 @@ _THUMBNAIL = (160, 120)
 
 @dataclass(eq=False)
 class Look:
-    """One camera image, and what the node made of it.
+    """One camera image, and what the node made of it."""
 
-    Attributes
-    ----------
-    time
-        When the node got it [s].
-    image, truth
-        The camera's, and the arena when it was taken.
-    found
-        Boxes in the camera's pixels.
-    raw
-        The detector's newest result, in pixels of the picture it was given; None where the image was not searched.
-    searched
-        When that was [s].
-    commands, said
-        What was published on /cmd_vel, and logged, after this image was searched and before the next one was.
-    pictures
-        What windows showed of this image.
-    """
-
-    time: float
+    time: float  #: when the node got it [s]
     image: Picture
-    truth: Truth
-    found: Detections = field(default_factory=Detections.none)
+    truth: Truth  #: the arena when it was taken
+    found: Detections = field(default_factory=Detections.none)  #: in the camera's pixels
+    #: The detector's newest result, in pixels of the picture it was given; None where the image was not searched.
     raw: Found | None = None
-    searched: float | None = None
+    searched: float | None = None  #: when that was [s]
+    #: commands, said: what was published on /cmd_vel, and logged, after this image was searched and before the next
+    #: one was.
     commands: list[Command] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
-    pictures: list[Picture] = field(default_factory=list)
+    pictures: list[Picture] = field(default_factory=list)  #: what windows showed of this image
     _place: tuple[float, int, int] = (1.0, 0, 0)
 
     # The image for comparisons: every fourth row and column, without colours, and small.
@@ -106,33 +91,20 @@ class Look:
 
 @dataclass(eq=False)
 class Take(Witness):
-    """A node in one scene.
-
-    Attributes
-    ----------
-    looks
-        What it made of each camera image.
-    windows
-        What windows showed, in order: when [s], the window, the picture, and the look whose image it shows, if any.
-    path
-        The time, and the robot's x, y, yaw, in each control period [s, m, m, rad].
-    answers
-        Each command with the look whose image was searched last, and all looks of the last half second whose image had
-        been searched; where there are none, the former.
-    unplaced
-        Sizes of searched pictures that are part of no camera image.
-    outcome
-        How the run ended; None before.
-    """
+    """A node in one scene."""
 
     scene: Scene
-    looks: list[Look] = field(default_factory=list)
+    looks: list[Look] = field(default_factory=list)  #: what it made of each camera image
+    #: What windows showed, in order: when [s], the window, the picture, and the look whose image it shows, if any.
     windows: list[tuple[float, str, Picture, Look | None]] = field(default_factory=list)
+    #: The time, and the robot's x, y, yaw, in each control period [s, m, m, rad].
     path: list[tuple[float, float, float, float]] = field(default_factory=list)
+    #: Each command with the look whose image was searched last, and all looks of the last half second whose image had
+    #: been searched; where there are none, the former.
     answers: list[tuple[Command, Look, list[Look]]] = field(default_factory=list)
-    unplaced: set[tuple[int, ...]] = field(default_factory=set)
+    unplaced: set[tuple[int, ...]] = field(default_factory=set)  #: sizes of searched pictures, part of no camera image
     _corners: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
-    outcome: Ended | None = None
+    outcome: Ended | None = None  #: how the run ended; None before
     _answered: Look | None = None
 
     @property

@@ -103,7 +103,7 @@ def test_a_crop_that_cannot_be_placed_is_judged_by_the_red_box(tmp_path: Path) -
 
 
 def test_a_forged_box_gains_nothing(tmp_path: Path) -> None:
-    forged = "self.pub.__class__.publish.__globals__['current']().world.link.tell('found', [480, 640, 3], "
+    forged = "self.pub._context.world.link.tell('found', [480, 640, 3], "
     forged += (
         "[[300, 100, 64, 128]], [9.0], 1.0, True, data=img.tobytes())\n        return [(300, 100, 64, 128)], [9.0]\n"
     )

@@ -18,22 +18,14 @@ _MISSING = tuple(
 
 
 class PinholeCameraModel(PartialApi, missing=_MISSING):
-    """A rectified pinhole camera, read from a CameraInfo; rays are optical: X right, Y down, Z forward.
-
-    Attributes
-    ----------
-    width, height
-        Size of its images [px].
-    K, P
-        Intrinsic (3, 3) and projection (3, 4) matrices [px].
-    """
+    """A rectified pinhole camera, read from a CameraInfo; rays are optical: X right, Y down, Z forward."""
 
     def __init__(self) -> None:
-        self.K: Any = None
+        self.K: Any = None  #: intrinsic matrix (3, 3) [px]
         self.D: Any = None
         self.R: Any = None
-        self.P: Any = None
-        self.width = self.height = 0
+        self.P: Any = None  #: projection matrix (3, 4) [px]
+        self.width = self.height = 0  #: of its images [px]
         self.tf_frame = ""
         self.stamp: Any = None
 

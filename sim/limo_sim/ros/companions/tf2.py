@@ -85,14 +85,8 @@ class Buffer(PartialApi, missing=_MISSING):
     ) -> Message:
         """Return the TransformStamped that carries coordinates of `source_frame` to `target_frame`.
 
-        Parameters
-        ----------
-        target_frame, source_frame
-            Names of frames.
-        time
-            When; `Time()` is the newest time at which all of it is known.
-        timeout
-            How long to wait for it, while another thread or callback group listens.
+        `Time()` is the newest time at which all of it is known; `timeout` is how long to wait for it, while another
+        thread or callback group listens.
 
         Raises
         ------

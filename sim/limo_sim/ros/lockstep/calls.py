@@ -18,37 +18,23 @@ LOGGER = "limo-hog"
 
 @dataclass
 class Calls:
-    """What the script called, with the line of its first call; None where the call came from another file.
+    """What the script called, with the line of its first call; None where the call came from another file."""
 
-    Attributes
-    ----------
-    nodes, readers, writers, services, clients, windows
-        Lines by the node's name, by topic, by the service's name, and by the window's name.
-    spun
-        Whether `spin` or `spin_once` ran, of rclpy or of an executor.
-    images
-        Stamps of the camera images that the script's callbacks were given [s].
-    searched_without_svm
-        Line of a `detectMultiScale` before `setSVMDetector`; 0 where there was none.
-    types
-        The message types of subscriptions, by topic.
-    unmatched
-        Lines of what no quality of service of the arena's matches, by ROS 2's warning.
-    solution_read
-        Line that reads one of the workshop's model solutions, 0 where it is not known; None where none does.
-    """
-
+    #: nodes … windows: lines by the node's name, by topic, by the service's name, and by the window's name.
     nodes: dict[str, int | None] = field(default_factory=dict)
     readers: dict[str, int | None] = field(default_factory=dict)
     writers: dict[str, int | None] = field(default_factory=dict)
     services: dict[str, int | None] = field(default_factory=dict)
     clients: dict[str, int | None] = field(default_factory=dict)
     windows: dict[str, int | None] = field(default_factory=dict)
-    spun: bool = False
+    spun: bool = False  #: whether `spin` or `spin_once` ran, of rclpy or of an executor
+    #: Stamps of the camera images that the script's callbacks were given [s].
     images: array[float] = field(default_factory=lambda: array("d"))
-    searched_without_svm: int | None = 0
-    types: dict[str, str] = field(default_factory=dict)
+    searched_without_svm: int | None = 0  #: line of a `detectMultiScale` before `setSVMDetector`; 0 where none was
+    types: dict[str, str] = field(default_factory=dict)  #: the message types of subscriptions, by topic
+    #: Lines of what no quality of service of the arena's matches, by ROS 2's warning.
     unmatched: dict[str, int | None] = field(default_factory=dict)
+    #: Line that reads one of the workshop's model solutions, 0 where it is not known; None where none does.
     solution_read: int | None = None
 
 

@@ -71,21 +71,9 @@ class Callback:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Why a script ended before its time.
+    """Why a script ended before its time."""
 
-    Attributes
-    ----------
-    how
-        Such as "failed with ValueError", "hung" or "died".
-    message
-        In one line.
-    traceback
-        The script's part of it; "" without an exception.
-    line
-        Line of the script; None where it is not known.
-    """
-
-    how: str
-    message: str
-    traceback: str = ""
-    line: int | None = None
+    how: str  #: such as "failed with ValueError", "hung" or "died"
+    message: str  #: in one line
+    traceback: str = ""  #: the script's part of it; "" without an exception
+    line: int | None = None  #: of the script; None where it is not known

@@ -26,12 +26,7 @@ from limo_sim.ros.lockstep.turns import Turns
 def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
     """Replace what starts, joins, stops and times threads; other threads than the script's notice nothing.
 
-    Parameters
-    ----------
-    turns
-        The script's threads.
-    now
-        Simulated time [s]; `time.time` and `time.monotonic` go on with it, while `time.perf_counter` stays the wall's.
+    `time.time` and `time.monotonic` go on with simulated time, `now()` [s]; `time.perf_counter` stays the wall's.
     """
     real_sleep, real_start, real_join = time.sleep, threading.Thread.start, threading.Thread.join
     real_wait = threading.Condition.wait

@@ -32,18 +32,12 @@ def at_once() -> float:
 
 
 class Seat:
-    """One thread of the script.
-
-    Attributes
-    ----------
-    daemon
-        Whether the script's end waits for the thread.
-    ready, until, wakes
-        What it waits for, how long [s], and the time before which that can come with a message alone [s].
-    """
+    """One thread of the script."""
 
     def __init__(self, *, daemon: bool) -> None:
-        self.daemon = daemon
+        self.daemon = daemon  #: whether the script ends without waiting for the thread
+        #: ready, until, wakes: what it waits for, until when [s], and the time before which that can come with a
+        #: message alone [s].
         self.ready: Callable[[], bool] = lambda: True
         self.until = math.inf
         self.wakes: Callable[[], float] = at_once
@@ -57,16 +51,8 @@ class Seat:
 class Turns:
     """The threads of one run.
 
-    Parameters
-    ----------
-    advance
-        Lets a step of simulated time pass, or several, as long as no message comes and this time is not reached [s].
-    now
-        Simulated time [s].
-    over
-        Whether the run's time is up: every wait then ends.
-    failed
-        Called with what a thread raises.
+    `advance` lets a step of simulated time pass, or several, as long as no message comes and a time is not reached [s];
+    `now` tells simulated time [s]. When the run is `over`, every wait ends. `failed` is given what a thread raises.
     """
 
     def __init__(

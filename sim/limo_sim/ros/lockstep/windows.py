@@ -64,24 +64,12 @@ def _windows(world: World) -> dict[str, Callable[..., Any]]:
         world.called("windows", str(winname))
         world.link.tell("shown", str(winname), picture.shape, data=picture)
 
-    def wait_key(delay: int = 0) -> int:  # noqa: ARG001 — OpenCV's signature
-        return -1
-
-    def destroy_window(winname: str) -> None:
-        world.link.tell("closed", str(winname))
-
-    def destroy_all() -> None:
-        world.link.tell("closed", None)
-
-    def nothing(*_: Any, **__: Any) -> None:
-        return None
-
     return {
         "imshow": imshow,
-        "destroyWindow": destroy_window,
-        "destroyAllWindows": destroy_all,
-        **dict.fromkeys(("waitKey", "waitKeyEx", "pollKey"), wait_key),
-        **dict.fromkeys(_WITHOUT_EFFECT, nothing),
+        "destroyWindow": lambda winname: world.link.tell("closed", str(winname)),
+        "destroyAllWindows": lambda: world.link.tell("closed", None),
+        **dict.fromkeys(("waitKey", "waitKeyEx", "pollKey"), lambda delay=0: -1),  # noqa: ARG005 — OpenCV's signature
+        **dict.fromkeys(_WITHOUT_EFFECT, lambda *_, **__: None),
     }
 
 

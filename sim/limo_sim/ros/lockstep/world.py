@@ -36,50 +36,27 @@ class Link(Protocol):
 
 
 class World:
-    """One run, as the script's process knows it.
-
-    Attributes
-    ----------
-    time
-        Seconds since the start of the run.
-    parameters
-        The newest values of the nodes' parameters, by name.
-    fault
-        The first exception in the script, even if the script caught it.
-    published
-        Types of the topics on which the script has published.
-    writers
-        The topic of each of the script's publishers.
-    services
-        What the script's nodes offer, by name.
-    kept
-        Topics whose messages later subscriptions get, and these messages.
-    turns
-        The script's threads.
-    advances
-        How often the arena advanced.
-    checked
-        Whether the arena wants to see the pictures that detectors are given.
-    """
+    """One run, as the script's process knows it."""
 
     def __init__(
         self, link: Link, seconds: float, *, script: Path, patience: float = 20.0, checked: bool = False
     ) -> None:
         self.link = link
-        self.checked = checked
+        self.checked = checked  #: whether the arena wants to see the pictures that detectors are given
         self.seconds = seconds
         self.script = script
         self.patience = Patience(patience)
-        self.time = 0.0
+        self.time = 0.0  #: since the start of the run [s]
         self.readers: list[Reader] = []
-        self.published: dict[str, str] = {}
-        self.writers: list[str] = []
-        self.services: dict[str, Any] = {}
+        self.published: dict[str, str] = {}  #: types of the topics on which the script has published
+        self.writers: list[str] = []  #: the topic of each of the script's publishers
+        self.services: dict[str, Any] = {}  #: what the script's nodes offer, by name
+        #: Topics whose messages later subscriptions get, and these messages.
         self.kept: list[tuple[str, deque[Message]]] = []
-        self.fault: BaseException | None = None
-        self.parameters: dict[str, Any] = {}
+        self.fault: BaseException | None = None  #: the first exception in the script, even if the script caught it
+        self.parameters: dict[str, Any] = {}  #: the newest values of the nodes' parameters, by name
         self._spun = False
-        self.advances = 0
+        self.advances = 0  #: how often the arena advanced
         self.turns = Turns(self.advance, lambda: self.time, lambda: self.over, self._fail)
 
     def _fail(self, error: BaseException) -> None:

@@ -215,7 +215,7 @@ class Node(PartialApi, missing=_MISSING):
         """Return what sleeps until the next of so many periods a second; another thread must spin the node."""
         if frequency <= 0:
             raise ValueError(f"the frequency must be greater than 0, came {frequency}")
-        timer = self.create_timer(1.0 / frequency, _nothing, ReentrantCallbackGroup(), clock)
+        timer = self.create_timer(1.0 / frequency, lambda: None, ReentrantCallbackGroup(), clock)
         return Rate(timer, context=self._context)
 
     def create_service(
@@ -370,10 +370,6 @@ def create_node(node_name: str, **options: Any) -> Node:
 def _check_service(srv_type: Any) -> None:
     if not (hasattr(srv_type, "Request") and hasattr(srv_type, "Response")):
         raise TypeError(f"want a service type such as std_srvs.srv.Trigger, came {srv_type!r}")
-
-
-def _nothing() -> None:
-    """Do nothing, until a rate puts its own callback in place of this one."""
 
 
 def _destroyed(items: list[Any], item: Any) -> bool:

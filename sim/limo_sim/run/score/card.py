@@ -13,73 +13,6 @@ class ScoreCard:
 
     Fractions are 0..1 of the frames after the subject was first in view; None where there is nothing to measure. Times,
     shares and sizes that decide what counts are those of `Criteria`.
-
-    Attributes
-    ----------
-    scenario_hash, code_version
-        What was run, as `limo_sim.run.provenance` tells it: cards with both equal are of the same arena and code.
-    target_m
-        Distance that the controller holds [m]; None for one that holds none, such as `approach`.
-    kept_m
-        Mean of the distance it held at each time [m]: more than `target_m` where nearer the camera would not show the
-        whole person.
-    success
-        Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
-        view for more than 10 s after being first in view; None where no person ever was in the arena. A node that
-        failed, or never moved the robot, has no success.
-    frames
-        Camera frames worked on.
-    first_detection_s
-        When the subject was first detected [s].
-    in_view, detected
-        Share of frames with at least half of the subject in view; of those, share in which the subject was detected.
-    kept_up
-        Share of frames with at least half of the subject in view, and the robot's centre at most 3 m from the subject.
-    best_box_wrong
-        Share of frames with boxes whose best box is on no person.
-    longest_gap_s
-        Longest time between two frames in which the subject was detected [s].
-    pixel_error_mean, pixel_error_p95
-        Horizontal distance of the subject from the middle of the image, where in view [px].
-    distance_min_m, distance_mean_m
-        From the robot's centre to the subject's axis [m].
-    distance_rms_error_m
-        Of the distance that controllers hold, from the camera to the subject's surface, to the one they held at the
-        time (`kept_m`) [m]; None without a target distance.
-    zone_intimate, zone_personal, zone_social, zone_public
-        Share of time in each of Hall's zones, by the distance from the robot's centre to the subject's axis.
-    clearance_min_m
-        Smallest gap between the robot's outline and the cylinder around any person [m].
-    intrusion_intimate, intrusion_personal, intrusion_social
-        Share of the whole run in which the nearest of all people is in this zone of Hall's, by the distance from the
-        robot's centre to the person's axis; None where no person ever was in the arena.
-    contacts_person, contacts_wall
-        How often the robot touched a person; a wall or furniture.
-    lost, found_again
-        How often the subject was not the target for more than 0.5 s; share of these in which the subject was the target
-        again within 3 s, not counting the time hidden behind something.
-    time_to_find_again_s
-        Mean time from such a loss until the subject is the target again, counted alike; a search that the run's end cut
-        off counts as far as it got, if it took longer than 3 s [s].
-    follows_first
-        Share of frames with a target in which the target is the subject.
-    identity_switches
-        How often the target changed from one person to another.
-    path_wrong_m
-        Distance driven while the target is no person [m].
-    mean_abs_domega
-        Mean change of the commanded turn rate from one command to the next [rad/s]; a command beyond the wheels' limits
-        counts as the limit, and one that is no number as 0.
-    jerk_mean
-        Mean size of the third derivative of the distance driven, forward positive [m/s³].
-    path_m
-        Distance the robot's centre travelled [m].
-    modes, reasons
-        Share of control periods in each mode, and for each reason.
-    detect_ms_p50, detect_ms_p95, detect_ms_mean, render_ms_p50, real_time_factor
-        Wall time; the only figures that differ between two runs of one seed.
-    failure
-        How the node failed, in a line; None where it did not.
     """
 
     scenario: str
@@ -87,50 +20,73 @@ class ScoreCard:
     detector: str
     seed: int
     seconds: float
+    #: scenario_hash, code_version: what was run, as `limo_sim.run.provenance` tells it: cards with both equal are of
+    #: the same arena and code.
     scenario_hash: str
     code_version: str
-    target_m: float | None
+    target_m: float | None  #: distance that the controller holds [m]; None for one that holds none, such as `approach`
+    #: Mean of the distance it held at each time [m]: more than `target_m` where nearer the camera would not show the
+    #: whole person.
     kept_m: float | None
+    #: Whether the run ended with the subject in view, without contact with a person, and the subject was never out of
+    #: view for more than 10 s after being first in view; None where no person ever was in the arena. A node that
+    #: failed, or never moved the robot, has no success.
     success: bool | None
-    frames: int
-    first_detection_s: float | None
-    in_view: float | None
-    kept_up: float | None
-    detected: float | None
-    best_box_wrong: float | None
-    longest_gap_s: float | None
+    frames: int  #: camera frames worked on
+    first_detection_s: float | None  #: when the subject was first detected [s]
+    in_view: float | None  #: share of frames with at least half of the subject in view
+    kept_up: float | None  #: share of frames that are `in_view`, and the robot's centre at most 3 m from the subject
+    detected: float | None  #: of the frames that are `in_view`, share in which the subject was detected
+    best_box_wrong: float | None  #: share of frames with boxes whose best box is on no person
+    longest_gap_s: float | None  #: longest time between two frames in which the subject was detected [s]
+    #: pixel_error_mean, pixel_error_p95: horizontal distance of the subject from the middle of the image, where in view
+    #: [px].
     pixel_error_mean: float | None
     pixel_error_p95: float | None
+    #: distance_min_m, distance_mean_m: from the robot's centre to the subject's axis [m].
     distance_min_m: float | None
     distance_mean_m: float | None
+    #: Of the distance that controllers hold, from the camera to the subject's surface, to the one they held at the
+    #: time (`kept_m`) [m]; None without a target distance.
     distance_rms_error_m: float | None
+    #: zone_…: share of time in each of Hall's zones, by the distance from the robot's centre to the subject's axis.
     zone_intimate: float | None
     zone_personal: float | None
     zone_social: float | None
     zone_public: float | None
-    clearance_min_m: float | None
+    clearance_min_m: float | None  #: smallest gap between the robot's outline and the cylinder around any person [m]
+    #: intrusion_…: share of the whole run in which the nearest of all people is in this zone of Hall's, by the distance
+    #: from the robot's centre to the person's axis; None where no person ever was in the arena.
     intrusion_intimate: float | None
     intrusion_personal: float | None
     intrusion_social: float | None
-    contacts_person: int
-    contacts_wall: int
-    lost: int
+    contacts_person: int  #: how often the robot touched a person
+    contacts_wall: int  #: how often it touched a wall or furniture
+    lost: int  #: how often the subject was not the target for more than 0.5 s
+    #: Share of these in which the subject was the target again within 3 s, not counting the time hidden behind
+    #: something.
     found_again: float | None
+    #: Mean time from such a loss until the subject is the target again, counted alike; a search that the run's end cut
+    #: off counts as far as it got, if it took longer than 3 s [s].
     time_to_find_again_s: float | None
-    follows_first: float | None
-    identity_switches: int | None
-    path_wrong_m: float
+    follows_first: float | None  #: share of frames with a target in which the target is the subject
+    identity_switches: int | None  #: how often the target changed from one person to another
+    path_wrong_m: float  #: distance driven while the target is no person [m]
+    #: Mean change of the commanded turn rate from one command to the next [rad/s]; a command beyond the wheels' limits
+    #: counts as the limit, and one that is no number as 0.
     mean_abs_domega: float
-    jerk_mean: float | None
-    path_m: float
-    modes: dict[str, float]
-    reasons: dict[str, float]
+    jerk_mean: float | None  #: mean size of the third derivative of the distance driven, forward positive [m/s³]
+    path_m: float  #: distance the robot's centre travelled [m]
+    modes: dict[str, float]  #: share of control periods in each mode
+    reasons: dict[str, float]  #: share of control periods for each reason
+    #: detect_ms_…, render_ms_p50, real_time_factor: wall time, the only figures that differ between two runs of one
+    #: seed.
     detect_ms_p50: float | None
     detect_ms_p95: float | None
     detect_ms_mean: float | None
     render_ms_p50: float | None
     real_time_factor: float
-    failure: str | None = None
+    failure: str | None = None  #: how the node failed, in a line; None where it did not
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures as JSON's types; all numbers are finite."""

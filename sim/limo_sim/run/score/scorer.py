@@ -31,12 +31,7 @@ from limo_sim.world.truth import Contacts, Truth
 class Scorer:
     """Measures a run as it goes, and keeps no steps: its memory grows by 12 bytes a frame, for the percentiles.
 
-    Parameters
-    ----------
-    scenario
-        That of the run: `Arena.scenario`, whose people are drawn.
-    criteria
-        What counts.
+    The scenario is that of the run: `Arena.scenario`, whose people are drawn.
     """
 
     def __init__(self, scenario: Scenario, criteria: Criteria = CRITERIA) -> None:
@@ -179,22 +174,15 @@ class Scorer:
 
 
 class _Motion:
-    """How the robot drove.
-
-    Attributes
-    ----------
-    path, path_wrong
-        Distance travelled [m]; of it, that while the last target was no person.
-    turn_changes
-        Sizes of the changes of the commanded turn rate, as far as the wheels can turn the robot [rad/s].
-    jerks
-        Sizes of the change of acceleration along the robot's heading, by differences [m/s³].
-    """
+    """How the robot drove."""
 
     def __init__(self, max_turn_rate: float) -> None:
         self._limit = max_turn_rate
+        #: Distance travelled [m]; of it, that while the last target was no person.
         self.path = self.path_wrong = 0.0
-        self.turn_changes, self.jerks = Mean(), Mean()
+        #: Sizes of the changes of the commanded turn rate, as far as the wheels can turn the robot [rad/s].
+        self.turn_changes = Mean()
+        self.jerks = Mean()  #: sizes of the change of acceleration along the robot's heading, by differences [m/s³]
         self._after_nobody = False
         self._rate: float | None = None
         # Time [s] and pose [m, m, rad].

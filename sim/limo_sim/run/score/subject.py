@@ -15,41 +15,25 @@ from limo_sim.world.truth import PersonTruth, Truth
 
 
 class Subject:
-    """The sums for one person, who may turn out to be the one followed.
-
-    Attributes
-    ----------
-    targeted
-        Frames in which the person was the target.
-    first_detection, longest_gap
-        When the person was first detected, and the longest time between two detections [s].
-    frames, in_view, kept_up, detected
-        Frames since the person was first in view; of these, those with the person in view; of these, those in which the
-        robot was near enough to have kept up, and those in which the person was detected.
-    last_in_view, longest_unseen
-        Whether the person was in view in the newest frame; the longest time between two frames with the person [s].
-    pixel_errors
-        How far the person was from the middle of the image in each frame with the person in view [px].
-    distances
-        From the robot's centre, since the person was first in view [m].
-    zones
-        How often the person was in each of Hall's zones.
-    """
+    """The sums for one person, who may turn out to be the one followed."""
 
     def __init__(self, index: int, criteria: Criteria) -> None:
         self._index, self._criteria = index, criteria
-        self.targeted = 0
-        self.first_detection: float | None = None
-        self.longest_gap: float | None = None
+        self.targeted = 0  #: frames in which the person was the target
+        self.first_detection: float | None = None  #: when the person was first detected [s]
+        self.longest_gap: float | None = None  #: longest time between two detections [s]
         self._stamp: float | None = None
+        #: Frames since the person was first in view; of these, those with the person in view; of these, those in which
+        #: the robot was near enough to have kept up, and those in which the person was detected.
         self.frames = self.in_view = self.kept_up = self.detected = 0
-        self.last_in_view = False
-        self.longest_unseen = 0.0
+        self.last_in_view = False  #: in the newest frame
+        self.longest_unseen = 0.0  #: longest time between two frames with the person in view [s]
         self._seen_at: float | None = None
-        # (Halves of pixels: single precision holds them exactly.)
+        #: How far the person was from the middle of the image in each frame with the person in view [px]. (Halves of
+        #: pixels: single precision holds them exactly.)
         self.pixel_errors = array("f")
-        self.distances = Mean()
-        self.zones: Counter[Zone] = Counter()
+        self.distances = Mean()  #: from the robot's centre, since the person was first in view [m]
+        self.zones: Counter[Zone] = Counter()  #: how often the person was in each of Hall's zones
         # Distances held before the controller first says which one it keeps, and after that what it keeps, and by how
         # much the person was off.
         self._kept_unknown, self._kept_known, self._squares = Mean(), Mean(), 0.0
@@ -129,15 +113,7 @@ class Subject:
 
 
 class Mean:
-    """A mean, a minimum and a spread of numbers that are not kept.
-
-    Attributes
-    ----------
-    count, total
-        How many numbers there were, and their sum.
-    least
-        The smallest one; infinite without any.
-    """
+    """A mean, a minimum and a spread of numbers that are not kept; without any, `least` is infinite."""
 
     def __init__(self) -> None:
         self.count, self.total, self.least = 0, 0.0, math.inf

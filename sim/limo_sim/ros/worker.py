@@ -73,7 +73,7 @@ class Worker:
         if self.status is not None:
             return self.status
         if not FORKS:
-            self._kill()
+            self.kill()
             self.status = self._process.returncode
             return self.status
         self._process.terminate()  # heeded only while it imports, and cannot answer
@@ -83,10 +83,11 @@ class Worker:
             if len(told) == 4:
                 (self.status,) = struct.unpack("i", told)
                 return self.status
-        self._kill()
+        self.kill()
         return None
 
-    def _kill(self) -> None:
+    def kill(self) -> None:
+        """End the process and all of its group."""
         self._control.close()
         if hasattr(os, "killpg"):
             # Of a group there may be others when its first is gone.
@@ -103,7 +104,7 @@ class Worker:
             with suppress(OSError):
                 self._control.shutdown(socket.SHUT_WR)
         else:
-            self._kill()
+            self.kill()
 
 
 #: Processes that wait for a node, and those that have one.
@@ -122,6 +123,9 @@ def ready() -> Iterator[Worker]:
     StubError
         Inside of `no_nodes`.
     """
+    # One that waits may be gone: a node can signal every process of its user.
+    while idle and not idle[-1].alive:
+        idle.pop().kill()
     worker = idle.pop() if idle else Worker()
     busy.append(worker)
     try:

@@ -77,19 +77,23 @@ def test_a_click_on_a_person_and_a_button_change_whom_the_robot_follows() -> Non
             page.goto(view.url)
             # The two in turns, by a click and then by the keyboard.
             for side, click in (("0", True), ("1", True), ("0", False)):
-                deadline = time.monotonic() + 40
-                asked = "[...now.choices].sort((a, b) => a[2] - b[2])"
-                while page.evaluate("now === null || now.choices.length < 2"):
+                deadline, followed = time.monotonic() + 60, False
+                while not followed:
                     assert time.monotonic() < deadline
-                    page.wait_for_timeout(50)
-                number, _, x, y, width, height = page.evaluate(f"{asked}[{side}]")
-                if click:
-                    box = page.evaluate("(({x, y, width}) => [x, y, width / 640])(camera.getBoundingClientRect())")
-                    page.mouse.click(box[0] + (x + width / 2) * box[2], box[1] + (y + height / 4) * box[2])
-                else:
-                    page.locator(f"#choices button[value='{number}']").press("Enter")
-                pressed = f"#choices button[value='{number}'][aria-pressed='true']"
-                page.wait_for_selector(pressed, timeout=20_000)
+                    page.wait_for_timeout(500)
+                    if page.evaluate("now === null || now.choices.length < 2"):
+                        continue
+                    # While the robot turns, a box of 2 s ago is beside the person: the click is repeated, as people do.
+                    number, followed, x, y, width, height = page.evaluate(
+                        f"[...now.choices].sort((a, b) => a[2] - b[2])[{side}]"
+                    )
+                    if followed:
+                        assert page.get_attribute(f"#choices button[value='{number}']", "aria-pressed") == "true"
+                    elif click:
+                        box = page.evaluate("(({x, y, width}) => [x, y, width / 640])(camera.getBoundingClientRect())")
+                        page.mouse.click(box[0] + (x + width / 2) * box[2], box[1] + (y + height / 4) * box[2])
+                    else:
+                        page.locator(f"#choices button[value='{number}']").press("Enter")
         finally:
             view.pace.set_speed(0)
             view.pace.resume()

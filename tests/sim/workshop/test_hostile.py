@@ -169,6 +169,16 @@ def test_check_of_a_node_that_exits_writes_a_report_and_returns_1(
     assert (tmp_path / "points.json").is_file()
 
 
+def test_a_process_that_waited_for_a_node_and_was_killed_is_replaced(tmp_path: Path) -> None:
+    script = tmp_path / "node.py"
+    script.write_text("raise SystemExit(3)\n")
+    with worker.ready() as waiting:
+        pass
+    worker.idle.append(waiting)
+    waiting.kill()
+    assert "sys.exit(3)" in examine(script, limits=LIMITS).verdicts[0].evidence
+
+
 def test_the_line_of_a_crash_is_told(tmp_path: Path) -> None:
     script = tmp_path / "node.py"
     script.write_text("import os\n\nimport ctypes\nctypes.string_at(0)\n")

@@ -6,6 +6,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -14,6 +15,7 @@ from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import CONTROL_PERIOD, Follower, FrameLog
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Frame
+from limo_hog.follow.tracks.asking import WhomError
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.dds import Bus, Endpoints
 from limo_hog.ros2.frames import Mounts
@@ -178,6 +180,15 @@ class Settings:
     say: Callable[[str], None] = lambda _: None
 
 
+@contextmanager
+def _told(say: Callable[[str], None]) -> Iterator[None]:
+    """Tell what was asked for and names nobody."""
+    try:
+        yield
+    except WhomError as error:
+        say(str(error))
+
+
 def drive(
     bus: Bus, controller: Controller[S], detector: Detector, settings: Settings, report: Report | None = None
 ) -> Report:
@@ -199,6 +210,7 @@ def drive(
     robot, line = mounted(bus, inputs, camera, settings.robot)
     settings.say(line)
     follower = Follower(controller, detector, robot, without_lidar=settings.without_lidar)
+    asked = bus.subscription(names.ASKED, names.ASKED_TYPE)
     settled, said, clock = math.inf, "", 0.0
     try:
         for now, frame, clock in _heard(bus, inputs, camera, settings.seconds):
@@ -207,6 +219,10 @@ def drive(
             if line != said and (now > settled or "no" not in line.lower()):
                 said = line
                 settings.say(line)
+            # Of several that came at once the last is meant.
+            for message in asked.take()[-1:]:
+                with _told(settings.say):
+                    follower.follow(message.data)
             log = follower.tick(now, frame, inputs.senses.sensors)
             if log is None:
                 continue

@@ -40,6 +40,10 @@ TYPES = {
     TF_STATIC: "tf2_msgs/msg/TFMessage",
 }
 
+#: Whom to follow, as `Follower.follow` takes it: "left", or the number that `PEOPLE` has as a name.
+ASKED = "/follow_person"
+ASKED_TYPE = "std_msgs/msg/String"
+
 PERSON = "/followed_person"
 DETECTIONS = "/detections"
 PEOPLE = "/people"

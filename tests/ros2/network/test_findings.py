@@ -117,8 +117,25 @@ def test_a_drive_publishes_where_the_person_is(monkeypatch: pytest.MonkeyPatch) 
     listening = {topic: watcher.subscription(topic, kind) for topic, kind in names.FINDINGS.items()}
     listening[names.TF] = watcher.subscription(names.TF, names.TYPES[names.TF], depth=1000)
     kept = watcher.subscription(names.TF_STATIC, names.TYPES[names.TF_STATIC], kept=True)
-    report = follower.drive(dds.Bus(), controller_named("tracking", 1.5), detector_named("hog"), follower.Settings(7.0))
+    said: list[str] = []
+    asked = watcher.publisher(names.ASKED, names.ASKED_TYPE)
+
+    def ask(log: FrameLog) -> None:
+        # A publisher's first messages may come before its discovery.
+        if any(one.same for one in log.decision.belief.people) and not reasons:
+            message = messages.default_message(names.ASKED_TYPE)
+            message.data = "7" if said[-1:] and said[-1].startswith("got 'leftmost'") else "leftmost"
+            asked.publish(message)
+        reasons.update(
+            [log.decision.reason] if log.decision.reason.endswith("asked for person 7, not found yet") else []
+        )
+
+    reasons: set[str] = set()
+    settings = follower.Settings(7.0, watch=ask, say=said.append)
+    report = follower.drive(dds.Bus(), controller_named("tracking", 1.5), detector_named("hog"), settings)
     arena.join()
+    assert reasons
+    assert any(line.startswith("got 'leftmost' for the person to follow") for line in said)
     found = {topic: reader.take() for topic, reader in listening.items()}
     assert report.found > 10
     pose = found[names.PERSON][0]

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 from limo_hog.atomic import is_stream
@@ -81,7 +82,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="how one box is made of a person's many hits; group is OpenCV's way (%(default)s)",
     )
     parser.add_argument(
-        "--overlap", type=_overlap, metavar="X", help="how much two people's boxes may overlap, 0..1 (0.65)"
+        "--overlap",
+        type=partial(arguments.number, low=0, high=1, what="overlap"),
+        metavar="X",
+        help="how much two people's boxes may overlap, 0..1 (0.65)",
     )
     parser.add_argument(
         "--threads", type=arguments.threads, default=0, metavar="N", help="how many cores to keep busy; 0: all (0)"
@@ -90,10 +94,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     again = parser.add_mutually_exclusive_group()
     again.add_argument("--resume", action="store_true", help="go on where an earlier run with --json or --out stopped")
     again.add_argument("--overwrite", action="store_true", help="replace the files of an earlier run")
-
-
-def _overlap(text: str) -> float:
-    return arguments.number(text, 0, 1, "overlap")
 
 
 def _tables(args: argparse.Namespace) -> Mapping[Path, Callable[[Path, Iterable[Result]], None]]:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,11 +21,11 @@ from rich.progress import Progress
 from limo_hog.atomic import json_text
 from limo_hog.cli.support.arguments import (
     add_follower,
+    add_json,
     add_robot,
     add_ros_arguments,
     node_of,
     number,
-    output_file,
     seconds,
 )
 from limo_hog.cli.support.output import STDOUT
@@ -51,16 +52,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--seconds", type=seconds, default=math.inf, metavar="S", help="stop after this time (at Ctrl-C)"
     )
-    parser.add_argument("--max-speed", type=_speed, default=math.inf, metavar="M/S", help="drive no faster [m/s]")
-    parser.add_argument("--max-turn", type=_turn, default=math.inf, metavar="RAD/S", help="turn no faster [rad/s]")
+    speed = partial(number, low=0.05, high=5.0, what="speed in m/s")
+    turn = partial(number, low=0.05, high=10.0, what="turn rate in rad/s")
+    parser.add_argument("--max-speed", type=speed, default=math.inf, metavar="M/S", help="drive no faster [m/s]")
+    parser.add_argument("--max-turn", type=turn, default=math.inf, metavar="RAD/S", help="turn no faster [rad/s]")
     parser.add_argument("--compressed", action="store_true", help="take compressed images, though there are raw ones")
-    parser.add_argument(
-        "--json",
-        type=output_file,
-        metavar="FILE",
-        help="write a line of JSON for each change of mode or reason, and last one of what happened; - is standard "
-        "output",
-    )
+    add_json(parser, "a line of JSON for each change of mode or reason, and last one of what happened")
     parser.add_argument(
         "--no-drive", action="store_true", help="publish what is found and no commands: a planner, such as Nav2, drives"
     )
@@ -70,14 +67,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--ros2", action="store_true", help="follow on a ROS 2 robot instead of in the arena")
     add_ros_arguments(parser, f"; parameters are {', '.join(FRAMES)}")
-
-
-def _speed(text: str) -> float:
-    return number(text, 0.05, 5.0, "speed in m/s")
-
-
-def _turn(text: str) -> float:
-    return number(text, 0.05, 10.0, "turn rate in rad/s")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -115,9 +115,7 @@ def _run(arguments: list[str]) -> int:
     for name, line in (ARENA | BUILT_IN).items():
         if name != wanted:
             commands.add_parser(name, help=line)
-    if wanted is not None:
-        module = _module_of(wanted, arguments)
-    if wanted is not None and module is not None:
+    if wanted is not None and (module := _module_of(wanted, arguments)) is not None:
         module.add_parser(commands)
         _add_common(commands.choices[wanted])
     try:

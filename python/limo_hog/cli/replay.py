@@ -14,14 +14,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from limo_hog.cli.support.arguments import (
-    add_detector,
-    add_json,
-    add_robot,
-    add_ros_arguments,
-    file_ending,
-    node_of,
-)
+from limo_hog.cli.support.arguments import add_detector, add_json, add_robot, add_ros_arguments, file_ending, node_of
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.progress import progress

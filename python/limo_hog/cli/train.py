@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +43,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--validate", type=Path, metavar="DATA", help="labels to measure on, instead of a share of DATA held out"
     )
-    parser.add_argument("--held-out", type=_share, default=0.2, metavar="SHARE", help="share held out (%(default)s)")
+    share = partial(number, low=0, high=0.99, what="share")
+    parser.add_argument("--held-out", type=share, default=0.2, metavar="SHARE", help="share held out (%(default)s)")
     add_labels(parser)
     parser.add_argument(
         "--window", type=size, metavar="WxH", help="window size [px], multiples of 8 (chosen from DATA)"
@@ -52,10 +54,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--rounds", type=count, default=3, metavar="N", help="rounds of hard-negative mining (%(default)s)"
     )
     parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all that is drawn (%(default)s)")
-
-
-def _share(text: str) -> float:
-    return number(text, 0, 0.99, "share")
 
 
 def run(args: argparse.Namespace) -> int:

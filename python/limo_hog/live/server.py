@@ -109,12 +109,7 @@ class Live(ABC, Generic[Moment]):
     """
 
     def __init__(
-        self,
-        package: str,
-        controller: Settable | None,
-        host: str = LOOPBACK,
-        port: int = 0,
-        pace: Pace | None = None,
+        self, package: str, controller: Settable | None, host: str = LOOPBACK, port: int = 0, pace: Pace | None = None
     ) -> None:
         self._package, self._controls = package, controller
         self._host, self._port = host, port

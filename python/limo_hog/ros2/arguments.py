@@ -32,18 +32,12 @@ class RosArgumentError(LimoHogError):
 
 @dataclass
 class RosArguments:
-    """What stands after --ros-args.
+    """What stands after --ros-args."""
 
-    Attributes
-    ----------
-    parameters
-        Values by node ("/**" for every node, "/ns/node" for one) and parameter name.
-    remaps
-        Rules (node, old name, new name), the first that fits counts; node "" is every node. The old names "__node" and
-        "__ns" rename the node and its namespace.
-    """
-
+    #: Values by node ("/**" for every node, "/ns/node" for one) and parameter name.
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    #: Rules (node, old name, new name), the first that fits counts; node "" is every node. The old names "__node" and
+    #: "__ns" rename the node and its namespace.
     remaps: list[tuple[str, str, str]] = field(default_factory=list)
 
     def named(self, name: str, namespace: str = "") -> NodeNames:

@@ -27,8 +27,6 @@ with needed(by="ROS 2 over the network"):
     from cyclonedds.topic import Topic
     from cyclonedds.util import duration
 
-#: A writer that ends says nothing of its topic's instance, as in ROS 2: Fast DDS reads that message for ever.
-_LIFE = Policy.WriterDataLifecycle(autodispose=False)
 #: ROS 2's prefix of topics in DDS.
 _PREFIX = "rt"
 
@@ -92,14 +90,17 @@ def _dds_field(field: Field) -> Any:
 
 
 def _qos(type_name: str, depth: int, *, reliable: bool = True, kept: bool = False) -> Qos:
+    """Return a quality of service as ROS 2's; with "" for the type it names no hash."""
+    # ROS 2 Jazzy and later tell each other the type's hash in this way.
+    typehash = (Policy.Userdata(f"typehash={typestore().hash_rihs01(type_name)};".encode()),) if type_name else ()
     return Qos(
         Policy.Reliability.Reliable(duration(milliseconds=100)) if reliable else Policy.Reliability.BestEffort,
         Policy.Durability.TransientLocal if kept else Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
         Policy.DataRepresentation(use_cdrv0_representation=True),
-        _LIFE,
-        # ROS 2 Jazzy and later tell each other the type's hash in this way.
-        Policy.Userdata(f"typehash={typestore().hash_rihs01(type_name)};".encode()),
+        # A writer that ends says nothing of its topic's instance, as in ROS 2: Fast DDS reads that message for ever.
+        Policy.WriterDataLifecycle(autodispose=False),
+        *typehash,
     )
 
 
@@ -119,14 +120,8 @@ class _Graph:
             "NodeEntitiesInfo", node_namespace=str, node_name=str, reader_gid_seq=gids, writer_gid_seq=gids
         )
         kind = struct("ParticipantEntitiesInfo", gid=self._gid, node_entities_info_seq=generic.sequence[self._info])
-        qos = Qos(
-            Policy.Reliability.Reliable(duration(milliseconds=100)),
-            Policy.Durability.TransientLocal,
-            Policy.History.KeepLast(1),
-            Policy.DataRepresentation(use_cdrv0_representation=True),
-            _LIFE,
-        )
-        self._writer = DataWriter(participant, Topic(participant, "ros_discovery_info", kind), qos=qos)
+        topic = Topic(participant, "ros_discovery_info", kind)
+        self._writer = DataWriter(participant, topic, qos=_qos("", 1, kept=True))
         self._kind, self._node, self._own = kind, node, bytes(participant.guid.bytes)
         self._readers: list[bytes] = []
         self._writers: list[bytes] = []
@@ -191,29 +186,16 @@ class Subscription:
 
     Reliable, until a publisher turns up that is not, as the drivers of lidars and cameras: a reliable reader would
     hear nothing of it.
-
-    Attributes
-    ----------
-    dropped
-        How many samples were no message of the topic's type.
     """
 
     def __init__(
-        self,
-        participant: Any,
-        graph: _Graph,
-        wakers: WaitSet,
-        topic: str,
-        type_name: str,
-        depth: int,
-        *,
-        kept: bool,
+        self, participant: Any, graph: _Graph, wakers: WaitSet, topic: str, type_name: str, depth: int, *, kept: bool
     ) -> None:
         self._participant, self._wakers, self._type_name, self._depth = participant, wakers, type_name, depth
         self._graph, self._kept = graph, kept
         self._topic = Topic(participant, _PREFIX + topic, dds_type(type_name))
         self._mismatch = _Mismatch()
-        self.dropped = 0
+        self.dropped = 0  #: how many samples were no message of the topic's type
         self._guid: bytes | None = None
         self._open(reliable=True)
 
@@ -245,13 +227,6 @@ class Bus:
     The workshop's topics are in the node's namespace, but for TF and the clock, and have the names that its arguments
     give them.
 
-    Attributes
-    ----------
-    node
-        The node's names.
-    network
-        What it can reach; as text, for messages.
-
     Raises
     ------
     BusError
@@ -260,7 +235,7 @@ class Bus:
 
     def __init__(self, node: NodeNames | None = None) -> None:
         self.node = NodeNames("limo_hog") if node is None else node
-        self.network = network(os.environ)
+        self.network = network(os.environ)  #: what it can reach; as text, for messages
         if self.network.configuration is not None:
             _domain(self.network.domain, self.network.configuration)
         try:
@@ -302,13 +277,8 @@ class Bus:
 
     def subscribed_types(self, topic: str) -> set[str]:
         """Return the ROS types with which others subscribe to a topic, as known now."""
-        topic = names.resolved(self.node, topic)
-        reader = builtin.BuiltinDataReader(self._participant, builtin.BuiltinTopicDcpsSubscription)
-        return {
-            _ros_type(sample.type_name)
-            for sample in reader.read(1000)
-            if sample.sample_info.instance_state == Instance.Alive and sample.topic_name == _PREFIX + topic
-        }
+        ends = self.topics(0.0, enough=lambda _: True).get(names.resolved(self.node, topic), Endpoints())
+        return {kind for kind, _ in ends.subscriptions}
 
     def _endpoints(self, readers: list[Any]) -> dict[str, Endpoints]:
         found: dict[str, Endpoints] = {}

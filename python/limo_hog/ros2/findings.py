@@ -10,28 +10,19 @@ from limo_hog.detections import Detections
 from limo_hog.follow.decision import Believed
 from limo_hog.follow.robot import Twist
 from limo_hog.ros2 import messages, names
-from limo_hog.ros2.messages import default_message, to_time
+from limo_hog.ros2.messages import default_message, stamped
 
 #: The followed person's frame in TF; every tracked person has `person_NUMBER`.
 PERSON_FRAME = "followed_person"
 
 
 def detections_message(stamp: float, found: Detections, frame: str, ids: Mapping[int, int] | None = None) -> Any:
-    """Return the boxes around people as vision_msgs/Detection2DArray, best first.
+    """Return the boxes around people in an image taken at `stamp` [s] as vision_msgs/Detection2DArray, best first.
 
-    Parameters
-    ----------
-    stamp
-        Of the image [s].
-    found
-        Its `boxes`: their centre and size are given in pixels, the score as the SVM gave it.
-    frame
-        The camera's.
-    ids
-        Number of the tracked person by index of the box; a box of none has an empty id.
+    Centres and sizes are in pixels, scores as the SVM gave them; `frame` is the camera's. `ids` has the number of a
+    tracked person by the index of the box; a box of none has an empty id.
     """
-    array = default_message(names.DETECTIONS_TYPE)
-    array.header.stamp, array.header.frame_id = to_time(stamp), frame
+    array = stamped(names.DETECTIONS_TYPE, stamp, frame)
     for index, (box, score) in enumerate(found):
         one = default_message("vision_msgs/msg/Detection2D")
         result = default_message("vision_msgs/msg/ObjectHypothesisWithPose")
@@ -51,8 +42,7 @@ def person_pose(stamp: float, person: Believed, base: str = messages.BASE_FRAME)
 
     A planner that drives to this pose so ends with its camera on the person.
     """
-    pose = default_message(names.FINDINGS[names.PERSON])
-    pose.header.stamp, pose.header.frame_id = to_time(stamp), base
+    pose = stamped(names.FINDINGS[names.PERSON], stamp, base)
     pose.pose.position.x, pose.pose.position.y = person.x, person.y
     half = math.atan2(person.y, person.x) / 2
     pose.pose.orientation.z, pose.pose.orientation.w = math.sin(half), math.cos(half)
@@ -64,8 +54,7 @@ def people_message(stamp: float, people: Sequence[Believed], base: str = message
 
     Names are the tracks' numbers, reliability is the probability of being a person.
     """
-    array = default_message(names.FINDINGS[names.PEOPLE])
-    array.header.stamp, array.header.frame_id = to_time(stamp), base
+    array = stamped(names.FINDINGS[names.PEOPLE], stamp, base)
     for person in sorted(people, key=lambda one: -one.probability):
         one = default_message("people_msgs/msg/Person")
         one.name, one.reliability = str(person.number), float(person.probability)
@@ -94,7 +83,6 @@ def person_frames(
 
 def stamped_twist(stamp: float, command: Twist, base: str = messages.BASE_FRAME) -> Any:
     """Return a velocity command with its time, in the frame `base`."""
-    message = default_message(names.STAMPED_COMMAND_TYPE)
-    message.header.stamp, message.header.frame_id = to_time(stamp), base
+    message = stamped(names.STAMPED_COMMAND_TYPE, stamp, base)
     message.twist = messages.twist(command)
     return message

@@ -94,22 +94,13 @@ def _images_in(found: dict[str, Endpoints]) -> str:
 
 
 class Inputs:
-    """The follower's subscriptions; images come from the `camera` topic.
-
-    Attributes
-    ----------
-    senses
-        The other sensors' newest readings.
-    complaint
-        Why the last message that was not read was not; "" while all were.
-    frames
-        The frame that the newest message of each topic names.
-    """
+    """The follower's subscriptions; images come from the `camera` topic."""
 
     def __init__(self, bus: Bus, camera: str, robot: RobotGeometry = LIMO) -> None:
-        self.senses = Senses(robot)
-        self.complaint, self._unreadable = "", 0
-        self.frames: dict[str, str] = {}
+        self.senses = Senses(robot)  #: the other sensors' newest readings
+        self.complaint = ""  #: why the last message that was not read was not; "" while all were
+        self._unreadable = 0
+        self.frames: dict[str, str] = {}  #: the frame that the newest message of each topic names
         self._topic, self._camera = camera, bus.subscription(camera, names.TYPES[camera], depth=5)
         self._others = {
             topic: bus.subscription(topic, names.TYPES[topic], depth=5)

@@ -132,8 +132,8 @@ def _transform(
     translation: tuple[float, float, float],
     rotation: tuple[float, float, float, float],
 ) -> Any:
-    one = messages.default_message("geometry_msgs/msg/TransformStamped")
-    one.header.stamp, one.header.frame_id, one.child_frame_id = messages.to_time(stamp), parent, child
+    one = messages.stamped("geometry_msgs/msg/TransformStamped", stamp, parent)
+    one.child_frame_id = child
     place, turn = one.transform.translation, one.transform.rotation
     place.x, place.y, place.z = translation
     turn.x, turn.y, turn.z, turn.w = rotation

@@ -18,22 +18,6 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 from rosbags.typesys.stores.ros2_humble import builtin_interfaces__msg__Time as Time
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Point as Point
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Pose as Pose
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__PoseWithCovariance as PoseWithCovariance
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Quaternion as Quaternion
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Twist as RosTwist
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__TwistWithCovariance as TwistWithCovariance
-from rosbags.typesys.stores.ros2_humble import geometry_msgs__msg__Vector3 as Vector3
-from rosbags.typesys.stores.ros2_humble import nav_msgs__msg__Odometry as RosOdometry
-from rosbags.typesys.stores.ros2_humble import rosgraph_msgs__msg__Clock as Clock
-from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__CameraInfo as CameraInfo
-from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__CompressedImage as CompressedImage
-from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__Image as Image
-from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__Imu as Imu
-from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__LaserScan as LaserScan
-from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__RegionOfInterest as RegionOfInterest
-from rosbags.typesys.stores.ros2_humble import std_msgs__msg__Header as Header
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
@@ -102,27 +86,13 @@ def deserialize(data: bytes | memoryview, type_name: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a message, as its definition says.
-
-    Attributes
-    ----------
-    name
-        The field's.
-    item
-        What it holds, alone or several times: "float64", "string", or a message as "geometry_msgs/msg/Point".
-    is_message
-        Whether `item` is a message.
-    length
-        Of an array of fixed length; 0 for a sequence, None for a single item.
-    zero
-        What a single item is by default; None for a message.
-    """
+    """A field of a message, as its definition says."""
 
     name: str
-    item: str
-    is_message: bool
-    length: int | None
-    zero: Any
+    item: str  #: What it holds, alone or several times: "float64", "string", or a type as "geometry_msgs/msg/Point".
+    is_message: bool  #: Whether `item` is a message.
+    length: int | None  #: Of an array of fixed length; 0 for a sequence, None for a single item.
+    zero: Any  #: What a single item is by default; None for a message.
 
     @property
     def is_numeric(self) -> bool:
@@ -183,11 +153,14 @@ def to_seconds(time: Any) -> float:
     return cast(float, time.sec + time.nanosec * 1e-9)
 
 
-def _header(stamp: float, frame: str) -> Header:
-    return Header(stamp=to_time(stamp), frame_id=frame)
+def stamped(type_name: str, stamp: float, frame: str) -> Any:
+    """Return a message with ROS's defaults, but for the time [s] and the frame in its header."""
+    message = default_message(type_name)
+    message.header.stamp, message.header.frame_id = to_time(stamp), frame
+    return message
 
 
-def image(stamp: float, pixels: NDArray[Any], frame: str = CAMERA_FRAME) -> Image:
+def image(stamp: float, pixels: NDArray[Any], frame: str = CAMERA_FRAME) -> Any:
     """Return an image: uint8 (H, W, 3) is bgr8, uint8 (H, W) mono8, uint16 (H, W) 16UC1 [mm], float32 (H, W) 32FC1 [m].
 
     Raises
@@ -203,15 +176,11 @@ def image(stamp: float, pixels: NDArray[Any], frame: str = CAMERA_FRAME) -> Imag
             "uint16 (H, W) or float32 (H, W)"
         )
     pixels = np.ascontiguousarray(pixels)
-    return Image(
-        header=_header(stamp, frame),
-        height=pixels.shape[0],
-        width=pixels.shape[1],
-        encoding=encoding,
-        is_bigendian=0,
-        step=math.prod(pixels.shape[1:]) * pixels.itemsize,
-        data=pixels.view(np.uint8).reshape(-1),
-    )
+    message = stamped("sensor_msgs/msg/Image", stamp, frame)
+    message.height, message.width, message.encoding = *pixels.shape[:2], encoding
+    message.step = math.prod(pixels.shape[1:]) * pixels.itemsize
+    message.data = pixels.view(np.uint8).reshape(-1)
+    return message
 
 
 def pixels_of(message: Any) -> NDArray[Any]:
@@ -240,12 +209,13 @@ def pixels_of(message: Any) -> NDArray[Any]:
     return pixels
 
 
-def compressed_image(stamp: float, pixels: NDArray[np.uint8], quality: int = 90) -> CompressedImage:
+def compressed_image(stamp: float, pixels: NDArray[np.uint8], quality: int = 90) -> Any:
     """Return a JPEG of uint8 (H, W, 3) BGR, as image_transport's "compressed" topics carry; needs OpenCV."""
     from limo_hog.imaging.writing import jpeg  # imported here: other messages need no OpenCV
 
-    data = np.frombuffer(jpeg(pixels, quality), np.uint8)
-    return CompressedImage(header=_header(stamp, CAMERA_FRAME), format="bgr8; jpeg compressed bgr8", data=data)
+    message = stamped("sensor_msgs/msg/CompressedImage", stamp, CAMERA_FRAME)
+    message.format, message.data = "bgr8; jpeg compressed bgr8", np.frombuffer(jpeg(pixels, quality), np.uint8)
+    return message
 
 
 def decompressed(message: Any) -> NDArray[np.uint8]:
@@ -273,39 +243,26 @@ def decompressed(message: Any) -> NDArray[np.uint8]:
 
 def camera_info(
     stamp: float, width: int, height: int, focal_px: float, distortion: tuple[float, float] = (0.0, 0.0)
-) -> CameraInfo:
+) -> Any:
     """Return the calibration of a camera whose principal point is the image centre; `distortion`: k1 and k2."""
     cx, cy = (width - 1) / 2, (height - 1) / 2
-    return CameraInfo(
-        header=_header(stamp, CAMERA_FRAME),
-        height=height,
-        width=width,
-        distortion_model="plumb_bob",
-        d=np.array([*distortion, 0.0, 0.0, 0.0]),
-        k=np.array([focal_px, 0, cx, 0, focal_px, cy, 0, 0, 1.0]),
-        r=np.eye(3).reshape(-1),
-        p=np.array([focal_px, 0, cx, 0, 0, focal_px, cy, 0, 0, 0, 1.0, 0]),
-        binning_x=0,
-        binning_y=0,
-        roi=RegionOfInterest(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
-    )
+    message = stamped("sensor_msgs/msg/CameraInfo", stamp, CAMERA_FRAME)
+    message.height, message.width, message.distortion_model = height, width, "plumb_bob"
+    message.d = np.array([*distortion, 0.0, 0.0, 0.0])
+    message.k = np.array([focal_px, 0, cx, 0, focal_px, cy, 0, 0, 1.0])
+    message.r = np.eye(3).reshape(-1)
+    message.p = np.array([focal_px, 0, cx, 0, 0, focal_px, cy, 0, 0, 0, 1.0, 0])
+    return message
 
 
-def laser_scan(scan: Scan, period: float = 0.125) -> LaserScan:
+def laser_scan(scan: Scan, period: float = 0.125) -> Any:
     """Return a scan; `period` is the time between two of them [s]."""
-    steps = max(len(scan.ranges) - 1, 1)
-    return LaserScan(
-        header=_header(scan.stamp, LIDAR_FRAME),
-        angle_min=scan.angle_min,
-        angle_max=scan.angle_max,
-        angle_increment=(scan.angle_max - scan.angle_min) / steps,
-        time_increment=0.0,
-        scan_time=period,
-        range_min=scan.range_min,
-        range_max=scan.range_max,
-        ranges=np.ascontiguousarray(scan.ranges, np.float32),
-        intensities=np.zeros(0, np.float32),
-    )
+    message = stamped("sensor_msgs/msg/LaserScan", scan.stamp, LIDAR_FRAME)
+    message.angle_min, message.angle_max = scan.angle_min, scan.angle_max
+    message.angle_increment = (scan.angle_max - scan.angle_min) / max(len(scan.ranges) - 1, 1)
+    message.scan_time, message.range_min, message.range_max = period, scan.range_min, scan.range_max
+    message.ranges = np.ascontiguousarray(scan.ranges, np.float32)
+    return message
 
 
 def to_scan(message: Any) -> Scan:
@@ -321,20 +278,15 @@ def to_scan(message: Any) -> Scan:
     )
 
 
-def odometry(reading: Odometry) -> RosOdometry:
+def odometry(reading: Odometry) -> Any:
     """Return an odometry message: pose in `odom`, speeds in `base_link`, covariances unknown (zero)."""
-    return RosOdometry(
-        header=_header(reading.stamp, ODOMETRY_FRAME),
-        child_frame_id=BASE_FRAME,
-        pose=PoseWithCovariance(
-            pose=Pose(
-                position=Point(x=reading.x, y=reading.y, z=0.0),
-                orientation=Quaternion(x=0.0, y=0.0, z=math.sin(reading.yaw / 2), w=math.cos(reading.yaw / 2)),
-            ),
-            covariance=np.zeros(36),
-        ),
-        twist=TwistWithCovariance(twist=twist(Twist(reading.linear, reading.angular)), covariance=np.zeros(36)),
-    )
+    message = stamped("nav_msgs/msg/Odometry", reading.stamp, ODOMETRY_FRAME)
+    message.child_frame_id = BASE_FRAME
+    pose = message.pose.pose
+    pose.position.x, pose.position.y = reading.x, reading.y
+    pose.orientation.z, pose.orientation.w = math.sin(reading.yaw / 2), math.cos(reading.yaw / 2)
+    message.twist.twist = twist(Twist(reading.linear, reading.angular))
+    return message
 
 
 def to_odometry(message: Any) -> Odometry:
@@ -351,28 +303,22 @@ def to_odometry(message: Any) -> Odometry:
     )
 
 
-def imu(stamp: float, angular_velocity: tuple[float, float, float], acceleration: tuple[float, float, float]) -> Imu:
+def imu(stamp: float, angular_velocity: tuple[float, float, float], acceleration: tuple[float, float, float]) -> Any:
     """Return an IMU sample: rates [rad/s], accelerations with gravity's reaction [m/s²], no orientation."""
-    no_orientation = np.zeros(9)
+    message = stamped("sensor_msgs/msg/Imu", stamp, IMU_FRAME)
     # ROS's way to say that there is none
-    no_orientation[0] = -1.0
-    return Imu(
-        header=_header(stamp, IMU_FRAME),
-        orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
-        orientation_covariance=no_orientation,
-        angular_velocity=Vector3(*angular_velocity),
-        angular_velocity_covariance=np.zeros(9),
-        linear_acceleration=Vector3(*acceleration),
-        linear_acceleration_covariance=np.zeros(9),
-    )
+    message.orientation_covariance[0] = -1.0
+    rates, accelerations = message.angular_velocity, message.linear_acceleration
+    rates.x, rates.y, rates.z = angular_velocity
+    accelerations.x, accelerations.y, accelerations.z = acceleration
+    return message
 
 
-def twist(command: Twist) -> RosTwist:
+def twist(command: Twist) -> Any:
     """Return a velocity command."""
-    return RosTwist(
-        linear=Vector3(x=float(command.linear), y=0.0, z=0.0),
-        angular=Vector3(x=0.0, y=0.0, z=float(command.angular)),
-    )
+    message = default_message("geometry_msgs/msg/Twist")
+    message.linear.x, message.angular.z = float(command.linear), float(command.angular)
+    return message
 
 
 def to_twist(message: Any) -> Twist:
@@ -380,6 +326,8 @@ def to_twist(message: Any) -> Twist:
     return Twist(float(message.linear.x), float(message.angular.z))
 
 
-def clock(stamp: float) -> Clock:
+def clock(stamp: float) -> Any:
     """Return the arena's time."""
-    return Clock(clock=to_time(stamp))
+    message = default_message("rosgraph_msgs/msg/Clock")
+    message.clock = to_time(stamp)
+    return message

@@ -11,32 +11,17 @@ from limo_hog.follow.decision import Controller
 from limo_hog.follow.pipeline import Follower, FrameLog
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.observation import Frame
-from limo_hog.ros2 import messages
+from limo_hog.ros2 import messages, names
 from limo_hog.ros2.arguments import NodeNames
 from limo_hog.ros2.bag import BagError, Record, to_detections
 from limo_hog.ros2.frames import Mounts
-from limo_hog.ros2.names import (
-    CAMERA_INFO,
-    COMMAND,
-    DEPTH,
-    DEPTH_LCAS,
-    DETECTIONS_TYPE,
-    IMAGE,
-    IMAGE_COMPRESSED,
-    ODOMETRY,
-    SCAN,
-    STAMPED_COMMAND_TYPE,
-    TF_STATIC,
-    TYPES,
-    resolved,
-)
 from limo_hog.ros2.outputs import frame_named
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
 
 S = TypeVar("S")
 
 #: Sensors beside the camera's images.
-SENSED = (CAMERA_INFO, DEPTH, DEPTH_LCAS, SCAN, ODOMETRY)
+SENSED = (names.CAMERA_INFO, names.DEPTH, names.DEPTH_LCAS, names.SCAN, names.ODOMETRY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +65,10 @@ def replay(
     topics: set[str] = set()
     frames = 0
     node = NodeNames("limo_hog_follower") if node is None else node
-    own = {resolved(node, topic): topic for topic in (*SENSED, IMAGE, IMAGE_COMPRESSED, COMMAND, TF_STATIC)}
+    own = {
+        names.resolved(node, topic): topic
+        for topic in (*SENSED, names.IMAGE, names.IMAGE_COMPRESSED, names.COMMAND, names.TF_STATIC)
+    }
 
     def work(now: float, twist: Twist | None) -> Replayed:
         nonlocal follower
@@ -99,8 +87,10 @@ def replay(
         topics.add(topic)
         name = own.get(topic, "")
         # Of a camera recorded both ways, the raw images are looked at.
-        is_image = name == IMAGE or (name == IMAGE_COMPRESSED and resolved(node, IMAGE) not in topics)
-        command = _command(message) if name == COMMAND else None
+        is_image = name == names.IMAGE or (
+            name == names.IMAGE_COMPRESSED and names.resolved(node, names.IMAGE) not in topics
+        )
+        command = _command(message) if name == names.COMMAND else None
         if waiting is not None and (is_image or command is not None):
             yield work(time, command)
             waiting, recorded, frames = None, None, frames + 1
@@ -108,42 +98,39 @@ def replay(
             follower.tick(time, None, senses.sensors)
         if is_image:
             waiting = message
-        elif message.__msgtype__ == DETECTIONS_TYPE:
+        elif message.__msgtype__ == names.DETECTIONS_TYPE:
             recorded = to_detections(message)
-        elif name == TF_STATIC:
+        elif name == names.TF_STATIC:
             mounts.take(message)
         elif name in SENSED:
-            lidar = message.header.frame_id if name == SCAN else lidar
+            lidar = message.header.frame_id if name == names.SCAN else lidar
             senses.take(message)
     if waiting is not None:
         yield work(time, None)
         frames += 1
     if not frames:
         there = ", ".join(sorted(topics)) or "nothing"
-        raise BagError(f"no images on {resolved(node, IMAGE)}; the recording holds {there}")
+        raise BagError(f"no images on {names.resolved(node, names.IMAGE)}; the recording holds {there}")
 
 
 def kind_of(record: Record) -> str:
     """Return the type of a record's message; a depth image's is that of its own, "depth"."""
     kind: str = record.message.__msgtype__
-    is_depth = kind == TYPES[DEPTH] and record.message.encoding in DEPTH_ENCODINGS
+    is_depth = kind == names.TYPES[names.DEPTH] and record.message.encoding in DEPTH_ENCODINGS
     return "depth" if is_depth else kind
 
 
 def elsewhere(kinds: Mapping[str, str], node: NodeNames) -> list[str]:
-    """Name the sensors that a recording has on other topics than they have for a node.
+    """Name the sensors that a recording has on other topics than they have for `node`.
 
-    Parameters
-    ----------
-    kinds
-        Of each topic of the recording, what `kind_of` says.
-    node
-        Whose names the topics have.
+    `kinds` has what `kind_of` says of each topic of the recording.
     """
     told = []
-    for topic in (SCAN, ODOMETRY, DEPTH):
-        wanted = "depth" if topic == DEPTH else TYPES[topic]
-        known = [resolved(node, one) for one in ((DEPTH, DEPTH_LCAS) if topic == DEPTH else (topic,))]
+    for topic in (names.SCAN, names.ODOMETRY, names.DEPTH):
+        wanted = "depth" if topic == names.DEPTH else names.TYPES[topic]
+        known = [
+            names.resolved(node, one) for one in ((names.DEPTH, names.DEPTH_LCAS) if topic == names.DEPTH else (topic,))
+        ]
         others = sorted(other for other, kind in kinds.items() if kind == wanted)
         if others and not set(known) & set(others):
             rule = f"--ros-args -r {topic.lstrip('/')}:={others[0]}"
@@ -153,8 +140,8 @@ def elsewhere(kinds: Mapping[str, str], node: NodeNames) -> list[str]:
 
 def _command(message: Any) -> Twist | None:
     """Return the command that drives the robot, of either type; None of any other message."""
-    if message.__msgtype__ == TYPES[COMMAND]:
+    if message.__msgtype__ == names.TYPES[names.COMMAND]:
         return messages.to_twist(message)
-    if message.__msgtype__ == STAMPED_COMMAND_TYPE:
+    if message.__msgtype__ == names.STAMPED_COMMAND_TYPE:
         return messages.to_twist(message.twist)
     return None

@@ -29,19 +29,12 @@ CAMERA_ENCODINGS = ("bgr8", "rgb8", "bgra8", "rgba8", "mono8", "mono16", "yuv422
 
 
 class Senses:
-    """Takes in sensor messages, ours or rclpy's, and tells what was known when a camera image was taken.
-
-    Attributes
-    ----------
-    focal_px
-        Focal length of the camera [px]; None until its calibration has come.
-    scan, odometry
-        The newest; None before the first.
-    """
+    """Takes in sensor messages, ours or rclpy's, and tells what was known when a camera image was taken."""
 
     def __init__(self, robot: RobotGeometry = LIMO) -> None:
         self._robot = robot
-        self.focal_px: float | None = None
+        self.focal_px: float | None = None  #: of the camera [px]; None until its calibration has come
+        #: The newest of each; None before the first.
         self.scan: Scan | None = None
         self.odometry: Odometry | None = None
         self._depths: deque[tuple[float, NDArray[np.float32], int]] = deque(maxlen=_DEPTHS)

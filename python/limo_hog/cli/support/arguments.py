@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import REMAINDER, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,25 +31,16 @@ def size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def count(text: str) -> int:
-    """Read a whole number from 1 on."""
-    return _whole(text, 1, "no count; wanted is a whole number from 1 on")
-
-
-def threads(text: str) -> int:
-    """Read a number of threads, 0 for all cores."""
-    return _whole(text, 0, "no number of threads; wanted is 0 (all cores) or more")
-
-
-def seed(text: str) -> int:
-    """Read a seed."""
-    return _whole(text, 0, "no seed; wanted is a whole number from 0 on")
-
-
 def _whole(text: str, least: int, complaint: str) -> int:
     if not text.isdecimal() or len(text) > _MOST_DIGITS or int(text) < least:
         raise ArgumentTypeError(f"{_cut(text)} is {complaint}, of at most {_MOST_DIGITS} digits")
     return int(text)
+
+
+#: A whole number from 1 on; a number of threads, 0 for all cores; a seed.
+count = partial(_whole, least=1, complaint="no count; wanted is a whole number from 1 on")
+threads = partial(_whole, least=0, complaint="no number of threads; wanted is 0 (all cores) or more")
+seed = partial(_whole, least=0, complaint="no seed; wanted is a whole number from 0 on")
 
 
 def _cut(text: str) -> str:
@@ -64,14 +56,11 @@ def number(text: str, low: float, high: float, what: str) -> float:
         raise ArgumentTypeError(f"{_cut(text)} is no {what}; {wanted}") from None
 
 
-def metres(text: str) -> float:
-    """Read a distance [m]."""
-    return number(text, 0.1, 8.0, "distance in metres")
-
-
-def seconds(text: str) -> float:
-    """Read a duration [s]."""
-    return number(text, 0.1, 86400.0, "duration in seconds")
+#: A distance [m], a duration [s], an SVM margin, and the height of people in pictures [px].
+metres = partial(number, low=0.1, high=8.0, what="distance in metres")
+seconds = partial(number, low=0.1, high=86400.0, what="duration in seconds")
+score = partial(number, low=-100, high=100, what="score")
+height = partial(number, low=8, high=10_000, what="height in pixels")
 
 
 def output_file(text: str) -> str:
@@ -104,16 +93,6 @@ def add_search(parser: ArgumentParser) -> None:
     )
 
 
-def score(text: str) -> float:
-    """Read an SVM margin."""
-    return number(text, -100, 100, "score")
-
-
-def height(text: str) -> float:
-    """Read the height of people in pictures [px]."""
-    return number(text, 8, 10_000, "height in pixels")
-
-
 def least_height(text: str) -> float | None:
     """Read the height of the smallest person, or none for pictures at their own size [px]."""
     return None if text == "none" else height(text)
@@ -133,16 +112,10 @@ def file_ending(*suffixes: str) -> Callable[[str], Path]:
 def add_follower(parser: ArgumentParser) -> None:
     """Add the options that choose a controller and a detector."""
     from limo_hog.follow.control.naming import CONTROLLERS
+    from limo_hog.follow.tracks.asking import WORDS
 
     parser.add_argument("--controller", choices=CONTROLLERS, default="tracking", help="the controller (%(default)s)")
     add_target_and_detector(parser)
-    add_person(parser)
-
-
-def add_person(parser: ArgumentParser) -> None:
-    """Add --person."""
-    from limo_hog.follow.tracks.asking import WORDS
-
     parser.add_argument(
         "--person", type=whom, metavar="|".join((*WORDS, "N")), help="whom of several to follow; N is a person's number"
     )

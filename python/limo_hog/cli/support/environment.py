@@ -50,13 +50,12 @@ def extras() -> list[Extra]:
         found = re.match(r"([\w.-]+).*\bextra == ['\"]([\w-]+)['\"]", line)
         if found and found[1] != "limo-hog":
             wanted.setdefault(found[2], []).append(found[1])
-    return [_extra(name, libraries, f"'limo-hog[{name}]'") for name, libraries in sorted(wanted.items())]
-
-
-def _extra(name: str, libraries: list[str], install: str) -> Extra:
-    versions = {library: _version(library) for library in libraries}
-    installed = [found for found in versions.values() if found]
-    return Extra(name, installed, None if len(installed) == len(libraries) else f"pip install {install}")
+    listed = []
+    for name, libraries in sorted(wanted.items()):
+        installed = [each for library in libraries if (each := _version(library))]
+        whole = len(installed) == len(libraries)
+        listed.append(Extra(name, installed, None if whole else f"pip install 'limo-hog[{name}]'"))
+    return listed
 
 
 def _version(library: str) -> str | None:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limo_hog.cli.support.results import Row
 from limo_hog.cv2_api.arguments import shown
-from limo_hog.detections import Detections
 from limo_hog.imaging.writing import jpeg
 from limo_hog.live.controls import Parameter, ParameterError
 from limo_hog.live.server import Live
@@ -22,16 +22,8 @@ _LOWEST, _HIGHEST = -1.0, 3.0
 _RATE_OVER = 25
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class Shown:
-    """What the page shows of a picture that was searched: boxes and numbers are drawn into it."""
-
-    source: str
-    frame: int
-    people: Detections
-    picture: NDArray[np.uint8]
-    ms: float  #: what the detection took [ms]
-    dropped: int  #: pictures of a live source that nobody took so far
+#: A picture that was searched, boxes and numbers drawn into it; and how many of a live source nobody took so far.
+Shown = tuple[Row, NDArray[np.uint8], int]
 
 
 class FilmPage(Live[Shown]):
@@ -64,18 +56,19 @@ class FilmPage(Live[Shown]):
         return {"threshold": dataclasses.asdict(self.threshold)}
 
     def _state(self, moment: Shown) -> dict[str, Any]:
+        row, _, dropped = moment
         seconds = self._times[-1] - self._times[0]
         return {
-            "source": moment.source,
-            "frame": moment.frame,
-            "people": len(moment.people),
-            "ids": [] if moment.people.ids is None else moment.people.ids.tolist(),
-            "detect_ms": moment.ms,
+            "source": row.source,
+            "frame": row.frame,
+            "people": len(row.people),
+            "ids": [] if row.people.ids is None else row.people.ids.tolist(),
+            "detect_ms": row.ms,
             "rate": (len(self._times) - 1) / seconds if seconds else None,
-            "dropped": moment.dropped,
+            "dropped": dropped,
             "threshold": self.threshold.value,
             "paused": self.pace.paused,
         }
 
     def _pictures(self, moment: Shown) -> list[bytes]:
-        return [jpeg(moment.picture)]
+        return [jpeg(moment[1])]

@@ -121,17 +121,11 @@ def emit(line: str) -> None:
 
 
 class _Lasting:
-    """A text stream that drops what is written once its reader or its terminal is gone.
-
-    Attributes
-    ----------
-    lost
-        Whether it is gone.
-    """
+    """A text stream that drops what is written once its reader or its terminal is gone."""
 
     def __init__(self, stream: Any, *, every_error: bool) -> None:
         self._stream, self._every_error = stream, every_error
-        self.lost = False
+        self.lost = False  #: whether its reader is gone
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)

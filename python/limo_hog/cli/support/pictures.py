@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -22,8 +22,8 @@ import limo_hog
 from limo_hog.cli.support.copies import copies_of, real, written
 from limo_hog.cli.support.films import PIECE_S, Identities, Newest, pieces
 from limo_hog.cli.support.output import UsageError, emit, one_line, printable, refuse_to_overwrite
-from limo_hog.cli.support.results import Result, Results
-from limo_hog.detections import Detections, people
+from limo_hog.cli.support.results import Result, Results, Row
+from limo_hog.detections import people
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ImageError
 from limo_hog.imaging.reading import (
@@ -52,35 +52,6 @@ Image = NDArray[np.uint8]
 Frame = tuple[int, Image, float]
 #: Pictures that are tracked are taken for a film of this rate [Hz].
 _PICTURES_HZ = 25.0
-
-
-@dataclass(frozen=True)
-class Row:
-    """The people found in one picture."""
-
-    source: str
-    frame: int
-    width: int
-    height: int
-    people: Detections
-    ms: float
-    at: float  #: its time in the film [s]; that of a clock for a live source
-
-    def result(self) -> Result:
-        """Return it as plain values; a model without calibration has None for each probability."""
-        people = self.people
-        return {
-            "source": self.source,
-            "frame": self.frame,
-            "width": self.width,
-            "height": self.height,
-            "boxes": people.boxes.tolist(),
-            "windows": people.windows.tolist(),
-            "scores": people.scores.tolist(),
-            "probabilities": people.probabilities.round(4).tolist() if people.calibration else [None] * len(people),
-            **({} if people.ids is None else {"ids": people.ids.tolist()}),
-            "ms": self.ms,
-        }
 
 
 class Run:
@@ -311,12 +282,7 @@ class Run:
             found = replace(found, people=people)
             picture = None if picture is None else self._identities.draw(people, picture)
         if self.page and picture is not None:
-            # Imported here: the server is an extra.
-            from limo_hog.cli.support.film_page import Shown
-
-            dropped = newest.dropped if newest else 0
-            shown = Shown(found.source, found.frame, found.people, picture, found.ms, dropped)
-            self.page.watch(shown, None if newest else found.at)
+            self.page.watch((found, picture, newest.dropped if newest else 0), None if newest else found.at)
         return found, picture
 
     def _is_done(self, source: Source) -> bool:

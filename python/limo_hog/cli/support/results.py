@@ -8,31 +8,52 @@ import json
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from limo_hog.atomic import about, json_text, part_of, write_text
 from limo_hog.cli.support.output import STDOUT, emit, refuse_to_overwrite
-from limo_hog.detections import BOX_COLUMNS, WINDOW_COLUMNS
+from limo_hog.detections import BOX_COLUMNS, WINDOW_COLUMNS, Detections
 from limo_hog.exceptions import LimoHogError
 
 #: One line: source, frame, width, height, boxes, windows, scores, probabilities, ids if tracked, ms, parameters.
 Result = dict[str, Any]
-#: What of a line is read back.
-_KINDS = {
-    "source": str,
-    "frame": int,
-    "width": int,
-    "height": int,
-    "boxes": list,
-    "windows": list,
-    "scores": list,
-    "probabilities": list,
-    "parameters": dict,
-}
 #: What of a line has an entry for each person.
 _EACH = ("boxes", "windows", "scores", "probabilities")
+#: What of a line is read back.
+_KINDS: dict[str, type] = {"source": str, "frame": int, "width": int, "height": int, "parameters": dict}
+_KINDS |= dict.fromkeys(_EACH, list)
+
+
+@dataclass(frozen=True)
+class Row:
+    """The people found in one picture."""
+
+    source: str
+    frame: int
+    width: int
+    height: int
+    people: Detections
+    ms: float
+    at: float  #: its time in the film [s]; that of a clock for a live source
+
+    def result(self) -> Result:
+        """Return it as plain values; a model without calibration has None for each probability."""
+        people = self.people
+        return {
+            "source": self.source,
+            "frame": self.frame,
+            "width": self.width,
+            "height": self.height,
+            "boxes": people.boxes.tolist(),
+            "windows": people.windows.tolist(),
+            "scores": people.scores.tolist(),
+            "probabilities": people.probabilities.round(4).tolist() if people.calibration else [None] * len(people),
+            **({} if people.ids is None else {"ids": people.ids.tolist()}),
+            "ms": self.ms,
+        }
 
 
 class Results(NamedTuple):

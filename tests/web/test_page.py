@@ -121,7 +121,7 @@ def test_sliders_give_the_figures_of_the_workshop(
     own_lab.page.locator("#model").select_option("opencv")
     own_lab.page.locator("#stride").fill(str(stride))
     own_lab.page.locator("#scale").fill(str(scale))
-    own_lab.wait(f"document.getElementById('hits-says').textContent === '{hits} hits become {people} people.'")
+    own_lab.wait(f"document.getElementById('hits-says').textContent === 'Hits: {hits}. People: {people}.'")
 
 
 def street(lab: Lab, width: int = 640, height: int = 480) -> bytes:

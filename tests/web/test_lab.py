@@ -105,7 +105,7 @@ for _ in sys.stdin:
 @pytest.mark.skipif("sse41" not in limo_hog._core.available_backends(), reason="a CPU without SSE4.1")
 @pytest.mark.parametrize("lab", ["hog.wasm"], indirect=True)
 def test_a_search_takes_at_most_three_times_as_long_as_with_sse41(lab: Lab) -> None:
-    """In turns, the fastest of each: 1.5 times was measured, 3.7 without a lane for simd128."""
+    """In turns, the fastest of each: 3.7 times was measured without a lane for simd128."""
     lab.page.evaluate(
         """async (data) => {
             await lab.choose("opencv");

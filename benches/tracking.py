@@ -92,7 +92,7 @@ def data_of(frames: list[Frame], answers: Iterator[Detections]) -> dict[str, Any
     for side in ("gt", "tracker"):
         lists = data[f"{side}_ids"]
         known, flat = np.unique(np.concatenate(lists), return_inverse=True)
-        data[f"{side}_ids"] = np.split(flat, np.cumsum([len(one) for one in lists])[:-1])
+        data[f"{side}_ids"] = np.split(flat, np.cumsum([len(ids) for ids in lists])[:-1])
         data[f"num_{side}_ids"], data[f"num_{side}_dets"] = len(known), len(flat)
     return data | {"num_timesteps": len(frames)}
 

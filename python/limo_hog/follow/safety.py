@@ -31,7 +31,7 @@ from limo_hog.follow.sense.clearance import (
     to_odometry,
 )
 from limo_hog.follow.sense.observation import Observation, Odometry, Scan
-from limo_hog.follow.tracks.asking import Whom, WhomError, checked
+from limo_hog.follow.tracks.asking import Whom, ask_of, checked
 
 S = TypeVar("S")
 
@@ -120,10 +120,7 @@ class Guard(Generic[S]):
 
     def ask(self, whom: Whom, state: GuardState[S]) -> GuardState[S]:
         """Return the state in which the guarded controller is asked to follow a person; raises `WhomError`."""
-        ask = getattr(self.controller, "ask", None)
-        if ask is None:
-            raise WhomError(f"{type(self.controller).__name__} follows nobody in particular: use TrackingController")
-        return replace(state, inner=ask(checked(whom), state.inner))
+        return replace(state, inner=ask_of(self.controller)(checked(whom), state.inner))
 
     def recheck(
         self, now: float, scan: Scan | None, odometry: Odometry | None, state: GuardState[S]

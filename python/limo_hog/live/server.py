@@ -141,7 +141,7 @@ class Live(ABC, Generic[Moment]):
 
     @abstractmethod
     def _pictures(self, moment: Moment) -> list[bytes]:
-        """Encode the pictures of a moment; a letter before each tells which."""
+        """Encode the pictures of a moment, as the page reads them."""
 
     @property
     def url(self) -> str:

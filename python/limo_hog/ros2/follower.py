@@ -6,7 +6,6 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -180,11 +179,10 @@ class Settings:
     say: Callable[[str], None] = lambda _: None
 
 
-@contextmanager
-def _told(say: Callable[[str], None]) -> Iterator[None]:
-    """Tell what was asked for and names nobody."""
+def _ask(follower: Follower[S], whom: str, say: Callable[[str], None]) -> None:
+    """Ask for a person; what names nobody is told."""
     try:
-        yield
+        follower.follow(whom)
     except WhomError as error:
         say(str(error))
 
@@ -221,8 +219,7 @@ def drive(
                 settings.say(line)
             # Of several that came at once the last is meant.
             for message in asked.take()[-1:]:
-                with _told(settings.say):
-                    follower.follow(message.data)
+                _ask(follower, message.data, settings.say)
             log = follower.tick(now, frame, inputs.senses.sensors)
             if log is None:
                 continue

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from limo_hog.cli.support.arguments import file_ending
 from limo_hog.cli.support.output import STDOUT, write_json
-from limo_hog.cli.support.page import HERE, PORT, address, announce, has_display
+from limo_hog.cli.support.page import PORT, add_view, announce, has_display
 from limo_hog.exceptions import LimoHogError
 from limo_hog.signals import held
 
@@ -27,13 +27,9 @@ if TYPE_CHECKING:
 def add_watching(parser: argparse.ArgumentParser, *, plot: bool = True) -> None:
     """Add the options; --plot is not shown where a run has no end at which to draw."""
     group = parser.add_argument_group("to show and to record the run")
-    group.add_argument(
-        "--view",
-        nargs="?",
-        const=(HERE, PORT),
-        type=address,
-        metavar="[HOST:]PORT|off",
-        help=f"show the run, in real time, on a page ({PORT}), which opens where there is a display; without HOST to "
+    add_view(
+        group,
+        f"show the run, in real time, on a page ({PORT}), which opens where there is a display; without HOST to "
         "this machine alone. `follow` shows it unasked where nothing else is asked for",
     )
     group.add_argument(

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 from limo_hog.cv2_api.arguments import shown
 from limo_hog.follow.decision import Controller, Decision
 from limo_hog.follow.sense.observation import Observation
-from limo_hog.follow.tracks.asking import Whom, WhomError, checked
+from limo_hog.follow.tracks.asking import Whom, ask_of, checked
 from limo_hog.live.controls import Parameter, ParameterError
 
 S = TypeVar("S")
@@ -33,14 +33,13 @@ class Tunable(Generic[S]):
     def step(self, observation: Observation, state: S) -> Decision[S]:
         """Decide as the controller with today's parameters does."""
         asked, self._asked = self._asked, None
-        controller: Any = self._controller
-        decision: Decision[S] = controller.step(observation, state if asked is None else controller.ask(asked, state))
-        return decision
+        if asked is not None:
+            state = ask_of(self._controller)(asked, state)
+        return self._controller.step(observation, state)
 
     def follow(self, whom: Whom) -> None:
         """Ask to follow a person from the next step on, as `Follower.follow`; raises `WhomError`."""
-        if not hasattr(self._controller, "ask"):
-            raise WhomError(f"{type(self._controller).__name__} follows nobody in particular")
+        ask_of(self._controller)
         self._asked = checked(whom)
 
     @property

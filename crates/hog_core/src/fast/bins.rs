@@ -37,8 +37,8 @@ use std::hint::black_box;
 use super::lane::{Lane, ODD};
 use super::layout::{BINS, CELL};
 
-/// A gradient's two votes. Of two neighbouring bins one is even and one is odd, so each vote is kept by parity and a
-/// bin has to look at one of them only. Bins 8 and 0 are neighbours too: there the odd vote belongs to the other one.
+/// A gradient's two votes, one for an even bin and one for an odd bin: a bin reads the vote of its own parity alone.
+/// Bins 8 and 0 are neighbours too, and both even: of a gradient between them one bin reads the even vote, the other the odd.
 ///
 /// Even bin b has slot b / 2, odd bin b has slot `ODD` + (b + 1) / 2; `ODD` stands for bin 8, `ODD` + 5 for bin 0.
 #[derive(Clone, Copy)]

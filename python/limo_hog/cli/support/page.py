@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import webbrowser
-from argparse import ArgumentTypeError
+from argparse import ArgumentParser, ArgumentTypeError, _ArgumentGroup
 
 HERE, PORT = "127.0.0.1", 8488
 
@@ -18,6 +18,11 @@ def address(text: str) -> tuple[str, int] | tuple[()]:
     if not port.isdecimal() or int(port) > 65535:
         raise ArgumentTypeError(f"{text!r} is no [HOST:]PORT such as {PORT} or 0.0.0.0:{PORT}")
     return host.strip("[]") or HERE, int(port)
+
+
+def add_view(parser: ArgumentParser | _ArgumentGroup, about: str) -> None:
+    """Add --view; `about` is its help."""
+    parser.add_argument("--view", nargs="?", const=(HERE, PORT), type=address, metavar="[HOST:]PORT|off", help=about)
 
 
 def has_display() -> bool:

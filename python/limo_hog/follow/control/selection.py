@@ -151,7 +151,8 @@ class Selection:
     def _asked(self, whom: Whom, tracks: Tracks, choice: Choice) -> Choice | None:
         """Take the person asked for once they are in view; None where somebody else is followed until then."""
         now, follows = tracks.stamp or 0.0, choice.likeness is not None
-        people = [one for one in self.measured(tracks) if one.confirmed or not follows]
+        # Somebody who is followed is left for a confirmed person alone.
+        people = [person for person in self.measured(tracks) if person.confirmed or not follows]
         one = picked(whom, people, pose_at(tracks.poses, now))
         if one is None:
             return None if follows else replace(choice, number=None)

@@ -407,7 +407,7 @@ class TrackingController:
         if state.since_full + 1 >= self.whole_image_every or not self.selection.is_candidate(person):
             return None
         if state.choice.asked is not None or not self._is_sure(person, state.choice):
-            # The person asked for, or the right one, may be beside the one who is followed.
+            # The person asked for, or the right person, may be outside the region of the person followed.
             return None
         stamp = observation.stamp + state.tracks.period
         pose = pose_at(state.tracks.poses, stamp)

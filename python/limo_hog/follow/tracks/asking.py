@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.sense.observation import Odometry
@@ -36,6 +37,14 @@ def checked(whom: Whom) -> Whom:
     raise WhomError(f"got {str(whom)[:40]!r} for the person to follow; want {', '.join(WORDS)}, or a person's number")
 
 
+def ask_of(controller: Any) -> Callable[[Whom, Any], Any]:
+    """Return the method that asks a controller for a person; raises `WhomError` for one that has none."""
+    if not hasattr(controller, "ask"):
+        raise WhomError(f"{type(controller).__name__} follows nobody in particular: use TrackingController")
+    ask: Callable[[Whom, Any], Any] = controller.ask
+    return ask
+
+
 def named(whom: Whom) -> str:
     """Return what was asked for, in words."""
     return f"person {whom}" if isinstance(whom, int) else _RANKS[whom][0]
@@ -44,6 +53,6 @@ def named(whom: Whom) -> str:
 def picked(whom: Whom, people: Iterable[Person], pose: Odometry) -> Person | None:
     """Return the person of `people` that is asked for, as seen by a robot at `pose`; None where they are not there."""
     if isinstance(whom, int):
-        return next((one for one in people if one.number == whom), None)
+        return next((person for person in people if person.number == whom), None)
     rank = _RANKS[whom][1]
-    return max(people, key=lambda one: rank(*bearing_range(one.track, pose), one.window), default=None)
+    return max(people, key=lambda person: rank(*bearing_range(person.track, pose), person.window), default=None)

@@ -17,6 +17,8 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+import cv2
+
 import limo_hog
 from limo_hog.follow import Decision, Follower, Frame, TrackingController, Twist
 from limo_hog.follow.sense.detectors import detector_named
@@ -144,6 +146,7 @@ def judged_apart(ride: Ride, row: Row) -> Row:
 def rows_of(seed: int, shifted: str, shift: float) -> list[Row]:
     """Play all cases of a seed and a wrong clock: they share the first seconds."""
     limo_hog.set_num_threads(1)
+    cv2.setNumThreads(0)  # OpenCV's threads do not survive the fork of `judged_apart`.
     ride = Ride(seed, shifted, shift)
     losses = [(name,) for name in SHIFTED if name != shifted] if shifted else SUBSETS
     rows = [] if shifted else [judged_apart(ride, Row(seed, lost, 0.0)) for lost in losses]

@@ -109,24 +109,6 @@ class Stage:
         self._seen_before = False
         self._collected = False
         self._told = 0
-        self._handlers = self._named_handlers()
-
-    def _named_handlers(self) -> dict[str, Callable[..., None]]:
-        """Return what is done with each message of the node, by its name."""
-        return {
-            "called": self._called,
-            "closed": self._closed,
-            "command": self._command,
-            "found": self._find,
-            "given": lambda stamp: self.calls.images.append(float(stamp)),
-            "log": lambda *line: self.log(self.time, *map(str, line)),
-            "looked": self._looked,
-            "published": lambda topic: self.published.add(str(topic)),
-            "read": lambda line: setattr(self.calls, "solution_read", int(line or 0)),
-            "shown": self._show,
-            "slept": self._slept,
-            "spun": lambda: setattr(self.calls, "spun", True),
-        }
 
     @property
     def commands(self) -> list[Command]:
@@ -155,7 +137,7 @@ class Stage:
         self._told += 1
         if self._told > _MOST_TOLD:
             raise ValueError(f"{_MOST_TOLD} messages without a step of the arena: the loop that sends them never waits")
-        self._handlers[told](*content, **({"data": data} if data else {}))
+        _HANDLERS[told](self, *content, **({"data": data} if data else {}))
 
     def advance(
         self, wanted: Collection[str] = (), target: float | None = None, until: float = 0.0
@@ -304,6 +286,8 @@ class Stage:
             self.seconds = failed_at + _AFTERMATH
         while not self.over:
             self.advance((), self.target_distance)
+        # (Who listens may hold this run: without this, its pictures stay until Python looks for cycles.)
+        self.log, self.watch = (lambda *_: None), (lambda _: None)
         episode = Episode(
             scenario=self.arena.scenario,
             controller=self.script.name,
@@ -341,6 +325,23 @@ def _news(topic: str, message: Any) -> News:
         return topic, serialize(message), b""
     # (Pixels are not copied into the message: the node's process does that.)
     return topic, serialize(replace(message, data=message.data[:0])), message.data
+
+
+#: What is done with each message of the node, by its name.
+_HANDLERS: dict[str, Callable[..., None]] = {
+    "called": Stage._called,
+    "closed": Stage._closed,
+    "command": Stage._command,
+    "found": Stage._find,
+    "given": lambda stage, stamp: stage.calls.images.append(float(stamp)),
+    "log": lambda stage, *line: stage.log(stage.time, *map(str, line)),
+    "looked": Stage._looked,
+    "published": lambda stage, topic: stage.published.add(str(topic)),
+    "read": lambda stage, line: setattr(stage.calls, "solution_read", int(line or 0)),
+    "shown": Stage._show,
+    "slept": Stage._slept,
+    "spun": lambda stage: setattr(stage.calls, "spun", True),
+}
 
 
 @dataclass(frozen=True)

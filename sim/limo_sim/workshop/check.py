@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -78,8 +77,6 @@ def examine(
     judged by what it did before, and in the other scenes. `limits` are those of all scenes together; `said` is given
     what the node prints. `workers` scenes are played at once; with several, no other thread may run a node meanwhile.
     """
-    # A stage refers to itself: without this, the .7 GB of pictures of each node examined before stay for a while.
-    gc.collect()
     wanted = exercise(name)
     limits = replace(limits or Limits(), began=time.monotonic())
     source = Source(script)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import gc
+import weakref
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from limo_sim.workshop import solution
 from limo_sim.workshop.check import Verdict, check
 from limo_sim.workshop.exercises import exercise, scene_named
 from limo_sim.workshop.report import by_task, total
+from limo_sim.workshop.takes import play
 from limo_sim.world.schema import ScenarioError
 
 DETECT = "self.det.detectMultiScale(img, winStride=(8, 8), padding=(4, 4), scale=1.05)"
@@ -255,3 +258,13 @@ def test_what_python_or_opencv_refuse_is_told(tmp_path: Path, name: str) -> None
     assert said in verdicts[0].evidence
     assert len(verdicts[0].evidence) < 20_000
     assert total(verdicts) == (0, 100)
+
+
+def test_a_take_is_freed_with_its_last_user_and_not_by_the_collector_of_cycles(tmp_path: Path) -> None:
+    (tmp_path / "node.py").write_text("raise SystemExit(3)\n")
+    gc.disable()
+    try:
+        take = weakref.ref(play(tmp_path / "node.py", scene_named("left")))
+        assert take() is None
+    finally:
+        gc.enable()

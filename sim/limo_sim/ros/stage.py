@@ -43,6 +43,8 @@ _OF_DETECTIONS = (
 ).split()
 #: What a node may tell in one step of the arena; a loop that publishes tells so much in seconds. Chosen.
 _MOST_TOLD = 10_000
+#: Windows that a node may have open; this process keeps the newest picture of each. Chosen.
+_MOST_WINDOWS = 100
 
 
 class Witness:
@@ -204,6 +206,8 @@ class Stage:
             self._witness.found(self.time, found, np.frombuffer(data, np.uint8).reshape(shape))
 
     def _show(self, window: str, shape: list[int], *, data: bytes) -> None:
+        if len(self.shown) >= _MOST_WINDOWS and str(window) not in self.shown:
+            raise ValueError(f"more than {_MOST_WINDOWS} windows are open")
         self.shown[str(window)] = shown = Shown(self.time, np.frombuffer(data, np.uint8).reshape(shape))
         self._witness.shown(str(window), shown)
 

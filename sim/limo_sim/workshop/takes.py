@@ -36,6 +36,8 @@ ON_PERSON = 0.2
 _ALIKE = 16
 #: Correlation from which a searched picture is taken for a camera image, or for a part of one. Chosen.
 _CORRELATED = 0.9
+#: Pictures that may be shown in a second of a scene [bytes]: a hundred of the camera's. All are kept. Chosen.
+_MOST_SHOWN = 100 * 640 * 480 * 3
 #: A window's picture is looked for among images of this age or younger [s].
 _OLDEST = 4.0
 _THUMBNAIL = (160, 120)
@@ -106,6 +108,7 @@ class Take(Witness):
     _corners: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     outcome: Ended | None = None  #: how the run ended; None before
     _answered: Look | None = None
+    _kept: int = 0  # bytes of all pictures in `windows`
 
     @property
     def calls(self) -> Calls:
@@ -142,6 +145,9 @@ class Take(Witness):
 
     def shown(self, window: str, shown: Shown) -> None:
         """Note a picture in a window."""
+        self._kept += shown.picture.nbytes
+        if self._kept > _MOST_SHOWN * (1.0 + shown.time):
+            raise ValueError(f"more than {_MOST_SHOWN // 10**6} MB of pictures a second")
         look = _shown_in(shown.picture, self._recent(shown.time, _OLDEST))
         self.windows.append((shown.time, window, shown.picture, look))
         if look is not None:

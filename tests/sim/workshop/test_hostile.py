@@ -1,4 +1,4 @@
-"""Forty hostile nodes: each costs its own run alone, with a true sentence, and leaves nothing running."""
+"""Hostile nodes: each costs its own run alone, with a true sentence, and leaves nothing running."""
 
 from __future__ import annotations
 
@@ -49,6 +49,14 @@ IN_A_CALLBACK = {
     "printing": ("import os\nwhile True: os.write(1, b'x' * 10**6)", "more than 5 MB"),
     "printing errors": ("import sys\nwhile True: sys.stderr.write('x' * 10**5)", "more than 5 MB"),
     "logging": ("while True: self.get_logger().info('x' * 10**6)", "more than 5 MB"),
+    "pictures": (
+        "import cv2, numpy\nwhile True: cv2.imshow('a', numpy.zeros((480, 640, 3), numpy.uint8))",
+        "more than 92 MB of pictures a second",
+    ),
+    "windows": (
+        "import cv2, numpy\nfor i in range(9999): cv2.imshow(str(i), numpy.zeros((2, 2), numpy.uint8))",
+        "more than 100 windows are open",
+    ),
     "commands": ("while True: self.pub.publish(Twist())", "without a step of the arena"),
     "memory": ("keep = bytearray(10 * 10**9)", "MemoryError"),
     "memory bit by bit": ("import numpy\nkeep = []\nwhile True: keep.append(numpy.zeros(10**7))", "MemoryError"),
@@ -152,7 +160,7 @@ def test_a_hostile_file_is_reported_and_leaves_nothing(
     tried(tmp_path, text, said, monkeypatch)
 
 
-@pytest.mark.parametrize("name", ["exit 0", "segfault", "daemon", "forged messages"])
+@pytest.mark.parametrize("name", ["exit 0", "segfault", "daemon", "pictures", "forged messages"])
 def test_some_hostile_nodes(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     body, said = IN_A_CALLBACK[name]
     tried(tmp_path, HEAD + node(THEN + body), said, monkeypatch)

@@ -65,3 +65,21 @@ impl Default for SearchOptions {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_those_of_opencvs_detect_multi_scale() {
+        let wanted = SearchOptions {
+            search: Search { hit_threshold: 0.0, win_stride: (0, 0), padding: (0, 0) },
+            scale: 1.05,
+            first_level: None,
+            grouping: Grouping::Similar(2),
+            guide: None,
+            threads: 1,
+        };
+        assert_eq!(SearchOptions::default(), wanted);
+    }
+}

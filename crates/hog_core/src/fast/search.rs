@@ -1,8 +1,13 @@
 //! A search of many levels at once, shared among threads: tiles, cut into bands, of which any thread may take the rest.
 //!
-//! A thread makes the bands of a tile one after the other, from the top. One that has nothing to do takes the lower half of
-//! the bands that another one has before it. Where the two meet, the windows of the upper one's last band end in the lower
-//! one's first: whichever is there last has the blocks of both, and scores them (a [`Seam`]). So nothing waits.
+//! ```text
+//! each thread, until nothing is left:
+//!     take:  the next tile; or, of that with most work left, the lower half of the bands that its thread has before it
+//!     for each band, from the top:  make its blocks; score the windows that begin in the band above
+//!     at a cut (a `Seam`):  the first thread there leaves its blocks; the second scores the windows across it
+//! ```
+//!
+//! Trick: windows across a cut need the blocks of both threads, yet neither waits for the other.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

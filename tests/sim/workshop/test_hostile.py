@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from dataclasses import replace
@@ -94,6 +95,11 @@ IN_A_CALLBACK = {
         "link.tell('points', 100)",
         "it sent what is no message of a node",
     ),
+    "a deep message": (
+        "import gc\nlink = next(o for o in gc.get_objects() if type(o).__name__ == 'SocketLink')\n"
+        "link._connection.sendall(bytes((160, 134, 1, 0, 0, 0, 0, 0)) + b'[' * 100000)",
+        "it sent what is no message of a node",
+    ),
 }
 #: The same as a file.
 FILES = {
@@ -175,6 +181,14 @@ def test_check_of_a_node_that_exits_writes_a_report_and_returns_1(
     assert "0 of 100 points" in said.out
     assert "its process ended with status 0" in " ".join(said.out.split())
     assert (tmp_path / "points.json").is_file()
+
+
+def test_what_a_node_prints_is_not_in_the_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "node.py").write_text("print('{oh}')\nraise SystemExit(3)\n")
+    assert main(["workshop", "check", str(tmp_path / "node.py"), "--json", "-"]) == 1
+    said = capsys.readouterr()
+    assert json.loads(said.out)["points"] == 0
+    assert "{oh}" in said.err
 
 
 def test_a_process_that_waited_for_a_node_and_was_killed_is_replaced(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.runner import Limits, Said
 from limo_sim.ros.worker import no_nodes
 from limo_sim.workshop.exercises import Checkpoint, Exercise, exercise
@@ -77,6 +78,8 @@ def examine(
     judged by what it did before, and in the other scenes. `limits` are those of all scenes together; `said` is given
     what the node prints. `workers` scenes are played at once; with several, no other thread may run a node meanwhile.
     """
+    if not script.is_file():
+        raise StubError(f"{script}: no such file")
     wanted = exercise(name)
     limits = replace(limits or Limits(), began=time.monotonic())
     source = Source(script)

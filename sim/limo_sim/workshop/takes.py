@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from limo_hog.detections import Detections
 from limo_hog.suppression import intersection_over_union
 from limo_sim.ros.lockstep.calls import LOGGER, Calls
-from limo_sim.ros.lockstep.records import Command, Found, Shown
+from limo_sim.ros.lockstep.records import Command, Fault, Found, Shown, StubError
 from limo_sim.ros.runner import Limits, Said, run_node
 from limo_sim.ros.stage import Ended, Stage, Witness
 from limo_sim.run.log import Step
@@ -178,7 +178,10 @@ def play(script: Path, scene: Scene, limits: Limits | None = None, said: Said = 
         take.path.append((step.log.time, *step.truth.robot))
 
     stage = Stage(script, scene.scenario, scene.seconds, log=take.log, watch=watch, witness=take)
-    take.outcome = run_node(stage, ("--ros-args", *scene.arguments), limits=limits, said=said, checked=True)
+    try:
+        take.outcome = run_node(stage, ("--ros-args", *scene.arguments), limits=limits, said=said, checked=True)
+    except StubError as error:  # a node that has deleted its file in an earlier scene
+        take.outcome = stage.finish(Fault("was stopped", str(error)))
     return take
 
 

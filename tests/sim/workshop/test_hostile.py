@@ -8,14 +8,18 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.sim.ros.scripts import DRIVE, HEAD, node
 
 from limo_hog.cli.main import main
 from limo_sim.ros import runner, worker
+from limo_sim.ros.lockstep.records import Shown
 from limo_sim.ros.runner import Limits
 from limo_sim.workshop.check import examine
+from limo_sim.workshop.exercises import scene_named
 from limo_sim.workshop.report import total
+from limo_sim.workshop.takes import Take
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what a node leaves is found by Linux's /proc")
 
@@ -50,10 +54,6 @@ IN_A_CALLBACK = {
     "printing": ("import os\nwhile True: os.write(1, b'x' * 10**6)", "more than 5 MB"),
     "printing errors": ("import sys\nwhile True: sys.stderr.write('x' * 10**5)", "more than 5 MB"),
     "logging": ("while True: self.get_logger().info('x' * 10**6)", "more than 5 MB"),
-    "pictures": (
-        "import cv2, numpy\nwhile True: cv2.imshow('a', numpy.zeros((480, 640, 3), numpy.uint8))",
-        "more than 92 MB of pictures a second",
-    ),
     "windows": (
         "import cv2, numpy\nfor i in range(9999): cv2.imshow(str(i), numpy.zeros((2, 2), numpy.uint8))",
         "more than 100 windows are open",
@@ -166,7 +166,7 @@ def test_a_hostile_file_is_reported_and_leaves_nothing(
     tried(tmp_path, text, said, monkeypatch)
 
 
-@pytest.mark.parametrize("name", ["exit 0", "segfault", "daemon", "pictures", "forged messages"])
+@pytest.mark.parametrize("name", ["exit 0", "segfault", "daemon", "own file deleted", "forged messages"])
 def test_some_hostile_nodes(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     body, said = IN_A_CALLBACK[name]
     tried(tmp_path, HEAD + node(THEN + body), said, monkeypatch)
@@ -189,6 +189,14 @@ def test_what_a_node_prints_is_not_in_the_json(tmp_path: Path, capsys: pytest.Ca
     said = capsys.readouterr()
     assert json.loads(said.out)["points"] == 0
     assert "{oh}" in said.err
+
+
+def test_a_node_that_shows_pictures_without_end_is_stopped() -> None:
+    take, shown = Take(scene_named("left")), Shown(0.0, np.zeros((480, 640, 3), np.uint8))
+    for _ in range(100):
+        take.shown("a", shown)
+    with pytest.raises(ValueError, match="more than 92 MB of pictures a second"):
+        take.shown("a", shown)
 
 
 def test_a_process_that_waited_for_a_node_and_was_killed_is_replaced(tmp_path: Path) -> None:

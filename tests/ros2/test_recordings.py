@@ -25,7 +25,7 @@ from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.ros2 import messages
-from limo_hog.ros2.bag import MAX_RECORD, BagError, bag_writer, read_bag
+from limo_hog.ros2.bag import MAX_RECORD, MAX_RECORDS, BagError, bag_writer, read_bag
 from limo_hog.ros2.findings import detections_message
 from limo_hog.ros2.names import CAMERA_INFO, COMMAND, DEPTH, DETECTIONS, IMAGE, ODOMETRY, SCAN
 from limo_hog.ros2.replay import replay
@@ -214,8 +214,8 @@ ZEROS = zstandard.compress(bytes(1 << 30))
 MESSAGE = _record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"\0\1\0\0")
 
 
-def _schema(text: bytes, encoding: bytes = b"ros2msg", name: bytes = b"a/msg/B") -> bytes:
-    return _record(3, struct.pack("<H", 1) + _string(name) + _string(encoding) + _string(text))
+def _schema(text: bytes, encoding: bytes = b"ros2msg", name: bytes = b"a/msg/B", number: int = 1) -> bytes:
+    return _record(3, struct.pack("<H", number) + _string(name) + _string(encoding) + _string(text))
 
 
 def _channel(encoding: bytes = b"cdr") -> bytes:
@@ -251,6 +251,8 @@ def _channel(encoding: bytes = b"cdr") -> bytes:
         (BEGIN + _schema(b"a/B b\n") + _channel() + MESSAGE, "at byte"),
         (BEGIN + _schema(b"module a {" * 5_000, b"ros2idl"), "at byte"),
         (BEGIN + _schema(b"{}", b"jsonschema"), "known are ros2msg and ros2idl"),
+        (BEGIN + _chunk(zstandard.compress(MESSAGE * 600_000), len(MESSAGE) * 600_000, b"zstd"), f"{MAX_RECORDS} records are read"),
+        (BEGIN + b"".join(_schema(b"int32 x\n", number=number) for number in range(1001)), "more definitions than the 1000"),
         (BEGIN + _schema(b"\xff"), "at byte"),
         (BEGIN + _schema(b"string x\n", name=b"geometry_msgs/msg/Twist"), "Twist has other fields than that of ROS 2"),
     ],

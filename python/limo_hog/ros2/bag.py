@@ -35,8 +35,12 @@ with needed(by="a recording"):
 
 #: The longest record and the largest chunk that are read [bytes]: five 4K images as they come from a camera.
 MAX_RECORD = 1 << 27
+#: The most records of a chunk that are read [1], each some 500 bytes of Python: 4 MB of the shortest messages.
+MAX_RECORDS = 1 << 17
 #: The longest message definition that is read [bytes]; the longest of ROS 2's own has 12 000.
 MAX_DEFINITION = 1 << 17
+#: The most of them that are read [1]; all of ROS 2's own are some 300.
+MAX_DEFINITIONS = 1000
 #: Types whose fields are read: a recording must mean by them what ROS 2 Humble and Jazzy mean.
 _READ = {*TYPES.values(), DETECTIONS_TYPE}
 
@@ -187,6 +191,8 @@ def _mcap_messages(file: BinaryIO) -> Iterator[tuple[str, int, Any]]:
             return
         for record in _in_chunk(outer) if isinstance(outer, Chunk) else [outer]:
             if isinstance(record, Schema):
+                if len(stores) >= MAX_DEFINITIONS and record.id not in stores:
+                    raise BagError(f"more definitions than the {MAX_DEFINITIONS} that are read")
                 stores[record.id] = record.name, _definitions(record.name, record.encoding, record.data)
             elif isinstance(record, Channel):
                 if record.message_encoding != "cdr":
@@ -216,6 +222,11 @@ def _in_chunk(chunk: Chunk) -> list[McapRecord]:
         raise BagError(f"a chunk compressed by {chunk.compression!r}; known are zstd and lz4")
     if len(data) != size:
         raise BagError(f"a chunk that is not {size} bytes long, as it says")
+    at = count = 0
+    while at + 9 <= size and count <= MAX_RECORDS:
+        at, count = at + 9 + int.from_bytes(data[at + 1 : at + 9], "little"), count + 1
+    if count > MAX_RECORDS:
+        raise BagError(f"a chunk of many records; {MAX_RECORDS} records are read at most")
     records = breakup_chunk(replace(chunk, compression="", data=data), validate_crc=True)
     # Definitions and channels come before the messages that need them.
     return sorted(records, key=lambda record: cast(int, getattr(record, "log_time", -1)))

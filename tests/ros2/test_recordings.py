@@ -251,8 +251,14 @@ def _channel(encoding: bytes = b"cdr") -> bytes:
         (BEGIN + _schema(b"a/B b\n") + _channel() + MESSAGE, "at byte"),
         (BEGIN + _schema(b"module a {" * 5_000, b"ros2idl"), "at byte"),
         (BEGIN + _schema(b"{}", b"jsonschema"), "known are ros2msg and ros2idl"),
-        (BEGIN + _chunk(zstandard.compress(MESSAGE * 600_000), len(MESSAGE) * 600_000, b"zstd"), f"{MAX_RECORDS} records are read"),
-        (BEGIN + b"".join(_schema(b"int32 x\n", number=number) for number in range(1001)), "more definitions than the 1000"),
+        (
+            BEGIN + _chunk(zstandard.compress(MESSAGE * 600_000), len(MESSAGE) * 600_000, b"zstd"),
+            f"{MAX_RECORDS} records are read",
+        ),
+        (
+            BEGIN + b"".join(_schema(b"int32 x\n", number=number) for number in range(1001)),
+            "more definitions than the 1000",
+        ),
         (BEGIN + _schema(b"\xff"), "at byte"),
         (BEGIN + _schema(b"string x\n", name=b"geometry_msgs/msg/Twist"), "Twist has other fields than that of ROS 2"),
     ],

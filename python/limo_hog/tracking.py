@@ -54,7 +54,8 @@ class Tracker:
         with needed(by="tracking people"):
             import trackers
         self._tracker = getattr(trackers, TRACKERS[name])(frame_rate=fps, **_SETTINGS)
-        self.set_threshold(load_model("limo").threshold if threshold is None else threshold)
+        limo = load_model("limo")
+        self.set_threshold((limo.second_look or limo).threshold if threshold is None else threshold)
 
     @property
     def lowest(self) -> float:

@@ -88,7 +88,10 @@ def _rivals(args: argparse.Namespace) -> list[Rival]:
             if height != "default":
                 detector = replace(detector, min_height=height)
                 name = f"{model} {'as is' if height is None else f'{height:g} px'}"
-            rivals.append(Rival(name, replace(detector, threshold=args.least_score), detector))
+            stages = {name: detector}
+            if args.report and detector.looks_twice:
+                stages[f"{name}, first look"] = replace(detector, second_look=False)
+            rivals += [Rival(name, replace(one, threshold=args.least_score), one) for name, one in stages.items()]
     return rivals
 
 

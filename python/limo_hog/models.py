@@ -33,7 +33,7 @@ class PersonBox(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """How an SVM margin becomes a probability: 1 / (1 + exp(-(slope · margin + offset))) (Platt, 1999)."""
+    """How a score becomes a probability: 1 / (1 + exp(-(slope · score + offset))) (Platt, 1999)."""
 
     slope: float
     offset: float

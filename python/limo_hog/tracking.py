@@ -59,11 +59,11 @@ class Tracker:
 
     @property
     def lowest(self) -> float:
-        """Least SVM margin of a box that is of use: the detector's threshold."""
+        """Least score of a box that is of use: the detector's threshold."""
         return self._threshold - FED
 
     def set_threshold(self, threshold: float) -> None:
-        """Take new people from another SVM margin on, from the next picture on."""
+        """Take new people from another score on, from the next picture on."""
         self._threshold = threshold
         # SORT has the first, OC-SORT the second, ByteTrack both.
         for name in ("track_activation_threshold", "high_conf_det_threshold"):

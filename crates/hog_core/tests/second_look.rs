@@ -183,7 +183,7 @@ fn a_look_can_be_interrupted_between_any_two_steps() {
         asked.get() > limit.get()
     };
     let interrupt = Interrupt::when(&ask);
-    let mut call = |most| {
+    let call = |most| {
         asked.set(0);
         limit.set(most);
         look.logits(picture.view(), &windows(), 1, &interrupt, &mut [0.0; 37])

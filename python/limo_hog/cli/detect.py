@@ -71,9 +71,7 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
     """Add the options of the search."""
     parser.add_argument("--model", default=PeopleDetector.model, metavar="NAME|FILE", help=f"{MODEL} (%(default)s)")
     add_search(parser)
-    parser.add_argument(
-        "--threshold", type=arguments.score, metavar="T", help="least score of a hit (the model's own)"
-    )
+    parser.add_argument("--threshold", type=arguments.score, metavar="T", help="least score of a hit (the model's own)")
     parser.add_argument(
         "--no-second-look",
         action="store_const",

@@ -106,7 +106,9 @@ def learnt(args: argparse.Namespace) -> bytes:
     negatives = np.concatenate([crops(args.crops), mined])
     print(f"{len(people)} people, {len(negatives)} negatives, {len(mined)} of them mined", flush=True)
     params = train(people, negatives, args.epochs, args.seed)
-    return np.concatenate([np.asarray(value).ravel() for value in params.values()]).astype("<f2").tobytes()
+    # (jax sorts a dictionary's keys, which puts a bias before its weights.)
+    ordered = [np.asarray(params[f"{layer}{kind}"]).ravel() for layer in range(5) for kind in "wb"]
+    return np.concatenate(ordered).astype("<f2").tobytes()
 
 
 def source(folder: Path) -> dict[str, Any]:

@@ -31,8 +31,8 @@ _OVERLAP = 0.65
 #: Where a model has two windows: from this height of the smallest person [px] on the large window alone is used, the
 #: image being enlarged for it. On USC-C, LAMR .27 against .32 with both at 64 px; at 48 px both are better, .29 to .31.
 _LARGE_WINDOW_FROM_PX = 64.0
-#: What a second look is given: windows of at least this margin, of those that share more than this (IoU) the best, and
-#: of these the best few. On USC-C no person found is lost by it.
+#: What a second look is given: windows of at least this margin, of those whose people share more than this (IoU) the
+#: best, and of these the best few. On USC-C the best of three ways.
 _LOOKED_AT_FROM, _LOOKED_AT_IOU, _LOOKED_AT_MOST = -1.5, 0.7, 50
 #: Hits that OpenCV's sample asks a group to have more than.
 _GROUP_THRESHOLD = 2
@@ -95,8 +95,8 @@ class PeopleDetector:
         on the levels around them: about twice as fast, and a raw hit in two hundred is missed (docs/simd.md).
         Geometries without kernels are searched whole.
     second_look
-        A small network looks again at the best 50 windows; a score is then SVM margin + a share of the network's
-        logit, and `threshold` applies to it. False: every step is HOG's. None: where the model has one ("limo"),
+        A small network looks again at the best 50 windows, the most that are then found in an image; a score is SVM
+        margin + a share of the network's logit, and `threshold` applies to it. False: every step is HOG's. None: where the model has one ("limo"),
         `min_height` is given and hits are not grouped.
 
     Raises
@@ -275,7 +275,8 @@ class PeopleDetector:
         boxes, scores = (np.concatenate(parts) for parts in zip(*hits, strict=True))
         zoom = np.tile(np.array(size) / image.shape[1::-1], 2)
         if self._look is not None:
-            looked_at = nms(boxes, scores, _LOOKED_AT_IOU)[:_LOOKED_AT_MOST]
+            people = self._model.person_box.inside(boxes)
+            looked_at = nms(people, scores, _LOOKED_AT_IOU)[:_LOOKED_AT_MOST]
             boxes, (network, look) = boxes[looked_at], self._look
             scores = scores[looked_at] + look.share * network.logits(image, boxes / zoom, threads=threads)
             boxes, scores = boxes[scores >= threshold], scores[scores >= threshold]

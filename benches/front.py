@@ -46,7 +46,7 @@ def main() -> None:
     detectors = {
         f"{name}{', first look' if look is False else ''}": PeopleDetector(threshold=LEAST, second_look=look, **search)
         for name, search in SEARCHES.items()
-        for look in (None, False)
+        for look in (True, False)
     }
     how = EvaluationParameters(draws=1)
     rivals = [[Rival(name, replace(one, min_height=low)) for name, one in detectors.items()] for low in (64, 96)]

@@ -54,16 +54,15 @@ class Tracker:
         with needed(by="tracking people"):
             import trackers
         self._tracker = getattr(trackers, TRACKERS[name])(frame_rate=fps, **_SETTINGS)
-        limo = load_model("limo")
-        self.set_threshold((limo.second_look or limo).threshold if threshold is None else threshold)
+        self.set_threshold(load_model("limo").threshold if threshold is None else threshold)
 
     @property
     def lowest(self) -> float:
-        """Least score of a box that is of use: the detector's threshold."""
+        """Least SVM margin of a box that is of use: the detector's threshold."""
         return self._threshold - FED
 
     def set_threshold(self, threshold: float) -> None:
-        """Take new people from another score on, from the next picture on."""
+        """Take new people from another SVM margin on, from the next picture on."""
         self._threshold = threshold
         # SORT has the first, OC-SORT the second, ByteTrack both.
         for name in ("track_activation_threshold", "high_conf_det_threshold"):

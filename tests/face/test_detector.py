@@ -79,14 +79,14 @@ def test_searching_at_half_the_size_finds_what_a_half_size_image_holds() -> None
 
 
 def test_the_height_of_a_window_without_enlarging_is_the_models_own() -> None:
-    own, asked = PeopleDetector(min_height=None), PeopleDetector(min_height=0.78 * 128, second_look=False)
+    own, asked = PeopleDetector(min_height=None), PeopleDetector(min_height=0.78 * 128)
     np.testing.assert_array_equal(own.detect(picture()).windows, asked.detect(picture()).windows)
 
 
 def test_boxes_of_an_enlarged_image_are_in_pixels_of_the_image_itself() -> None:
     larger = np.asarray(cv2.resize(picture(), (998, 749), interpolation=cv2.INTER_LINEAR_EXACT), np.uint8)
     expected = PeopleDetector(min_height=None).detect(larger)
-    found = PeopleDetector(min_height=64, second_look=False).detect(picture())
+    found = PeopleDetector(min_height=64).detect(picture())
     zoom = np.array([998 / 640, 749 / 480] * 2)
     np.testing.assert_array_equal(found.windows, np.rint(expected.windows / zoom))
     np.testing.assert_array_equal(found.scores, expected.scores)
@@ -105,7 +105,7 @@ def test_people_taller_than_asked_for_are_left_out() -> None:
 
 
 def test_people_of_exactly_the_greatest_height_are_reported() -> None:
-    every_window = PeopleDetector(threshold=-9.0, overlap=1, second_look=False)
+    every_window = PeopleDetector(threshold=-9.0, overlap=1)
     for max_height, window_height in ((64, 82), (65, 82), (67, 86)):  # 64 / 0.78, and 1.05 times that
         found = replace(every_window, max_height=max_height).detect(picture()[200:360, 300:400])
         assert found.windows[:, 3].max() == window_height
@@ -150,17 +150,16 @@ def test_of_hits_on_one_person_the_best_stays_by_the_person_boxes_overlap() -> N
 
 def test_the_limit_of_overlap_can_be_chosen() -> None:
     hits = PeopleDetector(nms="group", group_threshold=0).detect(picture())
-    assert len(PeopleDetector(overlap=1, second_look=False).detect(picture())) == len(hits)
+    assert len(PeopleDetector(overlap=1).detect(picture())) == len(hits)
     counts = [len(PeopleDetector(threshold=-1.0, overlap=limit).detect(picture())) for limit in (0.1, 0.65, 0.95)]
     assert 0 < counts[0] < counts[1] < counts[2]
 
 
 def test_a_threshold_below_minus_one_gives_more_and_surest_first() -> None:
-    for look in (None, False):
-        few, many = (PeopleDetector(threshold=least, second_look=look).detect(picture()) for least in (None, -1.8))
-        assert len(many) > len(few)
-        assert -1.8 <= many.scores.min() < 0
-        assert (np.diff(many.scores) <= 0).all()
+    few, many = PeopleDetector().detect(picture()), PeopleDetector(threshold=-1.2).detect(picture())
+    assert len(many) > len(few)
+    assert -1.2 <= many.scores.min() < 0
+    assert (np.diff(many.scores) <= 0).all()
 
 
 # What a detector is.

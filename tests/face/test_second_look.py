@@ -22,6 +22,7 @@ from limo_hog.cli.support.scene import street
 from limo_hog.models import SecondLook, load_model
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data"
+WEIGHTS = Path(models.__file__).parent / "weights" / "second_look.f16"
 Numbers = NDArray[np.float64]
 
 
@@ -76,8 +77,8 @@ def test_the_network_answers_what_plain_numpy_answers() -> None:
 
 
 def test_a_score_is_the_margin_and_a_share_of_the_networks_logit() -> None:
-    look, twice = network(), PeopleDetector(threshold=-9, overlap=1)
-    every = replace(twice, threshold=-1.5, second_look=False).detect(picture())
+    look, twice = network(), PeopleDetector(threshold=-9, overlap=1, second_look=True)
+    every = replace(twice, threshold=-1.2, second_look=False).detect(picture())
     margins = {tuple(window): score for window, score in zip(every.windows.tolist(), every.scores, strict=True)}
     found = twice.detect(picture())
     assert 10 < len(found) <= 50
@@ -95,19 +96,13 @@ def test_the_order_of_the_colours_does_not_matter() -> None:
 
 
 def test_switched_off_every_score_is_an_svm_margin() -> None:
-    off = PeopleDetector(second_look=False)
-    assert not off.looks_twice and off.least_score == load_model("limo").threshold
-    weights = Path(models.__file__).parent / "weights" / "limo_64x128.yml"
-    alone = PeopleDetector(model=weights).detect(picture())
-    assert off.detect(picture()) == alone and len(alone) > 0
+    alone = PeopleDetector(model=WEIGHTS.with_name("limo_64x128.yml")).detect(picture())
+    assert PeopleDetector().detect(picture()) == alone and len(alone) > 0
+    assert PeopleDetector().least_score == load_model("limo").threshold
+    assert PeopleDetector(second_look=True).least_score == network().threshold
 
 
-@pytest.mark.parametrize("arguments", [{"model": "opencv"}, {"nms": "group"}, {"min_height": None}])
-def test_other_models_grouping_and_pictures_as_they_are_have_no_second_look(arguments: dict[str, str]) -> None:
-    assert not PeopleDetector(**arguments).looks_twice  # type: ignore[arg-type]
-
-
-def test_pictures_as_they_are_have_one_where_it_is_asked_for() -> None:
+def test_pictures_as_they_are_may_be_looked_at_twice() -> None:
     found = PeopleDetector(min_height=None, second_look=True).detect(picture())
     assert len(found) > 0 and found.calibration == network().calibration
 
@@ -116,15 +111,12 @@ def test_what_has_no_second_look_refuses_it() -> None:
     for wrong in ({"model": "opencv"}, {"nms": "group"}):
         with pytest.raises(limo_hog.ParameterError, match=r'needs a model that has one \("limo"\) and nms="overlap"'):
             PeopleDetector(second_look=True, **wrong)  # type: ignore[arg-type]
-    with pytest.raises(limo_hog.ParameterTypeError, match="second_look is 'yes'; True, False or None is wanted"):
+    with pytest.raises(limo_hog.ParameterTypeError, match="second_look is 'yes'; True or False is wanted"):
         PeopleDetector(second_look="yes")  # type: ignore[arg-type]
 
 
 def test_a_picture_without_candidates_needs_no_network() -> None:
-    assert len(PeopleDetector().detect(np.full((300, 200), 90, np.uint8))) == 0
-
-
-WEIGHTS = Path(models.__file__).parent / "weights" / "second_look.f16"
+    assert len(PeopleDetector(second_look=True).detect(np.full((300, 200), 90, np.uint8))) == 0
 
 
 @pytest.fixture
@@ -185,7 +177,7 @@ from limo_hog.imaging.inputs import as_array
 set_num_threads(int(sys.argv[1]))
 images = [as_array(name) for name in sys.argv[2:]] or [street(640, 480, 3), street(500, 400, 1)]
 for image in images:
-    found = PeopleDetector(threshold=-1.0).detect(image)
+    found = PeopleDetector(threshold=-1.0, second_look=True).detect(image)
     print([[*map(float, row), float(score).hex()] for row, score in zip(found.windows, found.scores)])
 """
 

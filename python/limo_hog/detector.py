@@ -96,8 +96,8 @@ class PeopleDetector:
         Geometries without kernels are searched whole.
     second_look
         A small network looks again at the best 50 windows, the most that are then found in an image; a score is SVM
-        margin + a share of the network's logit, and `threshold` applies to it. For "limo" and `nms="overlap"`. False:
-        every step is HOG's.
+        margin + a share of the network's logit, and `threshold` applies to it. For "limo", `nms="overlap"` and
+        `search="exact"`: a guide that follows every candidate takes longer. False: every step is HOG's.
 
     Raises
     ------
@@ -166,8 +166,9 @@ class PeopleDetector:
         if not self.second_look:
             return None
         look = self._model.second_look
-        if look is None or self.nms == "group":
-            raise ParameterError('second_look is True; it needs a model that has one ("limo") and nms="overlap"')
+        if look is None or self.nms == "group" or self.search != "exact":
+            needs = 'a model that has one ("limo"), nms="overlap" and search="exact"'
+            raise ParameterError(f"second_look is True; it needs {needs}")
         return look.compiled(), look
 
     def _compiled(self, smaller: Model | None) -> Iterator[_core.Hog]:

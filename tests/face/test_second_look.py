@@ -108,8 +108,8 @@ def test_pictures_as_they_are_may_be_looked_at_twice() -> None:
 
 
 def test_what_has_no_second_look_refuses_it() -> None:
-    for wrong in ({"model": "opencv"}, {"nms": "group"}):
-        with pytest.raises(limo_hog.ParameterError, match=r'needs a model that has one \("limo"\) and nms="overlap"'):
+    for wrong in ({"model": "opencv"}, {"nms": "group"}, {"search": "guided"}):
+        with pytest.raises(limo_hog.ParameterError, match=r'one \("limo"\), nms="overlap" and search="exact"'):
             PeopleDetector(second_look=True, **wrong)  # type: ignore[arg-type]
     with pytest.raises(limo_hog.ParameterTypeError, match="second_look is 'yes'; True or False is wanted"):
         PeopleDetector(second_look="yes")  # type: ignore[arg-type]

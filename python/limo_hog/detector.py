@@ -249,14 +249,13 @@ class PeopleDetector:
         image = pixels(image)
         size = self._searched_size(image)
         reading = self._model if self._look is None else self._look[1]
-        threshold = self.least_score
         members: int | None = None
         if self.nms == "group":
             members = _GROUP_THRESHOLD if self.group_threshold is None else self.group_threshold
         hits = [
             hog.detect_multi_scale(
                 image,
-                hit_threshold=threshold if self._look is None else _LOOKED_AT_FROM,
+                hit_threshold=self.least_score if self._look is None else _LOOKED_AT_FROM,
                 win_stride=self.win_stride,
                 padding=self.padding,
                 scale=self.scale,
@@ -269,12 +268,7 @@ class PeopleDetector:
         ]
         boxes, scores = (np.concatenate(parts) for parts in zip(*hits, strict=True))
         zoom = np.tile(np.array(size) / image.shape[1::-1], 2)
-        if self._look is not None:
-            people = self._model.person_box.inside(boxes)
-            looked_at = nms(people, scores, _LOOKED_AT_IOU, most=_LOOKED_AT_MOST)
-            boxes, (network, look) = boxes[looked_at], self._look
-            scores = scores[looked_at] + look.share * network.logits(image, boxes / zoom, threads=threads)
-            boxes, scores = boxes[scores >= threshold], scores[scores >= threshold]
+        boxes, scores = self._looked_at_again(image, boxes, scores, zoom, threads)
         if self.nms == "group":
             kept = np.argsort(-scores, kind="stable")
         else:
@@ -288,6 +282,27 @@ class PeopleDetector:
             found, scores = found[low], scores[low]
         boxes = np.rint(found).astype(np.int32)
         return Detections(boxes, scores, self._model.person_box, reading.calibration, searched)
+
+    def _looked_at_again(
+        self,
+        image: NDArray[np.uint8],
+        boxes: NDArray[np.int32],
+        margins: NDArray[np.float64],
+        zoom: NDArray[np.float64],
+        threads: int | None,
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Return the best windows whose score, with the network's opinion, is enough, and their scores.
+
+        Without a second look these are all windows and their margins.
+        """
+        if self._look is None:
+            return boxes, margins
+        network, look = self._look
+        best = nms(self._model.person_box.inside(boxes), margins, _LOOKED_AT_IOU, most=_LOOKED_AT_MOST)
+        boxes = boxes[best]
+        scores = margins[best] + look.share * network.logits(image, boxes / zoom, threads=threads)
+        enough = scores >= self.least_score
+        return boxes[enough], scores[enough]
 
     def _searched_size(self, image: NDArray[np.uint8]) -> tuple[int, int]:
         """Return the size (x, y) [px] at which the smallest person in the image fills the model's window."""

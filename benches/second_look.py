@@ -75,7 +75,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True, help="with eval/usc-c and real/annotations")
     parser.add_argument("--frames", type=Path, required=True, help="frames 1 to 41 of TUD-Stadtmitte")
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--epochs", type=int, default=8)
+    parser.add_argument("--epochs", type=int, default=16)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
     if not args.out.exists():

@@ -9,7 +9,7 @@
     uv run --script benches/second_look.py --people inria/positive mit/Positive --crops inria/negative \
         --photographs photographs/images --data ../shared/data --frames TUD --out second_look.f16
 
-writes the weights (float16, little-endian) and beside them a card. One seed, one machine: the same weights to the bit.
+writes the weights (float16, little-endian) and beside them a card. All that is drawn comes from `--seed`.
 The windows that `limo` takes for people on the photographs are mined first and kept in `--mined`, if that is named.
 Weights that are there are not trained again: only their card is made.
 """

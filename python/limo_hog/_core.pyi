@@ -20,6 +20,7 @@ from typing_extensions import Self
 __all__ = [
     "Canvas",
     "Hog",
+    "SecondLook",
     "available_backends",
     "backend",
     "daimler_people_detector",
@@ -239,6 +240,47 @@ class Hog:
         ------
         ImageError, ParameterError
             As `compute`; both ways to group are asked for.
+        """
+
+@final
+class SecondLook:
+    """A network of three convolutions (kernels 5, 3, 3; stride 2) and two dense layers: immutable, as `Hog` is."""
+
+    def __new__(cls, channels: tuple[int, int, int], hidden: int, weights: NDArray[np.float32]) -> Self:
+        """Take the network's weights.
+
+        Parameters
+        ----------
+        channels, hidden
+            Channels of the convolutions and units of the first dense layer, 1 to 1024 each.
+        weights
+            float32 (n,), finite: layer by layer the weights [row][column][input][output], then the biases.
+
+        Raises
+        ------
+        ModelFormatError
+            These are no weights of such a network.
+        """
+
+    def logits(
+        self, image: NDArray[np.uint8], windows: NDArray[np.float64], *, threads: int | None = None
+    ) -> NDArray[np.float32]:
+        """Answer to each window: float32 (N,), above 0 where it rather shows a person.
+
+        A window is averaged to 32 × 64 grey pixels (a colour is its channels' mean), less their mean, over their
+        deviation and 8. Its answer does not depend on the others, nor on the number of threads.
+
+        Parameters
+        ----------
+        windows
+            float64 (N, 4): x, y, w, h [px]; what lies beyond the image is mirrored.
+        threads
+            None: as many as `set_num_threads` allows.
+
+        Raises
+        ------
+        ImageError, ParameterError
+            The image is none of those above; a window has no area, or is far away or far too large.
         """
 
 @final

@@ -41,7 +41,7 @@ class Detections:
         int32 (N, 4): x, y, w, h [px] of HOG's windows, which hold a margin around the person; `nms="group"` gives
         OpenCV's rectangles.
     scores
-        float64 (N,): SVM margin of each window, descending; larger is surer.
+        float64 (N,): SVM margin of each window, with a second look and a share of the network's logit; descending.
     person_box
         Where the person stands in a window, as shares of it.
     calibration

@@ -33,7 +33,7 @@ class PersonBox(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """How an SVM margin becomes a probability: 1 / (1 + exp(-(slope · margin + offset))) (Platt, 1999)."""
+    """How a score becomes a probability: 1 / (1 + exp(-(slope · score + offset))) (Platt, 1999)."""
 
     slope: float
     offset: float
@@ -41,6 +41,25 @@ class Calibration(NamedTuple):
     def probabilities(self, margins: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probability of each of (N,) SVM margins, float64 (N,); none overflows."""
         return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (self.slope * margins + self.offset)))
+
+
+class SecondLook(NamedTuple):
+    """A small convolutional network's opinion of a model's best windows, and how scores with it are to be read.
+
+    Made by `benches/second_look.py`. A window's score is its SVM margin + `share` · the network's logit.
+    """
+
+    channels: tuple[int, int, int]  #: of the convolutions
+    hidden: int  #: units of the dense layer
+    weights: bytes  #: float16, little-endian: layer by layer weights [row][column][input][output], then biases
+    share: float
+    threshold: float  #: default of the least score of a person's window
+    calibration: Calibration  #: from scores to probabilities
+
+    def compiled(self) -> _core.SecondLook:
+        """Return the network; a `ModelFormatError` says what is wrong with its weights."""
+        numbers = np.frombuffer(self.weights, "<f2").astype(np.float32)
+        return _core.SecondLook(self.channels, self.hidden, numbers)
 
 
 #: The person box of OpenCV's models; at IoU 0.5 the best of a grid on three sets of street photographs.
@@ -67,6 +86,8 @@ class Model:
         From margins to probabilities; None where it was never measured.
     smaller
         A model with a smaller window, for people too small for this one; its margins mean what this one's do.
+    second_look
+        A network that looks again at the best windows of both.
     """
 
     geometry: Geometry
@@ -75,6 +96,7 @@ class Model:
     threshold: float = 0.0
     calibration: Calibration | None = None
     smaller: Model | None = None
+    second_look: SecondLook | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         weights = np.array(self.coefficients, np.float32)
@@ -84,7 +106,7 @@ class Model:
         object.__setattr__(self, "coefficients", weights)
 
     def _values(self) -> tuple[object, ...]:
-        reading = (self.person_box, self.threshold, self.calibration, self.smaller)
+        reading = (self.person_box, self.threshold, self.calibration, self.smaller, self.second_look)
         return (self.geometry, self.coefficients.tobytes(), *reading)
 
     def __eq__(self, other: object) -> bool:
@@ -126,7 +148,24 @@ def _limo() -> Model:
     slope = small.calibration.slope / large.calibration.slope
     coefficients = small.coefficients * np.float32(slope)
     coefficients[-1] += np.float32((small.calibration.offset - large.calibration.offset) / large.calibration.slope)
-    return replace(large, smaller=replace(small, coefficients=coefficients, calibration=large.calibration))
+    smaller = replace(small, coefficients=coefficients, calibration=large.calibration)
+    return replace(large, smaller=smaller, second_look=_second_look(os.path.join(_WEIGHTS, "second_look.f16")))  # noqa: PTH118
+
+
+def _second_look(path: str) -> SecondLook:
+    """Read a network and its card; both are wanted, and that they belong together."""
+    import hashlib
+    from pathlib import Path
+
+    try:
+        weights, card = Path(path).read_bytes(), _read_card(f"{path}.json")
+    except OSError as error:
+        raise ModelFormatError(f"{path}: {error.strerror}; the installation is damaged") from error
+    if hashlib.sha256(weights).hexdigest() != card.get("sha256"):
+        raise ModelFormatError(f"{path} is not the file that its card describes; the installation is damaged")
+    sides = [int(side) for side in _numbers(path, "layers", card.get("layers"), 4)]
+    share, threshold = _numbers(path, "share, threshold", [card.get("share"), card.get("threshold")], 2)
+    return SecondLook((sides[0], sides[1], sides[2]), sides[3], weights, share, threshold, _calibration(path, card))
 
 
 #: The folder of our own weights.
@@ -188,8 +227,7 @@ def _from_file(path: str) -> Model:
     return Model(geometry, weights, **facts)
 
 
-def _card(path: str) -> dict[str, Any]:
-    """Read person box, threshold and calibration from a model's card."""
+def _read_card(path: str) -> dict[str, Any]:
     import json
     from pathlib import Path
 
@@ -199,6 +237,12 @@ def _card(path: str) -> dict[str, Any]:
         raise ModelFormatError(f"{path} is no model card: {error}") from error
     if not isinstance(card, dict):
         raise ModelFormatError(f"{path} is no model card: a JSON object is wanted")
+    return card
+
+
+def _card(path: str) -> dict[str, Any]:
+    """Read person box, threshold and calibration from a model's card."""
+    card = _read_card(path)
     facts: dict[str, Any] = {}
     if "person_box" in card:
         box = PersonBox(*_numbers(path, "person_box", card["person_box"], 4))
@@ -208,11 +252,15 @@ def _card(path: str) -> dict[str, Any]:
     if card.get("threshold") is not None:
         (facts["threshold"],) = _numbers(path, "threshold", [card["threshold"]], 1)
     if card.get("calibration") is not None:
-        given = card["calibration"]
-        if not isinstance(given, dict) or not {"slope", "offset"} <= given.keys():
-            raise ModelFormatError(f'{path}: calibration is {shown(given)}; {{"slope": …, "offset": …}} is wanted')
-        facts["calibration"] = Calibration(*_numbers(path, "calibration", [given["slope"], given["offset"]], 2))
+        facts["calibration"] = _calibration(path, card)
     return facts
+
+
+def _calibration(path: str, card: dict[str, Any]) -> Calibration:
+    given = card.get("calibration")
+    if not isinstance(given, dict) or not {"slope", "offset"} <= given.keys():
+        raise ModelFormatError(f'{path}: calibration is {shown(given)}; {{"slope": …, "offset": …}} is wanted')
+    return Calibration(*_numbers(path, "calibration", [given["slope"], given["offset"]], 2))
 
 
 def _numbers(path: str, key: str, values: Any, count: int) -> list[float]:

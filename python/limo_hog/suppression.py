@@ -43,15 +43,21 @@ def share_inside(some: Boxes, others: Boxes) -> NDArray[np.float64]:
     return _ratio(shared, np.broadcast_to(areas, shared.shape))
 
 
-def nms(boxes: Boxes, scores: Scores, threshold: float, overlap: Overlap = intersection_over_union) -> NDArray[np.intp]:
+def nms(
+    boxes: Boxes,
+    scores: Scores,
+    threshold: float,
+    overlap: Overlap = intersection_over_union,
+    most: int | None = None,
+) -> NDArray[np.intp]:
     """Return the indices of the boxes to keep, best first (greedy NMS; of equal scores the first box wins).
 
     The best box is kept and removes every box whose `overlap` with it is above `threshold`; then the best of the
-    rest, and so on.
+    rest, and so on, until there are `most`, if that is given.
     """
     waiting = np.argsort(-scores, kind="stable")
     kept = np.empty(0, np.intp)
-    while waiting.size:
+    while waiting.size and (most is None or len(kept) < most):
         # The best few are decided on together: first by what is kept already, then among themselves.
         best, waiting = waiting[:_CHUNK], waiting[_CHUNK:]
         best = best[~(overlap(boxes[best], boxes[kept]) > threshold).any(axis=1)]
@@ -61,7 +67,7 @@ def nms(boxes: Boxes, scores: Scores, threshold: float, overlap: Overlap = inter
             if stays[i]:
                 stays[i + 1 :] &= ~removes[i, i + 1 :]
         kept = np.concatenate([kept, best[stays]])
-    return kept
+    return kept[:most]
 
 
 def _areas(some: Boxes, others: Boxes) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -51,6 +51,7 @@ FINDERS = [
     for wanted in (
         *({}, {"min_height": None}, {"nms": "group"}, {"threshold": -1.0}, {"model": "daimler"}),
         {"model": "limo", "min_height": 40, "padding": (0, 0)},
+        {"second_look": True},
     )
 ]
 
@@ -232,6 +233,7 @@ def finders(a: Arguments) -> None:
         win_stride=a.stride,
         padding=a.padding,
         scale=a.scale,
+        second_look=lambda: a.some(False, True),
     )
     repr(PeopleDetector(**options))
 

@@ -93,6 +93,13 @@ def test_the_report_is_a_page_with_the_curve_and_the_mistakes(
     assert sheet.std() > 10
 
 
+def test_the_report_shows_the_first_look_apart_from_the_second(streets: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report"
+    assert main(["evaluate", "limo", str(streets), "--against", "opencv", "--report", str(out), "--json", "-"]) == 0
+    names = [model["model"] for model in json.loads((out / "figures.json").read_text())["models"]]
+    assert names == ["limo", "limo, second look", "opencv"]
+
+
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [

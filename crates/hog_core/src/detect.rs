@@ -1,6 +1,6 @@
 //! Composes the stages: descriptors and hits of one image, and of a whole pyramid on several threads.
 
-use crate::error::{BackendError, ParameterError, Result};
+use crate::error::{ParameterError, Result};
 use crate::exact::{self, RowVotes, Svm, Tables};
 use crate::fast::{self, Backend, Found, Plan, Planes, Thresholds};
 use crate::geometry::{Padding, Rect, Size};
@@ -61,9 +61,7 @@ impl Hog {
 
     /// [`new`](Self::new) with a backend other than the one in force; this CPU must have it.
     pub fn with_backend(params: &HogParams, coefficients: Option<&[f32]>, backend: Backend) -> Result<Self> {
-        if !backend.is_available() {
-            return Err(BackendError::Missing { name: backend.name() }.into());
-        }
+        let backend = backend.checked()?;
         let spec = HogSpec::new(params)?;
         let svm = coefficients.map(|c| Svm::new(c, &spec)).transpose()?;
         let geometry = fast::geometry(backend, &spec);

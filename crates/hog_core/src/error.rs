@@ -34,6 +34,9 @@ pub enum HogError {
     /// The forced instruction set is unknown, or this CPU does not have it.
     #[error(transparent)]
     Backend(#[from] BackendError),
+    /// The weights are those of no network.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
     /// The memory that the arguments ask for cannot be had.
     #[error(
         "{bytes} bytes of memory are wanted, and cannot be had; use a smaller image, padding or geometry"
@@ -202,12 +205,50 @@ pub enum ParameterError {
         /// Elements of the descriptor of each.
         elements: usize,
     },
+    /// A window without area, far away, or far too large.
+    #[error("a window is {x}, {y}, {width} x {height} px; sides above 0 and up to {most} px are wanted")]
+    Window {
+        /// Left edge \[px\].
+        x: i64,
+        /// Upper edge \[px\].
+        y: i64,
+        /// Width \[px\].
+        width: i64,
+        /// Height \[px\].
+        height: i64,
+        /// The longest side allowed \[px\].
+        most: usize,
+    },
     /// The number of threads does not fit its type.
     #[error("the number of threads is negative or far too large; 0 (one per core) to {most} are wanted")]
     Threads {
         /// The most that are ever used.
         most: usize,
     },
+}
+
+/// Numbers that make no network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum NetworkError {
+    /// A layer has no channels, or too many.
+    #[error("a layer of the network has {got} channels; 1 to {most} are wanted")]
+    Channels {
+        /// Channels of the layer.
+        got: usize,
+        /// The most allowed.
+        most: usize,
+    },
+    /// There are other than the layers' weights and biases.
+    #[error("the network has {got} weights; these layers need {wanted}")]
+    Weights {
+        /// How many numbers came.
+        got: usize,
+        /// How many the layers have.
+        wanted: usize,
+    },
+    /// A weight is infinite or NaN.
+    #[error("a weight of the network is infinite or NaN; finite numbers are wanted")]
+    NotFinite,
 }
 
 /// A backend that cannot serve.
@@ -243,7 +284,7 @@ mod tests {
         let (axis, most, size) = ("width", 99, Size::new);
         let (width, height) = (7, 9);
         let available = vec!["sse41", "scalar"];
-        let texts: [(HogError, &str); 17] = [
+        let texts: [(HogError, &str); 19] = [
             (
                 HogError::DetectorSize { got: 5, wanted: 8 },
                 "the detector has 5 coefficients; this geometry needs 8 or 9 (with bias last)",
@@ -253,6 +294,14 @@ mod tests {
                 "12 bytes of memory are wanted, and cannot be had; use a smaller image, padding or geometry",
             ),
             (HogError::Interrupted, "the call was interrupted"),
+            (
+                NetworkError::Weights { got: 3, wanted: 5 }.into(),
+                "the network has 3 weights; these layers need 5",
+            ),
+            (
+                NetworkError::Channels { got: 0, most }.into(),
+                "a layer of the network has 0 channels; 1 to 99 are wanted",
+            ),
             (
                 GeometryError::Side { name: "cellSize", x: 0, y: 8, most }.into(),
                 "cellSize is (0, 8); both sides must be 1 to 99 pixels",

@@ -9,6 +9,8 @@
 //! 6. `rescore` takes the hits from either, and lets `exact` decide those that are too close to the threshold.
 //! 7. [`group`] makes one rectangle of many overlapping ones.
 //!
+//! [`SecondLook`] is no HOG: a small network's opinion of the windows found.
+//!
 //! [`skimage`] is no part of the detector: scikit-image's descriptor, which is another.
 //!
 //! [`Hog`] composes these stages. Each follows Dalal and Triggs, "Histograms of Oriented Gradients for Human
@@ -33,6 +35,7 @@ mod interrupt;
 mod memory;
 mod options;
 mod rescore;
+mod second;
 mod separable;
 mod threads;
 
@@ -47,3 +50,4 @@ pub use interrupt::Interrupt;
 pub use options::{Grouping, Search, SearchOptions};
 pub use params::{HogParams, HogSpec};
 pub use rescore::Hit;
+pub use second::{SecondLook, Window};

@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 12] = [
     &["pyramid"],
     &["exact"],
     &["fast", "separable", "skimage"],
-    &["rescore", "guided"],
+    &["rescore", "guided", "second"],
     &["options"],
     &["detect"],
     &["describe"],

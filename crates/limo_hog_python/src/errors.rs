@@ -12,6 +12,7 @@ pub(crate) fn raised(py: Python<'_>, error: &HogError) -> PyErr {
         HogError::DetectorSize { .. } => "DetectorSizeError",
         HogError::Image(_) => "ImageError",
         HogError::Parameter(_) => "ParameterError",
+        HogError::Network(_) => "ModelFormatError",
         HogError::Backend(_) => "BackendError",
         HogError::Memory { .. } => return PyMemoryError::new_err(error.to_string()),
         HogError::Interrupted => return PyKeyboardInterrupt::new_err(error.to_string()),

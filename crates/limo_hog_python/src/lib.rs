@@ -5,6 +5,7 @@ mod calls;
 mod canvas;
 mod errors;
 mod hog;
+mod second;
 mod skimage;
 
 use std::sync::atomic::Ordering;
@@ -27,6 +28,8 @@ mod _core {
     use crate::canvas::Canvas;
     #[pymodule_export]
     use crate::hog::Hog;
+    #[pymodule_export]
+    use crate::second::SecondLook;
     #[pymodule_export]
     use crate::skimage::skimage_hog;
 

@@ -20,11 +20,10 @@ from limo_hog.cli.support.page import PORT, add_view, announce
 from limo_hog.cli.support.results import Result, json_lines, write_coco, write_csv, write_mot
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
-from limo_hog.models import load_model
 from limo_hog.tracking import FED, TRACKERS
 
 #: What the results of a run depend on, and its JSON lines hold.
-PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "every", "search")
+PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "every", "search", "second_look")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -72,8 +71,11 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
     """Add the options of the search."""
     parser.add_argument("--model", default=PeopleDetector.model, metavar="NAME|FILE", help=f"{MODEL} (%(default)s)")
     add_search(parser)
+    parser.add_argument("--threshold", type=arguments.score, metavar="T", help="least score of a hit (the model's own)")
     parser.add_argument(
-        "--threshold", type=arguments.score, metavar="T", help="least SVM margin of a hit (the model's own)"
+        "--second-look",
+        action="store_true",
+        help="let a small network look again at limo's best 50 windows: fewer misses, half as long again",
     )
     parser.add_argument(
         "--min-height",
@@ -126,7 +128,7 @@ def run(args: argparse.Namespace) -> int:
         detector = PeopleDetector(**{name: value for name, value in parameters.items() if name != "every"})
     except ParameterError as error:
         raise UsageError(str(error)) from error
-    threshold = load_model(args.model).threshold if args.threshold is None else args.threshold
+    threshold = detector.least_score
     if args.track:
         parameters["track"] = args.track
         detector = dataclasses.replace(detector, threshold=threshold - FED)

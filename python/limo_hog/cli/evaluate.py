@@ -37,6 +37,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="height of the smallest person sought, or `none` for pictures as they are; several are compared",
     )
     parser.add_argument("--least-score", type=score, default=-1.2, metavar="T", help="lowest score counted (-1.2)")
+    parser.add_argument(
+        "--second-look", action="store_true", help="also measure with the second look; --report does so by itself"
+    )
     parser.add_argument("--report", type=Path, metavar="DIR", help="write a page with the curve and the worst mistakes")
     add_json(parser, "the figures as JSON")
 
@@ -79,6 +82,7 @@ def _rivals(args: argparse.Namespace) -> list[Rival]:
 
     from limo_hog.detector import PeopleDetector
     from limo_hog.learn.evaluation.run import Rival
+    from limo_hog.models import load_model
 
     rivals = []
     for model in dict.fromkeys([args.model, *args.against]):
@@ -88,7 +92,10 @@ def _rivals(args: argparse.Namespace) -> list[Rival]:
             if height != "default":
                 detector = replace(detector, min_height=height)
                 name = f"{model} {'as is' if height is None else f'{height:g} px'}"
-            rivals.append(Rival(name, replace(detector, threshold=args.least_score), detector))
+            stages = {name: detector}
+            if (args.second_look or args.report) and load_model(model).second_look is not None:
+                stages[f"{name}, second look"] = replace(detector, second_look=True)
+            rivals += [Rival(name, replace(one, threshold=args.least_score), one) for name, one in stages.items()]
     return rivals
 
 

@@ -75,6 +75,11 @@ impl Backend {
         }
     }
 
+    /// An error unless this CPU has it.
+    pub(crate) fn checked(self) -> Result<Self> {
+        if self.is_available() { Ok(self) } else { Err(BackendError::Missing { name: self.name() }.into()) }
+    }
+
     /// The backend in force: the one `LIMO_HOG_BACKEND` names, else the fastest this CPU has. Read once.
     ///
     /// An unknown name, or one that this CPU does not have, is an error.

@@ -128,6 +128,15 @@ impl Lines {
         Ok(self.0.as_mut_ptr().cast())
     }
 
+    /// `len` zeros.
+    pub fn zeros(&mut self, len: usize) -> Result<&mut [f32]> {
+        let pointer = self.reserve(len)?.cast::<f32>();
+        // SAFETY: there is room for so many words, of the same size; any bits are a number.
+        let numbers = unsafe { std::slice::from_raw_parts_mut(pointer, len) };
+        numbers.fill(0.0);
+        Ok(numbers)
+    }
+
     pub fn pointer(&self) -> *const u32 {
         self.0.as_ptr().cast()
     }

@@ -1,0 +1,202 @@
+"""The detector's second look: a small network's opinion, against the same in plain numpy."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import limo_hog
+from limo_hog import PeopleDetector, _core, models
+from limo_hog.cli.support.scene import street
+from limo_hog.models import SecondLook, load_model
+
+PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data"
+WEIGHTS = Path(models.__file__).parent / "weights" / "second_look.f16"
+Numbers = NDArray[np.float64]
+
+
+@cache
+def picture() -> NDArray[np.uint8]:
+    return street(640, 480, 3)
+
+
+def network() -> SecondLook:
+    look = load_model("limo").second_look
+    assert look is not None
+    return look
+
+
+def plain_crop(image: NDArray[np.uint8], x: int, y: int, w: int, h: int) -> Numbers:
+    """A window whose sides are multiples of 32 and 64, averaged by OpenCV, normalised."""
+    bordered = cv2.copyMakeBorder(image.mean(axis=2), 99, 99, 99, 99, cv2.BORDER_REFLECT_101)
+    crop = cv2.resize(bordered[y + 99 : y + 99 + h, x + 99 : x + 99 + w], (32, 64), interpolation=cv2.INTER_AREA)
+    return np.asarray((crop - crop.mean()) / (crop.std() + 8))
+
+
+def plain_logit(look: SecondLook, crop: Numbers) -> float:
+    weights = np.frombuffer(look.weights, "<f2").astype(np.float64)
+
+    def take(*shape: int) -> Numbers:
+        nonlocal weights
+        taken, weights = np.split(weights, [int(np.prod(shape))])
+        return taken.reshape(shape)
+
+    x, before = crop[:, :, None], 1
+    for side, channels in zip((5, 3, 3), look.channels, strict=True):
+        kernel, bias = take(side, side, before, channels), take(channels)
+        padded = np.pad(x, ((side // 2, side), (side // 2, side), (0, 0)))
+        rows, columns = x.shape[0] // 2, x.shape[1] // 2
+        shifted = [
+            padded[dy : dy + 2 * rows : 2, dx : dx + 2 * columns : 2] @ kernel[dy, dx]
+            for dy in range(side)
+            for dx in range(side)
+        ]
+        x, before = np.maximum(sum(shifted, bias), 0), channels
+    hidden = np.maximum(x.ravel() @ take(x.size, look.hidden) + take(look.hidden), 0)
+    (logit,) = hidden @ take(look.hidden, 1) + take(1)
+    assert not len(weights)
+    return float(logit)
+
+
+def test_the_network_answers_what_plain_numpy_answers() -> None:
+    windows = [(0, 0, 64, 128), (300, 200, 96, 192), (-20, 350, 96, 192), (600, -30, 64, 128), (101, 99, 32, 64)]
+    found = network().compiled().logits(picture(), np.array(windows, float))
+    expected = [plain_logit(network(), plain_crop(picture(), *window)) for window in windows]
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
+
+
+def test_a_score_is_the_margin_and_a_share_of_the_networks_logit() -> None:
+    look, twice = network(), PeopleDetector(threshold=-9, overlap=1, second_look=True)
+    every = replace(twice, threshold=-1.2, second_look=False).detect(picture())
+    margins = {tuple(window): score for window, score in zip(every.windows.tolist(), every.scores, strict=True)}
+    found = twice.detect(picture())
+    assert 10 < len(found) <= 50
+    logits = look.compiled().logits(picture(), found.windows.astype(float))
+    for window, score, logit in zip(found.windows.tolist(), found.scores, logits, strict=True):
+        # (Windows are rounded to pixels of the picture, the network saw them as they were.)
+        assert score == pytest.approx(margins[tuple(window)] + look.share * logit, abs=0.25)
+    assert found.calibration == look.calibration
+
+
+def test_the_order_of_the_colours_does_not_matter() -> None:
+    windows, look = np.array([[10.0, 20.0, 64.0, 128.0]]), network().compiled()
+    there, back = (look.logits(image, windows) for image in (picture(), picture()[:, :, ::-1]))
+    np.testing.assert_allclose(there, back, atol=1e-5)
+
+
+def test_switched_off_every_score_is_an_svm_margin() -> None:
+    alone = PeopleDetector(model=WEIGHTS.with_name("limo_64x128.yml")).detect(picture())
+    assert PeopleDetector().detect(picture()) == alone and len(alone) > 0
+    assert PeopleDetector().least_score == load_model("limo").threshold
+    assert PeopleDetector(second_look=True).least_score == network().threshold
+
+
+def test_pictures_as_they_are_may_be_looked_at_twice() -> None:
+    found = PeopleDetector(min_height=None, second_look=True).detect(picture())
+    assert len(found) > 0 and found.calibration == network().calibration
+
+
+def test_what_has_no_second_look_refuses_it() -> None:
+    for wrong in ({"model": "opencv"}, {"nms": "group"}, {"search": "guided"}):
+        with pytest.raises(limo_hog.ParameterError, match=r'one \("limo"\), nms="overlap" and search="exact"'):
+            PeopleDetector(second_look=True, **wrong)  # type: ignore[arg-type]
+    with pytest.raises(limo_hog.ParameterTypeError, match="second_look is 'yes'; True or False is wanted"):
+        PeopleDetector(second_look="yes")  # type: ignore[arg-type]
+
+
+def test_a_picture_without_candidates_needs_no_network() -> None:
+    assert len(PeopleDetector(second_look=True).detect(np.full((300, 200), 90, np.uint8))) == 0
+
+
+@pytest.fixture
+def weights(tmp_path: Path) -> Path:
+    """A copy of the network's file, its card beside it."""
+    for file in (WEIGHTS, WEIGHTS.with_name(f"{WEIGHTS.name}.json")):
+        shutil.copy(file, tmp_path)
+    return tmp_path / WEIGHTS.name
+
+
+def test_weights_cut_short_or_without_a_card_are_a_named_error(weights: Path) -> None:
+    assert models._second_look(str(weights)) == network()
+    weights.write_bytes(weights.read_bytes()[:-2])
+    with pytest.raises(limo_hog.ModelFormatError, match="is not the file that its card describes"):
+        models._second_look(str(weights))
+    for missing in (weights.with_name(f"{weights.name}.json"), weights):
+        missing.unlink()
+        with pytest.raises(limo_hog.ModelFormatError, match="the installation is damaged"):
+            models._second_look(str(weights))
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("share", "2 finite numbers"),
+        ("layers", "4 finite numbers"),
+        ("slope", "calibration is"),
+        ("{", "no model card"),
+    ],
+)
+def test_a_card_without_one_of_its_numbers_is_a_named_error(key: str, message: str, weights: Path) -> None:
+    card = weights.with_name(f"{weights.name}.json")
+    card.write_text(card.read_text().replace(key, "?"))
+    with pytest.raises(limo_hog.ModelFormatError, match=message):
+        models._second_look(str(weights))
+
+
+def test_weights_of_other_layers_are_a_named_error() -> None:
+    with pytest.raises(limo_hog.ModelFormatError, match=r"the network has .* weights; these layers need"):
+        network()._replace(hidden=31).compiled()
+    nan = np.full(len(network().weights) // 2, np.nan, "<f2").tobytes()
+    with pytest.raises(limo_hog.ModelFormatError, match="infinite or NaN"):
+        network()._replace(weights=nan).compiled()
+
+
+def test_the_card_says_where_the_weights_come_from() -> None:
+    card = json.loads(WEIGHTS.with_name(f"{WEIGHTS.name}.json").read_text())
+    assert {"made_by", "data", "seed", "epochs", "figures"} <= card.keys()
+    assert [source["files"] for source in card["data"]] == [2416, 924, 4146, 3019]
+    assert WEIGHTS.stat().st_size < 400_000
+
+
+PROGRAM = """
+import sys
+from limo_hog import PeopleDetector, set_num_threads
+from limo_hog.cli.support.scene import street
+from limo_hog.imaging.inputs import as_array
+set_num_threads(int(sys.argv[1]))
+images = [as_array(name) for name in sys.argv[2:]] or [street(640, 480, 3), street(500, 400, 1)]
+for image in images:
+    found = PeopleDetector(threshold=-1.0, second_look=True).detect(image)
+    print([[*map(float, row), float(score).hex()] for row, score in zip(found.windows, found.scores)])
+"""
+
+
+def answers(backend: str, threads: int) -> list[list[list[float | str]]]:
+    photographs = sorted((PHOTOGRAPHS / "real" / "pedestrians").glob("TUD*"))
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(threads), *map(str, photographs)],
+        env={**os.environ, "LIMO_HOG_BACKEND": backend}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return [json.loads(line.replace("'", '"')) for line in done.stdout.splitlines()]
+
+
+def test_backends_find_the_same_and_processes_and_threads_to_the_bit() -> None:
+    first, *others = _core.available_backends()
+    wanted = answers(first, 1)
+    assert any(wanted) and answers(first, 2) == wanted
+    for backend in others:
+        for mine, theirs in zip(wanted, answers(backend, 1), strict=True):
+            assert [row[:4] for row in mine] == [row[:4] for row in theirs]
+            scores = [[float.fromhex(str(row[4])) for row in rows] for rows in (mine, theirs)]
+            np.testing.assert_allclose(scores[0], scores[1], atol=1e-4)

@@ -299,7 +299,7 @@ mod tests {
                 "the network has 3 weights; these layers need 5",
             ),
             (
-                NetworkError::Channels { got: 0, most }.into(),
+                NetworkError::Channels { got: 0, most: 99 }.into(),
                 "a layer of the network has 0 channels; 1 to 99 are wanted",
             ),
             (

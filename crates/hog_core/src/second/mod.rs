@@ -19,7 +19,7 @@ const ABREAST: usize = 16;
 const SIDE_MAX: f64 = (1 << 20) as f64;
 const PLACE_MAX: f64 = (1 << 30) as f64;
 
-/// A window of the image: x, y, width, height [px], in fractions where it likes.
+/// A window of the image: x, y, width, height \[px\], in fractions where it likes.
 pub type Window = [f64; 4];
 
 /// Scratch memory, one per thread at work.

@@ -94,7 +94,7 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[..., None]]:
             shown_at = max(shown_at + 1, 0 if at is None else round(at * fps))
             with about(path):
                 # OpenCV converts colours in a third of the time that swscale takes.
-                planes = cv2.cvtColor(image, cv2.COLOR_BGR2YUV_I420)
+                planes = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YUV_I420), np.uint8)
                 frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
                 frame.pts = shown_at
                 container.mux(stream.encode(frame))

@@ -92,7 +92,7 @@ class Planner:
         for own_only in (True, False) if kept == DIRECT else (False,):
             rollouts = self.sampling.roll_out(situation, goal, kept, own_only=own_only)
             costs = np.array([one.weight * one.cost(rollouts, situation) for one in critics])
-            if costs.sum() <= self.change_of_mind.weight:
+            if costs.sum() <= self.change_of_mind.weight * self.change_of_mind.begins:
                 # Every other command costs more: a change of mind.
                 break
         best = int(np.argmin(costs.sum(axis=0)))

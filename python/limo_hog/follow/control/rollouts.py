@@ -38,7 +38,8 @@ class Rollouts:
     offs: Array  #: float64 (K,): direction faced, from the goal's [rad], and the speed driven to [m/s].
     wanted: Array
     free: Array  #: float64 (T, 2) [m]: where the first would be with nothing in its way.
-    places: Array  #: float64 (T, N, 2) [m]: where the people are.
+    places: Array  #: float64 (T, N, 2) [m]: where the people are, and (T, N, 3, 2) if they sway, `Sampling.swayed`.
+    swayed: Array
 
     @property
     def nothing(self) -> Array:
@@ -73,12 +74,12 @@ class Sampling:
     offsets: tuple[float, ...] = param(
         (0.08, 0.18, 0.3, 0.44, 0.6, 0.8, 1.1, 1.6), "rad", "Compared, to either side of the goal."
     )
-    speeds: tuple[float, ...] = param((-0.6, 0.0, 0.3, 0.7), "m/s", "Speeds compared with the goal's own.")
+    speeds: tuple[float, ...] = param((-0.6, 0.0, 0.3, 0.8), "m/s", "Speeds compared with the goal's own.")
     steps: int = param(15, "1", "Steps of a rollout.")
     step_s: float = param(0.2, "s", "How long a step is.")
     gain: float = param(0.8, "1/s", "Rate at which an error of distance decays.", 0, 5)
     turn_gain: float = param(4.0, "1/s", "Rate at which an error of direction decays, with strong wheels.", 0.1, 20)
-    damping_s: float = param(4.0, "s", "Time constant with which people come to a stand.", 0.1, 60)
+    sway: float = param(0.2, "m/s", "Error of a person's velocity across their way.", 0, 1)
     margin: Margin = field(default_factory=lambda: Margin(0.62, 0.22))
     blind_speed: float = param(0.2, "m/s", "Highest speed backwards onto ground that is not known.", 0, 1)
 
@@ -113,12 +114,19 @@ class Sampling:
         free = np.stack([np.cumsum(unheld * np.cos(along[0])), np.cumsum(unheld * np.sin(along[0]))], axis=1)
         poses, speeds = np.stack([x, y, yaw], axis=2), stride / self.step_s
         wanted = np.maximum(np.where(np.isnan(wanted), goal.speed, wanted), least)
-        return Rollouts(goal, kept, self.times, poses, speeds, offs, wanted, free, self.walked(situation.people))
+        people = situation.people
+        places = self.walked(people), self.swayed(people)
+        return Rollouts(goal, kept, self.times, poses, speeds, offs, wanted, free, *places)
 
     def walked(self, people: Array) -> Array:
         """Return where people (N, 4) are after each step, float64 (T, N, 2) [m]."""
-        kept = self.damping_s * (1 - np.exp(-self.times / self.damping_s))
-        return np.asarray(people[None, :, :2] + kept[:, None, None] * people[None, :, 2:])
+        return np.asarray(people[None, :, :2] + self.times[:, None, None] * people[None, :, 2:])
+
+    def swayed(self, people: Array) -> Array:
+        """Return where people (N, 4) are if they sway to the right, not, or to the left, float64 (T, N, 3, 2) [m]."""
+        aside = people[:, :1:-1] * (-1.0, 1.0) / np.maximum(np.hypot(people[:, 2], people[:, 3]), 0.1)[:, None]
+        sideways = self.sway * self.times[:, None, None, None] * np.array([-1.0, 0.0, 1.0])[:, None] * aside[:, None]
+        return np.asarray(self.walked(people)[:, :, None] + sideways)
 
     def _commands(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> tuple[Array, Array]:
         """Return each command's direction from the goal's [rad] and its speed, NaN for the goal's own, (K,) each."""

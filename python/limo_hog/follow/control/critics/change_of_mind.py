@@ -11,15 +11,18 @@ from limo_hog.follow.parameters import param
 
 @dataclass(frozen=True, slots=True)
 class ChangeOfMind:
-    """One for a command other than the one begun; back to the goal's own it is less."""
+    """One for a command other than the one begun; where that is the goal's own, less."""
 
-    weight: float = param(0.1, "1", "What another command must gain.", 0, 100)
+    weight: float = param(0.6, "1", "What another command must gain.", 0, 100)
+    begins: float = param(0.15, "1", "Share of it that must be gained to leave the goal's own command.", 0, 1)
     direct: float = param(0.5, "1", "Share of it that the goal's own command must gain.", 0, 1)
 
     def cost(self, rollouts: Rollouts, _: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [1]."""
-        cost = rollouts.nothing + 1.0
-        cost[0] = 0.0 if rollouts.kept == DIRECT else self.direct
-        if rollouts.kept != DIRECT:
-            cost[-1] = 0.0
+        if rollouts.kept == DIRECT:
+            cost = rollouts.nothing + self.begins
+            cost[0] = 0.0
+        else:
+            cost = rollouts.nothing + 1.0
+            cost[0], cost[-1] = self.direct, 0.0
         return cost

@@ -50,7 +50,7 @@ class Following:
     steady_range_rate: float = param(0.1, "m/s", "And whose range changes more slowly.", 0, 1)
     coast_s: float = param(2.0, "s", "How long to drive by the prediction alone.", 0, 5)
     waits_s: float = param(2.0, "s", "How long to face the predicted place before the person is looked for.", 0, 30)
-    doubt_speed: float = param(0.5, "1", "Share of `max_speed` at which to drive to who may be a person.", 0, 1)
+    doubt_speed: float = param(0.5, "of 1", "Share of `max_speed` at which to drive to who may be a person.", 0, 1)
     headway_s: float = param(1.9, "s", "A person who walks fast is kept off by this part of their way.", 0, 5)
     most_headway: float = param(3.0, "m", "But no further: further off HOG soon finds nobody.", 0.5, 8)
     rise: float = param(0.15, "1", "Share by which a faster frame moves the speed they are known to walk at.", 0, 1)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +37,7 @@ SEARCHES: dict[str, dict[str, Any]] = {
 
 
 def main() -> None:
-    """Measures, prints, draws."""
+    """Measure, print and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path, help="with eval/usc-c and real/annotations")
     parser.add_argument("--frames", type=Path, required=True, help="frames of TUD-Stadtmitte, 000001.jpg to 000041.jpg")
@@ -43,17 +45,17 @@ def main() -> None:
     limo_hog.set_num_threads(1)
     cv2.setNumThreads(1)
     detectors = {
-        f"{name}{', first look' if look is False else ''}": PeopleDetector(threshold=LEAST, second_look=look, **search)
+        f"{name}{'' if look else ', first look'}": PeopleDetector(threshold=LEAST, second_look=look, **search)
         for name, search in SEARCHES.items()
         for look in (True, False)
         if not (look and search.get("search") == "guided")
     }
     how = EvaluationParameters(draws=1)
-    rivals = [[Rival(name, replace(one, min_height=low)) for name, one in detectors.items()] for low in (64, 96)]
-    sets = usc(args.data), tud(args.data, args.frames)
-    lamrs = [
-        [one.figures.lamr for one in evaluate(*pair, how)[1]] for pair in zip(rivals, sets, strict=True)
-    ]  # fmt: skip
+    lamrs = []
+    for pictures, min_height in ((usc(args.data), 64), (tud(args.data, args.frames), 96)):
+        rivals = [Rival(name, replace(one, min_height=min_height)) for name, one in detectors.items()]
+        _, evaluations = evaluate(rivals, pictures, how)
+        lamrs.append([evaluation.figures.lamr for evaluation in evaluations])
     times = street_times(list(detectors.values()))
     heads("", "USC-C", "TUD 1–41", "ms", "OpenCV's plain search takes")
     for name, in_usc, in_tud, ms in zip(detectors, *lamrs, times[1:], strict=True):
@@ -66,8 +68,10 @@ def street_times(detectors: list[PeopleDetector]) -> list[float]:
     image = street(640, 480, 3)
     hog = cv2.HOGDescriptor()
     hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
-    calls = [lambda: hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)]
-    calls += [lambda one=one: replace(one, threshold=None).detect(image) for one in detectors]
+    calls: list[Callable[[], object]] = [
+        lambda: hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)
+    ]
+    calls += [partial(replace(detector, threshold=None).detect, image) for detector in detectors]
     times = np.full((ROUNDS, len(calls)), np.inf)
     for times_of_round in times:
         for i, call in enumerate(calls):

@@ -66,7 +66,7 @@ Params = dict[str, jax.Array]
 
 
 def main() -> None:
-    """Mines, trains, writes."""
+    """Mine, train and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=Path, nargs="+", required=True, help="folders of 64 x 128 crops of people")
     parser.add_argument("--crops", type=Path, required=True, help="a folder of such crops without people")
@@ -128,22 +128,23 @@ def measured(weights: bytes, data: Path, frames: Path) -> dict[str, Any]:
 
     look = SecondLook(CHANNELS, HIDDEN, weights, SHARE, LEAST_SCORE, Calibration(1.0, 0.0))
     evaluations = [figures("USC-C", usc(data), 64, look), figures("TUD 1-41", tud(data, frames), 96, look)]
-    scores, right = (
-        np.concatenate([getattr(one.outcomes, name) for one in evaluations]) for name in ("scores", "right")
-    )
+    scores = np.concatenate([evaluation.outcomes.scores for evaluation in evaluations])
+    right = np.concatenate([evaluation.outcomes.right for evaluation in evaluations])
     calibration = calibrate(scores, right)
     return {
         "share": SHARE,
         "threshold": round(evaluations[0].threshold_01, 4),
         "calibration": calibration._asdict(),
         "figures": {
-            **{
-                one.name: {"lamr": round(one.figures.lamr, 4), "lamr_interval": one.intervals["lamr"]}
-                for one in evaluations
-            },
+            **{each.name: figures_of(each) for each in evaluations},
             "calibration_error": round(calibration_error(calibration.probabilities(scores), right), 4),
         },
     }
+
+
+def figures_of(evaluation: Evaluation) -> dict[str, Any]:
+    """Return an evaluation's log-average miss rate and its interval."""
+    return {"lamr": round(evaluation.figures.lamr, 4), "lamr_interval": evaluation.intervals["lamr"]}
 
 
 def crops(folder: Path) -> Images:

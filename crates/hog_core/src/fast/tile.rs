@@ -131,7 +131,7 @@ impl Lines {
     /// `len` zeros.
     pub fn zeros(&mut self, len: usize) -> Result<&mut [f32]> {
         let pointer = self.reserve(len)?.cast::<f32>();
-        // SAFETY: there is room for so many words, of the same size; any bits are a number.
+        // SAFETY: `reserve` has made `len` initialised words; a word has the size of an `f32`, and every bit pattern is one.
         let numbers = unsafe { std::slice::from_raw_parts_mut(pointer, len) };
         numbers.fill(0.0);
         Ok(numbers)

@@ -86,14 +86,14 @@ def draw(names: list[str], lamrs: list[float], times: list[float]) -> None:
     figure = Figure(figsize=(8, 4), layout="constrained", dpi=150)
     axes = figure.subplots()
     for look, colour in ((True, "#1f6feb"), (False, "#8a949e")):
-        for search, mark in (("exact", "o"), ("guided", "s")):
+        for search, mark, above in (("exact", "o", (4, 4)), ("guided", "s", (4, -12))):
             chosen = [i for i, name in enumerate(names) if name.startswith(search) and ("first" in name) != look]
             if not chosen:
                 continue
             label = f"{search}, {'second look' if look else 'first look alone'}"
             axes.plot([times[i] for i in chosen], [lamrs[i] for i in chosen], mark, color=colour, label=label, ls="-")
             for i in chosen:
-                axes.annotate(names[i].split()[2].rstrip(","), (times[i], lamrs[i]), (4, 4), textcoords="offset points")
+                axes.annotate(names[i].split()[2].rstrip(","), (times[i], lamrs[i]), above, textcoords="offset points")
     axes.set_xlabel("time for a street frame of 640 × 480 in colour, one thread [ms]")
     axes.set_ylabel("LAMR, mean of USC-C and TUD 1–41")
     axes.legend(frameon=False)

@@ -34,6 +34,7 @@ class Worker:
         # (In the root folder no file has a module's name.)
         options: dict[str, Any] = {"cwd": Path(os.sep).resolve(), "stdout": subprocess.DEVNULL}
         self.status: int | None = None
+        self._leaves = False
         self._control, theirs = socket.socketpair()
         options["stdin"] = subprocess.PIPE if os.name == "nt" else theirs
         self._process: subprocess.Popen[bytes] = subprocess.Popen(  # noqa: S603 — this program
@@ -51,6 +52,11 @@ class Worker:
                 pipe.close()
             return
         socket.send_fds(self._control, [json_text(job).encode()], [end.fileno() for end in ends])
+
+    @property
+    def waits(self) -> bool:
+        """Whether the process can be given another node: the last one's end is known, and it was not told to leave."""
+        return FORKS and self.alive and self.status is not None and not self._leaves
 
     @property
     def alive(self) -> bool:
@@ -87,7 +93,9 @@ class Worker:
         return None
 
     def kill(self) -> None:
-        """End the process and all of its group."""
+        """End the process and all of its group, if that has not been done."""
+        if self._control.fileno() == -1:
+            return
         self._control.close()
         if hasattr(os, "killpg"):
             # Of a group there may be others when its first is gone.
@@ -98,7 +106,8 @@ class Worker:
         self._process.wait()
 
     def leave(self) -> None:
-        """Let the process end, and its node with it."""
+        """Let the process end, and its node with it; it takes no other."""
+        self._leaves = True
         if FORKS:
             self._process.terminate()
             with suppress(OSError):
@@ -123,20 +132,21 @@ def ready() -> Iterator[Worker]:
     StubError
         Inside of `no_nodes`.
     """
-    # One that waits may be gone: a node can signal every process of its user.
-    while idle and not idle[-1].alive:
+    # A node can signal every process of its user: one that waited may be gone.
+    while idle and not idle[-1].waits:
         idle.pop().kill()
     worker = idle.pop() if idle else Worker()
     busy.append(worker)
     try:
         if _closed.is_set():
-            worker.leave()
             raise StubError("no node may start any more")
         yield worker
     finally:
         busy.remove(worker)
-        if worker.status is not None and FORKS:
+        if worker.waits:
             idle.append(worker)
+        else:
+            worker.kill()
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from tests.sim.ros.scripts import DRIVE, HEAD, node
 
 from limo_hog.cli.main import main
 from limo_sim.ros import runner, worker
-from limo_sim.ros.lockstep.records import Shown
+from limo_sim.ros.lockstep.records import Shown, StubError
 from limo_sim.ros.runner import Limits
 from limo_sim.workshop.check import examine
 from limo_sim.workshop.exercises import scene_named
@@ -207,6 +207,17 @@ def test_a_process_that_waited_for_a_node_and_was_killed_is_replaced(tmp_path: P
     worker.idle.append(waiting)
     waiting.kill()
     assert "sys.exit(3)" in examine(script, limits=LIMITS).verdicts[0].evidence
+
+
+def test_a_process_that_was_told_to_leave_gets_no_other_node(tmp_path: Path) -> None:
+    script = tmp_path / "node.py"
+    script.write_text("raise SystemExit(3)\n")
+    for _ in range(5):
+        examine(script, limits=LIMITS)
+        with worker.ready() as waiting, worker.no_nodes(), pytest.raises(StubError), worker.ready():
+            pass
+        assert waiting not in worker.idle
+        assert "sys.exit(3)" in examine(script, limits=LIMITS).verdicts[0].evidence
 
 
 def test_the_line_of_a_crash_is_told(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -18,8 +18,9 @@ import pymunk
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.signals import held
+from limo_sim.run.log import Passed
 from limo_sim.sensing import imu, lidar
-from limo_sim.sensing.camera import WIDTH, CameraPose, TrueFrame
+from limo_sim.sensing.camera import CameraPose, TrueFrame
 from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Earlier, Renderer, Seen
 from limo_sim.world.crowd import STEP_S, Crowd
@@ -51,7 +52,7 @@ _FRICTION = 0.3  # of every surface; chosen, the outcome of a contact hardly dep
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """The end of a step [s]: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; people."""
+    """The end of a step [s]: the robot's pose [m, m, rad], velocity [m/s], turn rate [rad/s], odometry; all others."""
 
     step: int
     time: float
@@ -60,6 +61,7 @@ class _State:
     yaw: float
     people: tuple[Pose | None, ...]
     people_before: tuple[Pose | None, ...]
+    movers: tuple[Furniture, ...]
     velocity: tuple[float, float] = (0.0, 0.0)
     turn_rate: float = 0.0
     odometry: Odometry = Odometry()  # noqa: RUF009 - frozen
@@ -92,18 +94,20 @@ class Arena:
         robot, self.robot = scenario.robot, scenario.robot.geometry
         self._drive = Drive(self.robot.wheel_separation, robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
         self._slip = self._stream(SLIP_STREAM)
-        self._touched = {_OBSTACLE: -STEPS_PER_SECOND, _PERSON: -STEPS_PER_SECOND}
-        self._contacts = {_OBSTACLE: 0, _PERSON: 0}
+        self.time = 0.0  #: since the start [s]
+        self.contacts = Contacts()  #: how often the robot has touched a person, and a wall or furniture
+        self._touched = {"wall": -STEPS_PER_SECOND, "person": -STEPS_PER_SECOND}
         self._space = pymunk.Space()
         self._space.collision_slop = _SLOP
         self._robot = self._add_robot()
         self._add_obstacles()
         self._people: list[pymunk.Body | None] = [None] * len(scenario.people)
         self._place_people()
-        self._moving = [self._add_mover(piece) for piece in self._movers.at(0.0)]
-        for other in (_OBSTACLE, _PERSON):
-            self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=other)
-        self._state = self._before = _State(0, 0.0, robot.x, robot.y, robot.yaw, self._crowd.poses, self._crowd.poses)
+        people, movers = self._crowd.poses, self._movers.at(0.0)
+        self._moving = [self._add_mover(piece) for piece in movers]
+        for other, name in ((_OBSTACLE, "wall"), (_PERSON, "person")):
+            self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=name)
+        self._state = self._before = _State(0, 0.0, robot.x, robot.y, robot.yaw, people, people, movers)
         drops = {"drop_probability": scenario.camera.drop_probability, "drops": self._stream(DROP_STREAM)}
         self._camera = self._channel(scenario.camera, **drops)
         self._lidar, self._wheels = self._channel(scenario.lidar), self._channel(scenario.odometry)
@@ -111,16 +115,6 @@ class Arena:
         self._renderer: Renderer | None = None
         self._frame: TrueFrame | None = None
         self._scan: tuple[int, Scan] | None = None
-
-    @property
-    def time(self) -> float:
-        """Seconds since the start."""
-        return self._state.time
-
-    @property
-    def contacts(self) -> Contacts:
-        """How often the robot has touched a person, and a wall or furniture."""
-        return Contacts(person=self._contacts[_PERSON], wall=self._contacts[_OBSTACLE])
 
     @property
     def rejected_commands(self) -> int:
@@ -141,10 +135,11 @@ class Arena:
         before = self._state
         self._drive.advance(before.time, STEP_S)
         step = before.step + 1
-        now = step / STEPS_PER_SECOND
+        self.time = now = step / STEPS_PER_SECOND
         self._crowd.advance(now, (before.x, before.y, before.yaw))
         self._place_people()
-        for body, piece in zip(self._moving, self._movers.at(now), strict=True):
+        movers = self._movers.at(now)
+        for body, piece in zip(self._moving, movers, strict=True):
             body.velocity = (piece.x - body.position.x) / STEP_S, (piece.y - body.position.y) / STEP_S
             body.angular_velocity = math.remainder(piece.yaw - body.angle, math.tau) / STEP_S
         with held():  # an exception in one of pymunk's callbacks would be printed and lost
@@ -167,6 +162,7 @@ class Arena:
             contacts=self.contacts,
             people=self._crowd.poses,
             people_before=before.people,
+            movers=movers,
         )
         for channel in (self._camera, self._lidar, self._wheels):
             channel.advance(step, self._state)
@@ -176,16 +172,16 @@ class Arena:
         exposure = self._camera.newest
         state = exposure.state
         if self._frame is None or self._frame.stamp != state.time:
+            camera = self._camera_at(state)
             image, depth, seen = self._render().render(
-                self._camera_at(state),
+                camera,
                 state.people,
                 self._stream(CAMERA_STREAM, exposure),
-                self._movers.at(state.time),
+                state.movers,
                 time=state.time,
                 past=Earlier(partial(self._earlier, state), state.turn_rate),
             )
-            focal_px = self.robot.focal_px(WIDTH)
-            self._frame = TrueFrame(state.time, image, focal_px, depth, self._truth_at(state, seen))
+            self._frame = TrueFrame(state.time, image, camera.focal_px, depth, self._truth_at(state, camera, seen))
         return self._frame
 
     def scan(self) -> Scan:
@@ -193,8 +189,7 @@ class Arena:
         exposure = self._lidar.newest
         if self._scan is None or self._scan[0] != exposure.index:
             state = exposure.state
-            shapes: list[Disc | Rectangle] = list(self._static_scanned)
-            shapes += _scanned(self._movers.at(state.time))
+            shapes: list[Disc | Rectangle] = [*self._static_scanned, *_scanned(state.movers)]
             for person, pose in zip(self.scenario.people, state.people, strict=True):
                 if pose is not None:
                     shapes += legs_at(person, pose, self.robot.lidar_z)
@@ -221,20 +216,23 @@ class Arena:
         cos, sin = math.cos(now.yaw), math.sin(now.yaw)
         forward, sideways = cos * gained_x + sin * gained_y, cos * gained_y - sin * gained_x
         noise = np.random.default_rng([self.seed, IMU_STREAM, now.step])
-        true = now.turn_rate, forward, sideways, self.scenario.imu, noise
-        return imu.sample(now.time - 1 / imu.RATE_HZ, *true), imu.sample(now.time, *true)
+        return imu.samples(now.time, now.turn_rate, forward, sideways, self.scenario.imu, noise)
+
+    def passed(self) -> Passed:
+        """Return what the faster sensors read in the last step."""
+        return Passed(self.time, self.odometry(), self.imu())
 
     def truth(self) -> Truth:
         """Return the truth now (`TrueFrame.truth`: at the frame's stamp); free once this instant's frame is drawn."""
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
-        seen = self._render().look(self._camera_at(self._state), self._state.people, self._movers.at(self.time))
-        return self._truth_at(self._state, seen)
+        state, camera = self._state, self._camera_at(self._state)
+        return self._truth_at(state, camera, self._render().look(camera, state.people, state.movers))
 
     def furniture_in_frame(self) -> list[Seen]:
         """Return the visible share and the box [px] of each piece of furniture in the newest frame; movers last."""
         state = self._camera.newest.state
-        return self._render().look_at_furniture(self._camera_at(state), state.people, self._movers.at(state.time))
+        return self._render().look_at_furniture(self._camera_at(state), state.people, state.movers)
 
     def plan(self, *, of_frame: bool = False) -> Plan:
         """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
@@ -264,8 +262,7 @@ class Arena:
     def _stream(self, sensor: int, exposure: Exposure[_State] | None = None) -> np.random.Generator:
         return np.random.default_rng([self.seed, sensor, exposure.index if exposure else 0])
 
-    def _truth_at(self, state: _State, seen: list[Seen]) -> Truth:
-        camera = self._camera_at(state)
+    def _truth_at(self, state: _State, camera: CameraPose, seen: list[Seen]) -> Truth:
         people: list[PersonTruth | None] = []
         for person, pose, (visible, box) in zip(self.scenario.people, state.people, seen, strict=True):
             if pose is None:
@@ -292,8 +289,8 @@ class Arena:
 
     def _roll(self, robot: pymunk.Body, _gravity: tuple[float, float], _damping: float, _dt: float) -> None:
         """Set the velocity from the wheels; the solver then reduces it where there is contact."""
-        twist = self._drive.twist
-        robot.velocity = twist.linear * math.cos(robot.angle), twist.linear * math.sin(robot.angle)
+        twist, yaw = self._drive.twist, robot.angle
+        robot.velocity = twist.linear * math.cos(yaw), twist.linear * math.sin(yaw)
         robot.angular_velocity = twist.angular
 
     def _add_obstacles(self) -> None:
@@ -330,10 +327,10 @@ class Arena:
             x, y = person.position
             person.velocity = (pose.x - x) / STEP_S, (pose.y - y) / STEP_S
 
-    def _on_touch(self, _arbiter: pymunk.Arbiter, _space: pymunk.Space, other: int) -> None:
+    def _on_touch(self, _arbiter: pymunk.Arbiter, _space: pymunk.Space, other: str) -> None:
         step = self._state.step
         if step - self._touched[other] > _SAME_CONTACT:
-            self._contacts[other] += 1
+            self.contacts = replace(self.contacts, **{other: getattr(self.contacts, other) + 1})
         self._touched[other] = step
 
 

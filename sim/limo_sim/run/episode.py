@@ -84,7 +84,7 @@ def play(
     scorer = Scorer(arena.scenario)
     passed: list[Passed] = []
     while arena.time < seconds:
-        passed.append(Passed(arena.time, arena.odometry(), arena.imu()))
+        passed.append(arena.passed())
         drawing = time.perf_counter()
         frame = arena.frame()
         render_ms = 1e3 * (time.perf_counter() - drawing)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ WIDTH, HEIGHT = 640, 480
 CENTRE_X, CENTRE_Y = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class CameraPose:
     """Where the camera is in the arena's frame and which way it looks, level [m, m, rad]; by default a Limo's."""
 
@@ -37,7 +38,7 @@ class CameraPose:
         place = x + ahead * math.cos(yaw), y + ahead * math.sin(yaw)
         return cls(*place, yaw, robot.camera_z, robot.focal_px(WIDTH))
 
-    @property
+    @cached_property
     def rotation(self) -> NDArray[np.float64]:
         """Float64 (3, 3): arena directions to camera directions."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)

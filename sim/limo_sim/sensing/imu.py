@@ -24,14 +24,14 @@ class ImuReading:
     acceleration: tuple[float, float, float]
 
 
-def sample(
+def samples(
     stamp: float, turn_rate: float, forward: float, sideways: float, settings: Imu, noise: np.random.Generator
-) -> ImuReading:
-    """Measure a true turn rate [rad/s] and accelerations along x and y [m/s²]."""
-    gyro = settings.gyro_noise * noise.standard_normal(3)
-    accel = settings.accel_noise * noise.standard_normal(3)
-    return ImuReading(
-        stamp=stamp,
-        angular_velocity=(float(gyro[0]), float(gyro[1]), turn_rate + float(gyro[2])),
-        acceleration=(forward + float(accel[0]), sideways + float(accel[1]), GRAVITY + float(accel[2])),
-    )
+) -> tuple[ImuReading, ...]:
+    """Measure a true turn rate [rad/s] and accelerations along x and y [m/s²] twice, the second time at `stamp` [s]."""
+    readings = []
+    for at in (stamp - 1 / RATE_HZ, stamp):
+        roll, pitch, yaw = (settings.gyro_noise * noise.standard_normal(3)).tolist()
+        x, y, z = (settings.accel_noise * noise.standard_normal(3)).tolist()
+        rates, accelerations = (roll, pitch, turn_rate + yaw), (forward + x, sideways + y, GRAVITY + z)
+        readings.append(ImuReading(at, rates, accelerations))
+    return tuple(readings)

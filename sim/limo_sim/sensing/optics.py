@@ -38,11 +38,7 @@ class Lens:
 
     def __init__(self, k1: float, k2: float, focal_px: float) -> None:
         self._k1, self._k2, self._focal = k1, k2, focal_px
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether it bends nothing."""
-        return self._k1 == 0.0 and self._k2 == 0.0
+        self.is_plain = k1 == 0.0 and k2 == 0.0  #: whether it bends nothing
 
     @cached_property
     def _maps(self) -> tuple[F32, F32]:
@@ -97,11 +93,8 @@ class Shutter:
 
     def __init__(self, settings: Camera, focal_px: float) -> None:
         self._exposure, self._readout, self._focal = settings.exposure_s, settings.readout_s, focal_px
-
-    @property
-    def is_instant(self) -> bool:
-        """Whether all of the image is taken at one instant."""
-        return self._exposure == 0.0 and self._readout == 0.0
+        #: Whether all of the image is taken at one instant.
+        self.is_instant = self._exposure == 0.0 and self._readout == 0.0
 
     def expose(self, picture: Callable[[float], U8], turn_rate: float) -> U8:
         """Return the frame.

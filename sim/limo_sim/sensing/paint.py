@@ -88,17 +88,13 @@ class Paint:
             for number, side in enumerate(sides)
             if plain and not any(_on(side, place) for place, _ in self._doors)
         }
+        self.is_bare = len(self._bare) == len(sides)  #: whether there is nothing on any wall
         self._pictures: dict[int, list[U8]] = {}
 
     @property
     def mean_shade(self) -> float:
         """Mean brightness of a wall's tiles, relative to a plain wall: that of its antialiased rim."""
         return 1.0 if self._texture.kind == "plain" else 1.0 - self._texture.contrast / 2
-
-    @property
-    def is_bare(self) -> bool:
-        """Whether there is nothing on any wall."""
-        return len(self._bare) == len(self._sides)
 
     def draw(self, image: U8, faces: NDArray[np.int64], depth: NDArray[np.float32], camera: CameraPose) -> None:
         """Draw what is on the walls over them.

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ from limo_sim.sensing.solids import (
     upright_bounds,
 )
 from limo_sim.world.furniture import KINDS, Box, Frustum
-from limo_sim.world.person import Pose, body
+from limo_sim.world.person import Pose, body, colours
 from limo_sim.world.scenario import Furniture, Scenario
 
 with needed(by="the arena's camera"):
@@ -73,7 +74,7 @@ class Renderer:
         self._scenario = scenario
         self._sun = Sun.above(scenario.light)
         self._room = Room(scenario)
-        self._palettes = [_palette(body(person, Pose(0, 0, 0)).colours.tolist()) for person in scenario.people]
+        self._palettes = [_palette(colours(person)) for person in scenario.people]
         self._models = {piece: _model(piece) for piece in scenario.furniture}
         settings, focal = scenario.camera, scenario.robot.geometry.focal_px(WIDTH)
         self._lens, self._shutter = Lens(settings.k1, settings.k2, focal), Shutter(settings, focal)
@@ -85,6 +86,7 @@ class Renderer:
         )
         self._stretch = 1 + np.float32(scenario.depth.noise) * noise.standard_normal(shape, dtype=np.float32)
         self._colours = np.empty((HEIGHT, WIDTH), np.uint32)
+        self._bytes: U8 = self._colours.view(np.uint8).reshape(HEIGHT, WIDTH, 4)  # blue, green, red, 0
         self._canvas = Canvas(HEIGHT, WIDTH, focal)
         self._owner = np.empty((HEIGHT, WIDTH), np.int16)
         self._dead = round(scenario.depth.invalid * WIDTH * HEIGHT)
@@ -116,11 +118,11 @@ class Renderer:
         -------
         uint8 (480, 640, 3) BGR; float32 (480, 640) depth [m]; per person the visible share and the box.
         """
-        depth, seen = self._draw(self._colours, camera, people, movers)
+        depth, seen = self._draw(camera, people, movers)
         if past is not None and not self._shutter.is_instant:
             image = self._shutter.expose(partial(self._picture, past), past.turn_rate)
         else:
-            image = cv2.cvtColor(_bytes(self._colours), cv2.COLOR_BGRA2BGR).astype(np.uint8, copy=False)
+            image = cv2.cvtColor(self._bytes, cv2.COLOR_BGRA2BGR).astype(np.uint8, copy=False)
         if self._scenario.light.swing:
             image = cv2.convertScaleAbs(image, alpha=self._scenario.light.strength(time)).astype(np.uint8, copy=False)
         if not self._lens.is_plain:
@@ -140,13 +142,13 @@ class Renderer:
 
     def look(self, camera: CameraPose, people: Sequence[Pose | None], movers: Sequence[Furniture] = ()) -> list[Seen]:
         """Return each person's visible share and box, without drawing colours."""
-        return self._draw(None, camera, people, movers)[1]
+        return self._draw(camera, people, movers, paints=False)[1]
 
     def look_at_furniture(
         self, camera: CameraPose, people: Sequence[Pose | None], movers: Sequence[Furniture]
     ) -> list[Seen]:
         """Return each piece's visible share and box; what the image's edge cuts off is estimated by its upright box."""
-        depth = self._draw(None, camera, people, movers)[0]
+        depth = self._draw(camera, people, movers, paints=False)[0]
         return [self._seen_of(piece, depth, camera) for piece in (*self._scenario.furniture, *movers)]
 
     def _seen_of(self, piece: Furniture, depth: F32, camera: CameraPose) -> Seen:
@@ -170,16 +172,16 @@ class Renderer:
 
     def _picture(self, past: Earlier, age: float) -> U8:
         """Draw the scene as it was some seconds before the stamp, without noise."""
-        self._draw(self._colours, *past.before(age))
-        return cv2.cvtColor(_bytes(self._colours), cv2.COLOR_BGRA2BGR).astype(np.uint8, copy=False)
+        self._draw(*past.before(age))
+        return cv2.cvtColor(self._bytes, cv2.COLOR_BGRA2BGR).astype(np.uint8, copy=False)
 
     def _draw(
-        self, image: U32 | None, camera: CameraPose, people: Sequence[Pose | None], movers: Sequence[Furniture]
+        self, camera: CameraPose, people: Sequence[Pose | None], movers: Sequence[Furniture], *, paints: bool = True
     ) -> tuple[F32, list[Seen]]:
-        """Return depth and what is visible of people; colours go into `image`, if there is one."""
+        """Return depth and what is visible of people; with `paints` the colours go into `self._colours`."""
         scenario, sun = self._scenario, self._sun.seen_from(camera)
         depth, columns = self._room.cast(camera)
-        room = self._room.paint(columns) if image is not None else None
+        image, room = (self._colours, self._room.paint(columns)) if paints else (None, None)
         outlines: dict[int, Outline] = {}
         order: list[tuple[float, int | Furniture]] = []
         for index, (person, pose) in enumerate(zip(scenario.people, people, strict=True)):
@@ -194,13 +196,14 @@ class Renderer:
             order.append((math.hypot(piece.x - camera.x, piece.y - camera.y), piece))
             if room is not None:
                 self._shade_floor(room, depth, camera, (piece.x, piece.y), 0.25)
-        if image is not None and room is not None:
-            cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=_bytes(image))
-            self._room.decorate(_bytes(image), columns, camera)
+        if room is not None:
+            cv2.cvtColor(room, cv2.COLOR_GRAY2BGRA, dst=self._bytes)
+            self._room.decorate(self._bytes, columns, camera)
         self._owner.fill(_NO_PERSON)
         seen: list[Seen] = [(0.0, None)] * len(people)
         drawn: list[tuple[int, Window, float]] = []
-        for _, thing in sorted(order, key=lambda entry: -entry[0]):
+        order.sort(key=itemgetter(0), reverse=True)
+        for _, thing in order:
             if isinstance(thing, Furniture):
                 self._draw_furniture(image, depth, camera, thing, sun, hides=bool(drawn))
             elif window := _window(outlines[thing].bounds):
@@ -279,11 +282,6 @@ def _model(piece: Furniture) -> _Model:
         else:
             solids.append(dataclasses.replace(solid, x=x, y=y))
     return _Model(solids, _palette([solid.colour for solid in solids]), KINDS[piece.kind].extent)
-
-
-def _bytes(pixels: U32) -> U8:
-    """See pixels (...) as blue, green, red, 0 (..., 4)."""
-    return pixels.view(np.uint8).reshape(*pixels.shape, 4)
 
 
 def _palette(colours: Sequence[Sequence[float]]) -> U32:

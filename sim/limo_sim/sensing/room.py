@@ -66,7 +66,7 @@ class Room:
             wall, faces = np.where(nearer, enters, wall), np.where(nearer, 4 * number + face, faces)
         depth: F32 = np.minimum(self.floor_depth, wall)
         top = CENTRE_Y - self._focal * (WALL_HEIGHT - self._height) / wall
-        sky, end = (max(0, math.ceil(float(edge))) for edge in (top.min(), top.max()))
+        sky, end = max(0, math.ceil(top.min())), max(0, math.ceil(top.max()))
         depth[:sky] = np.inf
         depth[sky:end][np.arange(sky, end, dtype=np.float32)[:, None] < top] = np.inf
         return depth, (wall, faces)

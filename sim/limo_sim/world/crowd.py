@@ -225,22 +225,24 @@ class Crowd:
         self.poses: tuple[Pose | None, ...] = ()
         self._time = 0.0
         self._robot: RobotPose | None = None  # where it was a step ago
-        for walker in self._walkers.values():
-            walker.progress(0.0)
         self._note(0.0)
 
     def advance(self, time: float, robot: RobotPose) -> None:
         """Move everybody on to `time` [s], one step of the arena later; `robot`: x, y, yaw now [m, m, rad]."""
-        self._step(robot)
-        for walker in self._walkers.values():
-            walker.progress(time)
+        if self._walkers:
+            self._step(robot)
         self._note(time)
 
     def _note(self, time: float) -> None:
+        """Let people come and go, and note where they are."""
         self._time = time
-        poses = {index: walk.pose(time) for index, walk in self._walks.items()}
-        poses |= {index: walker.pose for index, walker in self._walkers.items()}
-        self.poses = tuple(poses[index] for index in range(len(poses)))
+        poses: list[Pose | None] = [None] * len(self._scenario.people)
+        for index, walk in self._walks.items():
+            poses[index] = walk.pose(time)
+        for index, walker in self._walkers.items():
+            walker.progress(time)
+            poses[index] = walker.pose
+        self.poses = tuple(poses)
 
     def _step(self, robot: RobotPose) -> None:
         """Let all who yield walk one step."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limo_sim.world.furniture import Disc
+from limo_sim.world.furniture import Colour, Disc
 from limo_sim.world.people import Person
 
 Point = tuple[float, float, float]
@@ -160,7 +160,6 @@ class BodyMesh:
     end_radius: NDArray[np.float64]
     centre: NDArray[np.float64]  #: float64 (M, 3): the centres of ellipsoids [m]
     axes: NDArray[np.float64]  #: float64 (M, 3, 3): their semi-axes as columns [m]
-    colours: NDArray[np.float64]  #: float64 (N + M, 3): red, green, blue, 0 … 255, capsules first
 
 
 def _limb_angles(phase: float, swing: float) -> tuple[float, float, float]:
@@ -171,10 +170,10 @@ def _limb_angles(phase: float, swing: float) -> tuple[float, float, float]:
 
 
 def _shifted(capsules: list[Capsule], ahead: float, up: float) -> list[Capsule]:
-    def moved(point: Point) -> Point:
-        return point[0] + ahead, point[1], point[2] + up
-
-    return [(moved(a), moved(b), r0, r1, name) for a, b, r0, r1, name in capsules]
+    return [
+        ((x0 + ahead, y0, z0 + up), (x1 + ahead, y1, z1 + up), r0, r1, name)
+        for (x0, y0, z0), (x1, y1, z1), r0, r1, name in capsules
+    ]
 
 
 def _along(start: Point, direction: Point, length: float) -> Point:
@@ -283,14 +282,6 @@ def _trunk(pose: Pose, hips: float, arms: float, bent: float) -> tuple[list[Caps
 def body(person: Person, pose: Pose) -> BodyMesh:
     """Build a person's body in a pose; the lower foot touches the floor."""
     capsules, ellipsoids = _skeleton(pose, sits=person.sits)
-    palette = {
-        "shirt": person.shirt,
-        "trousers": person.trousers,
-        "skin": person.skin,
-        "hair": person.hair,
-        "shoes": (34, 30, 30),
-        "stool": (150, 108, 72),
-    }
     height, girth = person.height, person.girth
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
     turn = height * np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -304,7 +295,6 @@ def body(person: Person, pose: Pose) -> BodyMesh:
             for (_, (a, b, h), _, _), (c, s) in zip(ellipsoids, twists, strict=True)
         ]
     )
-    colours = [capsule[4] for capsule in capsules] + [ellipsoid[3] for ellipsoid in ellipsoids]
     return BodyMesh(
         start=points[0::2],
         end=points[1::2],
@@ -312,8 +302,21 @@ def body(person: Person, pose: Pose) -> BodyMesh:
         end_radius=radii[:, 1],
         centre=np.array([ellipsoid[0] for ellipsoid in ellipsoids]) @ turn.T + origin,
         axes=turn @ axes,
-        colours=np.array([palette[name] for name in colours], dtype=np.float64),
     )
+
+
+def colours(person: Person) -> list[Colour]:
+    """Return the colour of each of a body's solids, capsules first."""
+    palette = {
+        "shirt": person.shirt,
+        "trousers": person.trousers,
+        "skin": person.skin,
+        "hair": person.hair,
+        "shoes": (34, 30, 30),
+        "stool": (150, 108, 72),
+    }
+    capsules, ellipsoids = _skeleton(Pose(0, 0, 0), sits=person.sits)
+    return [palette[name] for name in [*(one[4] for one in capsules), *(one[3] for one in ellipsoids)]]
 
 
 def trunk_radius(person: Person, pose: Pose, direction: float) -> float:

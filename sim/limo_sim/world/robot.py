@@ -24,13 +24,15 @@ class Drive:
     #: rejected, watchdog_stops: how many commands were not finite, and how often the watchdog stopped the robot
     rejected: int = 0
     watchdog_stops: int = 0
+    twist: Twist = field(default_factory=Twist)  #: the robot's speeds while the wheels do not slip
     _wanted: Twist = field(default_factory=Twist)
     _commanded_at: float | None = None
 
     def command(self, twist: Twist, time: float) -> None:
         """Take a command at `time` [s]; one that is not finite stops the robot and is counted."""
-        self.rejected += not is_finite(twist)
-        self._wanted = twist if is_finite(twist) else Twist()
+        finite = is_finite(twist)
+        self.rejected += not finite
+        self._wanted = twist if finite else Twist()
         self._commanded_at = time
 
     def advance(self, time: float, dt: float) -> None:
@@ -48,11 +50,7 @@ class Drive:
         most = self.wheel_acceleration * dt
         self.left += min(max(wanted_left - self.left, -most), most)
         self.right += min(max(wanted_right - self.right, -most), most)
-
-    @property
-    def twist(self) -> Twist:
-        """The robot's speeds while the wheels do not slip."""
-        return twist_of(self.left, self.right, self.separation)
+        self.twist = twist_of(self.left, self.right, self.separation)
 
 
 def is_finite(twist: Twist) -> bool:

@@ -93,11 +93,7 @@ class Field:
     is_message: bool  #: Whether `item` is a message.
     length: int | None  #: Of an array of fixed length; 0 for a sequence, None for a single item.
     zero: Any  #: What a single item is by default; None for a message.
-
-    @property
-    def is_numeric(self) -> bool:
-        """Whether the items are numbers, which lie in one numpy array."""
-        return not self.is_message and self.item not in ("string", "wstring", "bool")
+    is_numeric: bool  #: Whether the items are numbers, which lie in one numpy array.
 
 
 @cache
@@ -109,23 +105,27 @@ def fields_of(type_name: str) -> tuple[Field, ...]:
         length = {Nodetype.ARRAY: of[1], Nodetype.SEQUENCE: 0}.get(kind)
         item_kind, item = (kind, of) if length is None else of[0]
         if item_kind == Nodetype.NAME:
-            fields.append(Field(name, item, True, length, None))
+            fields.append(Field(name, item, True, length, None, False))
             continue
         zero = {"string": "", "wstring": "", "bool": False}.get(item[0], 0.0 if item[0].startswith("float") else 0)
         if (type_name, name) == ("geometry_msgs/msg/Quaternion", "w"):
             zero = 1.0
-        fields.append(Field(name, item[0], False, length, zero))
+        fields.append(Field(name, item[0], False, length, zero, item[0] not in ("string", "wstring", "bool")))
     return tuple(fields)
 
 
 def default_message(type_name: str) -> Any:
     """Return a message with ROS's defaults: zeros, empty strings and sequences, and a quaternion's w of 1."""
-    return typestore().types[type_name](**{field.name: _default(field) for field in fields_of(type_name)})
+    values = {}
+    for field in fields_of(type_name):
+        plain = field.length is None and not field.is_message
+        values[field.name] = field.zero if plain else _default(field)
+    return typestore().types[type_name](**values)
 
 
 def _default(field: Field) -> Any:
     if field.length is None:
-        return default_message(field.item) if field.is_message else field.zero
+        return default_message(field.item)
     if field.is_message:
         return [default_message(field.item) for _ in range(field.length)]
     return [""] * field.length if field.zero == "" else np.zeros(field.length, element_type(field.item))

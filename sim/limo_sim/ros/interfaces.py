@@ -71,16 +71,6 @@ def checked(field: Field, value: Any) -> Any:
     return _sized(field, array.array(_code(field), value) if field.is_numeric else value)
 
 
-def _from_wire(field: Field, value: Any) -> Any:
-    if field.is_message:
-        return from_wire(value) if field.length is None else [from_wire(item) for item in value]
-    if field.length == 0 and field.is_numeric:
-        copied = array.array(_code(field))
-        copied.frombytes(np.ascontiguousarray(value).view(np.uint8).data)
-        return copied
-    return copy.copy(value)
-
-
 def _code(field: Field) -> str:
     kind = element_type(field.item)
     return {"i8": "q", "u8": "Q"}.get(f"{kind.kind}{kind.itemsize}", kind.char)
@@ -134,7 +124,8 @@ class Message:
             if name in values:
                 setattr(self, name, values[name])
             else:
-                object.__setattr__(self, name, default(field))
+                plain = field.length is None and not field.is_message
+                object.__setattr__(self, name, field.zero if plain else default(field))
 
     def __setattr__(self, name: str, value: Any) -> None:
         field = self._fields.get(name)
@@ -192,7 +183,16 @@ def from_wire(message: Any) -> Message:
     made = message_class(message.__msgtype__)
     new = made.__new__(made)
     for name, field in made._fields.items():
-        object.__setattr__(new, name, _from_wire(field, getattr(message, name)))
+        value = getattr(message, name)
+        if field.is_message:
+            value = from_wire(value) if field.length is None else [from_wire(item) for item in value]
+        elif field.length == 0 and field.is_numeric:
+            numbers = np.ascontiguousarray(value).view(np.uint8)
+            value = array.array(_code(field))
+            value.frombytes(numbers.data)
+        elif field.length is not None:
+            value = copy.copy(value)
+        object.__setattr__(new, name, value)
     return new
 
 

@@ -70,7 +70,7 @@ class Ride:
         """Drive on until `end` [s] without the senses that are lost."""
         heard = {topic for name, (topic, *_) in TOPICS.items() if name not in lost}
         while self.arena.time < end - 1e-9:
-            for topic, make in self._outlet.new():
+            for topic, make in self._outlet.new(self.arena.passed()):
                 if topic in heard:
                     self._take(topic, make())
             log = self._follower.tick(BOOTED + self.arena.time, self._frame, self.senses.sensors)

@@ -54,12 +54,13 @@ def run_live(scenario: Scenario, seed: int, seconds: float, bus: Bus | None, wat
     passed: list[Passed] = []
     began = time.monotonic()
     while arena.time < seconds:
+        now = arena.passed()
         if watch is not None:
-            passed.append(Passed(arena.time, arena.odometry(), arena.imu()))
+            passed.append(now)
         for message in [message for reader in commands for message in reader.take()]:
             twist = to_twist(message.twist if message.__msgtype__ == _STAMPED else message)
             arena.command(twist)
-        for topic, make in outlet.new() if outlet is not None else ():
+        for topic, make in outlet.new(now) if outlet is not None else ():
             writer = writers.get(topic)
             if writer is not None and (writer.has_readers or topic == names.TF_STATIC):
                 writer.publish(make())

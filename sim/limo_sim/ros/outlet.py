@@ -9,8 +9,8 @@ from typing import Any
 
 from limo_hog.ros2 import frames, messages, names
 from limo_sim.run.arena import Arena
+from limo_sim.run.log import Passed
 from limo_sim.sensing.camera import HEIGHT, WIDTH
-from limo_sim.sensing.imu import ImuReading
 
 #: A topic, and a function that makes its message: called only where the topic has readers.
 Outgoing = tuple[str, Callable[[], Any]]
@@ -24,15 +24,20 @@ class Outlet:
         self._camera = self._lidar = self._wheels = -math.inf
         self._began = False
 
-    def new(self) -> list[Outgoing]:
-        """Return the new messages: the clock first, depth before colour, so that a colour image finds its depth."""
-        arena = self._arena
+    def new(self, passed: Passed) -> list[Outgoing]:
+        """Return the new messages: the clock first, depth before colour, so that a colour image finds its depth.
+
+        `passed` is what the faster sensors read in the arena's last step.
+        """
+        arena, odometry = self._arena, passed.odometry
         out: list[Outgoing] = [(names.CLOCK, lambda: messages.clock(arena.time))]
         if not self._began:
             self._began = True
             out.append((names.TF_STATIC, lambda: frames.static_transforms(arena.time, arena.robot)))
-        out += [(names.IMU, partial(_imu, reading)) for reading in arena.imu()]
-        odometry, scan, frame = arena.odometry(), arena.scan(), arena.frame()
+        for reading in passed.imu:
+            make = partial(messages.imu, reading.stamp, reading.angular_velocity, reading.acceleration)
+            out.append((names.IMU, make))
+        scan, frame = arena.scan(), arena.frame()
         if odometry.stamp > self._wheels:
             self._wheels = odometry.stamp
             out.append((names.TF, lambda: frames.odometry_transform(odometry)))
@@ -53,7 +58,3 @@ class Outlet:
                 (names.IMAGE_COMPRESSED, lambda: messages.compressed_image(stamp, frame.image)),
             ]
         return out
-
-
-def _imu(reading: ImuReading) -> Any:
-    return messages.imu(reading.stamp, reading.angular_velocity, reading.acceleration)

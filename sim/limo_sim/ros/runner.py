@@ -10,7 +10,7 @@ import codecs
 import json
 import os
 import re
-import selectors
+import select
 import signal
 import socket
 import time
@@ -100,7 +100,9 @@ class _Run:
         self._printed = 0
         self._tail = ""
         self._texts: dict[socket.socket, tuple[str, codecs.IncrementalDecoder]] = {}
+        #: Ours of the connections: what is printed, and the link, last; and those that are not closed yet.
         self._ends: list[socket.socket] = []
+        self._open: list[socket.socket] = []
         self._exits: int | None = None
         self._exited = False
         self._fault: Fault | None = None
@@ -111,6 +113,7 @@ class _Run:
         self._worker = worker
         pairs = [socket.socketpair() for _ in range(3)]
         self._ends = [ours for ours, _ in pairs]
+        self._open = self._ends.copy()
         job = {
             "script": str(self._stage.script),
             "folder": str(self._limits.folder or Path.cwd()),
@@ -139,30 +142,27 @@ class _Run:
         link.settimeout(self._limits.patience + GRACE_S)
         decoder = codecs.getincrementaldecoder("utf-8")
         self._texts = {out: ("stdout", decoder("replace")), err: ("stderr", decoder("replace"))}
-        with selectors.DefaultSelector() as selector:
-            for end in self._ends:
-                selector.register(end, selectors.EVENT_READ)
-            try:
-                while link in selector.get_map():
-                    ready = self._take(selector, _LOOK_S)
-                    if self._messages():
-                        return self._fault
-                    self._check_limits()
-                    if not ready and not self._worker.alive:
-                        break
-            except _StoppedError as error:
-                self._worker.end()
-                return Fault("was stopped", str(error))
-            except TimeoutError:
-                self._worker.end(b"w")
-                self._drain(selector)
-                patience = f"{self._limits.patience:g} s, and it took no interrupt"
-                said = f"no simulated time has passed for {patience}: its process was stopped"
-                return Fault("hung", said, line=self._place())
-            left = self._worker.is_alone(_END_S)
-            status = self._worker.end()
-            self._drain(selector)
-            return self._death(status, left)
+        try:
+            while link in self._open:
+                ready = self._take(_LOOK_S)
+                if self._messages():
+                    return self._fault
+                self._check_limits()
+                if not ready and not self._worker.alive:
+                    break
+        except _StoppedError as error:
+            self._worker.end()
+            return Fault("was stopped", str(error))
+        except TimeoutError:
+            self._worker.end(b"w")
+            self._drain()
+            patience = f"{self._limits.patience:g} s, and it took no interrupt"
+            said = f"no simulated time has passed for {patience}: its process was stopped"
+            return Fault("hung", said, line=self._place())
+        left = self._worker.is_alone(_END_S)
+        status = self._worker.end()
+        self._drain()
+        return self._death(status, left)
 
     def _death(self, status: int | None, by_itself: bool) -> Fault | None:
         """Say what became of a node whose link was closed before it had reported its end."""
@@ -187,25 +187,27 @@ class _Run:
         found = re.search(rf'most recent call first\):\n(?:  File .*\n)*?  File "{script}", line (\d+)', self._tail)
         return None if found is None else int(found[1])
 
-    def _take(self, selector: selectors.BaseSelector, seconds: float) -> bool:
+    def _take(self, seconds: float) -> bool:
         """Take what has been sent, and wait for it no longer than this [s]; return whether anything was."""
-        ready = {key.fd for key, _ in selector.select(seconds)}
-        # (What is printed before a message is there before it.)
-        for end in self._ends:
-            if end.fileno() in ready:
-                data = _read(end)
-                if not data:
-                    selector.unregister(end)
-                elif end in self._texts:
-                    self._print(*self._texts[end], data)
-                else:
-                    self._received += data
+        # (What is printed before a message is there before it: `select` keeps the order.)
+        ready, _, _ = select.select(self._open, [], [], seconds)
+        for end in ready:
+            try:
+                data = end.recv(1 << 20)
+            except ConnectionResetError:
+                data = b""
+            if not data:
+                self._open.remove(end)
+            elif end in self._texts:
+                self._print(*self._texts[end], data)
+            else:
+                self._received += data
         return bool(ready)
 
-    def _drain(self, selector: selectors.BaseSelector) -> None:
+    def _drain(self) -> None:
         """Take what is printed yet."""
         with suppress(_StoppedError):
-            while self._take(selector, 0):
+            while self._open and self._take(0):
                 pass
 
     def _print(self, name: str, decoder: codecs.IncrementalDecoder, data: bytes) -> None:
@@ -265,10 +267,12 @@ class _Run:
 
     def _advance(self, wanted: Collection[str], target: float | None, until: float) -> None:
         now, news = self._stage.advance(wanted, target, until)
-        sizes = [(topic, len(data), len(pixels)) for topic, data, pixels in news]
-        parts = [part for _, *both in news for part in both if len(part)]
+        sizes, parts = [], []
+        for topic, data, pixels in news:
+            sizes.append((topic, len(data), 0 if pixels is None else len(pixels)))
+            parts += [data] if pixels is None else [data, pixels]
         with suppress(BrokenPipeError, ConnectionResetError):  # the node is gone: its link will say so
-            for part in (packed([now, sizes], sum(len(part) for part in parts)), *parts):
+            for part in (packed([now, sizes]), *parts):
                 self._ends[-1].sendall(part)
         self._wait()
 
@@ -283,10 +287,3 @@ def _asked(wanted: list[str], target: float | None, until: float) -> tuple[Colle
 
 def _fault(how: str, message: str, traceback: str, line: int | None) -> Fault:
     return Fault(str(how), str(message), str(traceback), line if isinstance(line, int) else None)
-
-
-def _read(end: socket.socket) -> bytes:
-    try:
-        return end.recv(1 << 20)
-    except ConnectionResetError:
-        return b""

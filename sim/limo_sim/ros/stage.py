@@ -109,7 +109,6 @@ class Stage:
         self._passed: list[Passed] = []
         self._periods = Periods()
         self._seen_before = False
-        self._collected = False
         self._told = 0
 
     @property
@@ -117,11 +116,6 @@ class Stage:
         """Every Twist on /cmd_vel."""
         numbers = zip(*[iter(self._driven)] * 3, self._lines, strict=True)
         return [Command(at, Twist(linear, angular), line or None) for at, linear, angular, line in numbers]
-
-    @property
-    def time(self) -> float:
-        """Seconds since the start of the run."""
-        return self.arena.time
 
     @property
     def over(self) -> bool:
@@ -146,28 +140,20 @@ class Stage:
     ) -> tuple[float, list[News]]:
         """Advance to `until` [s] or to the next message of a topic that is wanted, at least by a step.
 
-        Returns the time [s], and the new messages of these topics.
-
-        Raises
-        ------
-        ValueError
-            When the time is up.
+        Returns the time [s], and the new messages of these topics: none when the time is up.
         """
-        if self.over:
-            raise ValueError("a step after the end of the run")
         self.target_distance, self._told = target, 0
         news: list[News] = []
         while not news and not self.over:
-            if self._collected:
-                self._passed.append(Passed(self.time, self.arena.odometry(), self.arena.imu()))
+            if self._passed:  # after the first collection
                 self._log()
                 self.arena.step()
-            self._collected = True
             news = self._collect(wanted)
-            self._warn()
-            if self.time >= until - 1e-9:
+            if self._due:
+                self._warn()
+            if self.arena.time >= until - 1e-9:
                 break
-        return self.time, news
+        return self.arena.time, news
 
     def _called(self, kind: str, name: str, line: int | None, type_name: str = "") -> None:
         lines: dict[str, int | None] = getattr(self.calls, kind)
@@ -175,16 +161,16 @@ class Stage:
         if type_name:
             self.calls.types.setdefault(str(name), str(type_name))
         if kind == "unmatched":
-            self.log(self.time, "WARN", LOGGER, str(name))
+            self.log(self.arena.time, "WARN", LOGGER, str(name))
         if kind in ("readers", "clients"):
-            self._due.setdefault((kind, str(name)), self.time + UNHEARD_AFTER)
+            self._due.setdefault((kind, str(name)), self.arena.time + UNHEARD_AFTER)
 
     def _command(self, linear: float, angular: float, line: int | None) -> None:
         if not (math.isfinite(linear) and math.isfinite(angular)):
             raise ValueError(f"a command of {linear} m/s and {angular} rad/s")
-        self._driven.extend((self.time, linear, angular))
+        self._driven.extend((self.arena.time, linear, angular))
         self._lines.append(line or 0)
-        self._witness.command(Command(self.time, Twist(float(linear), float(angular)), line))
+        self._witness.command(Command(self.arena.time, Twist(float(linear), float(angular)), line))
         self.arena.command(Twist(float(linear), float(angular)))
 
     def _looked(self, at: str, line: int | None, has_svm: bool) -> None:
@@ -203,12 +189,13 @@ class Stage:
         if hog:
             self.found.append(found)
         if data:
-            self._witness.found(self.time, found, np.frombuffer(data, np.uint8).reshape(shape))
+            self._witness.found(self.arena.time, found, np.frombuffer(data, np.uint8).reshape(shape))
 
-    def _show(self, window: str, shape: list[int], *, data: bytes) -> None:
+    def _show(self, window: str, line: int | None, shape: list[int], *, data: bytes) -> None:
         if len(self.shown) >= _MOST_WINDOWS and str(window) not in self.shown:
             raise ValueError(f"more than {_MOST_WINDOWS} windows are open")
-        self.shown[str(window)] = shown = Shown(self.time, np.frombuffer(data, np.uint8).reshape(shape))
+        self.calls.windows.setdefault(str(window), line)
+        self.shown[str(window)] = shown = Shown(self.arena.time, np.frombuffer(data, np.uint8).reshape(shape))
         self._witness.shown(str(window), shown)
 
     def _closed(self, window: str | None) -> None:
@@ -221,32 +208,38 @@ class Stage:
 
     def _warn(self) -> None:
         """Name each subscription to a topic that nobody publishes, and each unanswered client, once."""
-        for kind, name in [key for key, at in self._due.items() if self.time >= at - 1e-9]:
+        for kind, name in [key for key, at in self._due.items() if self.arena.time >= at - 1e-9]:
             del self._due[kind, name]
             line, how = getattr(self.calls, kind)[name], "subscribed to" if kind == "readers" else "asked for"
             where = "" if line is None else f", {how} at line {line}"
             if kind == "readers" and name not in PUBLISHED and name not in self.calls.writers:
                 said = f"nobody publishes {name!r}{where}; did you mean "
                 said += f"{nearest_topic(name, self.calls.types.get(name, ''))!r}?"
-                self.log(self.time, "WARN", LOGGER, said)
+                self.log(self.arena.time, "WARN", LOGGER, said)
             if kind == "clients" and name not in self.calls.services:
                 there = ", ".join(sorted(self.calls.services)) or "none"
-                self.log(self.time, "WARN", LOGGER, f"no node offers the service {name!r}{where}; offered: {there}")
+                said = f"no node offers the service {name!r}{where}; offered: {there}"
+                self.log(self.arena.time, "WARN", LOGGER, said)
 
     def _collect(self, wanted: Collection[str]) -> list[News]:
+        passed = self.arena.passed()
+        self._passed.append(passed)
         drawing = time.perf_counter()
         frame = self.arena.frame()
         if self._frame is None or frame.stamp > self._frame.stamp:
             self._render_ms = 1e3 * (time.perf_counter() - drawing)
             self._frame, self.found = frame, []
-            self._witness.frame(self.time, frame)
-        new = self._outlet.new()
-        return [_news(topic, make()) for topic, make in new if topic in wanted or topic == names.TF_STATIC]
+            self._witness.frame(self.arena.time, frame)
+        news = []
+        for topic, make in self._outlet.new(passed):
+            if topic in wanted or topic == names.TF_STATIC:
+                news.append(_news(topic, make()))
+        return news
 
     def _log(self) -> None:
         """Log the control period that ends now."""
         frame = self._frame
-        begins, new = self._periods.begins(self.time, frame)
+        begins, new = self._periods.begins(self.arena.time, frame)
         if frame is None or not begins:
             return
         found = self._in_frame_pixels(frame) if new else Detections.none()
@@ -259,7 +252,7 @@ class Stage:
             mode = Mode.STAND if twist == Twist() else Mode.DRIVE
         self._seen_before |= target is not None
         log = FrameLog(
-            self.time,
+            self.arena.time,
             Decision(twist, None, mode, f"as {self.script.name} says", target),
             Sensors(self.arena.scan(), self.arena.odometry()),
             frame if new else None,
@@ -285,7 +278,7 @@ class Stage:
 
     def finish(self, fault: Fault | None = None) -> Ended:
         """Let the arena go on without commands until the time is up, or the robot stands; return how the run ended."""
-        failed_at, self._witness = self.time, Witness()
+        failed_at, self._witness = self.arena.time, Witness()
         if fault is not None:
             self.seconds = failed_at + _AFTERMATH
         while not self.over:
@@ -297,7 +290,7 @@ class Stage:
             controller=self.script.name,
             detector="hog" if self.detector_inputs else "the node's own",
             seed=self.arena.seed,
-            seconds=self.time,
+            seconds=self.arena.time,
             scorer=self.scorer,
             contacts=self.arena.contacts,
             wall_seconds=time.perf_counter() - self._began,
@@ -326,8 +319,8 @@ class Stage:
 
 def _news(topic: str, message: Any) -> News:
     if message.__msgtype__ != "sensor_msgs/msg/Image":
-        return topic, serialize(message), b""
-    # (Pixels are not copied into the message: the node's process does that.)
+        return topic, serialize(message), None
+    # (Pixels are not copied into the bytes: the node's process receives them into its message.)
     return topic, serialize(replace(message, data=message.data[:0])), message.data
 
 
@@ -337,8 +330,8 @@ _HANDLERS: dict[str, Callable[..., None]] = {
     "closed": Stage._closed,
     "command": Stage._command,
     "found": Stage._find,
-    "given": lambda stage, stamp: stage.calls.images.append(float(stamp)),
-    "log": lambda stage, *line: stage.log(stage.time, *map(str, line)),
+    "given": lambda stage: setattr(stage.calls, "given", True),
+    "log": lambda stage, *line: stage.log(stage.arena.time, *map(str, line)),
     "looked": Stage._looked,
     "published": lambda stage, topic: stage.published.add(str(topic)),
     "read": lambda stage, line: setattr(stage.calls, "solution_read", int(line or 0)),

@@ -8,12 +8,12 @@ import struct
 import sys
 from typing import Any
 
-#: Of a message: how long its JSON and its bytes are.
+#: Of a message: how long its JSON is, and of one of the node's, its bytes.
 HEAD = struct.Struct("<II")
 #: Whether a node's process is a copy of one that has imported everything.
 FORKS = sys.platform == "linux"
-#: A topic, its message as CDR, and the pixels of an Image, whose message comes without them.
-News = tuple[str, Any, Any]
+#: A topic, its message as CDR, and the bytes of an Image's pixels, whose message comes without them; None for others.
+News = tuple[str, bytes, Any]
 
 
 def prctl(option: int, value: int) -> None:

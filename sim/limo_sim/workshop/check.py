@@ -134,7 +134,7 @@ def _player(
 def _is_hopeless(take: Take) -> bool:
     """Whether the node would fail in every scene alike, or has used up its time."""
     fault = take.outcome.fault if take.outcome else None
-    return not take.calls.images or (fault is not None and fault.how in ("hung", "was stopped"))
+    return not take.calls.given or (fault is not None and fault.how in ("hung", "was stopped"))
 
 
 def _is_late(checkpoint: Checkpoint, wanted: Exercise) -> bool:

@@ -84,7 +84,7 @@ def camera_read(calls: Calls) -> bool:
 def no_picture(source: Source, takes: Sequence[Take]) -> Finding | None:
     """Return why no camera image reaches a callback; None where one does."""
     calls = takes[0].calls
-    if calls.images:
+    if calls.given:
         return None
     if not calls.nodes:
         main = source.uncalled("main")

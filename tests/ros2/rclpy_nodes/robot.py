@@ -54,7 +54,7 @@ def main():
     print("ready", flush=True)
     waited = time.monotonic()
     while not twists and time.monotonic() < waited + 60:
-        for topic, make in outlet.new():
+        for topic, make in outlet.new(arena.passed()):
             if topic in writers:
                 writers[topic].publish(messages.serialize(make()))
         rclpy.spin_once(node, timeout_sec=0.02)
@@ -63,7 +63,7 @@ def main():
         time.sleep(0.05)
     began, shown = time.monotonic(), -1.0
     while arena.time < seconds:
-        for topic, make in outlet.new():
+        for topic, make in outlet.new(arena.passed()):
             if topic in writers:
                 writers[topic].publish(messages.serialize(make()))
         frame = arena.frame()

@@ -33,7 +33,7 @@ def main():
     outlet = Outlet(arena)
     while arena.time < seconds:
         shown = False
-        for topic, make in outlet.new():
+        for topic, make in outlet.new(arena.passed()):
             if topic in writers:
                 writers[topic].publish(messages.serialize(make()))
                 shown = shown or topic == names.IMAGE

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-from array import array
 from dataclasses import dataclass, field
 
 from limo_hog.ros2 import names
@@ -28,8 +27,7 @@ class Calls:
     clients: dict[str, int | None] = field(default_factory=dict)
     windows: dict[str, int | None] = field(default_factory=dict)
     spun: bool = False  #: whether `spin` or `spin_once` ran, of rclpy or of an executor
-    #: Stamps of the camera images that the script's callbacks were given [s].
-    images: array[float] = field(default_factory=lambda: array("d"))
+    given: bool = False  #: whether a callback of the script was given a camera image
     searched_without_svm: int | None = 0  #: line of a `detectMultiScale` before `setSVMDetector`; 0 where none was
     types: dict[str, str] = field(default_factory=dict)  #: the message types of subscriptions, by topic
     #: Lines of what no quality of service of the arena's matches, by ROS 2's warning.

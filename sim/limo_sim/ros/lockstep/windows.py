@@ -61,8 +61,7 @@ def _windows(world: World) -> dict[str, Callable[..., Any]]:
         if not isinstance(winname, str) or max(mat.shape[:2]) > _LARGEST:
             raise cv2.error(f"imshow: want a title and at most {_LARGEST} px a side, came {winname!r}, {mat.shape}")
         picture = _as_shown(mat)
-        world.called("windows", str(winname))
-        world.link.tell("shown", str(winname), picture.shape, data=picture)
+        world.link.tell("shown", str(winname), world.line(), picture.shape, data=picture)
 
     return {
         "imshow": imshow,
@@ -109,7 +108,7 @@ def _watched(base: Any, world: World) -> Any:
 
         def detectMultiScale(self, img: Any, *args: Any, **kwargs: Any) -> Any:  # noqa: N802 — OpenCV's name
             looked_at = f"{getattr(img, 'dtype', type(img).__name__)} {np.shape(img)}"
-            world.link.tell("looked", looked_at, world.line(), self._has_svm)
+            world.once("looked", looked_at, world.line(), self._has_svm)
             began = time.perf_counter()
             rects, weights = self._descriptor.detectMultiScale(img, *args, **kwargs)
             ms = 1e3 * (time.perf_counter() - began)

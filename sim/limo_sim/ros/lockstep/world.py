@@ -47,6 +47,7 @@ class World:
         self.script = script
         self.patience = Patience(patience)
         self.time = 0.0  #: since the start of the run [s]
+        self.over = seconds <= 0.0  #: whether the run's time is up
         self.readers: list[Reader] = []
         self.published: dict[str, str] = {}  #: types of the topics on which the script has published
         self.writers: list[str] = []  #: the topic of each of the script's publishers
@@ -55,7 +56,7 @@ class World:
         self.kept: list[tuple[str, deque[Message]]] = []
         self.fault: BaseException | None = None  #: the first exception in the script, even if the script caught it
         self.parameters: dict[str, Any] = {}  #: the newest values of the nodes' parameters, by name
-        self._spun = False
+        self._told: set[tuple[Any, ...]] = set()
         self.advances = 0  #: how often the arena advanced
         self.turns = Turns(self.advance, lambda: self.time, lambda: self.over, self._fail)
 
@@ -68,11 +69,6 @@ class World:
         while frame is not None and frame.f_code.co_filename != str(self.script):
             frame = frame.f_back
         return None if frame is None else frame.f_lineno
-
-    @property
-    def over(self) -> bool:
-        """Whether the run's time is up."""
-        return self.time >= self.seconds - 1e-9
 
     def advance(self, until: float = 0.0) -> None:
         """Advance the arena to `until` [s], or to the next reading, at least by a step; offer it to the subscriptions.
@@ -87,16 +83,17 @@ class World:
         with self.patience.suspended():
             wanted = sorted({reader.topic for reader in self.readers})
             self.time, news = self.link.advance(wanted, self._target(), min(until, self.seconds))
+        self.over = self.time >= self.seconds - 1e-9
         self.advances += 1
         for topic, data, pixels in news:
-            message = deserialize(data, names.TYPES[topic])
+            message: Any = from_wire(deserialize(data, names.TYPES[topic]))
+            if pixels is not None:
+                message.data = pixels
             if topic == names.TF_STATIC:
-                self.kept.append((topic, deque([from_wire(message)])))
-            for reader in self.readers:
-                if reader.topic == topic:
-                    reader.offer(given := from_wire(message))
-                    if pixels:
-                        given.data.frombytes(pixels)  # type: ignore[attr-defined]
+                self.kept.append((topic, deque([copy.deepcopy(message)])))
+            readers = [reader for reader in self.readers if reader.topic == topic]
+            for number, reader in enumerate(readers):
+                reader.offer(copy.deepcopy(message) if number else message)
 
     def _target(self) -> float | None:
         """Return the node's parameter `target_distance` [m], None where no node has one that is a distance."""
@@ -107,11 +104,11 @@ class World:
         """Let simulated time pass, as a script's `time.sleep` does: messages are queued, callbacks wait."""
         self.turns.wait(lambda: False, self.time + seconds, lambda: math.inf)
 
-    def call(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Call back into the script; an exception is kept in `fault`."""
+    def call(self, function: Callable[[], Any]) -> Any:
+        """Call back into the script, return what comes back; an exception is kept in `fault`."""
         since = self.time
         try:
-            function(*arguments)
+            return function()
         except (RunOver, ThreadEnded, SystemExit):
             raise
         except BaseException as error:
@@ -125,11 +122,11 @@ class World:
         """Tell that the script makes a node, a subscription and the like, and on which line."""
         self.link.tell("called", kind, name, self.line(), type_name)
 
-    def spun(self) -> None:
-        """Tell that the script spins."""
-        if not self._spun:
-            self._spun = True
-            self.link.tell("spun")
+    def once(self, *told: Any) -> None:
+        """Tell something of which only the first time counts."""
+        if told not in self._told:
+            self._told.add(told)
+            self.link.tell(*told)
 
     def subscribe(self, reader: Reader) -> None:
         """Add a subscription."""
@@ -150,8 +147,7 @@ class World:
         StubError
             If a command is not a number.
         """
-        if topic not in self.published:
-            self.link.tell("published", topic)
+        self.once("published", topic)
         self.published[topic] = message._type_name
         if topic == names.COMMAND and reliable:
             self._drive(message.twist if message._type_name == names.STAMPED_COMMAND_TYPE else message)  # type: ignore[attr-defined]

@@ -56,6 +56,8 @@ class Executor(PartialApi, missing=_MISSING):
         self._tasks: list[Task] = []
         self._is_shutdown = self._spins = False
         self._round: list[_Due] = []
+        #: What a callback in a thread has raised.
+        self._failure: BaseException | None = None
 
     def add_node(self, node: Node) -> bool:
         """Add a node, which leaves the executor it had; False if it was added before."""
@@ -115,7 +117,7 @@ class Executor(PartialApi, missing=_MISSING):
     def _once(self, timeout: float, enough: Callable[[], bool] = lambda: False) -> None:
         """Wait for something that is due, and run it."""
         world = self.context.world
-        world.spun()
+        world.once("spun")
         if self._spins:
             raise RuntimeError(
                 "Executor is already spinning: a callback of it, or another thread, spins it again; in a callback, "
@@ -126,15 +128,14 @@ class Executor(PartialApi, missing=_MISSING):
             context = self.context
 
             def wanted() -> bool:
-                ended = world.over or not context.ok() or self._is_shutdown
-                return ended or enough() or bool(self._ready()) or self._failed() is not None
+                ended = world.over or not context.is_initialized or self._is_shutdown
+                return ended or bool(self._ready()) or self._failure is not None or enough()
 
             polls, before = timeout <= 0 and not wanted(), world.advances
             until, wakes = (math.inf, at_once) if polls else (world.time + timeout, self._wakes)
             world.turns.wait(lambda: wanted() or (polls and world.advances > before), until, wakes)
-            failure = self._failed()
-            if failure is not None:
-                raise failure
+            if self._failure is not None:
+                raise self._failure
             due = None if world.over else self._next()
             if due is not None:
                 self._run(due[0], due[1].take())
@@ -143,27 +144,27 @@ class Executor(PartialApi, missing=_MISSING):
 
     def _run(self, group: CallbackGroup | None, work: Callable[[], Any]) -> None:
         """Run a callback; one written as a coroutine becomes a task, which holds its group to the end, as in ROS."""
-        made: list[Any] = []
+        made, world = None, self.context.world
         if group is not None:
             group.running += 1
         try:
-            self.context.world.call(lambda: made.append(work()))
+            made = world.call(work)
         finally:
-            if group is not None and not (made and hasattr(made[0], "send")):
+            if group is not None and not hasattr(made, "send"):
                 group.running -= 1
-        if made and hasattr(made[0], "send"):
-            self.context.world.call(self.create_task(_holding(group, made[0])).take())
-
-    def _failed(self) -> BaseException | None:
-        """Return what a callback in a thread has raised."""
-        return None
+        if hasattr(made, "send"):
+            world.call(self.create_task(_holding(group, made)).take())
 
     def _ready(self) -> list[_Due]:
         """Return what may run now, with its group: tasks first, the newest of them before the others."""
-        self._tasks = [task for task in self._tasks if not _ended(task)]
-        due: list[_Due] = [(None, task) for task in reversed(self._tasks) if task.is_ready()]
+        due: list[_Due] = []
+        if self._tasks:
+            self._tasks = [task for task in self._tasks if not _ended(task)]
+            due += [(None, task) for task in reversed(self._tasks) if task.is_ready()]
         for node in self._nodes:
-            due += [(one.callback_group, one) for one in node.entities if _may_run(one.callback_group, one)]
+            for one in node.entities:
+                if _may_run(one.callback_group, one):
+                    due.append((one.callback_group, one))
         return due
 
     def _wakes(self) -> float:
@@ -193,13 +194,9 @@ class MultiThreadedExecutor(Executor):
         super().__init__(context=context)
         self._threads = num_threads or _THREADS
         self._running = 0
-        self._failure: BaseException | None = None
 
     def _ready(self) -> list[_Due]:
         return super()._ready() if self._running < self._threads else []
-
-    def _failed(self) -> BaseException | None:
-        return self._failure
 
     def _run(self, group: CallbackGroup | None, work: Callable[[], Any]) -> None:
         self._running += 1

@@ -5,10 +5,10 @@ from __future__ import annotations
 import copy
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from limo_hog.ros2 import names
-from limo_hog.ros2.messages import to_seconds
 from limo_sim.ros.interfaces import Message
 from limo_sim.ros.lockstep.calls import PUBLISHED, incompatible
 from limo_sim.ros.lockstep.records import StubError
@@ -126,8 +126,8 @@ class Subscription(
         """Return the work of giving the oldest message to the callback."""
         message: Any = self._queue.popleft()
         if self.topic in (names.IMAGE, names.IMAGE_COMPRESSED):
-            self._context.world.link.tell("given", to_seconds(message.header.stamp))
-        return lambda: self.callback(message)
+            self._context.world.once("given")
+        return partial(self.callback, message)
 
     def get_publisher_count(self) -> int:
         """Return how many publish on the topic, the arena being one."""

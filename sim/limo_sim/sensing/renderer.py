@@ -210,7 +210,7 @@ class Renderer:
                 self._canvas.begin(window)
                 cast_body(self._canvas, outlines[thing], sun)
                 inside = self._canvas.draw(image, depth, self._palettes[thing], self._owner, thing)
-                area = _area_outside(outlines[thing]) + inside
+                area = _area_outside(outlines[thing], window) + inside
                 drawn.append((thing, window, area))
         for index, (left, top, right, bottom), area in drawn:
             visible = np.count_nonzero(self._owner[top:bottom, left:right] == index)
@@ -315,10 +315,10 @@ def _share_inside(bounds: Bounds | None) -> float:
     return (right - left) * (bottom - top) / ((whole[2] - whole[0]) * (whole[3] - whole[1]))
 
 
-def _area_outside(shape: Outline) -> float:
-    """Area of what the image's edge cuts off a silhouette [px]."""
+def _area_outside(shape: Outline, window: Window) -> float:
+    """Area of what the image's edge cuts off a silhouette, of which a window is inside [px]."""
     left, top, right, bottom = _pixels(shape.bounds)
-    if (left, top, right, bottom) == _window(shape.bounds):
+    if (left, top, right, bottom) == window:
         return 0.0
     step = max(1, (bottom - top) // _COARSE, (right - left) // _COARSE)
     x = np.arange(left, right, step, dtype=np.float32)

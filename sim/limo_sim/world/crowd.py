@@ -190,8 +190,8 @@ class Walker:
         return self._straight(self._waypoint, speed)
 
     def _straight(self, place: Point, speed: float) -> Point:
-        distance = max(self._distance(place), 1e-9)
-        return tuple(speed * (to - at) / distance for to, at in zip(place, self.position, strict=True))  # type: ignore[return-value]
+        (x, y), distance = self.position, max(self._distance(place), 1e-9)
+        return speed * (place[0] - x) / distance, speed * (place[1] - y) / distance
 
     def _distance(self, place: Point) -> float:
         return math.dist(self.position, place)
@@ -246,7 +246,7 @@ class Crowd:
 
     def _step(self, robot: RobotPose) -> None:
         """Let all who yield walk one step."""
-        walkers = [walker for walker in self._walkers.values() if walker.pose is not None]
+        walkers = [walker for index, walker in self._walkers.items() if self.poses[index] is not None]
         if not walkers:
             return
         wishes = [walker.wants(self._time, robot) for walker in walkers]

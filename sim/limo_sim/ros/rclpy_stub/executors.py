@@ -127,13 +127,15 @@ class Executor(PartialApi, missing=_MISSING):
         try:
             context = self.context
 
-            def wanted() -> bool:
-                ended = world.over or not context.is_initialized or self._is_shutdown
-                return ended or bool(self._ready()) or self._failure is not None or enough()
+            polls, before = False, world.advances
 
-            polls, before = timeout <= 0 and not wanted(), world.advances
+            def wanted() -> bool:
+                ended = world.over or not context.is_initialized or self._is_shutdown or self._failure is not None
+                return ended or bool(self._ready()) or (polls and world.advances > before) or enough()
+
+            polls = timeout <= 0 and not wanted()
             until, wakes = (math.inf, at_once) if polls else (world.time + timeout, self._wakes)
-            world.turns.wait(lambda: wanted() or (polls and world.advances > before), until, wakes)
+            world.turns.wait(wanted, until, wakes)
             if self._failure is not None:
                 raise self._failure
             due = None if world.over else self._next()

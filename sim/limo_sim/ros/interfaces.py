@@ -36,9 +36,9 @@ SERVICES = {
 
 
 def default(field: Field) -> Any:
-    """Return a fresh default of a field."""
+    """Return a fresh default of a field that is a message, or holds several items."""
     if field.length is None:
-        return message_class(field.item)() if field.is_message else field.zero
+        return message_class(field.item)()
     if not field.is_numeric:
         return [message_class(field.item)() if field.is_message else field.zero for _ in range(field.length)]
     return np.zeros(field.length, element_type(field.item)) if field.length else array.array(_code(field))

@@ -1,10 +1,13 @@
 """Listens as any ROS 2 node does, reliable and without settings: counts messages for some seconds after the first.
 
-Arguments: seconds, then topic=package/Type ... Prints the nodes it sees with their topics, then the counts by topic.
+Arguments: seconds, then topic=package/Type ...; with --busy it computes 40 ms for each image,
+with --die it is killed at its end. Prints the nodes it sees with their topics, then the counts by topic.
 """
 
 import importlib
 import json
+import os
+import signal
 import sys
 import time
 
@@ -12,7 +15,7 @@ import rclpy
 
 
 def main():
-    seconds, wanted = float(sys.argv[1]), dict(word.split("=") for word in sys.argv[2:])
+    seconds, wanted = float(sys.argv[1]), dict(word.split("=") for word in sys.argv[2:] if "=" in word)
     rclpy.init(args=[])
     node = rclpy.create_node("listener")
     counts = dict.fromkeys(wanted, 0)
@@ -20,7 +23,10 @@ def main():
     until = None
 
     def count(topic):
-        def callback(_message):
+        def callback(message):
+            until_done = time.monotonic() + 0.04
+            while "--busy" in sys.argv and hasattr(message, "encoding") and time.monotonic() < until_done:
+                pass
             if until is not None:
                 counts[topic] += 1
             first.setdefault(topic, time.monotonic())
@@ -43,7 +49,12 @@ def main():
             writes = node.get_publisher_names_and_types_by_node(name, namespace)
             reads = node.get_subscriber_names_and_types_by_node(name, namespace)
             seen[f"{namespace.rstrip('/')}/{name}"] = [dict(writes), dict(reads)]
-    print(json.dumps({"nodes": seen, "counts": counts, "missing": [topic for topic in wanted if topic not in first]}))
+    print(
+        json.dumps({"nodes": seen, "counts": counts, "missing": [topic for topic in wanted if topic not in first]}),
+        flush=True,
+    )
+    if "--die" in sys.argv:
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 main()

@@ -10,7 +10,11 @@ from pathlib import Path
 import pytest
 
 from limo_hog.cli.main import main
+from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.run.episode import run_episode, score
 from limo_sim.run.suite import Suite
+from limo_sim.world.scenario import Scenario
 
 KEYS = (
     "scenario controller detector seed seconds frames first_detection_s in_view detected best_box_wrong "
@@ -27,6 +31,17 @@ def test_the_score_card_on_standard_output_has_every_figure_of_the_contract(caps
     assert card["controller"] == "tracking"
     assert card["seconds"] == 1.0
     assert 0 <= card["in_view"] <= 1
+
+
+def test_another_robot_is_the_controllers_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text("camera_x = 0.2\ncamera_z = 0.25\nfield_of_view = 1.047\nhalf_length = 0.25\n")
+    assert main(["follow", "--robot", str(path), "--scenario", "followable", "--seconds", "3", "--json", "-"]) == 0
+    card = json.loads(capsys.readouterr().out)
+    controller, detector = controller_named("tracking", 1.5), detector_named("hog")
+    same = score(run_episode(Scenario.load("followable", path), controller, detector, 3.0, 0)).to_json()
+    for figure in ("distance_mean_m", "path_m", "modes", "reasons"):
+        assert card[figure] == same[figure]
 
 
 def test_without_json_a_person_reads_the_card(capsys: pytest.CaptureFixture[str]) -> None:

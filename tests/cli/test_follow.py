@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from limo_hog.cli.main import main
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.cli.card import picture
 from limo_sim.run.episode import run_episode, score
+from limo_sim.run.score import ScoreCard
 from limo_sim.run.suite import Suite
 from limo_sim.world.scenario import Scenario
 
@@ -49,6 +53,19 @@ def test_without_json_a_person_reads_the_card(capsys: pytest.CaptureFixture[str]
     out = capsys.readouterr().out
     assert "empty · approach · hog · seed 0" in out
     assert "no person detected" in out
+
+
+def test_the_widest_card_fits_into_a_terminal_of_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["follow", "--scenario", "followable", "--seconds", "0.5", "--json", "-"]) == 0
+    card = ScoreCard(**json.loads(capsys.readouterr().out))
+    wide = replace(card, lost=11, found_again=1.0, pixel_error_mean=120.0, pixel_error_p95=240.0, kept_m=1.56)
+    wide = replace(wide, intrusion_personal=1.0, time_to_find_again_s=12.3, path_m=123.4, mean_abs_domega=0.123)
+    screen = Console(width=80, record=True, file=io.StringIO())
+    screen.print(picture(wide))
+    text = screen.export_text()
+    assert "…" not in text
+    for shown in ("first detected", "target lost       11×", "100.0 %", "personal 100.0 %"):
+        assert shown in text
 
 
 def test_score_compares_controllers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

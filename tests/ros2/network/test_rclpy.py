@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +86,18 @@ def test_a_stock_reader_that_computes_gets_colour_and_depth() -> None:
             if most := min(counts[names.IMAGE], counts[names.DEPTH]) > 0.9 * counts[names.CAMERA_INFO] > 0:
                 break
     assert most
+
+
+@pytest.mark.slow
+def test_the_examples_longer_buffer_loses_no_images_without_asking_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    if int(Path("/proc/sys/net/core/rmem_max").read_text()) < 4 << 20:
+        pytest.skip("net.core.rmem_max is less than 4 MB")
+    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(ROOT / "examples" / "robot" / "fast_dds.xml"))
+    with arena():
+        counts = listened(8.0, "--busy", "--best-effort", topics=(names.CAMERA_INFO, names.IMAGE, names.DEPTH))[
+            "counts"
+        ]
+    assert min(counts[names.IMAGE], counts[names.DEPTH]) > 0.9 * counts[names.CAMERA_INFO] > 0
 
 
 @pytest.mark.slow
@@ -178,3 +192,6 @@ def test_the_example_on_rclpy_follows_and_stops_at_ctrl_c(tmp_path: Path) -> Non
         arena.terminate()
         arena.wait(20)
     assert "following a person" in said
+    told = [re.sub(r"[\d.]+", "", line.partition("]: ")[2]) for line in said.splitlines() if "[INFO]" in line]
+    # A reason whose numbers alone change is said once.
+    assert all(one != next_ for one, next_ in pairwise(told))

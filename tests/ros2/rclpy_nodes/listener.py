@@ -1,7 +1,7 @@
 """Listens as any ROS 2 node does, reliable and without settings: counts messages for some seconds after the first.
 
-Arguments: seconds, then topic=package/Type ...; with --busy it computes 40 ms for each image,
-with --die it is killed at its end. Prints the nodes it sees with their topics, then the counts by topic.
+Arguments: seconds, then topic=package/Type ...; with --busy it computes 40 ms for each image, with --best-effort it
+does not ask again, with --die it is killed at its end. Prints the nodes it sees with their topics, then the counts.
 """
 
 import importlib
@@ -12,6 +12,7 @@ import sys
 import time
 
 import rclpy
+from rclpy.qos import qos_profile_sensor_data
 
 
 def main():
@@ -33,9 +34,11 @@ def main():
 
         return callback
 
+    quality = qos_profile_sensor_data if "--best-effort" in sys.argv else 10
     for topic, kind in wanted.items():
         package, name = kind.split("/")
-        node.create_subscription(getattr(importlib.import_module(f"{package}.msg"), name), topic, count(topic), 10)
+        message = getattr(importlib.import_module(f"{package}.msg"), name)
+        node.create_subscription(message, topic, count(topic), quality)
     print("ready", flush=True)
     patience = time.monotonic() + 40
     while len(first) < len(wanted) and time.monotonic() < patience:

@@ -3,6 +3,7 @@
 python rclpy_follower.py --ros-args -p robot:=robot.toml -r scan:=scan_filtered -p reliable:=true
 """
 
+import re
 import time
 
 import rclpy
@@ -33,8 +34,10 @@ try:
             command = Twist()
             command.linear.x, command.angular.z = log.decision.twist.linear, log.decision.twist.angular
             commands.publish(command)
-            if log.decision.reason != reason:
-                node.get_logger().info(reason := log.decision.reason)
+            told = re.sub(r"[\d.]+", "", log.decision.reason)
+            if told != reason:  # apart from its numbers
+                node.get_logger().info(log.decision.reason)
+            reason = told
 finally:  # Ctrl-C: the last command is to stand
     commands.publish(Twist())
     rclpy.shutdown()

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from limo_hog.cli.main import main
+from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.sense.detectors import detector_named
+from limo_sim.cli.card import picture
+from limo_sim.run.episode import run_episode, score
+from limo_sim.run.score import ScoreCard
 from limo_sim.run.suite import Suite
+from limo_sim.world.scenario import Scenario
 
 KEYS = (
     "scenario controller detector seed seconds frames first_detection_s in_view detected best_box_wrong "
@@ -29,11 +37,35 @@ def test_the_score_card_on_standard_output_has_every_figure_of_the_contract(caps
     assert 0 <= card["in_view"] <= 1
 
 
+def test_another_robot_is_the_controllers_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text("camera_x = 0.2\ncamera_z = 0.25\nfield_of_view = 1.047\nhalf_length = 0.25\n")
+    assert main(["follow", "--robot", str(path), "--scenario", "followable", "--seconds", "3", "--json", "-"]) == 0
+    card = json.loads(capsys.readouterr().out)
+    controller, detector = controller_named("tracking", 1.5), detector_named("hog")
+    same = score(run_episode(Scenario.load("followable", path), controller, detector, 3.0, 0)).to_json()
+    for figure in ("distance_mean_m", "path_m", "modes", "reasons"):
+        assert card[figure] == same[figure]
+
+
 def test_without_json_a_person_reads_the_card(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["follow", "--scenario", "empty", "--seconds", "0.5", "--controller", "approach"]) == 0
     out = capsys.readouterr().out
     assert "empty · approach · hog · seed 0" in out
     assert "no person detected" in out
+
+
+def test_the_widest_card_fits_into_a_terminal_of_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["follow", "--scenario", "followable", "--seconds", "0.5", "--json", "-"]) == 0
+    card = ScoreCard(**json.loads(capsys.readouterr().out))
+    wide = replace(card, lost=11, found_again=1.0, pixel_error_mean=120.0, pixel_error_p95=240.0, kept_m=1.56)
+    wide = replace(wide, intrusion_personal=1.0, time_to_find_again_s=12.3, path_m=123.4, mean_abs_domega=0.123)
+    screen = Console(width=80, record=True, file=io.StringIO())
+    screen.print(picture(wide))
+    text = screen.export_text()
+    assert "…" not in text
+    for shown in ("first detected", "target lost       11×", "100.0 %", "personal 100.0 %"):
+        assert shown in text
 
 
 def test_score_compares_controllers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -71,7 +71,7 @@ def test_a_wrong_file_is_refused_by_file_key_and_what_is_allowed(tmp_path: Path,
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match="No such file"):
+    with pytest.raises(RobotError, match=r"nowhere\.toml: No such file or directory$"):
         load_robot(tmp_path / "nowhere.toml")
 
 

@@ -38,8 +38,8 @@ def mounts(tree: Mapping[str, tuple[Any, ...]] = TREE) -> frames.Mounts:
 
 @pytest.mark.parametrize("camera", ["camera", "optical"])
 def test_sensors_sit_where_their_frames_do_above_the_floor(camera: str) -> None:
-    robot, whole = mounts().applied(LIMO, "base_link", camera, "laser")
-    assert whole
+    robot, framed = mounts().applied(LIMO, "base_link", camera, "laser")
+    assert framed == {"camera_x", "camera_z", "lidar_x", "lidar_z", "lidar_yaw"}
     told = robot.camera_x, robot.camera_z, robot.lidar_x, robot.lidar_z, abs(robot.lidar_yaw)
     assert told == pytest.approx((0.2, 0.25, -0.1, 0.12, math.pi))
 
@@ -50,14 +50,30 @@ def test_without_a_footprint_heights_count_from_the_base() -> None:
 
 
 def test_what_the_robots_file_says_stays() -> None:
-    robot, whole = mounts().applied(replace(LIMO, camera_z=0.4), "base_link", "camera", "laser")
-    assert whole
+    robot, _ = mounts().applied(replace(LIMO, camera_z=0.4), "base_link", "camera", "laser")
     assert (robot.camera_z, robot.camera_x) == pytest.approx((0.4, 0.2))
 
 
 @pytest.mark.parametrize("frame", ["", "unknown", "elsewhere", "round"])
 def test_a_sensor_whose_frame_is_not_below_the_base_sits_as_before(frame: str) -> None:
-    assert mounts().applied(LIMO, "base_link", frame, frame) == (LIMO, False)
+    assert mounts().applied(LIMO, "base_link", frame, frame) == (LIMO, frozenset())
+
+
+@pytest.mark.parametrize(
+    ("file", "framed", "line"),
+    [
+        (LIMO, [], "a Limo's"),
+        (LIMO, ["camera_x", "camera_z", "lidar_x", "lidar_z", "lidar_yaw"], "/tf_static"),
+        (replace(LIMO, camera_x=0.2, camera_z=0.25, lidar_x=-0.1, lidar_yaw=3.0), ["camera_x"], "the robot's file"),
+        (
+            replace(LIMO, camera_z=0.25),
+            ["camera_x", "camera_z"],
+            "/tf_static: camera_x · the robot's file: camera_z · a Limo's: lidar_x, lidar_yaw",
+        ),
+    ],
+)
+def test_each_number_has_its_origin(file: RobotGeometry, framed: list[str], line: str) -> None:
+    assert frames.whence(file, frozenset(framed)) == line
 
 
 @pytest.mark.parametrize(
@@ -72,7 +88,6 @@ def test_the_arenas_own_frames_give_back_its_robot() -> None:
     own = RobotGeometry(camera_x=0.2, camera_z=0.25, lidar_x=-0.1, lidar_z=0.2, lidar_yaw=3.0)
     read = frames.Mounts()
     read.take(frames.static_transforms(1.0, own))
-    robot, whole = read.applied(LIMO, messages.BASE_FRAME, messages.CAMERA_FRAME, messages.LIDAR_FRAME)
-    assert whole
+    robot, _ = read.applied(LIMO, messages.BASE_FRAME, messages.CAMERA_FRAME, messages.LIDAR_FRAME)
     names = ("camera_x", "camera_z", "lidar_x", "lidar_z", "lidar_yaw")
     np.testing.assert_allclose([getattr(robot, name) for name in names], [getattr(own, name) for name in names])

@@ -59,7 +59,9 @@ def run(args: argparse.Namespace) -> int:
             print(printable(f"{name} [{', '.join(ends.types)}]" if args.show_types else name))
         return 0
     topic = args.topic if args.topic.startswith("/") else f"/{args.topic}"
-    found = bus.topics(2.0, enough=lambda topics: topic in topics and args.action != "info")
+    found = bus.topics(
+        2.0, enough=lambda found: args.action != "info" and topic in found and bool(found[topic].publishers)
+    )
     if topic not in found:
         known = ", ".join(found) or "none"
         raise LimoHogError(f"topic {topic} is not there in {bus.network}; there are: {known}")
@@ -71,7 +73,10 @@ def run(args: argparse.Namespace) -> int:
             for kind, quality in those:
                 print(printable(f"  {kind}: {quality}"))
         return 0
-    subscription = bus.subscription(topic, found[topic].types[0])
+    # What all publishers keep for later readers is asked for, as `ros2 topic echo` does.
+    qualities = [quality for _, quality in found[topic].publishers]
+    kept = bool(qualities) and all("TransientLocal" in quality for quality in qualities)
+    subscription = bus.subscription(topic, found[topic].types[0], kept=kept)
     (_hz if args.action == "hz" else _echo)(bus, subscription, topic, args)
     return 0
 

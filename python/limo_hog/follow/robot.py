@@ -79,8 +79,10 @@ def load_robot(path: str | Path) -> RobotGeometry:
             import tomli as tomllib  # type: ignore[import-not-found]
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise RobotError(f"{path}: cannot be read as TOML: {getattr(error, 'strerror', None) or error}") from error
+    except OSError as error:
+        raise RobotError(f"{path}: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise RobotError(f"{path}: cannot be read as TOML: {error}") from error
     known = [one.name for one in fields(RobotGeometry)]
     for key in table:
         if key not in known:

@@ -17,7 +17,7 @@ from limo_hog.follow.sense.observation import Frame
 from limo_hog.follow.tracks.asking import WhomError
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.dds import Bus, Endpoints
-from limo_hog.ros2.frames import Mounts
+from limo_hog.ros2.frames import Mounts, whence
 from limo_hog.ros2.messages import MessageError
 from limo_hog.ros2.network import BusError
 from limo_hog.ros2.outputs import Commands, Findings, frame_named
@@ -135,7 +135,7 @@ class Inputs:
 
 
 def mounted(bus: Bus, inputs: Inputs, camera: str, robot: RobotGeometry) -> tuple[RobotGeometry, str]:
-    """Return the robot with its sensors where /tf_static has them, and a line that says where they sit.
+    """Return the robot with its sensors where /tf_static has them, and a line: where they sit, and who says so.
 
     Waits some seconds for the frames, where somebody publishes some; `camera` is the topic of its images.
 
@@ -144,25 +144,22 @@ def mounted(bus: Bus, inputs: Inputs, camera: str, robot: RobotGeometry) -> tupl
     RobotError
         /tf_static has a sensor where none of this robot can be.
     """
-    mounts, whole = Mounts(), False
+    mounts, framed, file = Mounts(), frozenset[str](), robot
     static = names.resolved(bus.node, names.TF_STATIC)
     found = bus.topics(0.5, enough=lambda found: static in found and bool(found[static].publishers))
     if static in found and found[static].publishers:
         frames = bus.subscription(names.TF_STATIC, names.TYPES[names.TF_STATIC], depth=100, kept=True)
-        until, base, file = time.monotonic() + SETTLED, frame_named(bus.node, "base_frame"), robot
-        while not whole and time.monotonic() < until:
+        until, base = time.monotonic() + SETTLED, frame_named(bus.node, "base_frame")
+        while not {"camera_x", "lidar_x"} <= framed and time.monotonic() < until:
             bus.wait(CONTROL_PERIOD / 2)
             inputs.newest()
             for message in frames.take():
                 mounts.take(message)
             own = inputs.frames.get(camera, ""), inputs.frames.get(names.SCAN, "")
-            robot, whole = mounts.applied(file, base, *own)
+            robot, framed = mounts.applied(file, base, *own)
     turned = f"turned by {math.degrees(robot.lidar_yaw):.0f}°"
     camera_at = f"camera {robot.camera_x:.2f} m ahead, {robot.camera_z:.2f} m high"
-    return (
-        robot,
-        f"{camera_at} · lidar {robot.lidar_x:.2f} m ahead, {turned} ({'by' if whole else 'not in'} /tf_static)",
-    )
+    return robot, f"{camera_at} · lidar {robot.lidar_x:.2f} m ahead, {turned} ({whence(file, framed)})"
 
 
 @dataclass(frozen=True, slots=True)

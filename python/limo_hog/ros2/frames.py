@@ -77,8 +77,8 @@ class Mounts:
             pose = step @ pose
         return frame, pose
 
-    def applied(self, robot: RobotGeometry, base: str, camera: str, lidar: str) -> tuple[RobotGeometry, bool]:
-        """Return a robot whose sensors sit where their frames do, and whether these are known.
+    def applied(self, robot: RobotGeometry, base: str, camera: str, lidar: str) -> tuple[RobotGeometry, frozenset[str]]:
+        """Return a robot whose sensors sit where their frames do, and the names of the numbers that the frames have.
 
         What the robot's file says, and is not the Limo's, stays.
 
@@ -102,7 +102,19 @@ class Mounts:
         new: dict[str, Any] = {
             name: float(value) for name, value in found.items() if getattr(robot, name) == getattr(LIMO, name)
         }
-        return replace(robot, **new), looks is not None and scans is not None
+        return replace(robot, **new), frozenset(found)
+
+
+def whence(file: RobotGeometry, framed: frozenset[str]) -> str:
+    """Return where each number of where the sensors sit is from; `framed` are those that /tf_static has."""
+    origins: dict[str, list[str]] = {}
+    for name in ("camera_x", "camera_z", "lidar_x", "lidar_yaw"):
+        said = getattr(file, name) != getattr(LIMO, name)
+        origin = "the robot's file" if said else "/tf_static" if name in framed else "a Limo's"
+        origins.setdefault(origin, []).append(name)
+    if len(origins) == 1:
+        return next(iter(origins))
+    return " · ".join(f"{origin}: {', '.join(those)}" for origin, those in origins.items())
 
 
 def _matrix(transform: Any) -> NDArray[np.float64]:

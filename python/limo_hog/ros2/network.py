@@ -73,7 +73,9 @@ def _configuration(peers: Sequence[str], *, multicast: bool, interface: str | No
     """Return Cyclone DDS's configuration.
 
     Fragments are as long as UDP allows: an image of 0.9 MB in 690 short ones loses too many where the reader is Fast
-    DDS with its small socket buffer, and one of its requests for what was lost names 256 at most.
+    DDS with its small socket buffer, and one of its requests for what was lost names 256 at most. It asks when a
+    heartbeat comes; the one that goes with the last fragment is often lost, too, and the next must not be 0.1 s later.
+    The addresses of peers are tried for as long as it runs: Fast DDS does not find us by itself on loopback.
     """
     interfaces = f"<Interfaces><NetworkInterface address={quoteattr(interface)}/></Interfaces>" if interface else ""
     return f"""
@@ -84,7 +86,9 @@ def _configuration(peers: Sequence[str], *, multicast: bool, interface: str | No
     <MaxMessageSize>65500B</MaxMessageSize>
     <FragmentSize>65000B</FragmentSize>
   </General>
+  <Internal><HeartbeatInterval minsched="10ms">10ms</HeartbeatInterval></Internal>
   <Discovery>
+    <InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>
     <ParticipantIndex>auto</ParticipantIndex>
     <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
     <SPDPInterval>1s</SPDPInterval>

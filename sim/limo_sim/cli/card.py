@@ -43,8 +43,9 @@ def picture(card: ScoreCard) -> Panel:
         ("longest gap", _unit(card.longest_gap_s, "s"), "contacts", _good(str(contacts), contacts == 0)),
         ("best box wrong", _share(card.best_box_wrong, 0, 0.05), "path", _unit(card.path_m, "m")),
         ("pixel error", _pixels(card), "turn-rate change", _unit(card.mean_abs_domega, "rad/s", 3)),
-        ("lost", _losses(card), "jerk", _unit(card.jerk_mean, "m/s³")),
-        ("target switches", switches, "time to find again", _unit(card.time_to_find_again_s, "s")),
+        ("target lost", f"{card.lost}×" if card.lost else "never", "jerk", _unit(card.jerk_mean, "m/s³")),
+        ("found within 3 s", _percent(card.found_again), "time to find again", _unit(card.time_to_find_again_s, "s")),
+        ("target switches", switches, "", ""),
         ("near anybody", f"intimate {_percent(near[0])}", "", f"personal {_percent(near[1])}"),
     ):
         figures.add_row(*row)
@@ -108,10 +109,4 @@ def _success(card: ScoreCard) -> Text | str:
 def _pixels(card: ScoreCard) -> str:
     if card.pixel_error_mean is None or card.pixel_error_p95 is None:
         return "–"
-    return f"{card.pixel_error_mean:.0f} px, 95 % below {card.pixel_error_p95:.0f}"
-
-
-def _losses(card: ScoreCard) -> str:
-    if card.found_again is None:
-        return "never"
-    return f"{card.lost}×, found again within 3 s: {_percent(card.found_again)}"
+    return f"{card.pixel_error_mean:.0f} px, 95 % < {card.pixel_error_p95:.0f}"

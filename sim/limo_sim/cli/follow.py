@@ -10,6 +10,7 @@ from limo_hog.cli.support.output import STDOUT
 from limo_hog.cli.support.page import HERE, PORT
 from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.decision import made_for
 from limo_hog.follow.sense.detectors import detector_named
 from limo_sim.cli.options import add_scenario
 from limo_sim.cli.watching import add_watching, finish, observing, shown_unasked
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     if shown_unasked(args):
         args.view = HERE, 0
     scenario = of_run(Scenario.load(args.scenario, args.robot), args.seed)
-    controller = Tunable(controller_named(args.controller, args.target, args.person))
+    controller = Tunable(made_for(controller_named(args.controller, args.target, args.person), scenario.robot.geometry))
     detector = detector_named(args.detector)
     with observing(args, scenario, controller) as observers:
         with progress("s") as bar:

@@ -222,6 +222,13 @@ def test_topic_list_info_and_echo_print_as_ros2_topic_does(capsys: pytest.Captur
     )
 
 
+def test_topic_echo_shows_what_a_publisher_kept(capsys: pytest.CaptureFixture[str]) -> None:
+    publisher = dds.Bus().publisher(names.TF_STATIC, names.TYPES[names.TF_STATIC], kept=True)
+    publisher.publish(frames.static_transforms(0.0, LIMO))
+    assert main(["topic", "echo", "--once", "/tf_static", "--seconds", "10"]) == 0
+    assert "child_frame_id: laser_link" in capsys.readouterr().out
+
+
 def test_the_follower_takes_its_sensors_places_from_tf_static() -> None:
     own = RobotGeometry(camera_x=0.2, camera_z=0.25, lidar_x=-0.1, lidar_yaw=3.0)
     scan = messages.laser_scan(Scan(0.0, np.ones(9, np.float32), -2.0, 2.0, 0.12, 8.0))
@@ -229,11 +236,11 @@ def test_the_follower_takes_its_sensors_places_from_tf_static() -> None:
     with publishing(names.SCAN, scan), publishing(names.IMAGE, image):
         bus = dds.Bus()
         inputs = follower.Inputs(bus, names.IMAGE)
-        assert follower.mounted(bus, inputs, names.IMAGE, LIMO) == (LIMO, f"{LIMO_SITS} (not in /tf_static)")
+        assert follower.mounted(bus, inputs, names.IMAGE, LIMO) == (LIMO, f"{LIMO_SITS} (a Limo's)")
         with publishing(names.TF_STATIC, frames.static_transforms(0.0, own)):
             robot, line = follower.mounted(bus, inputs, names.IMAGE, LIMO)
     assert [robot.camera_x, robot.camera_z, robot.lidar_x, robot.lidar_yaw] == pytest.approx([0.2, 0.25, -0.1, 3.0])
-    assert line == "camera 0.20 m ahead, 0.25 m high · lidar -0.10 m ahead, turned by 172° (by /tf_static)"
+    assert line == "camera 0.20 m ahead, 0.25 m high · lidar -0.10 m ahead, turned by 172° (/tf_static)"
 
 
 def test_topic_hz_measures_the_rate(capsys: pytest.CaptureFixture[str]) -> None:

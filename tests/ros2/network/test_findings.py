@@ -168,7 +168,7 @@ def test_a_robot_that_publishes_images_alone_is_told_what_is_missing_and_stands(
     finally:
         done.set()
         camera.join()
-    assert said[0].endswith("(not in /tf_static)")
+    assert said[0].endswith("(a Limo's)")
     assert said[1:] == ["camera yes · camera_info no, 71° wide is assumed · depth no · scan NO · odom no"]
     assert {log.decision.reason for log in logs} == {"no depth image has come; no scan has come; no odometry has come"}
     sent = [messages.to_twist(message) for message in commands.take()]

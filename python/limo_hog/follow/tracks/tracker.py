@@ -86,7 +86,7 @@ class Tracker:
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
         others = self.movers.others(moving, known, measured, pose, self.noise)
-        pairs = self.association.pair(known, measured, pose, self.noise, flat, others)
+        pairs = self.association.pair(known, measured, pose, self.noise.turning(pose.angular), flat, others)
         people: list[Person] = []
         recall = tracks.recall
         for who, person in enumerate(known):
@@ -124,7 +124,7 @@ class Tracker:
         """Begin to track a box that belongs to no known person."""
         odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
         seen = replace(seen, clothes=self.association.worn(seen))
-        return initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds)
+        return initiate(number, seen, stamp, pose, self.noise.turning(pose.angular), self.association.unknown, odds)
 
     def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
         """Update a person, found with `recall`, by their box; the track is at the box's stamp."""
@@ -151,14 +151,14 @@ class Tracker:
         if not fits:
             # Something stands in front of the person.
             seen = replace(seen, range=None)
-        track = person.track
+        track, noise = person.track, self.noise.turning(pose.angular)
         if seen.range is not None and track.stamp - person.measured > self.restart_s:
-            track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, self.noise)
-        fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
+            track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, noise)
+        fit = innovation(track, seen.bearing, seen.range, pose, noise)
         strained = fit.distance2 > self.association.gate
         if strained:
             track = kalman.loosened(track, self.association.same_place, self.turn_speed)
-            fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
+            fit = innovation(track, seen.bearing, seen.range, pose, noise)
         return replace(
             self.existence.update(person, evidence, found=True),
             track=kalman.update(track, fit),

@@ -1,0 +1,28 @@
+"""The person followed should stay in the image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from limo_hog.follow.control.rollouts import Rollouts
+from limo_hog.follow.control.situation import Array, Situation
+from limo_hog.follow.parameters import param
+
+
+@dataclass(frozen=True, slots=True)
+class FollowedInView:
+    """Mean angle of the person followed beyond `edge`, and a share of that off the middle."""
+
+    weight: float = param(2.0, "1/rad", "Cost of a radian.", 0, 100)
+    edge: float = param(0.5, "rad", "Further to either side than this the camera does not show a whole person.", 0, 2)
+    share: float = param(0.1, "1", "Share that a radian off the middle counts for.", 0, 1)
+    most: float = param(0.9, "rad", "Further off costs no more: out of the image is out of the image.", 0, 4)
+
+    def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
+        """Return the cost of each rollout before its weight, float64 (K,) [rad]."""
+        if situation.followed is None or not rollouts.goal.faces:
+            return rollouts.nothing
+        off = np.minimum(rollouts.offs_to(rollouts.places[:, situation.followed]), self.most)
+        return np.asarray((self.share * off + np.maximum(off - self.edge, 0.0)).mean(axis=1))

@@ -30,7 +30,7 @@ class Noise:
 
     acceleration: float = param(0.6, "m/s^1.5", "Square root of the spectral density of a person's acceleration.")
     bearing: float = param(0.015, "rad", "Standard deviation of a measured bearing.")
-    clocks: float = param(0.02, "s", "Standard deviation of the image's stamp, by the odometry's clock.")
+    clocks: float = param(0.04, "s", "Standard deviation of the image's stamp, by the odometry's clock.")
     range: float = param(0.06, "m", "Standard deviation of a measured range.")
     velocity: float = param(0.6, "m/s", "Standard deviation of each component of a new track's velocity.")
     persistence: float = param(4.0, "s", "Time constant with which an unmeasured velocity decays.")

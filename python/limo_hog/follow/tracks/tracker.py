@@ -68,6 +68,7 @@ class Tracker:
     poses_s: float = param(2.0, "s", "How long odometry is kept: a camera image may be as late as this.")
     scans_s: float = param(1.0, "s", "How long scans are kept.")
     scan_period_s: float = param(0.13, "s", "A scan may be older by this than the image it is used with.")
+    walks_on_s: float = param(2.0, "s", "A person not measured is taken to walk on for this time.")
     walk: float = param(WALK, "m/s", "How fast people walk who are not measured.")
     min_period_s: float = param(0.02, "s", "Shortest time between two frames that is used to predict the next.")
     max_period_s: float = param(0.5, "s", "Longest time between two frames that is used to predict the next.")
@@ -270,10 +271,11 @@ class Tracker:
         people: dict[int, Track] = {}
         for one in tracks.people:
             one = followed if followed is not None and one.number == followed.number else one
-            if one.confirmed and now - one.measured <= lately_s:
+            if one.confirmed and now - one.measured <= self.walks_on_s:
                 people[one.number] = kalman.predict(one.track, now, self.noise)
         own = None if followed is None else people.get(followed.number)
-        others = [track.place for track in people.values() if track is not own]
+        lately = {one.number for one in tracks.people if now - one.measured <= lately_s}
+        others = [track.place for number, track in people.items() if track is not own and number in lately]
         places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)

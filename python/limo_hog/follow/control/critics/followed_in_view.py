@@ -1,4 +1,4 @@
-"""The person followed should stay in the image."""
+"""The person followed should stay in the image, or where they are looked for."""
 
 from __future__ import annotations
 
@@ -22,7 +22,12 @@ class FollowedInView:
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [rad]."""
-        if situation.followed is None or not rollouts.goal.faces:
+        goal, times = rollouts.goal, rollouts.times
+        if not goal.faces:
             return rollouts.nothing
-        off = np.minimum(rollouts.offs_to(rollouts.places[:, situation.followed]), self.most)
+        if situation.followed is None:
+            off = np.abs(rollouts.poses[:, :, 2] - goal.heading - goal.rate * times)
+        else:
+            off = rollouts.offs_to(rollouts.places[:, situation.followed])
+        off = np.minimum(off, self.most)
         return np.asarray((self.share * off + np.maximum(off - self.edge, 0.0)).mean(axis=1))

@@ -77,7 +77,7 @@ class Planner:
     effort: Effort = field(default_factory=Effort)
     change_of_mind: ChangeOfMind = field(default_factory=ChangeOfMind)
     turn_gain: float = param(2.5, "1/s", "Turn rate for each radian to turn.", 0, 10)
-    stay: float = param(0.4, "1", "Share by which the command begun may cost more than another, and is kept.", 0, 5)
+    stay: float = param(0.4, "1", "Share by which a manoeuvre begun may cost more than another, and is kept.", 0, 5)
     stands: float = param(0.02, "m/s", "A slower robot stands.", 0, 1)
     max_turn: float = param(3.0, "rad/s", "Limit of the turn rate.", 0, 6)
 
@@ -97,7 +97,8 @@ class Planner:
                 # Every other command costs more: a change of mind.
                 break
         totals = costs.sum(axis=0)
-        totals[rollouts.begun] /= 1 + self.stay
+        if not kept.is_direct:
+            totals[rollouts.begun] /= 1 + self.stay
         best = int(np.argmin(totals))
         gains = np.maximum(costs[:, 0] - costs[:, best], 0.0)
         gained = dict(zip(names, gains.tolist(), strict=True))

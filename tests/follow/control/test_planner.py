@@ -103,18 +103,19 @@ def others(planner: Planner) -> bool:
 
 
 def walls(planner: Planner) -> bool:
-    """It passes between two posts in the middle, not close to the one in its way."""
-    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=[(1.2, 0.0), (1.3, 0.72)], speed=0.5)
-    return (planner.plan(seen, towards(3.5), DIRECT).manoeuvre.heading or 0.0) > 0.4
+    """It turns off a wall that it would drive along too close by."""
+    along = [(x, 0.25) for x in np.arange(-0.5, 4.0, 0.04)]
+    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=along, speed=0.5)
+    return (planner.plan(seen, towards(3.5), DIRECT).manoeuvre.heading or 0.0) < 0
 
 
 def unseen_ground(planner: Planner) -> bool:
     """It does not back onto ground to which somebody out of sight can have come."""
-    seen = situation((1.0, 0.0, 0.0, 0.0), followed=0)
+    seen = situation((1.2, 0.0, 0.0, 0.0), followed=0)
     assert seen.ground is not None
     old = replace(seen.ground, freed=seen.ground.freed - 10.0)
     seen = replace(seen, ground=old, hiding=np.array([(-1.0, 0.0, 2.0)]))
-    return bool(planner.plan(seen, towards(1.0, speed=-0.3), DIRECT).twist.linear == 0)
+    return bool(planner.plan(seen, towards(1.2, speed=-0.3), DIRECT).twist.linear == 0)
 
 
 def effort(planner: Planner) -> bool:
@@ -126,7 +127,8 @@ def effort(planner: Planner) -> bool:
 def change_of_mind(planner: Planner) -> bool:
     """It goes on around a post on the side on which it began to."""
     seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=wall(1.2, half=0.05), speed=0.5)
-    return (planner.plan(seen, towards(3.5), Manoeuvre(0.32)).manoeuvre.heading or 0.0) > 0
+    keen = replace(planner, stay=0.0)
+    return (keen.plan(seen, towards(3.5), Manoeuvre(0.32)).manoeuvre.heading or 0.0) > 0
 
 
 @pytest.mark.parametrize(
@@ -160,6 +162,23 @@ def test_another_critic_is_one_class_and_one_line() -> None:
     polite = Polite().plan(seen, towards(3.0), DIRECT)
     assert polite.twist.angular < 0
     assert dict(polite.shares)["keep_right"] > 0
+
+
+def test_where_nothing_is_to_be_driven_to_it_does_not_drive_on_with_what_it_began() -> None:
+    # It went out of a person's way, lost them, and looks for them to the left.
+    plan = PLANNER.plan(situation(speed=0.8), Goal(0.5), Manoeuvre(0.0, 0.8))
+    assert plan.twist.linear < 0.1
+    assert plan.twist.angular > 0.5
+
+
+def test_a_manoeuvre_begun_is_kept_for_all_that_it_costs_a_little_more() -> None:
+    walks = (1.8, 0.06, -0.8, 0.0)
+    fresh = PLANNER.plan(situation(walks, followed=0), Goal(0.0), DIRECT).manoeuvre
+    assert fresh.heading is not None
+    other = replace(fresh, heading=-fresh.heading)
+    for stay, kept in ((PLANNER.stay, other), (0.0, fresh)):
+        planner = replace(PLANNER, stay=stay, change_of_mind=replace(PLANNER.change_of_mind, weight=0.0))
+        assert planner.plan(situation(walks, followed=0), Goal(0.0), other).manoeuvre == kept
 
 
 def test_people_who_would_be_met_in_two_seconds_hardly_count() -> None:

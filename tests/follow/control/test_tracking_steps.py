@@ -15,6 +15,7 @@ from limo_hog.follow import Decision, Mode, Observation, Odometry
 from limo_hog.follow.control.rollouts import DIRECT
 from limo_hog.follow.control.selection import Choice, TrackingState, believed
 from limo_hog.follow.space.grid import Ground
+from limo_hog.follow.tracks.hiding import Other
 from limo_hog.follow.tracks.kalman import Noise
 from limo_hog.follow.tracks.person import Person
 
@@ -130,6 +131,13 @@ def test_others_are_kept_in_mind_and_the_person_followed_is_none() -> None:
     after = step(1, someone(1, 2.0), someone(2, 3.0, 1.5)).state.others
     assert [(one.x, one.y, one.at) for one in after] == [(3.0, 1.5, NOW)]
     assert step(1, someone(1, 2.0), others=after).state.others == after
+
+
+def test_what_lasts_where_another_was_was_nobody() -> None:
+    # A wall's end that was seen from a new side seemed to walk.
+    wall = blocked(*((-1.0, y) for y in np.arange(-0.5, 0.5, 0.05)))
+    beside, on = Other(-1.0, 1.5, NOW - 3.0), Other(-1.0, 0.0, NOW - 3.0)
+    assert step(1, someone(1, 2.0), others=(beside, on), ground=wall).state.others == (beside,)
 
 
 def test_the_people_believed_in_are_in_the_robots_frame_with_their_velocities() -> None:

@@ -104,7 +104,8 @@ def run(args: argparse.Namespace) -> int:
             print(json_text(card), file=lines, flush=True)
     if args.json != STDOUT:
         modes = ", ".join(f"{mode} {count}" for mode, count in report.modes.items())
-        print(f"{report.frames} images, a person in {report.found}; commands: {modes}")
+        unsent = ", not sent" if args.no_drive else ""
+        print(f"{report.frames} images, a person in {report.found}; commands{unsent}: {modes}")
         print(
             f"command {card['answer_ms_p50'] or 0:.1f} ms after an image; messages dropped {report.dropped}",
             file=sys.stderr,

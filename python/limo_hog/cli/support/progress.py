@@ -28,7 +28,15 @@ class CountColumn(ProgressColumn):
     def render(self, task: Task) -> Text:
         """Return the steps done and, if known, of how many."""
         of = "" if task.total is None else f" of {task.total:g}"
-        return Text(f"{task.completed:g}{of} {self._unit}")
+        return Text(f"{task.completed:.0f}{of} {self._unit}")
+
+
+class LeftColumn(TimeRemainingColumn):
+    """The time left, where it is known how many steps there are."""
+
+    def render(self, task: Task) -> Text:
+        """Return the time left, or nothing."""
+        return Text("") if task.total is None else Text.assemble(super().render(task), " left")
 
 
 def progress(unit: str) -> Progress:
@@ -39,8 +47,7 @@ def progress(unit: str) -> Progress:
         CountColumn(unit),
         RateColumn(),
         TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
+        LeftColumn(),
         console=console(stderr=True),
         transient=True,
         disable=not sys.stderr.isatty(),

@@ -21,6 +21,9 @@ from typing import Any
 
 from limo_sim.ros.lockstep.turns import Turns
 
+#: `time.monotonic` at the start of a run [s]. Not the machine's: the digits lost in its sums would differ from run to run.
+_BEGAN = float(2**17)
+
 
 @contextmanager
 def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
@@ -37,8 +40,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         else:
             real_sleep(seconds)
 
-    def clock(real: Callable[[], float]) -> Callable[[], float]:
-        began = real()
+    def clock(real: Callable[[], float], began: float) -> Callable[[], float]:
         return lambda: began + now() if turns.inside else real()
 
     def start(thread: threading.Thread) -> None:
@@ -74,10 +76,10 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
                 condition._waiters.remove(waiter)
         return notified
 
-    monotonic = clock(time.monotonic)
+    monotonic = clock(time.monotonic, _BEGAN)
     replaced: list[tuple[Any, str, Any]] = [
         (time, "sleep", sleep),
-        (time, "time", clock(time.time)),
+        (time, "time", clock(time.time, time.time())),
         (time, "monotonic", monotonic),
         (threading, "_time", monotonic),
         (queue, "time", monotonic),

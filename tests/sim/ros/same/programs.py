@@ -69,7 +69,7 @@ def a_timer_without_autostart_waits_for_reset(node):
     spin(node, 0.15)
     print(timer.is_canceled())
     timer.reset()
-    spin(node, 0.08)
+    spin(node, 0.07)
 
 
 @program

@@ -21,7 +21,7 @@ from typing import Any
 
 from limo_sim.ros.lockstep.turns import Turns
 
-#: `time.monotonic` at the start of a run [s]. Not the machine's: the digits lost in its sums would differ from run to run.
+#: `time.monotonic` at the start of a run [s]: by the machine's, the digits lost in sums would differ from run to run.
 _BEGAN = float(2**17)
 
 

@@ -125,7 +125,7 @@ class Take(Witness):
         arguments = f" ({' '.join(self.scene.arguments)})" if self.scene.arguments else ""
         return f"{self.scene.words}{arguments}, image of {look.time:.1f} s"
 
-    def _recent(self, time: float, seconds: float = SILENCE) -> list[Look]:
+    def recent(self, time: float, seconds: float = SILENCE) -> list[Look]:
         """Return the looks of the last half second before a time [s], the newest first."""
         return [look for look in reversed(self.looks) if time - seconds - 1e-6 <= look.time <= time + 1e-6]
 
@@ -136,7 +136,7 @@ class Take(Witness):
 
     def found(self, time: float, found: Found, picture: Picture) -> None:
         """Note a search."""
-        look, place = _located(picture, self._recent(time), self._corners)
+        look, place = _located(picture, self.recent(time), self._corners)
         if look is None:
             self.unplaced.add(found.shape)
             return
@@ -148,7 +148,7 @@ class Take(Witness):
         self._kept += shown.picture.nbytes
         if self._kept > _MOST_SHOWN * (1.0 + shown.time):
             raise ValueError(f"more than {_MOST_SHOWN // 10**6} MB of pictures a second")
-        look = _shown_in(shown.picture, self._recent(shown.time, _OLDEST))
+        look = _shown_in(shown.picture, self.recent(shown.time, _OLDEST))
         self.windows.append((shown.time, window, shown.picture, look))
         if look is not None:
             look.pictures.append(shown.picture)
@@ -159,7 +159,7 @@ class Take(Witness):
             answered = self._answered or self.looks[-1]
             answered.commands.append(command)
             # (Now: a later search may bear the same time.)
-            recent = [look for look in self._recent(command.time) if look.searched is not None]
+            recent = [look for look in self.recent(command.time) if look.searched is not None]
             if not recent and answered.searched is not None:
                 recent = [answered]
             self.answers.append((command, answered, recent))
@@ -192,6 +192,9 @@ def judge_by_truth(takes: list[Take]) -> bool:
         return False
     for look in looks:
         look.found, look.searched = look.people, look.time
+    for take in takes:
+        # (When the commands came none of these images had been searched.)
+        take.answers = [(command, look, take.recent(command.time)) for command, look, _ in take.answers]
     return True
 
 

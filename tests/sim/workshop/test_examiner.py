@@ -85,7 +85,6 @@ def test_a_walk_that_fails_tells_why_and_what_was_wanted(tmp_path: Path) -> None
     assert "wanted 0.7 to 1" in loses.evidence
 
 
-@pytest.mark.slow
 def test_a_crop_that_cannot_be_placed_is_judged_by_the_red_box(tmp_path: Path) -> None:
     turned = "cv2.rotate(img, cv2.ROTATE_180), winStride"
     text = changed(CALLBACK, (DETECT, DETECT.replace("img, winStride", turned)))

@@ -120,8 +120,8 @@ def unseen_ground(planner: Planner) -> bool:
 
 def effort(planner: Planner) -> bool:
     """Of the ways out of a person's way that are as good it takes the smaller turn."""
-    seen = situation((1.6, 0.0, -0.8, 0.0), points=BEHIND)
-    return abs(planner.plan(seen, Goal(0.0, faces=False), DIRECT).manoeuvre.heading or 0.0) < 1.5
+    seen = situation((1.4, 0.0, -0.8, 0.0), points=BEHIND)
+    return abs(planner.plan(seen, Goal(0.0), DIRECT).manoeuvre.heading or 0.0) < 1.5
 
 
 def change_of_mind(planner: Planner) -> bool:

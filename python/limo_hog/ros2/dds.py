@@ -30,7 +30,7 @@ with needed(by="ROS 2 over the network"):
 
 #: ROS 2's prefix of topics in DDS.
 _PREFIX = "rt"
-#: A new reader has so long for the images that a reader that has died left unanswered [s]: ten of 2 MB take .5 s.
+#: Time in which a new reader takes the images that a killed one has not confirmed [s]. Chosen: ten of 2 MB take .5 s.
 _CATCH_UP = 1.0
 
 

@@ -316,7 +316,8 @@ def colours(person: Person) -> list[Colour]:
         "stool": (150, 108, 72),
     }
     capsules, ellipsoids = _skeleton(Pose(0, 0, 0), sits=person.sits)
-    return [palette[name] for name in [*(one[4] for one in capsules), *(one[3] for one in ellipsoids)]]
+    names = [name for *_, name in capsules] + [name for *_, name in ellipsoids]
+    return [palette[name] for name in names]
 
 
 def trunk_radius(person: Person, pose: Pose, direction: float) -> float:

@@ -164,9 +164,9 @@ class Executor(PartialApi, missing=_MISSING):
             self._tasks = [task for task in self._tasks if not _ended(task)]
             due += [(None, task) for task in reversed(self._tasks) if task.is_ready()]
         for node in self._nodes:
-            for one in node.entities:
-                if _may_run(one.callback_group, one):
-                    due.append((one.callback_group, one))
+            for entity in node.entities:
+                if _may_run(entity.callback_group, entity):
+                    due.append((entity.callback_group, entity))
         return due
 
     def _wakes(self) -> float:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from limo_hog.follow.control.steer import Wheels, advanced, all_advanced
+from limo_hog.follow.control.wheels import Wheels
 from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.observation import Odometry
 
@@ -69,12 +68,3 @@ def test_a_robot_that_is_held_tells_nothing_about_its_wheels() -> None:
 
 def test_a_clock_that_stands_tells_nothing() -> None:
     assert WHEELS.learn(1.0, Twist(0.6, 0.0), Odometry(1.0), Odometry(1.0, linear=0.5), LIMO) == 1.0
-
-
-def test_many_commands_at_once_are_advanced_as_each_alone() -> None:
-    random = np.random.default_rng(0)
-    linear, angular, now_linear, now_angular = random.uniform(-1.5, 1.5, (4, 50))
-    for most in (0.02, 0.3, 3.0):
-        together = all_advanced(linear, angular, now_linear, now_angular, most, LIMO)
-        alone = [advanced(*each, most, LIMO) for each in zip(linear, angular, now_linear, now_angular, strict=True)]
-        assert np.transpose(together) == pytest.approx(np.array(alone))

@@ -49,6 +49,8 @@ class Belief:
     places: tuple[tuple[float, float], ...] = ()
     way: tuple[tuple[float, float], ...] = ()  #: The way it means to drive: x, y in the base frame [m].
     followed: int | None = None  #: Number of the person followed; None while there is none.
+    rollout: tuple[tuple[float, float], ...] = ()  #: Where the command leads: x, y in the base frame [m].
+    shares: tuple[tuple[str, float], ...] = ()  #: What each critic adds to its cost, by name.
 
 
 @dataclass(frozen=True, slots=True)

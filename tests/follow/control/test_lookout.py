@@ -12,7 +12,7 @@ from tests.follow.estimates import upper
 from tests.follow.views import scan
 
 from limo_hog.follow.control.lookout import Hunt, Lookout
-from limo_hog.follow.control.steer import Detour
+from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import Odometry
@@ -21,7 +21,6 @@ from limo_hog.follow.space.places import Places, Wandering
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.kalman import Noise
 
-TURN = Twist(0.0, 0.7)
 LOOKOUT, GRID, HERE, NOW = Lookout(), Grid(), Odometry(10.0), 10.0
 #: A scan whose beams tell nothing.
 BLIND = scan(np.full(292, np.nan, np.float32), NOW)
@@ -36,6 +35,12 @@ def free_ground() -> Ground:
     return ground
 
 
+def situated(ground: Ground, pose: Odometry = HERE, grid: Grid = GRID) -> Situation:
+    """The situation of a robot that stands among nobody."""
+    nobody = np.empty((0, 4))
+    return Situation(pose.stamp, pose, Twist(), LIMO, 1.0, 0.1, 0.1, nobody, None, NO_POINTS, grid, ground, nobody)
+
+
 def hunt_for(points: Points, planned: float) -> Hunt:
     """Return the hunt for a person who may be at each of (N, 2) places."""
     track = kalman.initiate(NOW - 1.0, 0.0, 2.0, HERE, Noise())
@@ -45,16 +50,11 @@ def hunt_for(points: Points, planned: float) -> Hunt:
 def test_no_person_is_where_the_camera_shows_none() -> None:
     sure = Lookout(wandering=Wandering(found=1.0))
     around = np.array([(r * np.cos(a), r * np.sin(a)) for r in (1.0, 3.3, 3.7, 4.5) for a in np.arange(-3, 3.1, 0.3)])
-    after = sure.step(hunt_for(around, NOW), BLIND, NOW, HERE, GRID, free_ground(), LIMO)
+    after = sure.step(hunt_for(around, NOW), BLIND, situated(free_ground()))
     left = {tuple(one) for one in after.places.points.tolist()}
     shown = (np.abs(np.arctan2(around[:, 1], around[:, 0])) < 0.5) & (np.hypot(*around.T) < 3.5)
     assert shown.any()
     assert left == {tuple(one) for one in around[~shown].tolist()}
-
-
-@pytest.mark.parametrize(("off", "rate"), [(0.0, 0.0), (0.3, 0.6), (-0.3, -0.6), (1.0, 1.2), (-3.0, -1.2)])
-def test_it_turns_by_the_angle_that_is_left_and_never_faster_than_its_limit(off: float, rate: float) -> None:
-    assert Lookout(turn_gain=2.0, max_turn=1.2).turn(off) == pytest.approx(rate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class Counted(Grid):
 @pytest.mark.parametrize("count", [1, 40, 150, 1000])
 def test_as_many_places_are_compared_however_large_the_room_and_many_the_guesses(count: int) -> None:
     grid = Counted()
-    hunt = LOOKOUT.step(hunt_for(np.full((count, 2), 1.5), -np.inf), BLIND, NOW, HERE, grid, free_ground(), LIMO)
+    hunt = LOOKOUT.step(hunt_for(np.full((count, 2), 1.5), -np.inf), BLIND, situated(free_ground(), grid=grid))
     origins, places = grid.asked[-1]
     assert hunt.planned == NOW
     assert LOOKOUT.candidates <= origins <= 2 * LOOKOUT.candidates + 1
@@ -85,10 +85,10 @@ def test_a_place_that_is_driven_to_is_kept_until_another_is_half_as_good_again()
     for more, kept in ((1.3, True), (2.0, False)):
         few, many = np.full((24, 2), (0.0, 4.5)), np.full((round(24 * more), 2), (0.0, -4.5))
         hunt = hunt_for(np.concatenate([few, many]), -np.inf)
-        fresh = lookout.step(hunt, BLIND, NOW, HERE, GRID, free_ground(), LIMO)
+        fresh = lookout.step(hunt, BLIND, situated(free_ground()))
         assert fresh.way[-1, 1] < 0
         mirrored = fresh.way * (1.0, -1.0)
-        after = lookout.step(replace(hunt, way=mirrored), BLIND, NOW, HERE, GRID, free_ground(), LIMO)
+        after = lookout.step(replace(hunt, way=mirrored), BLIND, situated(free_ground()))
         assert (after.way[-1, 1] > 0) == kept
 
 
@@ -101,55 +101,35 @@ def ground_of(cells: dict[tuple[int, int], tuple[float, float]]) -> Ground:
     return replace(ground, occupied=occupied, seen=seen)
 
 
-def command(
-    way: list[tuple[float, float]], facing: tuple[float, float] | None = None, points: Points = NO_POINTS
-) -> tuple[Twist, str]:
-    """Return the command of a robot at the origin that looks along x."""
+def goal(way: list[tuple[float, float]], facing: tuple[float, float] | None = None) -> tuple[Goal | None, str]:
+    """Return the goal of a robot at the origin that looks along x."""
     hunt = replace(hunt_for(np.zeros((3, 2)), NOW), way=np.array(way).reshape(-1, 2), facing=facing)
-    return LOOKOUT.command(hunt, Odometry(), points, Detour(), LIMO, TURN)
+    return LOOKOUT.goal(hunt, situated(GRID.start(HERE), Odometry()), np.array([0.5, 1.0]))
 
 
 def test_a_way_ends_two_cells_before_its_last_point() -> None:
-    assert command([(0.0, 0.0), (0.21, 0.0)])[0].linear > 0
-    assert command([(0.0, 0.0), (0.19, 0.0)]) == (TURN, "searching for the lost person")
-    assert command([], (0.0, 1.0)) == (Twist(0.0, 1.2), "turning to where the lost person may be")
-    assert command([(0.1, 0.0)], (1.0, -0.1))[0].angular == pytest.approx(-2.0 * math.atan(0.1))
+    drives, reason = goal([(0.0, 0.0), (0.21, 0.0)])
+    assert drives is not None
+    assert (drives.speed, reason) == (LOOKOUT.speed, "looking round for the lost person")
+    assert goal([(0.0, 0.0), (0.19, 0.0)]) == (None, "searching for the lost person")
+    for facing, off in (((0.0, 1.0), LOOKOUT.glance), ((1.0, -0.1), -math.atan(0.1))):
+        turns, reason = goal([(0.1, 0.0)], facing)
+        assert turns is not None
+        assert turns.heading == pytest.approx(off)
+        assert (turns.places, reason) == (None, "turning to where the lost person may be")
 
 
-def test_the_point_half_a_metre_ahead_on_the_way_is_driven_to_at_six_tenths() -> None:
-    # The way bends to the left; (.3, .4) is the first point that is half a metre off.
-    along = [(0.1 * step, 0.0) for step in range(4)]
-    bend = [(0.3, 0.1 * step) for step in range(1, 20)]
-    off = math.atan2(0.4, 0.3)
-    twist, reason = command(along + bend)
-    assert off > LOOKOUT.aside
-    assert (twist.linear, reason) == (0.0, "looking round for the lost person")
-    assert twist.angular == pytest.approx(min(2.0 * off, 1.2))
-    straight, _ = command([(0.1 * step, 0.0) for step in range(20)])
-    assert straight == Twist(0.6, 0.0)
-
-
-@pytest.mark.parametrize("side", [-1, 1])
-def test_it_turns_to_the_way_before_it_drives_where_that_is_half_a_right_angle_aside(side: int) -> None:
-    for off, drives in ((0.75, True), (0.85, False)):
-        place = (2.0 * math.cos(off), side * 2.0 * math.sin(off))
-        twist, _ = command([place])
-        assert twist.linear == (pytest.approx(0.6 * math.cos(off) ** 2) if drives else 0.0)
-        assert twist.angular == pytest.approx(side * 1.2)
-
-
-def test_it_drives_around_what_stands_on_the_way_and_turns_where_nothing_is_free() -> None:
-    post = np.array([(0.5, 0.0), (0.5, 0.03), (0.5, -0.03)])
-    around, _ = command([(2.0, 0.0)], points=post)
-    assert around.linear > 0
-    assert abs(around.angular) > 0.3
-    angles = np.arange(-3.2, 3.2, 0.02)
-    walls = 0.4 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    assert command([(2.0, 0.0)], points=walls)[0] == Twist(0.0, 0.0)
+def test_a_way_is_faced_half_a_metre_on_and_driven_at_six_tenths() -> None:
+    # The way bends to the left after .3 m.
+    bend = [(0.1 * step, 0.0) for step in range(4)] + [(0.3, 0.1 * step) for step in range(1, 20)]
+    drives, _ = goal(bend)
+    assert drives is not None
+    assert drives.heading == pytest.approx(math.atan2(0.2, 0.3))
+    assert drives.places == pytest.approx(np.array([(0.3, 0.0), (0.3, 0.3)]))
 
 
 def planned(points: list[tuple[float, float]], lookout: Lookout = LOOKOUT, at: float = -math.inf) -> Hunt:
-    return lookout.step(hunt_for(np.array(points), at), BLIND, NOW, HERE, GRID, free_ground(), LIMO)
+    return lookout.step(hunt_for(np.array(points), at), BLIND, situated(free_ground()))
 
 
 def test_where_all_the_places_are_in_sight_it_turns_to_their_middle_and_stays() -> None:
@@ -191,7 +171,7 @@ def test_no_place_begins_on_the_other_side_of_a_wall() -> None:
     ground = ground_of({(row, 60): (2.0, NOW) for row in range(100)})
     track = kalman.initiate(NOW, 0.0, 0.5, HERE, Noise())
     track = replace(track, mean=(0.0, 0.9, 0.0, 0.0), covariance=upper(np.diag([0.04, 0.04, 0.01, 0.01])))
-    places = LOOKOUT.begin(track, 1, GRID, ground).places
+    places = LOOKOUT.begin(track, 1, situated(ground)).places
     assert places.points.shape == (150, 2)
     behind = places.points[:, 1] > 1.1
     assert not behind.any()
@@ -203,7 +183,7 @@ def test_no_place_begins_on_the_other_side_of_a_wall() -> None:
 def test_those_who_watch_see_places_and_way_from_the_robot() -> None:
     hunt = replace(hunt_for(np.array([(1.0, 3.0)]), NOW), way=np.array([(1.0, 1.0), (0.0, 1.0)]))
     # The robot is at (1, 1) and looks along +y.
-    places, way = LOOKOUT.ways(hunt, Odometry(0.0, 1.0, 1.0, math.pi / 2))
+    places, way = LOOKOUT.ways(hunt, situated(GRID.start(HERE), Odometry(0.0, 1.0, 1.0, math.pi / 2)))
     assert np.array(places) == pytest.approx(np.array([(2.0, 0.0)]))
     assert np.array(way) == pytest.approx(np.array([(0.0, 0.0), (0.0, 1.0)]), abs=1e-12)
 
@@ -213,7 +193,7 @@ def emptied(ground: Ground, lost_s: float = 4.0) -> Hunt:
     clear = replace(BLIND, ranges=np.full(292, 8.0, np.float32))
     hunt = hunt_for(np.full((150, 2), (2.0, 0.0)), -math.inf)
     track = replace(hunt.track, stamp=NOW - lost_s, mean=(0.0, 0.0, 0.0, 0.0))
-    return LOOKOUT.step(replace(hunt, track=track, facing=(1.0, 1.0)), clear, NOW, HERE, GRID, ground, LIMO)
+    return LOOKOUT.step(replace(hunt, track=track, facing=(1.0, 1.0)), clear, situated(ground))
 
 
 def test_where_no_place_is_left_it_begins_on_free_ground_not_seen_for_two_seconds() -> None:

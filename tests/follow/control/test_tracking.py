@@ -20,7 +20,7 @@ def test_it_searches_by_turning_and_does_not_drive() -> None:
     decision = run(World(person=(-3.0, 0.0)), 1.0)
     assert decision.mode is Mode.SEARCH
     assert decision.twist.linear == 0
-    assert abs(decision.twist.angular) == CONTROLLER.search.rate
+    assert abs(decision.twist.angular) == CONTROLLER.lookout.search_rate
 
 
 def test_it_faces_a_new_person_at_once_and_drives_only_when_sure() -> None:
@@ -69,11 +69,12 @@ def test_a_person_gone_is_lost_and_searched_for_the_way_they_went(side: float) -
     world = World(person=(3.0, side * -1.0), velocity=(0.0, side * 0.4), lidar=False)
     state = run(world, 4.0).state
     decision = run(world, 1.5, state, visible=False)
+    assert decision.reason == "following the legs or the predicted position"
+    decision = run(world, 2.0, decision.state, visible=False)
     assert decision.mode is Mode.LOST
     assert decision.twist.linear == 0
-    decision = run(world, 2.0, decision.state, visible=False)
     assert decision.reason == "searching for the lost person"
-    assert decision.twist.angular == side * CONTROLLER.search.rate
+    assert decision.twist.angular == side * CONTROLLER.lookout.search_rate
 
 
 def test_legs_in_the_scan_keep_a_person_too_near_for_the_camera() -> None:
@@ -117,7 +118,7 @@ def test_the_search_keeps_its_side_though_the_predicted_bearing_changes_sign() -
         if "searching" in decision.reason:
             rates.append(decision.twist.angular)
     assert len(rates) > 40
-    assert set(rates) in ({CONTROLLER.search.rate}, {-CONTROLLER.search.rate})
+    assert set(rates) in ({CONTROLLER.lookout.search_rate}, {-CONTROLLER.lookout.search_rate})
 
 
 def test_it_asks_for_the_part_of_the_image_where_the_person_will_be() -> None:
@@ -163,7 +164,7 @@ def test_a_late_frame_does_not_make_it_swing() -> None:
 
 
 def test_it_goes_around_a_pillar_between() -> None:
-    world = World(person=(4.0, 0.0))
+    world = World(person=(5.0, 0.0))
     state = run(world, 2.5).state
     pillar = (world.robot[0] + 1.2, 0.05)
     here = (pillar[0] - world.robot[0], pillar[1])
@@ -194,7 +195,8 @@ def test_it_does_not_back_into_what_its_map_shows_behind() -> None:
     ground, x = state.ground, world.robot[0] - CONTROLLER.robot.half_length - 0.15
     wall = CONTROLLER.grid.flat(ground, np.array([(x, y) for y in np.arange(-0.5, 0.5, 0.05)]))
     ground.occupied.flat[wall], ground.freed.flat[wall] = 2.0, -np.inf
-    assert CONTROLLER.step(world.observe(), state).twist.linear == 0
+    # It brakes as hard as it believes the wheels to.
+    assert CONTROLLER.step(world.observe(), state).twist.linear > backing.twist.linear + 0.1
 
 
 def test_it_backs_past_what_was_seen_behind_and_keeps_the_person_in_the_image() -> None:
@@ -208,7 +210,7 @@ def test_it_backs_past_what_was_seen_behind_and_keeps_the_person_in_the_image() 
     for side in (1.0, -1.0):
         decision = CONTROLLER.step(replace(world.observe(), remembered=post * (1.0, side)), state)
         assert decision.twist.linear < 0
-        assert decision.reason == "backing around an obstacle"
+        assert decision.reason == "giving way to a person"
         turns[side] = decision.twist.angular
     # Turned to the right its back goes to the left, and the other way round.
     assert turns[1.0] > 0.3
@@ -249,7 +251,7 @@ def test_before_a_person_is_found_it_turns_to_what_walks_beside_it() -> None:
     assert decision.twist.linear == 0
     # Nothing moves where legs stand: it searches to the side it began with.
     standing = walking(World(person=(-3.0, 0.0)), CONTROLLER.start(), [(0.3, -1.8)] * 25)
-    assert standing.twist.angular == CONTROLLER.search.rate
+    assert standing.twist.angular == CONTROLLER.lookout.search_rate
 
 
 def test_a_person_who_leaves_the_view_is_followed_by_the_lidar_as_long_as_they_move() -> None:

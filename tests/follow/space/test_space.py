@@ -14,7 +14,7 @@ from limo_hog.follow.sense.clearance import NO_POINTS
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.space.places import Places, Wandering
-from limo_hog.follow.space.routes import Router, point_ahead
+from limo_hog.follow.space.routes import Router, along
 
 GRID, ROUTER, WANDERING = Grid(), Router(), Wandering()
 HERE = Odometry()
@@ -145,10 +145,10 @@ def test_no_way_leads_through_a_door_narrower_than_the_robot_needs() -> None:
     assert ROUTER.way_towards(GRID, ground, HERE, at((2.5, 0.0))[0])[:, 0].max() < 1.0
 
 
-def test_the_point_ahead_is_on_the_way_at_the_distance_asked_for() -> None:
+def test_places_along_a_way_are_so_far_from_where_it_passes_the_robot_and_never_beyond_its_end() -> None:
     way = np.stack([np.arange(0, 2, 0.1), np.zeros(20)], axis=1)
-    assert point_ahead(way, Odometry(x=0.5), 0.5) == pytest.approx([1.0, 0.0])
-    assert point_ahead(way, Odometry(x=1.7), 0.5) == pytest.approx([1.9, 0.0])
+    ahead = along(way, Odometry(x=0.5, y=0.3), np.array([0.0, 0.25, 9.0]))
+    assert ahead == pytest.approx(np.array([(0.5, 0.0), (0.75, 0.0), (1.9, 0.0)]))
 
 
 def lost_at(x: float, y: float, velocity: tuple[float, float]) -> Places:

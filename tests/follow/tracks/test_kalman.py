@@ -29,6 +29,23 @@ def test_its_first_uncertainty_is_the_measurements() -> None:
     assert track.matrix[:2, :2] == pytest.approx(expected)
 
 
+def test_a_person_who_stands_hardly_seems_to_walk_when_the_robot_begins_to_turn() -> None:
+    # Its odometry is .02 s ahead of its images: from 1 s on, at 2 rad/s, everything is .04 rad to the left.
+    fastest = {}
+    for name, noise in (("sure", NOISE), ("turning", NOISE.turning(2.0))):
+        track = initiate(0.0, 0.0, 2.0, HERE, NOISE)
+        speeds = [0.0]
+        for step in range(1, 20):
+            track = predict(track, 0.1 * step, NOISE)
+            ahead, used = (0.04, noise) if step > 10 else (0.0, NOISE)
+            track = update(track, innovation(track, ahead, 2.0, HERE, used))
+            speeds.append(abs(track.mean[3]))
+        fastest[name] = max(speeds)
+    assert fastest["sure"] > 0.25
+    assert fastest["turning"] < 0.15
+    assert NOISE.turning(0.0) == NOISE
+
+
 def test_a_walker_is_learnt_and_foreseen() -> None:
     track = initiate(0.0, 0.0, 3.0, HERE, NOISE)
     for step in range(1, 40):

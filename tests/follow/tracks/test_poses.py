@@ -26,6 +26,11 @@ def test_between_two_readings_the_pose_is_between_them_the_short_way_round() -> 
     assert found.yaw == pytest.approx(3.0 + 0.25 * (math.tau - 6.0))
 
 
+def test_between_two_readings_the_speeds_are_between_theirs() -> None:
+    found = pose_at((Odometry(1.0, linear=0.2, angular=1.0), Odometry(2.0, linear=0.6, angular=-1.0)), 1.25)
+    assert (found.linear, found.angular) == pytest.approx((0.3, 0.5))
+
+
 def test_before_the_first_reading_the_robot_stood() -> None:
     found = pose_at((Odometry(1.0, 0.5, 4.0, 3.0, 0.5, 0.2), Odometry(2.0)), 0.2)
     assert (found.x, found.y, found.yaw, found.stamp) == (0.5, 4.0, 3.0, 0.2)

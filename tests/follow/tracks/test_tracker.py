@@ -191,8 +191,9 @@ def test_everyone_measured_lately_or_moving_is_around() -> None:
     mine, other = unseen(1, 1.0, 2.0), unseen(2, 0.3, 4.0)
     assert around(mine, (mine, other)) == (2, [4.0], True)
     assert around(None, (mine, other)) == (2, [2.0, 4.0], False)
-    # Who was not measured for .8 s is not around, nor what is no person yet.
-    assert around(mine, (mine, unseen(2, 0.1, 4.0))) == (1, [], True)
+    # One not measured for .8 s is taken to walk on, but is not where they were; what is no person yet does not count.
+    assert around(mine, (mine, unseen(2, 0.1, 4.0))) == (2, [], True)
+    assert around(mine, (mine, unseen(2, -1.1, 4.0))) == (1, [], True)
     assert around(mine, (mine, replace(other, confirmed=False))) == (1, [], True)
     # Legs that walk are one more, but for those of a person who is counted, or within half a metre of one.
     assert around(mine, (mine,), walker(None, 5.0, 0.0)) == (2, [5.0], True)
@@ -201,9 +202,9 @@ def test_everyone_measured_lately_or_moving_is_around() -> None:
     assert around(mine, (mine,), walker(None, 2.55, 0.0)) == (2, [2.55], True)
     # The person followed, lost .9 s ago, may be where the legs walk; then they are nobody else's.
     lost = unseen(1, 0.1, 2.0)
-    assert around(lost, (lost,), walker(None, 3.35, 0.0)) == (1, [], False)
-    assert around(lost, (lost,), walker(None, 3.45, 0.0)) == (1, [3.45], False)
-    assert around(lost, (lost,), walker(1, 5.0, 0.0)) == (1, [], False)
+    assert around(lost, (lost,), walker(None, 3.35, 0.0)) == (2, [], True)
+    assert around(lost, (lost,), walker(None, 3.45, 0.0)) == (2, [3.45], True)
+    assert around(lost, (lost,), walker(1, 5.0, 0.0)) == (1, [], True)
 
 
 def test_what_moves_may_be_the_person_until_the_camera_has_shown_it_twelve_times() -> None:

@@ -74,9 +74,9 @@ def test_a_parameter_changes_the_controller_and_keeps_its_kind() -> None:
     tunable.set("whole_image_every", 5.0)
     assert tunable.parameters["target_distance"].value == 2.0
     assert type(tunable.parameters["whole_image_every"].value) is int
-    tunable.set("steering.max_linear", 0.3)
-    assert tunable.parameters["steering.max_linear"].value == 0.3
-    assert tunable.parameters["steering.max_angular"].value == 1.5
+    tunable.set("following.max_speed", 0.3)
+    assert tunable.parameters["following.max_speed"].value == 0.3
+    assert tunable.parameters["planner.max_turn"].value == 3.0
 
 
 def test_the_page_is_served_on_loopback_alone() -> None:

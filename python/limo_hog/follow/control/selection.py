@@ -1,15 +1,15 @@
-"""Which of the tracked people to follow, and what else the tracking controller remembers from frame to frame.
-
-It stays with one person, says so where it is not sure which that is, and recognises them after a loss.
-"""
+"""Which of the tracked people to follow, and what else the tracking controller remembers from frame to frame."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
 
-from limo_hog.follow.control.backing import Other
+import numpy as np
+
 from limo_hog.follow.control.lookout import Hunt
+from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre
+from limo_hog.follow.control.situation import carried
 from limo_hog.follow.decision import Believed
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import Twist
@@ -17,6 +17,7 @@ from limo_hog.follow.sense.clearance import NO_POINTS, Points
 from limo_hog.follow.sense.observation import pose_at
 from limo_hog.follow.space.grid import Ground
 from limo_hog.follow.tracks.asking import Whom, picked
+from limo_hog.follow.tracks.hiding import Other
 from limo_hog.follow.tracks.identity import Identity, Likeness
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, predict
 from limo_hog.follow.tracks.person import Person
@@ -25,41 +26,21 @@ from limo_hog.follow.tracks.tracker import Tracks
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The person followed.
+    """The person followed."""
 
-    Attributes
-    ----------
-    number
-        Of the person; None while none is followed.
-    likeness
-        What the confirmed person followed last looks like, and which track that is; None where none was followed yet.
-    measured
-        When that person was last measured [s]; None where none was followed yet.
-    candidates
-        Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
-    unsure_at
-        Since when that is not sure [s]; None where it is.
-    asked
-        Who is asked for and was not in view yet; None where nobody is.
-    """
-
-    number: int | None = None
+    number: int | None = None  #: Of the person; None while none is followed.
+    #: What the confirmed person followed last looks like, and which track that is; None where none was followed yet.
     likeness: Likeness | None = None
-    measured: float | None = None
+    measured: float | None = None  #: When that person was last measured [s]; None where none was followed yet.
+    #: Numbers of the tracks of which one is the person followed, where it is not sure which; else empty.
     candidates: tuple[int, ...] = ()
-    unsure_at: float | None = None
-    asked: Whom | None = None
+    unsure_at: float | None = None  #: Since when that is not sure [s]; None where it is.
+    asked: Whom | None = None  #: The person asked for, not in view yet; None where nobody is.
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Chooses the person to follow.
-
-    Attributes
-    ----------
-    identity
-        Which track the person followed is.
-    """
+    """Chooses the person to follow."""
 
     # Chosen: three clear frames.
     min_existence: float = param(
@@ -95,7 +76,7 @@ class Selection:
     settles_s: float = param(
         1.0, "s", "People are looked at for this time before one asked for by a word is taken.", 0, 60
     )
-    identity: Identity = field(default_factory=Identity)
+    identity: Identity = field(default_factory=Identity)  #: Which track the person followed is.
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
         """Follow the person asked for, then whoever is followed so far; before there is one, the likeliest in view."""
@@ -194,80 +175,39 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class TrackingState:
-    """What the controller remembers.
+    """What the controller remembers."""
 
-    Attributes
-    ----------
-    tracks
-        All tracked people.
-    choice
-        Which of them is followed.
-    side
-        Which way to search: 1 left, -1 right.
-    detour
-        How far off the direct way to the person the robot drives [rad].
-    since_full
-        Frames since the whole image was searched [1].
-    ground
-        What stands where; None before the first scan.
-    known
-        The followed person's track when last measured; None before anyone was followed.
-    hunt
-        What is remembered while looking for that person; None while they are measured.
-    way, way_at
-        float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
-    way_out
-        Direction in the odometry frame [rad] and speed [m/s] by which it gives way, and since when [s]; None while it
-        does not.
-    gave_way_at
-        When it last gave way [s].
-    acceleration
-        Of the wheels, as learnt [m/s²].
-    sent
-        The last command.
-    others
-        Other people than the followed one, measured lately.
-    brisk
-        How fast the followed person walks at most, as far as known [m/s].
-    """
-
-    tracks: Tracks = field(default_factory=Tracks)
-    choice: Choice = field(default_factory=Choice)
-    side: float = 1.0
-    detour: float = 0.0
-    since_full: int = 0
-    ground: Ground | None = None
-    known: Track | None = None
-    hunt: Hunt | None = None
+    tracks: Tracks = field(default_factory=Tracks)  #: All tracked people.
+    choice: Choice = field(default_factory=Choice)  #: Which of them is followed.
+    side: float = 1.0  #: Which way to search: 1 left, -1 right.
+    since_full: int = 0  #: Frames since the whole image was searched [1].
+    ground: Ground | None = None  #: What stands where; None before the first scan.
+    known: Track | None = None  #: The followed person's track when last measured; None before anyone was followed.
+    hunt: Hunt | None = None  #: What is remembered while looking for that person; None while they are measured.
+    #: float64 (N, 2) [m], odometry frame: the way to the person where the direct one is not free; when planned [s].
     way: Points = field(default_factory=lambda: NO_POINTS)
     way_at: float = -math.inf
-    way_out: tuple[float, float, float] | None = None
-    gave_way_at: float = -math.inf
-    acceleration: float = 1.0
-    sent: Twist = field(default_factory=Twist)
-    others: tuple[Other, ...] = ()
-    brisk: float = 0.0
+    acceleration: float = 1.0  #: Of the wheels, as learnt [m/s²].
+    sent: Twist = field(default_factory=Twist)  #: The last command.
+    others: tuple[Other, ...] = ()  #: Other people than the followed one, measured lately.
+    brisk: float = 0.0  #: How fast the followed person walks at most, as far as known [m/s].
+    kept: Manoeuvre = DIRECT  #: The manoeuvre begun.
 
 
 def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:
     """Return everyone tracked, in the base frame, as of the newest stamp `now` [s]."""
-    boxes, likeness = dict(state.tracks.boxes), state.choice.likeness
-    pose = pose_at(state.tracks.poses, now)
-    people = []
-    for one in state.tracks.people:
-        track = predict(one.track, now, noise)
-        bearing, distance = bearing_range(track, pose)
-        speed, heading = math.hypot(*track.mean[2:]), math.atan2(track.mean[3], track.mean[2]) - pose.yaw
-        people.append(
-            Believed(
-                distance * math.cos(bearing),
-                distance * math.sin(bearing),
-                one.existence,
-                one.number,
-                speed * math.cos(heading),
-                speed * math.sin(heading),
-                boxes.get(one.number),
-                None if likeness is None else likeness.of(one.number),
-            )
+    boxes, likeness, people = dict(state.tracks.boxes), state.choice.likeness, state.tracks.people
+    means = np.array([predict(one.track, now, noise).mean for one in people]).reshape(-1, 4)
+    return tuple(
+        Believed(
+            x,
+            y,
+            one.existence,
+            one.number,
+            vx,
+            vy,
+            boxes.get(one.number),
+            None if likeness is None else likeness.of(one.number),
         )
-    return tuple(people)
+        for one, (x, y, vx, vy) in zip(people, carried(means, pose_at(state.tracks.poses, now)).tolist(), strict=True)
+    )

@@ -189,7 +189,11 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
     share = (stamp - one.stamp) / (other.stamp - one.stamp)
     yaw = one.yaw + share * math.remainder(other.yaw - one.yaw, math.tau)
     x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
-    return Odometry(stamp, x, y, yaw, last.linear, last.angular)
+    linear, angular = (
+        one.linear + share * (other.linear - one.linear),
+        one.angular + share * (other.angular - one.angular),
+    )
+    return Odometry(stamp, x, y, yaw, linear, angular)
 
 
 @dataclass(frozen=True, slots=True)

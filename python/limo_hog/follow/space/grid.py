@@ -140,6 +140,14 @@ class Grid:
         steps = np.array((0, 1, self.cells, self.cells + 1), np.int64)
         return np.asarray(inside & self._is_occupied(ground, flat[:, None] + steps, lasting).any(axis=1))
 
+    def lasting_near(self, ground: Ground, pose: Odometry, reach: float) -> Points:
+        """Return the middles of cells within `reach` [m] in which something lasts, float64 (N, 2), odometry frame."""
+        x, y = self.index(ground, np.array([[pose.x, pose.y]]))[0][0].tolist()
+        side = int(reach / self.cell)
+        rows, columns = slice(max(x - side, 0), x + side + 1), slice(max(y - side, 0), y + side + 1)
+        lasts = (ground.occupied[rows, columns] > 0) & (ground.freed[rows, columns] < ground.stamp - self.lasts_s)
+        return self.middle_of(ground, np.argwhere(lasts) + np.array([rows.start, columns.start]))
+
     def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> NDArray[np.bool_]:
         """Return whether the cells of flat indices are occupied, bool of their shape; `lasting` as `is_blocked`."""
         occupied = ground.occupied.take(flat) > 0

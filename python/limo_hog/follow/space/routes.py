@@ -91,13 +91,11 @@ class Router:
         return grid.middle_of(ground, np.array(cells[::-1]))
 
 
-def point_ahead(way: Points, pose: Odometry, ahead: float) -> Points:
-    """Return the first point (2,) of a way (N, 2) that is `ahead` [m] of the robot, or its last."""
-    gaps = np.hypot(way[:, 0] - pose.x, way[:, 1] - pose.y)
-    nearest = int(np.argmin(gaps))
-    beyond = np.flatnonzero(gaps[nearest:] >= ahead)
-    point: Points = way[nearest + beyond[0]] if len(beyond) else way[-1]
-    return point
+def along(way: Points, pose: Odometry, far: NDArray[np.float64]) -> Points:
+    """Return the points of a way (N, 2) that are so far (M,) along it from where it is nearest to the robot [m]."""
+    rest = way[int(np.argmin(np.hypot(way[:, 0] - pose.x, way[:, 1] - pose.y))) :]
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rest, axis=0).T))])
+    return np.stack([np.interp(far, arc, rest[:, 0]), np.interp(far, arc, rest[:, 1])], axis=1)
 
 
 def _dilated(cells: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:

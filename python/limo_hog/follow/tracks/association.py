@@ -153,11 +153,11 @@ class Legs:
         dx = sum(xs) / len(xs) + self.trail_s * vx - pose.x
         dy = sum(ys) / len(ys) + self.trail_s * vy - pose.y
         bearing = math.atan2(dy, dx) - pose.yaw
-        return update(track, innovation(track, bearing, math.hypot(dx, dy), pose, self.noise_at(distance, noise)))
+        return update(track, innovation(track, bearing, math.hypot(dx, dy), pose, self.noise_at(distance, noise, pose)))
 
-    def noise_at(self, distance: float, noise: Noise) -> Noise:
-        """Return the noise with that of legs measured at a distance [m]."""
-        return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma)
+    def noise_at(self, distance: float, noise: Noise, pose: Odometry) -> Noise:
+        """Return the noise with that of legs measured at a distance [m] from a robot at `pose`."""
+        return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma).turning(pose.angular)
 
 
 def distances(points: Points, track: Track) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ Li and Kirubarajan, Estimation with Applications to Tracking and Navigation (200
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -30,9 +30,17 @@ class Noise:
 
     acceleration: float = param(0.6, "m/s^1.5", "Square root of the spectral density of a person's acceleration.")
     bearing: float = param(0.015, "rad", "Standard deviation of a measured bearing.")
+    clocks: float = param(0.04, "s", "Standard deviation of the image's stamp, by the odometry's clock.")
     range: float = param(0.06, "m", "Standard deviation of a measured range.")
     velocity: float = param(0.6, "m/s", "Standard deviation of each component of a new track's velocity.")
     persistence: float = param(4.0, "s", "Time constant with which an unmeasured velocity decays.")
+
+    def turning(self, rate: float) -> Noise:
+        """Return the noise of a bearing measured while the robot turns at `rate` [rad/s]: its yaw is as late as clocks.
+
+        Without it a person who stands seems to walk aside whenever the robot begins to turn.
+        """
+        return replace(self, bearing=math.hypot(self.bearing, self.clocks * rate))
 
 
 @dataclass(frozen=True, slots=True)

@@ -176,7 +176,7 @@ class Movers:
         x, y, _, _ = legs[0].track.mean
         dx, dy = x - pose.x, y - pose.y
         distance = math.hypot(dx, dy)
-        noise = self.legs.noise_at(distance, noise)
+        noise = self.legs.noise_at(distance, noise, pose)
         fit = kalman.innovation(track, math.atan2(dy, dx) - pose.yaw, distance, pose, noise)
         return replace(person, track=kalman.update(track, fit), felt=returns.stamp)
 
@@ -236,7 +236,7 @@ class Movers:
             math.hypot(place[0] - pose.x, place[1] - pose.y),
             math.atan2(place[1] - pose.y, place[0] - pose.x),
         )
-        track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, self.legs.noise_at(far, noise))
+        track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, self.legs.noise_at(far, noise, pose))
         return Mover(track, (float(place[0]), float(place[1])), returns.stamp, returns.stamp)
 
 

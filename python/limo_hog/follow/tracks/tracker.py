@@ -68,6 +68,7 @@ class Tracker:
     poses_s: float = param(2.0, "s", "How long odometry is kept: a camera image may be as late as this.")
     scans_s: float = param(1.0, "s", "How long scans are kept.")
     scan_period_s: float = param(0.13, "s", "A scan may be older by this than the image it is used with.")
+    walks_on_s: float = param(2.0, "s", "A person not measured is taken to walk on for this time.")
     walk: float = param(WALK, "m/s", "How fast people walk who are not measured.")
     min_period_s: float = param(0.02, "s", "Shortest time between two frames that is used to predict the next.")
     max_period_s: float = param(0.5, "s", "Longest time between two frames that is used to predict the next.")
@@ -86,7 +87,7 @@ class Tracker:
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
         others = self.movers.others(moving, known, measured, pose, self.noise)
-        pairs = self.association.pair(known, measured, pose, self.noise, flat, others)
+        pairs = self.association.pair(known, measured, pose, self.noise.turning(pose.angular), flat, others)
         people: list[Person] = []
         recall = tracks.recall
         for who, person in enumerate(known):
@@ -124,7 +125,7 @@ class Tracker:
         """Begin to track a box that belongs to no known person."""
         odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
         seen = replace(seen, clothes=self.association.worn(seen))
-        return initiate(number, seen, stamp, pose, self.noise, self.association.unknown, odds)
+        return initiate(number, seen, stamp, pose, self.noise.turning(pose.angular), self.association.unknown, odds)
 
     def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
         """Update a person, found with `recall`, by their box; the track is at the box's stamp."""
@@ -151,14 +152,14 @@ class Tracker:
         if not fits:
             # Something stands in front of the person.
             seen = replace(seen, range=None)
-        track = person.track
+        track, noise = person.track, self.noise.turning(pose.angular)
         if seen.range is not None and track.stamp - person.measured > self.restart_s:
-            track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, self.noise)
-        fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
+            track = kalman.initiate(track.stamp, seen.bearing, seen.range, pose, noise)
+        fit = innovation(track, seen.bearing, seen.range, pose, noise)
         strained = fit.distance2 > self.association.gate
         if strained:
             track = kalman.loosened(track, self.association.same_place, self.turn_speed)
-            fit = innovation(track, seen.bearing, seen.range, pose, self.noise)
+            fit = innovation(track, seen.bearing, seen.range, pose, noise)
         return replace(
             self.existence.update(person, evidence, found=True),
             track=kalman.update(track, fit),
@@ -270,10 +271,11 @@ class Tracker:
         people: dict[int, Track] = {}
         for one in tracks.people:
             one = followed if followed is not None and one.number == followed.number else one
-            if one.confirmed and now - one.measured <= lately_s:
+            if one.confirmed and now - one.measured <= self.walks_on_s:
                 people[one.number] = kalman.predict(one.track, now, self.noise)
         own = None if followed is None else people.get(followed.number)
-        others = [track.place for track in people.values() if track is not own]
+        lately = {one.number for one in tracks.people if now - one.measured <= lately_s}
+        others = [track.place for number, track in people.items() if track is not own and number in lately]
         places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)

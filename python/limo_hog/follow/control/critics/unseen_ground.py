@@ -1,0 +1,30 @@
+"""The robot does not back onto ground to which somebody out of sight can have come since it was seen to be free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from limo_hog.follow.control.rollouts import Rollouts
+from limo_hog.follow.control.situation import Array, Situation
+from limo_hog.follow.parameters import param
+
+
+@dataclass(frozen=True, slots=True)
+class UnseenGround:
+    """Share of the time in which it backs onto ground where somebody can be; the near future counts most."""
+
+    weight: float = param(6.0, "1", "Cost of backing so all the time.", 0, 100)
+    unknown: float = param(0.3, "1", "Share that ground counts for that was not seen at all.", 0, 1)
+    stands: float = param(0.02, "m/s", "A slower robot stands.", 0, 1)
+    fades_s: float = param(1.2, "s", "Time constant with which the future counts less.", 0.1, 60)
+
+    def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
+        """Return the cost of each rollout before its weight, float64 (K,) [1]."""
+        cost, backs = rollouts.nothing, np.flatnonzero(rollouts.speeds.min(axis=1) < -self.stands)
+        if len(backs):
+            known, risky = situation.is_known_behind(rollouts.poses[backs, ::2])
+            onto = np.where(risky, 1.0, self.unknown * ~known) * (rollouts.speeds[backs, ::2] < -self.stands)
+            cost[backs] = (onto * np.exp(-rollouts.times[::2] / self.fades_s)).mean(axis=1)
+        return cost

@@ -1,0 +1,160 @@
+"""The commands that are compared, each driven on for some seconds in mind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from limo_hog.follow.control.situation import Array, Goal, Situation
+from limo_hog.follow.control.wheels import turn_acceleration
+from limo_hog.follow.parameters import param
+from limo_hog.follow.robot import RobotGeometry
+from limo_hog.follow.sense.clearance import Margin, rooms_ahead
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """To face a direction in the odometry frame [rad], and to drive at a speed [m/s]; None for the goal's own."""
+
+    heading: float | None = None
+    speed: float | None = None
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether it is the goal's own."""
+        return self == DIRECT
+
+
+#: What the goal asks for, with nothing in the way.
+DIRECT = Manoeuvre()
+
+
+@dataclass(frozen=True, slots=True)
+class Rollouts:
+    """K commands, each driven on for T steps; the first is the goal's own, the last the one begun, if it is another."""
+
+    goal: Goal  #: What they were made for, and the manoeuvre begun.
+    kept: Manoeuvre
+    times: Array  #: float64 (T,) [s].
+    poses: Array  #: float64 (K, T, 3): x, y [m], yaw [rad], base frame as of now; float64 (K, T) [m/s].
+    speeds: Array
+    offs: Array  #: float64 (K,): direction faced, from the goal's [rad], and the speed driven to [m/s].
+    wanted: Array
+    free: Array  #: float64 (T, 2) [m]: where the first would be with nothing in its way.
+    places: Array  #: float64 (T, N, 2) [m]: where the people are.
+
+    @property
+    def begun(self) -> int:
+        """Which of them goes on with the manoeuvre begun."""
+        return 0 if self.kept.is_direct else len(self.offs) - 1
+
+    @property
+    def nothing(self) -> Array:
+        """No cost for any of them, float64 (K,)."""
+        return np.zeros(len(self.offs))
+
+    def gaps(self, places: Array, robot: RobotGeometry) -> Array:
+        """Return the distance from the outline to places (T, N, 2), float64 (K, T, N) [m]; negative inside it."""
+        poses = self.poses[:, :, None]
+        dx, dy = places[None, ..., 0] - poses[..., 0], places[None, ..., 1] - poses[..., 1]
+        cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+        ahead = np.abs(cos * dx + sin * dy) - robot.half_length
+        beside = np.abs(cos * dy - sin * dx) - robot.half_width
+        outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(beside, 0.0))
+        return np.asarray(outside + np.minimum(np.maximum(ahead, beside), 0.0))
+
+    def offs_to(self, places: Array) -> Array:
+        """Return how far off straight ahead places (T, 2) are, float64 (K, T) [rad], 0 … π."""
+        to = places[None] - self.poses[:, :, :2]
+        off = np.arctan2(to[..., 1], to[..., 0]) - self.poses[:, :, 2]
+        return np.asarray(np.abs(off - math.tau * np.rint(off / math.tau)))
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """Which commands are compared, and how the robot and the people move on.
+
+    The robot turns as a critically damped controller would, drives the faster the less it has yet to turn, and stops
+    where `Guard` would stop it: a closed formula, so all rollouts together are a few operations on arrays.
+    """
+
+    offsets: tuple[float, ...] = param(
+        (0.08, 0.18, 0.3, 0.44, 0.6, 0.8, 1.1, 1.6), "rad", "Compared, to either side of the goal."
+    )
+    speeds: tuple[float, ...] = param((-0.6, 0.0, 0.3, 0.8), "m/s", "Speeds compared with the goal's own.")
+    steps: int = param(15, "1", "Steps of a rollout.")
+    step_s: float = param(0.2, "s", "How long a step is.")
+    gain: float = param(0.8, "1/s", "Rate at which an error of distance decays.", 0, 5)
+    turn_gain: float = param(4.0, "1/s", "Rate at which an error of direction decays, with strong wheels.", 0.1, 20)
+    margin: Margin = field(default_factory=lambda: Margin(0.62, 0.22))
+    blind_speed: float = param(0.2, "m/s", "Highest speed backwards onto ground that is not known.", 0, 1)
+
+    @property
+    def times(self) -> Array:
+        """When the steps end, float64 (T,) [s]."""
+        return np.arange(1.0, self.steps + 1) * self.step_s
+
+    def roll_out(self, situation: Situation, goal: Goal, kept: Manoeuvre, *, own_only: bool = False) -> Rollouts:
+        """Return the rollouts of all commands, or of the goal's own; `kept` is the manoeuvre begun."""
+        offs, wanted = (np.zeros(1), np.full(1, np.nan)) if own_only else self._commands(situation, goal, kept)
+        left, yaw = self._turned(situation, goal, offs)
+        own = goal.speed_later + (goal.speed - goal.speed_later) * np.exp(-self.gain * self.times)
+        target = np.where(np.isnan(wanted)[:, None], own, wanted[:, None])
+        known, _ = situation.is_known_behind(np.zeros(3))
+        least = -math.inf if known else -self.blind_speed
+        least = least if situation.robot.may_back else 0.0
+        target = np.maximum(target, least) * np.maximum(np.cos(left), 0.0) ** 2
+        reach = situation.acceleration * self.times
+        speed = np.clip(target, situation.driven.linear - reach, situation.driven.linear + reach)
+        before = np.concatenate([np.full((len(offs), 1), situation.driven.linear), speed[:, :-1]], axis=1)
+        far = np.cumsum((before + speed) / 2 * self.step_s, axis=1)
+        headings, which = np.unique(goal.heading + offs, return_inverse=True)
+        near = np.hypot(*situation.points.T) < np.abs(far).max() + self.margin.ahead + situation.robot.half_length
+        points = situation.points[near]
+        ahead, behind = (
+            np.maximum(rooms_ahead(side * points, headings, self.margin, situation.robot), 0.0)[which, None]
+            for side in (1, -1)
+        )
+        # It brakes no faster than its wheels can.
+        driven, braking = situation.driven.linear, np.minimum(reach, abs(situation.driven.linear))
+        stops = math.copysign(1.0, driven) * braking * (abs(driven) - braking / 2) / situation.acceleration
+        stride = np.diff(np.clip(far, np.minimum(-behind, stops), np.maximum(ahead, stops)), axis=1, prepend=0.0)
+        along = (np.concatenate([np.zeros((len(offs), 1)), yaw[:, :-1]], axis=1) + yaw) / 2
+        x, y = np.cumsum(stride * np.cos(along), axis=1), np.cumsum(stride * np.sin(along), axis=1)
+        unheld = np.diff(far[0], prepend=0.0)
+        free = np.stack([np.cumsum(unheld * np.cos(along[0])), np.cumsum(unheld * np.sin(along[0]))], axis=1)
+        poses, speeds = np.stack([x, y, yaw], axis=2), stride / self.step_s
+        wanted = np.maximum(np.where(np.isnan(wanted), goal.speed, wanted), least)
+        return Rollouts(goal, kept, self.times, poses, speeds, offs, wanted, free, self.walked(situation.people))
+
+    def walked(self, people: Array) -> Array:
+        """Return where people (N, 4) are after each step, float64 (T, N, 2) [m]."""
+        return np.asarray(people[None, :, :2] + self.times[:, None, None] * people[None, :, 2:])
+
+    def _commands(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> tuple[Array, Array]:
+        """Return each command's direction from the goal's [rad] and its speed, NaN for the goal's own, (K,) each."""
+        offsets = np.array([0.0, *(side * off for off in self.offsets for side in (1, -1))])
+        speeds = np.array([math.nan, *self.speeds])
+        offs, wanted = np.repeat(offsets, len(speeds)), np.tile(speeds, len(offsets))
+        if kept.is_direct:
+            return offs, wanted
+        off = 0.0
+        if kept.heading is not None:
+            off = math.remainder(kept.heading - situation.pose.yaw - goal.heading, math.tau)
+        return np.append(offs, off), np.append(wanted, math.nan if kept.speed is None else kept.speed)
+
+    def _turned(self, situation: Situation, goal: Goal, offs: Array) -> tuple[Array, Array]:
+        """Return what is left to turn, and the yaw, after each step, float64 (K, T) [rad]."""
+        headings, own = (goal.heading + offs)[:, None], (offs == 0)[:, None]
+        most = turn_acceleration(situation.acceleration, situation.robot)
+        gain = np.minimum(self.turn_gain, np.sqrt(most / np.maximum(np.abs(headings), 1e-3)))
+        rate, moved = np.where(own, goal.rate, 0.0), np.where(own, goal.rate, 0.0) * self.times
+        if goal.places is not None:
+            bearings = np.arctan2(goal.places[:, 1], goal.places[:, 0])
+            moved = np.where(own, np.unwrap(np.concatenate([[goal.heading], bearings]))[1:] - goal.heading, 0.0)
+        left = (-headings + (-headings * gain + situation.driven.angular - rate) * self.times) * np.exp(
+            -gain * self.times
+        )
+        return left, headings + moved + left

@@ -1,0 +1,96 @@
+"""What a command is decided by: built once a step, in the base frame as of the newest stamp."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limo_hog.follow.robot import RobotGeometry, Twist
+from limo_hog.follow.sense.clearance import Points, from_odometry, places_behind, to_odometry
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.space.grid import Grid, Ground
+
+Array = NDArray[np.float64]
+
+#: Ground behind the robot is looked at so far behind its outline [m]: from .6 m/s it stops within .33 m.
+DEPTHS = (0.1, 0.2, 0.3)
+#: Ground seen to be free counts as known for so long [s]: a second less than `Guard.memory_s`.
+KNOWN_S = 59.0
+#: And where a person out of sight can be, for so long [s]: a person at .75 m/s comes from 3.5 m away.
+LATELY_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """The robot, the people and the ground."""
+
+    now: float  #: The newest stamp [s]; where the robot is then, odometry frame, and what its wheels do.
+    pose: Odometry
+    driven: Twist
+    robot: RobotGeometry  #: Its geometry and limits; its wheels' acceleration as learnt [m/s²].
+    acceleration: float
+    period: float  #: The time to the next command, and what the image will be late then [s].
+    late_s: float
+    people: Array  #: float64 (N, 4): x, y [m], vx, vy [m/s] of everybody.
+    followed: int | None  #: The row of the person followed.
+    points: Points  #: float64 (M, 2) [m]: what stands around the robot, without people who are predicted.
+    grid: Grid  #: The map; None before the first scan.
+    ground: Ground | None
+    hiding: Array  #: float64 (H, 3): where people out of sight can be, `Hiding.circles`.
+
+    @property
+    def mapped(self) -> Ground:
+        """The ground, where it is known that there is a map."""
+        if self.ground is None:
+            raise ValueError("there is no map yet: ask for `ground`")
+        return self.ground
+
+    def is_known_behind(self, poses: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return whether ground behind poses (..., 3) was seen free, and if somebody can be where not, bool (...)."""
+        if self.ground is None:
+            return np.ones(poses.shape[:-1], bool), np.zeros(poses.shape[:-1], bool)
+        behind = places_behind(DEPTHS, self.robot)
+        cos, sin = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
+        x = poses[..., 0, None] + behind[:, 0] * cos - behind[:, 1] * sin
+        y = poses[..., 1, None] + behind[:, 0] * sin + behind[:, 1] * cos
+        places = to_odometry(np.stack([x.ravel(), y.ravel()], axis=1), self.pose)
+        hides = np.zeros(len(places), bool)
+        for at_x, at_y, reach in self.hiding.tolist():
+            hides |= np.hypot(places[:, 0] - at_x, places[:, 1] - at_y) < reach
+        within = np.where(hides, LATELY_S, KNOWN_S)
+        known = self.grid.is_free_since(self.ground, places, self.ground.stamp - within)
+        known, risky = known.reshape(x.shape), (hides & ~known).reshape(x.shape)
+        return np.asarray(known.all(axis=-1)), np.asarray(risky.any(axis=-1))
+
+    def is_behind(self, place: tuple[float, float]) -> bool:
+        """Whether something that lasts is between the robot and a place in the odometry frame [m]."""
+        here = np.array([[self.pose.x, self.pose.y]])
+        ground = self.ground
+        return ground is not None and not self.grid.sees(ground, here, np.array([place]), lasting=True)[0, 0]
+
+    def bearing_of(self, x: float, y: float) -> float:
+        """Return the direction of a place in the odometry frame [rad]."""
+        return math.remainder(math.atan2(y - self.pose.y, x - self.pose.x) - self.pose.yaw, math.tau)
+
+
+def carried(people: Array, pose: Odometry) -> Array:
+    """Carry places and velocities (N, 4) from the odometry frame into the base frame of a robot at `pose`."""
+    velocities = from_odometry(people[:, 2:], replace(pose, x=0.0, y=0.0))
+    return np.concatenate([from_odometry(people[:, :2], pose), velocities], axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Where the robot should be, looking where."""
+
+    heading: float  #: Direction to drive in and to face now [rad], and how it changes [rad/s].
+    rate: float = 0.0
+    speed: float = 0.0  #: Best speed now, and once the distance is right [m/s].
+    speed_later: float = 0.0
+    #: float64 (T, 2) [m]: the place to be near, after each step of a rollout; None to drive nowhere.
+    places: Points | None = None
+    keeps: float = 0.0  #: The distance to hold from it, from the robot's centre [m].
+    faces: bool = True  #: Whether it matters that the person followed stays in the image.

@@ -1,0 +1,65 @@
+"""People who were about and are not measured any more: where each of them can have walked to by now."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from limo_hog.follow.parameters import param
+from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.measurement import WALK
+
+
+class Other(NamedTuple):
+    """Another person than the one followed: where they were last measured, odometry frame [m], and when [s]."""
+
+    x: float
+    y: float
+    at: float
+
+
+@dataclass(frozen=True, slots=True)
+class Hiding:
+    """Remembers other people."""
+
+    remembers_s: float = param(59.0, "s", "How long people out of sight are remembered.", 0, 3600)
+    unseen_s: float = param(0.8, "s", "A person not measured for longer is out of sight.", 0, 60)
+    same: float = param(0.5, "m", "Nearer than this to where a person was is the same person.", 0, 5)
+    walk: float = param(WALK, "m/s", "How fast people walk out of sight.", 0, 5)
+
+    def remember(
+        self, others: tuple[Other, ...], seen: Points, felt: Points, followed: Points, now: float
+    ) -> tuple[Other, ...]:
+        """Bring the other people up to `now` [s]; all places are float64 (N, 2) [m], odometry frame.
+
+        `seen` is where others are measured now, `felt` what the scan shows that may be the legs of those remembered,
+        and `followed` where the person followed is, who may have been taken for another: none if that is unknown.
+        """
+        # Of a few places, lists are faster than arrays.
+        own, legs = followed.tolist(), felt.tolist()
+        left = [
+            one
+            for one in others
+            if now - one.at < self.remembers_s and all(math.dist(place, (one.x, one.y)) > self.same for place in own)
+        ]
+        kept: list[Other] = []
+        for x, y in seen.tolist():
+            gaps = [math.dist((x, y), (one.x, one.y)) - self._reach(one, now) for one in left]
+            if gaps and min(gaps) <= 0:
+                left.pop(gaps.index(min(gaps)))
+            kept.append(Other(x, y, now))
+        for one in left:
+            gap, x, y = min(((math.dist((x, y), (one.x, one.y)), x, y) for x, y in legs), default=(math.inf, 0.0, 0.0))
+            kept.append(Other(x, y, now) if gap < self.same else one)
+        return tuple(kept)
+
+    def circles(self, others: tuple[Other, ...], now: float) -> Points:
+        """Return where people out of sight can be, float64 (H, 3): x, y and radius [m], odometry frame."""
+        hidden = [(one.x, one.y, self._reach(one, now)) for one in others if now - one.at > self.unseen_s]
+        return np.array(hidden).reshape(-1, 3)
+
+    def _reach(self, one: Other, now: float) -> float:
+        return self.same + self.walk * (now - one.at)

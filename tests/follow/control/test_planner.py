@@ -1,0 +1,187 @@
+"""Which command costs least: what each critic is for, and how another is added."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from types import FunctionType
+
+import numpy as np
+import pytest
+
+from limo_hog.follow.control.planner import NO_WAY, Move, Planner
+from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre, Rollouts
+from limo_hog.follow.control.situation import Array, Goal, Situation
+from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.space.grid import Grid
+
+PLANNER, GRID, POSE = Planner(), Grid(), Odometry(10.0)
+TIMES = PLANNER.sampling.times
+NOBODY = np.empty((0, 4))
+
+
+def towards(x: float, y: float = 0.0, speed: float = 0.7, keeps: float = 1.5) -> Goal:
+    """To come up to a person who stands."""
+    return Goal(math.atan2(y, x), speed=speed, places=np.full((len(TIMES), 2), (x, y)), keeps=keeps)
+
+
+def situation(
+    *people: tuple[float, float, float, float], followed: int | None = None, points: object = (), speed: float = 0.0
+) -> Situation:
+    """A robot at the origin that drives along x, on ground that was just seen to be free."""
+    ground = GRID.start(POSE)
+    ground = replace(ground, freed=np.full_like(ground.freed, 10.0), stamp=10.0)
+    stands = np.array(points, float).reshape(-1, 2)
+    around = np.array(people, float).reshape(-1, 4)
+    hiding = np.empty((0, 3))
+    return Situation(10.0, POSE, Twist(speed), LIMO, 1.0, 0.1, 0.1, around, followed, stands, GRID, ground, hiding)
+
+
+def wall(x: float, *, half: float) -> list[tuple[float, float]]:
+    return [(x, y) for y in np.arange(-half, half + 0.01, 0.04)]
+
+
+#: A wall at the robot's back: it cannot give way by backing.
+BEHIND = wall(-0.5, half=0.6)
+
+
+def without(critic: str) -> Planner:
+    return replace(PLANNER, **{critic: replace(getattr(PLANNER, critic), weight=0.0)})
+
+
+def test_with_nothing_in_the_way_the_command_is_the_goals_own() -> None:
+    plan = PLANNER.plan(situation((3.0, 0.4, 0.0, 0.0), followed=0), towards(3.0, 0.4), DIRECT)
+    heading = math.atan2(0.4, 3.0)
+    assert plan.twist == Twist(pytest.approx(0.7 * math.cos(heading) ** 2), pytest.approx(2.5 * heading))  # type: ignore[arg-type]
+    assert (plan.manoeuvre, plan.reason) == (DIRECT, "")
+
+
+def test_a_plan_says_what_each_critic_adds_and_where_it_leads() -> None:
+    plan = PLANNER.plan(situation(), towards(3.0), DIRECT)
+    assert [name for name, _ in plan.shares] == [name for name, _ in PLANNER.critics()]
+    assert len(plan.shares) == 8
+    assert plan.rollout.shape == (len(TIMES), 2)
+    assert 0.3 < plan.rollout[-1, 0] < 1.5
+
+
+def test_around_a_post_it_drives_and_says_so() -> None:
+    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=wall(1.2, half=0.05), speed=0.5)
+    plan = PLANNER.plan(seen, towards(3.5), DIRECT)
+    assert abs(plan.twist.angular) > 0.2
+    assert plan.twist.linear > 0.3
+    assert plan.reason == "driving around an obstacle"
+
+
+def test_where_no_command_leads_anywhere_it_stands_and_says_so() -> None:
+    ring = [(0.4 * math.cos(a), 0.4 * math.sin(a)) for a in np.arange(-3.1, 3.2, 0.05)]
+    plan = PLANNER.plan(situation(points=ring), towards(3.0), DIRECT)
+    assert (plan.twist.linear, plan.reason) == (0.0, NO_WAY)
+
+
+def goal_distance(planner: Planner) -> bool:
+    """It drives around a post that stands between it and its goal."""
+    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=wall(1.2, half=0.05), speed=0.5)
+    return planner.plan(seen, towards(3.5), DIRECT).manoeuvre != DIRECT
+
+
+def in_view(planner: Planner) -> bool:
+    """It gives way to somebody without turning its camera off the person followed."""
+    seen = situation((3.0, 0.0, 0.0, 0.0), (1.2, 0.3, -0.8, 0.0), followed=0, points=BEHIND)
+    return abs(planner.plan(seen, Goal(0.0), DIRECT).manoeuvre.heading or 0.0) < 0.3
+
+
+def followed(planner: Planner) -> bool:
+    """It gives way to the person followed, who walks at it."""
+    seen = situation((1.2, 0.0, -0.8, 0.0), followed=0)
+    return planner.plan(seen, Goal(0.0, faces=False), DIRECT).manoeuvre != DIRECT
+
+
+def others(planner: Planner) -> bool:
+    """It gives way to somebody else who walks at it."""
+    return planner.plan(situation((0.8, 0.1, -0.8, 0.0)), Goal(0.0), DIRECT).manoeuvre != DIRECT
+
+
+def walls(planner: Planner) -> bool:
+    """It turns off a wall that it would drive along too close by."""
+    along = [(x, 0.25) for x in np.arange(-0.5, 4.0, 0.04)]
+    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=along, speed=0.5)
+    return (planner.plan(seen, towards(3.5), DIRECT).manoeuvre.heading or 0.0) < 0
+
+
+def unseen_ground(planner: Planner) -> bool:
+    """It does not back onto ground to which somebody out of sight can have come."""
+    seen = situation((1.2, 0.0, 0.0, 0.0), followed=0)
+    assert seen.ground is not None
+    old = replace(seen.ground, freed=seen.ground.freed - 10.0)
+    seen = replace(seen, ground=old, hiding=np.array([(-1.0, 0.0, 2.0)]))
+    return bool(planner.plan(seen, towards(1.2, speed=-0.3), DIRECT).twist.linear == 0)
+
+
+def effort(planner: Planner) -> bool:
+    """Of the ways out of a person's way that are as good it takes the smaller turn."""
+    seen = situation((1.4, 0.0, -0.8, 0.0), points=BEHIND)
+    return abs(planner.plan(seen, Goal(0.0), DIRECT).manoeuvre.heading or 0.0) < 1.5
+
+
+def change_of_mind(planner: Planner) -> bool:
+    """It goes on around a post on the side on which it began to."""
+    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=wall(1.2, half=0.05), speed=0.5)
+    keen = replace(planner, stay=0.0)
+    return (keen.plan(seen, towards(3.5), Manoeuvre(0.32)).manoeuvre.heading or 0.0) > 0
+
+
+@pytest.mark.parametrize(
+    "behaves", [goal_distance, in_view, followed, others, walls, unseen_ground, effort, change_of_mind]
+)
+def test_each_critic_is_needed_for_what_it_is_for(behaves: FunctionType) -> None:
+    assert behaves(PLANNER), behaves.__doc__
+    assert not behaves(without(behaves.__name__)), f"without {behaves.__name__} it does as well"
+
+
+@dataclass(frozen=True, slots=True)
+class KeepRight:
+    """Metres left of where the robot is."""
+
+    weight: float = 5.0
+
+    def cost(self, rollouts: Rollouts, _: Situation) -> Array:
+        return np.asarray(np.maximum(rollouts.poses[:, :, 1] + 0.3, 0.0).mean(axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class Polite(Planner):
+    """A planner that keeps right."""
+
+    keep_right: KeepRight = field(default_factory=KeepRight)
+
+
+def test_another_critic_is_one_class_and_one_line() -> None:
+    seen = situation((3.0, 0.0, 0.0, 0.0), followed=0)
+    assert PLANNER.plan(seen, towards(3.0), DIRECT).twist.angular == 0
+    polite = Polite().plan(seen, towards(3.0), DIRECT)
+    assert polite.twist.angular < 0
+    assert dict(polite.shares)["keep_right"] > 0
+
+
+def test_where_nothing_is_to_be_driven_to_it_does_not_drive_on_with_what_it_began() -> None:
+    # It went out of a person's way, lost them, and looks for them to the left.
+    plan = PLANNER.plan(situation(speed=0.8), Goal(0.5), Manoeuvre(0.0, 0.8))
+    assert plan.twist.linear < 0.1
+    assert plan.twist.angular > 0.5
+
+
+def test_a_manoeuvre_begun_is_kept_for_all_that_it_costs_a_little_more() -> None:
+    walks = (1.8, 0.06, -0.8, 0.0)
+    fresh = PLANNER.plan(situation(walks, followed=0), Goal(0.0), DIRECT).manoeuvre
+    assert fresh.heading is not None
+    other = replace(fresh, heading=-fresh.heading)
+    for stay, kept in ((PLANNER.stay, other), (0.0, fresh)):
+        planner = replace(PLANNER, stay=stay, change_of_mind=replace(PLANNER.change_of_mind, weight=0.0))
+        assert planner.plan(situation(walks, followed=0), Goal(0.0), other).manoeuvre == kept
+
+
+def test_people_who_would_be_met_in_two_seconds_hardly_count() -> None:
+    # They give way as well; a robot that takes them not to would stand.
+    plan: Move = PLANNER.plan(situation((3.2, 0.2, -0.8, 0.0)), towards(6.0), DIRECT)
+    assert plan.twist.linear > 0.3

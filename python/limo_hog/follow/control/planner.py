@@ -90,12 +90,8 @@ class Planner:
     def plan(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> Move:
         """Return the command that costs least; `kept` is the manoeuvre begun."""
         names, critics = zip(*self.critics(), strict=True)
-        for own_only in (True, False) if kept.is_direct else (False,):
-            rollouts = self.sampling.roll_out(situation, goal, kept, own_only=own_only)
-            costs = np.array([one.weight * one.cost(rollouts, situation) for one in critics])
-            if costs.sum() <= self.change_of_mind.weight:
-                # Every other command costs more: a change of mind.
-                break
+        rollouts = self.sampling.roll_out(situation, goal, kept)
+        costs = np.array([one.weight * one.cost(rollouts, situation) for one in critics])
         totals = costs.sum(axis=0)
         if not kept.is_direct:
             totals[rollouts.begun] /= 1 + self.stay

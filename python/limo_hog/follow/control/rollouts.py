@@ -96,9 +96,9 @@ class Sampling:
         """When the steps end, float64 (T,) [s]."""
         return np.arange(1.0, self.steps + 1) * self.step_s
 
-    def roll_out(self, situation: Situation, goal: Goal, kept: Manoeuvre, *, own_only: bool = False) -> Rollouts:
-        """Return the rollouts of all commands, or of the goal's own; `kept` is the manoeuvre begun."""
-        offs, wanted = (np.zeros(1), np.full(1, np.nan)) if own_only else self._commands(situation, goal, kept)
+    def roll_out(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> Rollouts:
+        """Return the rollouts of all commands; `kept` is the manoeuvre begun."""
+        offs, wanted = self._commands(situation, goal, kept)
         left, yaw = self._turned(situation, goal, offs)
         own = goal.speed_later + (goal.speed - goal.speed_later) * np.exp(-self.gain * self.times)
         target = np.where(np.isnan(wanted)[:, None], own, wanted[:, None])

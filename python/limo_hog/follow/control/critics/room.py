@@ -24,7 +24,7 @@ class Room:
     contact: float = param(2.0, "m", "What a sure contact costs besides.", 0, 100)
     error: float = param(0.05, "m", "Scale of the error of the distance now.", 0.001, 1)
     spread: float = param(0.1, "m/s", "How fast that scale grows.", 0, 1)
-    fades_s: float = param(2.5, "s", "Time constant with which the future counts less.", 0.1, 60)
+    fades_s: float = param(1.5, "s", "Time constant with which the future counts less.", 0.1, 60)
 
     def short(self, rollouts: Rollouts, people: list[int], situation: Situation) -> Array:
         """Return the cost of each rollout by the people in these rows, float64 (K,) [m]."""

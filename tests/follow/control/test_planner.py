@@ -104,7 +104,7 @@ def others(planner: Planner) -> bool:
 
 def walls(planner: Planner) -> bool:
     """It turns off a wall that it would drive along too close by."""
-    along = [(x, 0.25) for x in np.arange(-0.5, 4.0, 0.04)]
+    along = [(x, 0.28) for x in np.arange(-0.5, 4.0, 0.04)]
     seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=along, speed=0.5)
     return (planner.plan(seen, towards(3.5), DIRECT).manoeuvre.heading or 0.0) < 0
 
@@ -185,3 +185,20 @@ def test_people_who_would_be_met_in_two_seconds_hardly_count() -> None:
     # They give way as well; a robot that takes them not to would stand.
     plan: Move = PLANNER.plan(situation((3.2, 0.2, -0.8, 0.0)), towards(6.0), DIRECT)
     assert plan.twist.linear > 0.3
+
+
+def test_a_manoeuvre_that_leads_nowhere_is_not_gone_on_with() -> None:
+    # The wall ahead stops it; the person lost is looked for to the left.
+    seen = situation(points=[(0.5, y) for y in np.arange(-0.6, 0.61, 0.04)])
+    plan = PLANNER.plan(seen, Goal(0.45), Manoeuvre(0.0, 0.8))
+    assert plan.manoeuvre == DIRECT
+    assert PLANNER.plan(seen, Goal(0.45), plan.manoeuvre).twist.angular > 0.5
+
+
+def test_in_mind_the_robot_brakes_no_faster_than_its_wheels_can() -> None:
+    seen = situation(points=wall(0.6, half=0.6), speed=0.8)
+    rollouts = PLANNER.sampling.roll_out(seen, towards(3.0), DIRECT)
+    v, a = seen.driven.linear, seen.acceleration
+    ahead = np.flatnonzero((rollouts.offs == 0) & (rollouts.wanted > 0))
+    # Braking distance v² / 2a, in steps of the rollout.
+    assert rollouts.poses[ahead, -1, 0].min() == pytest.approx(v**2 / 2 / a, rel=0.05)

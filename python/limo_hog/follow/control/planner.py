@@ -78,7 +78,7 @@ class Planner:
     change_of_mind: ChangeOfMind = field(default_factory=ChangeOfMind)
     turn_gain: float = param(2.5, "1/s", "Turn rate for each radian to turn.", 0, 10)
     stay: float = param(0.4, "1", "Share by which a manoeuvre begun may cost more than another, and is kept.", 0, 5)
-    stands: float = param(0.02, "m/s", "A slower robot stands.", 0, 1)
+    nowhere: float = param(0.02, "m", "A rollout that leads no further beyond the way to stop leads nowhere.", 0, 1)
     max_turn: float = param(3.0, "rad/s", "Limit of the turn rate.", 0, 6)
 
     def critics(self) -> Iterator[tuple[str, Critic]]:
@@ -109,10 +109,11 @@ class Planner:
         manoeuvre = Manoeuvre(
             None if off == 0 else situation.pose.yaw + heading, None if speed == rollouts.wanted[0] else speed
         )
-        if self.stands > np.abs(rollouts.speeds[best]).max():
+        gone = float(np.abs(rollouts.speeds[best]).sum() * self.sampling.step_s)
+        if gone < situation.driven.linear**2 / 2 / situation.acceleration + self.nowhere:
             # What leads nowhere is not gone on with.
             manoeuvre = DIRECT
-            if abs(speed) > self.stands:
+            if abs(speed) > self.nowhere:
                 twist, reason = replace(twist, linear=0.0), NO_WAY
         shares = tuple(zip(names, costs[:, best].tolist(), strict=True))
         return Move(twist, manoeuvre, reason, shares, rollouts.poses[best, :, :2])

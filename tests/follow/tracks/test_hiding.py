@@ -7,12 +7,12 @@ import pytest
 
 from limo_hog.follow.tracks.hiding import Hiding, Other
 
-HIDING, NOW = Hiding(), 100.0
+HIDING, NOW, NOWHERE = Hiding(), 100.0, np.empty((0, 2))
 
 
 def remembered(*others: Other, **places: list[tuple[float, float]]) -> list[Other]:
-    seen, felt, own = (np.array(places.get(name, ())).reshape(-1, 2) for name in ("seen", "felt", "own"))
-    return list(HIDING.remember(others, seen, felt, own, NOW))
+    felt, own = (np.array(places.get(name, ())).reshape(-1, 2) for name in ("felt", "own"))
+    return list(HIDING.remember(others, [Other(x, y, NOW) for x, y in places.get("seen", ())], felt, own, NOW))
 
 
 def test_a_person_seen_again_within_a_walk_of_where_they_were_is_the_same() -> None:
@@ -24,6 +24,20 @@ def test_a_person_seen_again_within_a_walk_of_where_they_were_is_the_same() -> N
 def test_the_nearest_of_two_is_the_one_seen_again() -> None:
     left, right = Other(0.0, 1.0, NOW - 1.0), Other(0.0, -1.0, NOW - 1.0)
     assert remembered(left, right, seen=[(0.0, 0.5)]) == [Other(0.0, 0.5, NOW), right]
+
+
+def test_of_two_who_can_be_anywhere_the_one_just_measured_is_the_one_seen_again() -> None:
+    long_ago, just = Other(0.0, 0.5, NOW - 20.0), Other(1.0, 0.0, NOW - 0.1)
+    assert remembered(long_ago, just, seen=[(1.0, 0.2)]) == [Other(1.0, 0.2, NOW), long_ago]
+
+
+def test_a_person_in_other_clothes_is_another() -> None:
+    red, green = np.array([[6.0, 0.0, 5.0], [1.0, 1.0, 2.0]]), np.array([[-3.0, 5.0, 5.0], [1.0, 1.0, 2.0]])
+    for clothes, people in ((red + 0.5, 1), (green, 2), (None, 1)):
+        seen = [Other(1.0, 0.0, NOW, clothes)]
+        kept = HIDING.remember((Other(0.0, 0.0, NOW - 9.0, red),), seen, NOWHERE, NOWHERE, NOW)
+        assert len(kept) == people
+    assert kept[0].clothes is red
 
 
 def test_legs_where_a_person_was_are_still_theirs_and_others_are_nobodys() -> None:

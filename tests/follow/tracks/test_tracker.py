@@ -184,7 +184,7 @@ def around(followed: Person | None, people: tuple[Person, ...], *movers: object)
     """Return how many are around at 1 s, the x of those who are others, and whether one is the person followed."""
     tracks = Tracks(people, stamp=1.0, movers=movers)  # type: ignore[arg-type]
     everyone, others, own = TRACKER.around(tracks, followed, 1.0, 0.8)
-    return len(everyone), sorted(others[:, 0].tolist()), own is not None
+    return len(everyone), sorted(one.x for one in others), own is not None
 
 
 def test_everyone_measured_lately_or_moving_is_around() -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import WALK
+from limo_hog.follow.sense.observation import Appearance, Clothes
 
 
 class Other(NamedTuple):
@@ -19,6 +21,7 @@ class Other(NamedTuple):
     x: float
     y: float
     at: float
+    clothes: Clothes | None = None  #: What they wear; None where only the scan showed them.
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,14 +32,16 @@ class Hiding:
     unseen_s: float = param(0.8, "s", "A person not measured for longer is out of sight.", 0, 60)
     same: float = param(0.5, "m", "Nearer than this to where a person was is the same person.", 0, 5)
     walk: float = param(WALK, "m/s", "How fast people walk out of sight.", 0, 5)
+    appearance: Appearance = field(default_factory=Appearance)  #: Compares clothes.
 
     def remember(
-        self, others: tuple[Other, ...], seen: Points, felt: Points, followed: Points, now: float
+        self, others: tuple[Other, ...], seen: Sequence[Other], felt: Points, followed: Points, now: float
     ) -> tuple[Other, ...]:
-        """Bring the other people up to `now` [s]; all places are float64 (N, 2) [m], odometry frame.
+        """Bring the other people up to `now` [s]; all places are in the odometry frame [m].
 
-        `seen` is where others are measured now, `felt` what the scan shows that may be the legs of those remembered,
-        and `followed` where the person followed is, who may have been taken for another: none if that is unknown.
+        `seen` are the others measured now, `felt` (N, 2) what the scan shows that may be the legs of those remembered,
+        and `followed` (N, 2) where the person followed is, who may have been taken for another: none if that is
+        unknown.
         """
         # Of a few places, lists are faster than arrays.
         own, legs = followed.tolist(), felt.tolist()
@@ -46,15 +51,22 @@ class Hiding:
             if now - one.at < self.remembers_s and all(math.dist(place, (one.x, one.y)) > self.same for place in own)
         ]
         kept: list[Other] = []
-        for x, y in seen.tolist():
-            gaps = [math.dist((x, y), (one.x, one.y)) - self._reach(one, now) for one in left]
-            if gaps and min(gaps) <= 0:
-                left.pop(gaps.index(min(gaps)))
-            kept.append(Other(x, y, now))
+        for person in seen:
+            same = [number for number, one in enumerate(left) if self._may_be(one, person, now)]
+            if same:
+                # Somebody who was just measured, rather than one who was not for long and can be anywhere.
+                before = left.pop(min(same, key=lambda which: (now - left[which].at, _apart(left[which], person))))
+                person = person if person.clothes is not None else person._replace(clothes=before.clothes)
+            kept.append(person)
         for one in left:
             gap, x, y = min(((math.dist((x, y), (one.x, one.y)), x, y) for x, y in legs), default=(math.inf, 0.0, 0.0))
-            kept.append(Other(x, y, now) if gap < self.same else one)
+            kept.append(one._replace(x=x, y=y, at=now) if gap < self.same else one)
         return tuple(kept)
+
+    def _may_be(self, one: Other, seen: Other, now: float) -> bool:
+        """Whether a person out of sight can have walked to where one is seen, in these clothes."""
+        alike = self.appearance.cost(one.clothes, seen.clothes) <= self.appearance.other
+        return alike and _apart(one, seen) <= self._reach(one, now)
 
     def circles(self, others: tuple[Other, ...], now: float) -> Points:
         """Return where people out of sight can be, float64 (H, 3): x, y and radius [m], odometry frame."""
@@ -63,3 +75,7 @@ class Hiding:
 
     def _reach(self, one: Other, now: float) -> float:
         return self.same + self.walk * (now - one.at)
+
+
+def _apart(one: Other, other: Other) -> float:
+    return math.dist(one[:2], other[:2])

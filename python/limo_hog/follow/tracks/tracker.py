@@ -16,6 +16,7 @@ from limo_hog.follow.sense.observation import Clothes, Observation, Odometry, po
 from limo_hog.follow.space.grid import Grid, Ground
 from limo_hog.follow.tracks import kalman
 from limo_hog.follow.tracks.association import Association, Legs, Returns
+from limo_hog.follow.tracks.hiding import Other
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
 from limo_hog.follow.tracks.movers import Mover, Movers, named
 from limo_hog.follow.tracks.person import Existence, Person, Recall, initiate, predict
@@ -262,11 +263,11 @@ class Tracker:
 
     def around(
         self, tracks: Tracks, followed: Person | None, now: float, lately_s: float
-    ) -> tuple[list[Track], Points, Track | None]:
+    ) -> tuple[list[Track], list[Other], Track | None]:
         """Return all people, seen by the camera or moving in the scan, as of `now` [s].
 
-        Also where others than `followed` were measured within `lately_s` [s], float64 (N, 2) [m] in the odometry frame,
-        and which track is the person followed; None for none of them.
+        Also others than `followed` who were measured within `lately_s` [s], and which track is the person followed;
+        None for none of them.
         """
         people: dict[int, Track] = {}
         for one in tracks.people:
@@ -274,8 +275,12 @@ class Tracker:
             if one.confirmed and now - one.measured <= self.walks_on_s:
                 people[one.number] = kalman.predict(one.track, now, self.noise)
         own = None if followed is None else people.get(followed.number)
-        lately = {one.number for one in tracks.people if now - one.measured <= lately_s}
-        others = [track.place for number, track in people.items() if track is not own and number in lately]
+        lately = {one.number: one.clothes for one in tracks.people if now - one.measured <= lately_s}
+        others = [
+            Other(*track.place, now, lately[number])
+            for number, track in people.items()
+            if track is not own and number in lately
+        ]
         places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)
@@ -286,8 +291,8 @@ class Tracker:
             nameless.append(track)
             may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))
             if now - mover.felt <= lately_s and not may_be_own:
-                others.append(track.place)
-        return [*people.values(), *nameless], np.array(others).reshape(-1, 2), own
+                others.append(Other(*track.place, now))
+        return [*people.values(), *nameless], others, own
 
     def _is_near(self, person: Person, track: Track) -> bool:
         """Whether what moves in the scan can be a person's legs, where they have not been measured for some time."""

@@ -126,7 +126,8 @@ class Follower(Generic[S]):
         turned = self._turned(sensors)
         if turned.scan is not None:
             turned = replace(turned, scan=completed(turned.scan, frame, turned.odometry, self._robot))
-        observation = observed(frame, turned, detections, region, failure, self._between, now)
+        observation = observed(frame, turned, detections, region, failure)
+        observation = replace(observation, between=self._between, clock=now)
         self._between = ()
         decision = self._guard.step(observation, self._state)
         self._state, self._region = decision.state, decision.region
@@ -137,7 +138,7 @@ class Follower(Generic[S]):
         turned = self._turned(sensors)
         if turned.scan is not None and turned.odometry is not None:
             self._between = (*self._between[1 - _SCANS_BETWEEN :], (turned.scan, turned.odometry))
-        decision = self._guard.recheck(now, turned.scan, turned.odometry, self._state)
+        decision = self._guard.recheck(now, turned, self._state)
         self._state = decision.state
         told: Decision[None] = replace(decision, state=None)  # type: ignore[arg-type, assignment]
         return FrameLog(now, told, sensors)

@@ -17,8 +17,8 @@ from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, from_odometry, scan_points, to_odometry
-from limo_hog.follow.sense.detectors import Region, RegionSize
-from limo_hog.follow.sense.measurement import PERSON_RADIUS
+from limo_hog.follow.sense.detectors import Region
+from limo_hog.follow.sense.measurement import PERSON_RADIUS, RegionSize
 from limo_hog.follow.sense.observation import Observation, pose_at
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
@@ -274,5 +274,4 @@ class TrackingController:
         stamp = observation.stamp + state.tracks.period
         pose = pose_at(state.tracks.poses, stamp)
         bearing, distance = bearing_range(predict(person.track, stamp, self.tracker.noise), pose)
-        width, height = observation.width, observation.height
-        return self.region.around(bearing, distance, person.window, person.centre, observation.focal_px, width, height)
+        return self.region.around(bearing, distance, person.window, person.centre, observation)

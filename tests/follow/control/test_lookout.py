@@ -30,7 +30,7 @@ def free_ground() -> Ground:
     """Ground that nothing stands on, seen by a robot that turned once about itself."""
     ground = None
     for turn in (0.0, 1.5, 3.0, 4.5):
-        ground = GRID.update(ground, scan(stamp=NOW - 5 + turn), replace(HERE, yaw=turn), NO_POINTS, NO_POINTS)
+        ground = GRID.update(ground, scan(stamp=NOW - 5 + turn), replace(HERE, yaw=turn), NO_POINTS, NO_POINTS, LIMO)
     assert ground is not None
     return ground
 

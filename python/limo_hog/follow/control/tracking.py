@@ -34,9 +34,7 @@ class TrackingController:
 
     target_distance: float = param(1.5, "m", "Distance to hold, as the depth image measures it.", 0.1, 8)
     # Chosen: another person is noticed within 1.5 s.
-    whole_image_every: int = param(
-        15, "frames", "Once in this many frames the whole image is searched, else a region.", 1, 1000
-    )
+    whole_image_every: int = param(15, "frames", "One in this many frames is searched whole, else a region.", 1, 1000)
     slowest: float = param(0.3, "m/s", "People slower than this stand: the lidar shows them where they are.", 0, 2)
     #: Where to be while the person is known to be somewhere, and where to look for one who is lost.
     near_behind: float = param(1.2, "m", "Behind the robot, what the map shows this near counts as well.", 0, 5)
@@ -87,9 +85,7 @@ class TrackingController:
             moves = Mode.BLOCKED if plan.reason == NO_WAY else Mode.FOLLOW
             mode, reason = mode if mode in (Mode.LOST, Mode.SEARCH) else moves, plan.reason
         if observation.odometry is not None:
-            twist = self.wheels.within_reach(
-                twist, situation.driven, state.acceleration, situation.period, situation.robot
-            )
+            twist = self.wheels.within_reach(twist, situation.driven, state.acceleration, situation.period, self.robot)
         in_view = person is not None and person.seen == observation.stamp and belief.followed is not None
         target = dict(tracks.boxes).get(person.number) if person and belief.followed is not None else None
         region = self._region(person, state, observation) if person and in_view else None
@@ -117,7 +113,7 @@ class TrackingController:
         if scan is None or observation.odometry is None:
             return state
         half_view = min(self.robot.lidar_yaw - scan.angle_min, scan.angle_max - self.robot.lidar_yaw)
-        tracks = self.tracker.follow_movers(tracks, half_view, self.lookout.half_view, self.grid, state.ground)
+        tracks = self.tracker.follow_movers(tracks, (half_view, self.lookout.half_view), self.grid, state.ground)
         if state.ground is not None and scan.stamp < state.ground.stamp + self.grid.period_s:
             return replace(state, tracks=tracks)
         pose = pose_at(tracks.poses, scan.stamp)

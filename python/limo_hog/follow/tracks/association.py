@@ -13,12 +13,11 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement
-from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry
+from limo_hog.follow.sense.observation import Appearance, Array, Clothes, Mask, Odometry
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update
 from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to
 
@@ -125,16 +124,10 @@ class Legs:
     fewest: int = param(2, "1", "Returns that legs have at least.")
 
     def update(
-        self,
-        track: Track,
-        returns: Returns,
-        noise: Noise,
-        is_ground: Callable[[Points], NDArray[np.bool_]] | None = None,
+        self, track: Track, returns: Returns, noise: Noise, is_ground: Callable[[Points], Mask] | None = None
     ) -> Track | None:
         """Return the track at a scan's stamp, corrected by legs that are not on the ground known; None without any."""
         track = predict(track, returns.stamp, noise)
-        if math.dist(track.mean[:2], (returns.pose.x, returns.pose.y)) > self.reach:
-            return None
         legs = returns.points.compress(distances(returns.points, track) < self.radius, axis=0)
         if is_ground is not None and len(legs):
             legs = legs[~is_ground(legs)]
@@ -160,13 +153,13 @@ class Legs:
         return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma).turning(pose.angular)
 
 
-def distances(points: Points, track: Track) -> NDArray[np.float64]:
+def distances(points: Points, track: Track) -> Array:
     """Return the distance from a track to each of (N, 2) points, odometry frame, float64 (N,) [m]."""
     x, y, _, _ = track.mean
     return np.asarray(np.hypot(points[:, 0] - x, points[:, 1] - y))
 
 
-def all_distances(points: Points, tracks: Sequence[Track]) -> NDArray[np.float64]:
+def all_distances(points: Points, tracks: Sequence[Track]) -> Array:
     """Return `distances` of M tracks at once, float64 (M, N) [m]."""
     means = np.array([track.mean for track in tracks]).reshape(-1, 4, 1)
     return np.asarray(np.hypot(points[:, 0] - means[:, 0], points[:, 1] - means[:, 1]))

@@ -88,15 +88,13 @@ class Identity:
         """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
         people, seen = {one.number: one for one in tracks.people}, tracks.in_view
         walking = {one.number for one in tracks.people if self._walks_on(one, tracks)}
-        alone = {one.number for one in seen if self._is_alone(one, tracks)}
+        alone = {one.number: one for one in seen if self._is_alone(one, tracks)}
         chances = self._passed(known, people, tracks, walking)
         odds, before = dict(chances), dict(known.chances)
-        for one in seen:
-            if one.number not in alone:
-                continue
-            stays = before.get(one.number, 0.0) >= self.stays and one.number in walking
+        for number, one in alone.items():
+            stays = before.get(number, 0.0) >= self.stays and number in walking
             evidence = self._evidence(known, one, first=one.age <= 1)
-            odds[one.number] *= math.exp(self.steady * evidence if stays else evidence)
+            odds[number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
         chances = {number: value / total for number, value in odds.items()}
         known = replace(known, chances=tuple(chances.items()))
@@ -150,12 +148,8 @@ class Identity:
     def _walks_on(self, person: Person, tracks: Tracks) -> bool:
         """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""
         others = [one.track.place for one in tracks.movers if one.left and one.number != person.number]
-        for own in tracks.movers:
-            if own.number == person.number and own.felt - own.named >= self.legs_s:
-                gaps = [math.dist(own.track.place, place) for place in others]
-                if min(gaps, default=math.inf) > self.legs_apart:
-                    return True
-        return False
+        legs = [one for one in tracks.movers if one.number == person.number and one.felt - one.named >= self.legs_s]
+        return any(all(math.dist(own.track.place, place) > self.legs_apart for place in others) for own in legs)
 
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:
         """Whether nobody is so near that a person's box may show both or the other."""
@@ -176,10 +170,8 @@ class Identity:
         """Return how likely a person's last box is on one who looks like this, or on anybody [log]."""
         clothes = stature = 0.0
         if person.worn is not None:
-            for part, strange, odd in (
-                (0, self.strange_shirt, self.odd_shirt),
-                (1, self.strange_trousers, self.odd_trousers),
-            ):
+            parts = (self.strange_shirt, self.odd_shirt), (self.strange_trousers, self.odd_trousers)
+            for part, (strange, odd) in enumerate(parts):
                 if traits is None or traits.clothes is None:
                     clothes += math.log(strange)
                 else:

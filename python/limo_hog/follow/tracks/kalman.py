@@ -66,15 +66,13 @@ class Track:
 
 def initiate(stamp: float, bearing: float, distance: float, pose: Odometry, noise: Noise) -> Track:
     """Begin a track from one measurement of bearing [rad] and distance [m], with zero velocity."""
-    direction = pose.yaw + bearing
-    x = pose.x + distance * math.cos(direction)
-    y = pose.y + distance * math.sin(direction)
     # The position's covariance is the measurement's, turned from bearing and range into the odometry frame.
-    cos, sin = math.cos(direction), math.sin(direction)
+    cos, sin = math.cos(pose.yaw + bearing), math.sin(pose.yaw + bearing)
     turn = np.array([[cos, -distance * sin], [sin, distance * cos]])
     (xx, xy), (_, yy) = ((turn * (noise.range**2, noise.bearing**2)) @ turn.T).tolist()
     moves = noise.velocity**2
-    return Track(stamp, (x, y, 0.0, 0.0), (xx, xy, 0.0, 0.0, yy, 0.0, 0.0, moves, 0.0, moves))
+    mean = pose.x + distance * cos, pose.y + distance * sin, 0.0, 0.0
+    return Track(stamp, mean, (xx, xy, 0.0, 0.0, yy, 0.0, 0.0, moves, 0.0, moves))
 
 
 def predict(track: Track, stamp: float, noise: Noise) -> Track:

@@ -71,11 +71,9 @@ class Controller(Protocol[S]):
 
     def start(self) -> S:
         """Return the state before the first observation."""
-        ...
 
     def step(self, observation: Observation, state: S) -> Decision[S]:
         """Decide what to do about one observation."""
-        ...
 
 
 def made_for(controller: Controller[S], robot: RobotGeometry) -> Controller[S]:

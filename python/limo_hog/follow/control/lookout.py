@@ -82,8 +82,7 @@ class Lookout:
         if len(hunt.way) and math.dist(hunt.way[-1], (pose.x, pose.y)) > self.arrived:
             x, y = along(hunt.way, pose, np.array([self.ahead]))[0]
             places = from_odometry(along(hunt.way, pose, self.speed * times), pose)
-            heading = situation.bearing_of(x, y)
-            goal = Goal(heading, speed=self.speed, speed_later=self.speed, places=places, faces=False)
+            goal = Goal(situation.bearing_of(x, y), 0.0, self.speed, self.speed, places, faces=False)
             return goal, "looking round for the lost person"
         if hunt.facing is not None:
             return self.facing(situation.bearing_of(*hunt.facing)), "turning to where the lost person may be"

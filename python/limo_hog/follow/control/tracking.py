@@ -53,10 +53,9 @@ class TrackingController:
     person: Whom | None = None  #: Whom to follow first; None for who is ahead and near.
 
     def __post_init__(self) -> None:
-        tracker = self.tracker
-        if tracker.robot != self.robot:
-            tracker = replace(tracker, robot=self.robot, movers=replace(tracker.movers, robot=self.robot))
-            object.__setattr__(self, "tracker", tracker)
+        if self.tracker.robot != self.robot:
+            movers = replace(self.tracker.movers, robot=self.robot)
+            object.__setattr__(self, "tracker", replace(self.tracker, robot=self.robot, movers=movers))
 
     def start(self) -> TrackingState:
         """Return the state before the first observation: no people."""

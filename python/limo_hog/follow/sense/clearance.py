@@ -109,9 +109,7 @@ class DepthGrid:
             above_floor = robot.camera_z - down * z
             (seen,) = ((z > 0) & (z < reach) & (above_floor > self.floor)).ravel().nonzero()
         ahead = z.ravel()[seen]
-        points = np.empty((len(seen), 2))
-        points[:, 0], points[:, 1] = robot.camera_x + ahead, left[seen % z.shape[1]] * ahead
-        return points
+        return np.stack([robot.camera_x + ahead, left[seen % z.shape[1]] * ahead], axis=1)
 
 
 @dataclass(frozen=True, slots=True)

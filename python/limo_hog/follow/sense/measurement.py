@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -65,12 +65,12 @@ def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]
             continue
         x, y, relief = robot.camera_x + depth, slope * depth, stands_out(depths, box)
         bearing, distance = math.atan2(y, x), math.hypot(x, y)
-        seen = Measurement(bearing, distance, height, centre, score, clothes, relief)
         top = top_row(depths, box, depth)
         stature = robot.camera_z + (observation.height / 2 - top) / observation.focal_px * depth
         window = WINDOW_PER_STATURE * stature * observation.focal_px
         middle = (robot.camera_z - stature / 2) * observation.focal_px
-        measurements.append(replace(seen, window=window, middle=middle, whole=top > 0))
+        seen = Measurement(bearing, distance, height, centre, score, clothes, relief, window, middle, top > 0)
+        measurements.append(seen)
     return measurements
 
 
@@ -196,13 +196,11 @@ class Visibility:
         `Person`. Near by, the head and the space HOG wants above it are out of the image: that excuses a miss of a
         `confirmed` person, and not of a track that has yet to prove itself.
         """
-        if abs(bearing) > self.widest:
+        height = window / max(distance, 0.3)
+        if abs(bearing) > self.widest or height < self.smallest_window:
             return False
         column = observation.width / 2 - observation.focal_px * math.tan(bearing)
-        height = window / max(distance, 0.3)
         middle = observation.height / 2 + centre / max(distance, 0.3)
-        if height < self.smallest_window:
-            return False
         cut_off = not self.shown * height <= middle <= observation.height - self.shown * height
         if confirmed and (cut_off or distance < self.near):
             return False

@@ -221,9 +221,7 @@ class Appearance:
         seen_shirt, seen_trousers = seen.tolist()
         of_trousers = min(chi_squared(trousers, seen_trousers), self.max_trousers)
         cost = min(chi_squared(shirt, seen_shirt), self.max_shirt) + of_trousers
-        if slips:
-            cost = min(cost, min(chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers)
-        return cost
+        return min(cost, min(chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers) if slips else cost
 
     def learn(self, known: Clothes, seen: Clothes) -> Clothes:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""

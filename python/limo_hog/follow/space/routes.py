@@ -99,14 +99,10 @@ def along(way: Points, pose: Odometry, far: Array) -> Points:
 
 def _dilated(cells: Mask, radius: float) -> Mask:
     """Return the cells within a radius [cells] of those that are true."""
-    wide, reach = cells.copy(), int(radius)
-    for dx in range(-reach, reach + 1):
-        for dy in range(-reach, reach + 1):
-            if (dx or dy) and math.hypot(dx, dy) <= radius:
-                wide[_at(dx), _at(dy)] |= cells[_at(-dx), _at(-dy)]
+    wide, reach, (rows, columns) = cells.copy(), int(radius), cells.shape
+    edged = np.pad(cells, reach)
+    for dx in range(2 * reach + 1):
+        for dy in range(2 * reach + 1):
+            if math.hypot(dx - reach, dy - reach) <= radius:
+                wide |= edged[dx : dx + rows, dy : dy + columns]
     return np.asarray(wide)
-
-
-def _at(step: int) -> slice:
-    """Return the part of an axis that has a neighbour `step` cells before it."""
-    return slice(max(step, 0), step if step < 0 else None)

@@ -80,9 +80,8 @@ class Identity:
 
     def begin(self, person: Person) -> Likeness:
         """Begin with a person who is followed from now on."""
-        x, y, _, _ = person.track.mean
         traits = Traits(person.number, person.clothes, person.window)
-        return Likeness(traits, (x, y), person.measured, ((person.number, 1.0 - self.passes),))
+        return Likeness(traits, person.track.place, person.measured, ((person.number, 1.0 - self.passes),))
 
     def update(self, known: Likeness, tracks: Tracks) -> Likeness:
         """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
@@ -187,9 +186,8 @@ class Identity:
     def _learnt(self, known: Likeness, person: Person, chance: float, *, alone: bool) -> Likeness:
         """Learn who looks how: the person followed where `chance` is sure and they are `alone` in it, else others."""
         if chance >= self.sure:
-            x, y, _, _ = person.track.mean
             traits = self._moved(known.traits, person) if alone else known.traits
-            return replace(known, place=(x, y), at=person.measured, traits=traits)
+            return replace(known, place=person.track.place, at=person.measured, traits=traits)
         if not person.confirmed or chance > 1.0 - self.sure:
             return known
         rest = [traits for traits in known.others if traits.number != person.number]

@@ -188,12 +188,8 @@ def update(track: Track, measured: Innovation) -> Track:
         ku, lu = (d * bu - b * ru) / det, (a * ru - b * bu) / det
         kv, lv = (d * bv - b * rv) / det, (a * rv - b * bv) / det
     x, y, u, v = track.mean
-    mean = (
-        x + kx * turned + lx * further,
-        y + ky * turned + ly * further,
-        u + ku * turned + lu * further,
-        v + kv * turned + lv * further,
-    )
+    place = x + kx * turned + lx * further, y + ky * turned + ly * further
+    velocity = u + ku * turned + lu * further, v + kv * turned + lv * further
     left = (
         xx - kx * bx - lx * rx,
         xy - kx * by - lx * ry,
@@ -206,7 +202,7 @@ def update(track: Track, measured: Innovation) -> Track:
         uv - ku * bv - lu * rv,
         vv - kv * bv - lv * rv,
     )
-    return Track(track.stamp, mean, left)
+    return Track(track.stamp, (*place, *velocity), left)
 
 
 def loosened(track: Track, place: float, speed: float) -> Track:

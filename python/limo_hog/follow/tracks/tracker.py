@@ -78,11 +78,10 @@ class Tracker:
         """Bring all tracks up to a frame; also number -> index of the box of each person found."""
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
-        known: list[Person] = []
-        for one in tracks.people:
-            if stamp - one.measured < self.forget_s:
-                walked = self._walked(one, tracks.scans, stamp) if observation.between else one
-                known.append(predict(walked, stamp, self.noise))
+        known = [one for one in tracks.people if stamp - one.measured < self.forget_s]
+        if observation.between:
+            known = [self._walked(one, tracks.scans, stamp) for one in known]
+        known = [predict(one, stamp, self.noise) for one in known]
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
@@ -100,21 +99,18 @@ class Tracker:
             if expected and person.confirmed:
                 recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
-                people.append(self.correct(person, measured[pairs[who]], pose, chance))
+                person = self.correct(person, measured[pairs[who]], pose, chance)
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
                 # that there is one.
                 walks = any(one.number == person.number for one in moving)
                 evidence = 0.0 if walks else self.existence.of_miss(chance)
-                people.append(self.existence.update(person, evidence, found=False))
-            else:
-                people.append(person)
+                person = self.existence.update(person, evidence, found=False)
+            people.append(person)
         boxes = {people[who].number: which for who, which in pairs.items()}
         number = tracks.next_number
         for which, seen in enumerate(measured):
-            if which in boxes.values() or which in flat:
-                continue
-            if self.association.is_new(seen, people, pose):
+            if which not in boxes.values() and which not in flat and self.association.is_new(seen, people, pose):
                 people.append(self.begin(number, seen, stamp, pose))
                 boxes[number] = which
                 number += 1
@@ -235,19 +231,13 @@ class Tracker:
         Only where they can be one person's alone, and that person has no others to choose from.
         """
         lost = [one for one in people if one.confirmed and self.scan_period_s < stamp - one.measured < self.legs_only_s]
-        if not lost:
-            return movers
         walking = [one for one in self.movers.moving(movers) if one.number is None and one.felt == stamp]
-        pairs = [
-            (one.number, mover)
-            for one in lost
-            for mover in walking
-            if mover.since > one.measured and self._is_near(one, mover.track)
-        ]
+        pairs = [(one, mover) for one in lost for mover in walking if mover.since > one.measured]
+        pairs = [(one, mover) for one, mover in pairs if self._is_near(one, mover.track)]
         if len(pairs) != 1:
             return movers
-        number, legs = pairs[0]
-        return tuple(named(mover, number, stamp) if mover is legs else mover for mover in movers)
+        one, legs = pairs[0]
+        return tuple(named(mover, one.number, stamp) if mover is legs else mover for mover in movers)
 
     def around(
         self, tracks: Tracks, followed: Person | None, now: float, lately_s: float

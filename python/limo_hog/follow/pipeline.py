@@ -107,9 +107,7 @@ class Follower(Generic[S]):
             return None
         # The scan's angles as the robot's.
         turned = replace(sensors, scan=sensors.scan and sensors.scan.turned(self._robot.lidar_yaw))
-        if frame is not None and new:
-            return self._see(now, frame, sensors, turned)
-        return self._recheck(now, sensors, turned)
+        return self._see(now, frame, sensors, turned) if frame and new else self._recheck(now, sensors, turned)
 
     def follow(self, whom: Whom) -> None:
         """Ask to follow one person of several in view: "nearest", "left", "right", "largest", or a number.

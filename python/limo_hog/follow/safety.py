@@ -207,19 +207,12 @@ class Guard(Generic[S]):
         out_of_view = ~scan.looks_at(np.arctan2(old[:, 1], old[:, 0] - self.robot.lidar_x))
         age = scan.stamp - state.scan_points_at
         kept = out_of_view & (age >= 0) & (age < self.memory_s)
-        return replace(
-            state,
-            scan_stamp=scan.stamp,
-            scan_points=np.concatenate([state.scan_points[kept], new]),
-            scan_points_at=np.concatenate([state.scan_points_at[kept], np.full(len(new), scan.stamp)]),
-            looks=self._looked(state.looks, scan, pose),
-        )
-
-    def _looked(self, looks: tuple[Look, ...], scan: Scan, pose: Odometry) -> tuple[Look, ...]:
-        young = tuple(look for look in looks if 0 <= scan.stamp - look.scan.stamp < self.memory_s)
-        if young and scan.stamp - young[-1].scan.stamp < self.look_every_s:
-            return young
-        return (*young, Look(scan, pose))
+        points = np.concatenate([state.scan_points[kept], new])
+        points_at = np.concatenate([state.scan_points_at[kept], np.full(len(new), scan.stamp)])
+        looks = tuple(look for look in state.looks if 0 <= scan.stamp - look.scan.stamp < self.memory_s)
+        if not looks or scan.stamp - looks[-1].scan.stamp >= self.look_every_s:
+            looks = (*looks, Look(scan, pose))
+        return replace(state, scan_stamp=scan.stamp, scan_points=points, scan_points_at=points_at, looks=looks)
 
 
 def find_fault(observation: Observation, last_stamp: float | None) -> str:

@@ -63,11 +63,9 @@ class Counted(Grid):
 
     asked: list[tuple[int, int]] = field(default_factory=list)
 
-    def sees(
-        self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24
-    ) -> NDArray[np.bool_]:
+    def sees(self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
         self.asked.append((len(origins), len(places)))
-        return Grid.sees(self, ground, origins, places, lasting=lasting, samples=samples)
+        return Grid.sees(self, ground, origins, places, lasting=lasting)
 
 
 @pytest.mark.parametrize("count", [1, 40, 150, 1000])

@@ -101,10 +101,9 @@ class Lookout:
         now, pose, grid, ground = situation.now, situation.pose, situation.grid, situation.mapped
         routes = self.router.field(grid, ground, pose)
         cells = np.argwhere(np.isfinite(routes))
-        here = np.array([[pose.x, pose.y]])
         step = max(len(cells) // self.candidates, 1)
         cells = cells[step // 2 :: step]
-        origins = np.concatenate([here, grid.middle_of(ground, cells)])
+        origins = np.concatenate([[[pose.x, pose.y]], grid.middle_of(ground, cells)])
         far = np.concatenate([[0.0], routes[cells[:, 0], cells[:, 1]]])
         points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
         near = np.hypot(*(origins[:, None] - points[None, :]).transpose(2, 0, 1)) < self.view

@@ -66,10 +66,8 @@ class Selection:
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
         """Follow the person asked for, then whoever is followed so far; before there is one, the likeliest in view."""
-        if choice.asked is None:
-            return self._known(tracks, choice)
-        answer = self._asked(choice.asked, tracks, choice)
-        return replace(self._known(tracks, choice), asked=choice.asked) if answer is None else answer
+        answer = None if choice.asked is None else self._asked(choice.asked, tracks, choice)
+        return answer or replace(self._known(tracks, choice), asked=choice.asked)
 
     def _known(self, tracks: Tracks, choice: Choice) -> Choice:
         now = tracks.stamp or 0.0
@@ -103,12 +101,11 @@ class Selection:
                 return replace(choice, candidates=(best.number,))
         choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)
         followed = tracks.person(choice.number)
-        if followed is not None and followed in measured and chances[followed.number] < self.other_below:
-            # The track went over to another person.
-            return replace(choice, number=None)
-        if followed is not None and not self.is_candidate(followed):
-            return replace(choice, number=None)
-        return choice
+        if followed is None:
+            return choice
+        # The track may have gone over to another person.
+        strange = followed in measured and chances[followed.number] < self.other_below
+        return replace(choice, number=None) if strange or not self.is_candidate(followed) else choice
 
     def measured(self, tracks: Tracks) -> list[Person]:
         """Return the people who may be followed and were measured just now."""

@@ -1,4 +1,4 @@
-"""A detection as a measurement: bearing, range and size by the depth image, and whether one is to be expected."""
+"""A detection as a measurement: bearing, range and size by the depth image, and whether and where one is to be expected."""
 
 from __future__ import annotations
 
@@ -60,16 +60,15 @@ def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]
         slope = (observation.width / 2 - column) / observation.focal_px
         height, centre = int(box[3]), row - observation.height / 2
         depth = None if depths is None else person_depth(depths, box)
-        if depths is None or depth is None:
-            measurements.append(Measurement(math.atan(slope), None, height, centre, score, clothes))
-            continue
-        x, y, relief = robot.camera_x + depth, slope * depth, stands_out(depths, box)
-        bearing, distance = math.atan2(y, x), math.hypot(x, y)
-        top = top_row(depths, box, depth)
-        stature = robot.camera_z + (observation.height / 2 - top) / observation.focal_px * depth
-        window = WINDOW_PER_STATURE * stature * observation.focal_px
-        middle = (robot.camera_z - stature / 2) * observation.focal_px
-        seen = Measurement(bearing, distance, height, centre, score, clothes, relief, window, middle, top > 0)
+        seen = Measurement(math.atan(slope), None, height, centre, score, clothes)
+        if depths is not None and depth is not None:
+            x, y, relief = robot.camera_x + depth, slope * depth, stands_out(depths, box)
+            bearing, distance = math.atan2(y, x), math.hypot(x, y)
+            top = top_row(depths, box, depth)
+            stature = robot.camera_z + (observation.height / 2 - top) / observation.focal_px * depth
+            window = WINDOW_PER_STATURE * stature * observation.focal_px
+            middle = (robot.camera_z - stature / 2) * observation.focal_px
+            seen = Measurement(bearing, distance, height, centre, score, clothes, relief, window, middle, top > 0)
         measurements.append(seen)
     return measurements
 

@@ -53,13 +53,13 @@ class Grid:
     person_radius: float = param(PERSON_RADIUS, "m", "Returns nearer than this to a tracked person fill no cell.")
     period_s: float = param(0.2, "s", "A scan sooner after the last one entered is left out.")
     lasts_s: float = param(6.0, "s", "What stands for this time is taken to last.")
+    samples: int = param(24, "1", "Points on a line of sight at which something may stand.")
     own_radius: float = param(0.2, "m", "The ground under the robot is free: the circle around its outline.")
 
     def start(self, pose: Odometry) -> Ground:
         """Return ground of which nothing is known, around the robot."""
-        shape = self.cells, self.cells
-        never = np.full(shape, -np.inf)
-        return Ground(self._corner(pose), np.zeros(shape, np.float32), never, never.copy())
+        never = np.full((self.cells, self.cells), -np.inf)
+        return Ground(self._corner(pose), np.zeros(never.shape, np.float32), never, never.copy())
 
     def update(
         self, ground: Ground | None, scan: Scan, pose: Odometry, people: Points, depths: Points, robot: RobotGeometry
@@ -84,7 +84,8 @@ class Grid:
             ends = ends[gaps.min(axis=1) > self.person_radius]
         under = np.array([pose.x, pose.y]) + _square(self.own_radius, self.cell)
         passed = self._passed(ground, at, directions[:: self.every], clear[:: self.every])
-        cleared, filled = self._mask(passed, self.flat(ground, under)), self._mask(self.flat(ground, ends))
+        crossed = np.concatenate([passed, self.flat(ground, under)])
+        cleared, filled = self._mask(crossed), self._mask(self.flat(ground, ends))
         before = ground.occupied
         lower = np.maximum(before - np.float32(self.free), np.float32(self.lowest))
         higher = np.minimum(before + np.float32(self.hit), np.float32(self.highest))
@@ -98,8 +99,7 @@ class Grid:
         cells: Cells = np.floor(points / self.cell).astype(np.int64) - ground.corner
         # As unsigned numbers, what is below 0 is large.
         within = cells.view(np.uint64) < self.cells
-        inside: Mask = within[:, 0] & within[:, 1]
-        return cells, inside
+        return cells, np.asarray(within[:, 0] & within[:, 1])
 
     def flat(self, ground: Ground, points: Points) -> NDArray[np.int64]:
         """Return the flat indices of the cells of those points that are in the square."""
@@ -119,9 +119,8 @@ class Grid:
     def is_free_since(self, ground: Ground, points: Points, stamps: float | Array) -> Mask:
         """Return whether each point was seen to be free after its stamp [s], bool (N,); outside of the square none."""
         cells, inside = self.index(ground, points)
-        free = np.zeros(len(points), bool)
-        free[inside] = ground.freed[cells[inside, 0], cells[inside, 1]] > np.broadcast_to(stamps, len(points))[inside]
-        return free
+        flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
+        return inside & (ground.freed.take(flat) > stamps)
 
     def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether an occupied cell is within half a cell of each point, bool (N,); at the edge none is."""
@@ -147,11 +146,9 @@ class Grid:
             occupied &= ground.freed.take(flat) < ground.stamp - self.lasts_s
         return np.asarray(occupied)
 
-    def sees(
-        self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24
-    ) -> Mask:
+    def sees(self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False) -> Mask:
         """Return whether nothing occupied is between (K, 2) origins and (N, 2) places, at `samples` points, (K, N)."""
-        shares = (np.arange(samples) + 0.5) / samples
+        shares = (np.arange(self.samples) + 0.5) / self.samples
         way = origins[:, None, None, :] + shares[None, None, :, None] * (places[None, :] - origins[:, None])[:, :, None]
         blocked = self.is_blocked(ground, way.reshape(-1, 2), lasting=lasting)
         return np.asarray(~blocked.reshape(way.shape[:3]).any(axis=2))
@@ -166,11 +163,10 @@ class Grid:
         inside = (row.view(np.uint64) < self.cells) & (column.view(np.uint64) < self.cells)
         return np.asarray((row * self.cells + column)[free & inside])
 
-    def _mask(self, *flat: NDArray[np.int64]) -> Mask:
+    def _mask(self, flat: NDArray[np.int64]) -> Mask:
         """Return which cells are among those of flat indices, bool (N, N)."""
         mask = np.zeros(self.cells**2, bool)
-        for cells in flat:
-            mask[cells] = True
+        mask[flat] = True
         return mask.reshape(self.cells, self.cells)
 
     def _corner(self, pose: Odometry) -> tuple[int, int]:

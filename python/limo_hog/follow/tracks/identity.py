@@ -125,10 +125,9 @@ class Identity:
             taken = share if near else 0.0
             gone = [other for other in chances if stamp - people[other].measured > self.unseen_s]
             absent = max(1.0 - sum(chances.values()), 0.0)
-            gained = taken * (absent + sum(chances[other] for other in gone))
+            chances[number] = taken * (absent + sum(chances[other] for other in gone))
             for other in gone:
                 chances[other] *= 1.0 - taken
-            chances[number] = gained
         measured = [one for one in people.values() if stamp - one.measured <= self.unseen_s]
         absent = max(1.0 - sum(chances.values()), 0.0)
         own = known.traits.number

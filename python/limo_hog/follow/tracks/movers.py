@@ -230,7 +230,6 @@ def named(mover: Mover, number: int, stamp: float) -> Mover:
 
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry, towards: float = 0.0) -> bool:
     """Whether a track's place, from the lidar, was at most `half_view` [rad] to either side of `towards`."""
-    pose = returns.pose
-    x, y = lidar_at(pose, robot)
-    off = math.atan2(track.mean[1] - y, track.mean[0] - x) - pose.yaw
+    x, y = lidar_at(returns.pose, robot)
+    off = math.atan2(track.mean[1] - y, track.mean[0] - x) - returns.pose.yaw
     return abs(math.remainder(off - towards, math.tau)) < half_view

@@ -47,14 +47,6 @@ class Person:
         return 1.0 / (1.0 + math.exp(-self.log_odds))
 
 
-@dataclass(frozen=True, slots=True)
-class UnknownRange:
-    """Where a new track begins whose first box has no depth."""
-
-    distance: float = param(3.0, "m", "Distance assumed of a first box without depth.")
-    sigma: float = param(1.5, "m", "Its standard deviation.")
-
-
 def predict(person: Person, stamp: float, noise: Noise) -> Person:
     """Predict the person's track for `stamp` [s]."""
     return replace(person, track=kalman.predict(person.track, stamp, noise))

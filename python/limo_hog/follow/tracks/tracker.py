@@ -122,7 +122,7 @@ class Tracker:
         odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
         distance, noise = seen.range, self.noise.turning(pose.angular)
         if distance is None:
-            distance, noise = self.association.unknown.distance, replace(noise, range=self.association.unknown.sigma)
+            distance, noise = self.association.unknown, replace(noise, range=self.association.unknown_sigma)
         track = kalman.initiate(stamp, seen.bearing, distance, pose, noise)
         window = seen.window or seen.height * distance
         centre = seen.middle if seen.window else seen.centre * distance

@@ -43,9 +43,9 @@ class Selection:
     """Chooses the person to follow."""
 
     # Chosen: three clear frames.
-    min_existence: float = param(0.4, "of 1", "One too far away for HOG is approached if this likely a person.", 0, 1)
+    min_existence: float = param(0.4, "of 1", "A track too far away for HOG is approached if this probable.", 0, 1)
     # Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
-    max_unconfirmed_frames: int = param(30, "frames", "Then a track neither confirmed nor likely is given up.", 1, 1000)
+    max_unconfirmed_frames: int = param(30, "frames", "Older tracks neither confirmed nor likely are dropped.", 1, 1000)
     # Chosen: two full turns of the search.
     reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
     # Chosen: one frame of evidence.

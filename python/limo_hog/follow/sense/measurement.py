@@ -1,4 +1,4 @@
-"""A detection as a measurement: bearing, range and size by the depth image, and whether and where one is to be expected."""
+"""A detection as bearing, range and size, by the depth image; whether and where one is to be expected."""
 
 from __future__ import annotations
 

@@ -95,11 +95,11 @@ class Movers:
             due = is_in_view(expected[index], returns, lidar, self.robot, self.robot.lidar_yaw)
             if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
                 kept.append(mover)
-        if ground is not None and kept:
+        if ground is not None and not all(one.left for one in kept):
             began, since = np.array([one.began for one in kept]), np.array([one.since for one in kept])
             # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
-            kept = [replace(one, left=one.left or gone) for one, gone in zip(kept, left.tolist(), strict=True)]
+            kept = [replace(one, left=True) if gone else one for one, gone in zip(kept, left.tolist(), strict=True)]
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]

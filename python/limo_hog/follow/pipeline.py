@@ -64,9 +64,7 @@ class Periods:
         new = frame is not None and frame is not self._last
         if not new and self._began is not None and 0 <= now - self._began <= CONTROL_PERIOD - _SLACK:
             return False, False
-        self._began = now
-        if new:
-            self._last = frame
+        self._began, self._last = now, frame if new else self._last
         return True, new
 
 

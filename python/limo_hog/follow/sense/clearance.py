@@ -72,9 +72,8 @@ def completed(scan: Scan, frame: Frame, odometry: Odometry | None, robot: RobotG
     step = (scan.angle_max - scan.angle_min) / max(len(scan.ranges) - 1, 1)
     count = max(math.floor(math.tau / step), len(scan.ranges))
     ranges = np.full(count, np.nan)
-    here = odometry or Odometry()
     known = (row > 0) & (row < np.inf)
-    late = scan.stamp - frame.stamp
+    here, late = odometry or Odometry(), scan.stamp - frame.stamp
     moved = Odometry(x=here.linear * late, yaw=here.angular * late)
     points = from_odometry(np.stack([robot.camera_x + row, left * row], axis=1)[known], moved) - (robot.lidar_x, 0.0)
     angle_max = scan.angle_min + step * (count - 1)

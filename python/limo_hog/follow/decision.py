@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from limo_hog.follow.robot import LIMO, RobotError, RobotGeometry, Twist
 from limo_hog.follow.sense.detectors import Region
@@ -71,11 +71,9 @@ class Controller(Protocol[S]):
 
     def start(self) -> S:
         """Return the state before the first observation."""
-        ...
 
     def step(self, observation: Observation, state: S) -> Decision[S]:
         """Decide what to do about one observation."""
-        ...
 
 
 def made_for(controller: Controller[S], robot: RobotGeometry) -> Controller[S]:
@@ -86,5 +84,4 @@ def made_for(controller: Controller[S], robot: RobotGeometry) -> Controller[S]:
     known = getattr(controller, "robot", robot)
     if known not in (robot, LIMO):
         raise RobotError("the controller was made for another robot: give the follower the same")
-    changed: Any = controller if known == robot else replace(controller, robot=robot)  # type: ignore[type-var]
-    return changed  # type: ignore[no-any-return]
+    return controller if known == robot else replace(controller, robot=robot)  # type: ignore[type-var]

@@ -64,9 +64,7 @@ class Periods:
         new = frame is not None and frame is not self._last
         if not new and self._began is not None and 0 <= now - self._began <= CONTROL_PERIOD - _SLACK:
             return False, False
-        self._began = now
-        if new:
-            self._last = frame
+        self._began, self._last = now, frame if new else self._last
         return True, new
 
 
@@ -105,7 +103,9 @@ class Follower(Generic[S]):
         begins, new = self._periods.begins(now, frame)
         if not begins:
             return None
-        return self._see(now, frame, sensors) if frame is not None and new else self._recheck(now, sensors)
+        # The scan's angles as the robot's.
+        turned = replace(sensors, scan=sensors.scan and sensors.scan.turned(self._robot.lidar_yaw))
+        return self._see(now, frame, sensors, turned) if frame and new else self._recheck(now, sensors, turned)
 
     def follow(self, whom: Whom) -> None:
         """Ask to follow one person of several in view: "nearest", "left", "right", "largest", or a number.
@@ -115,7 +115,7 @@ class Follower(Generic[S]):
         """
         self._state = self._guard.ask(whom, self._state)
 
-    def _see(self, now: float, frame: Frame, sensors: Sensors) -> FrameLog:
+    def _see(self, now: float, frame: Frame, sensors: Sensors, turned: Sensors) -> FrameLog:
         region = self._region
         began = time.perf_counter()
         try:
@@ -123,27 +123,20 @@ class Follower(Generic[S]):
         except Exception as error:  # whatever a detector raises, the robot must stop and the loop must go on
             detections, failure = Detections.none(), f"the detector failed: {error}"
         detect_ms = 1e3 * (time.perf_counter() - began)
-        turned = self._turned(sensors)
         if turned.scan is not None:
             turned = replace(turned, scan=completed(turned.scan, frame, turned.odometry, self._robot))
-        observation = observed(frame, turned, detections, region, failure, self._between, now)
+        observation = observed(frame, turned, detections, region, failure)
+        observation = replace(observation, between=self._between, clock=now)
         self._between = ()
         decision = self._guard.step(observation, self._state)
         self._state, self._region = decision.state, decision.region
         told: Decision[None] = replace(decision, state=None)  # type: ignore[arg-type, assignment]
         return FrameLog(now, told, sensors, frame, detections, region, failure, detect_ms)
 
-    def _recheck(self, now: float, sensors: Sensors) -> FrameLog:
-        turned = self._turned(sensors)
+    def _recheck(self, now: float, sensors: Sensors, turned: Sensors) -> FrameLog:
         if turned.scan is not None and turned.odometry is not None:
             self._between = (*self._between[1 - _SCANS_BETWEEN :], (turned.scan, turned.odometry))
-        decision = self._guard.recheck(now, turned.scan, turned.odometry, self._state)
+        decision = self._guard.recheck(now, turned, self._state)
         self._state = decision.state
         told: Decision[None] = replace(decision, state=None)  # type: ignore[arg-type, assignment]
         return FrameLog(now, told, sensors)
-
-    def _turned(self, sensors: Sensors) -> Sensors:
-        """Return the readings with the scan's angles as the robot's."""
-        if sensors.scan is None:
-            return sensors
-        return replace(sensors, scan=sensors.scan.turned(self._robot.lidar_yaw))

@@ -30,10 +30,13 @@ from limo_hog.follow.sense.clearance import (
     speed_within,
     to_odometry,
 )
-from limo_hog.follow.sense.observation import Observation, Odometry, Scan
+from limo_hog.follow.sense.observation import Observation, Odometry, Scan, Sensors
 from limo_hog.follow.tracks.asking import Whom, ask_of, checked
 
 S = TypeVar("S")
+
+#: One in so many rows and columns of the depth image is looked at first [px].
+_STEP = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,63 +93,53 @@ class Guard(Generic[S]):
 
     def step(self, observation: Observation, state: GuardState[S]) -> Decision[GuardState[S]]:
         """Ask the controller and let through what is safe; a faulty observation stops the robot."""
-        fault = find_fault(observation, state.stamp)
-        if fault:
+        sensors = Sensors(observation.scan, observation.odometry)
+        if fault := find_fault(observation, state.stamp):
             # When the clock was set back, what is remembered has stamps of the old clock.
             set_back = state.stamp is not None and observation.stamp < state.stamp
             stamp = observation.stamp if math.isfinite(observation.stamp) else state.stamp
             after = replace(self.start() if set_back else state, stamp=stamp, proposed=None)
-            after = self._heard(observation.at, observation.scan, observation.odometry, after, observation)
+            after = self._heard(observation.at, sensors, after, observation)
             return Decision(Twist(), after, Mode.BLOCKED, fault)
-        state = self._heard(observation.at, observation.scan, observation.odometry, state, observation)
+        state = self._heard(observation.at, sensors, state, observation)
         if fault := state.arrivals.disagreement(self.max_age_s, self.max_late_s):
             # Neither the controller nor the memory can do anything with times of several clocks.
             after = replace(state, stamp=observation.stamp, proposed=None)
             fault = "; ".join(filter(None, (self._missing(observation.at, after), fault)))
             return Decision(Twist(), after, Mode.BLOCKED, fault)
-        state = self._remember(state, observation.scan, observation.odometry)
+        state = self._remember(state, sensors)
         if observation.scan is not None and observation.odometry is not None:
             old = state.scan_points[state.scan_points_at < state.scan_stamp]
             observation = replace(observation, remembered=from_odometry(old, observation.odometry))
         proposed = self.controller.step(observation, state.inner)
-        depth_points = state.depth_points
+        state = replace(state, inner=proposed.state, proposed=proposed, stamp=observation.stamp)
         if observation.depth is not None:
             reach = 2 * self.robot.half_length + self.margin.ahead + self.depth_reach
-            depth_points = self.depth_grid.points(observation.depth, observation.focal_px, reach, self.robot)
-        state = replace(
-            state, inner=proposed.state, proposed=proposed, stamp=observation.stamp, depth_points=depth_points
-        )
-        return self._limited(proposed, state, observation.scan, observation.odometry, observation.at)
+            seen = self.depth_grid.points(observation.depth, observation.focal_px, reach, self.robot)
+            state = replace(state, depth_points=seen)
+        return self._limited(proposed, state, sensors, observation.at)
 
     def ask(self, whom: Whom, state: GuardState[S]) -> GuardState[S]:
         """Return the state in which the guarded controller is asked to follow a person; raises `WhomError`."""
         return replace(state, inner=ask_of(self.controller)(checked(whom), state.inner))
 
-    def recheck(
-        self, now: float, scan: Scan | None, odometry: Odometry | None, state: GuardState[S]
-    ) -> Decision[GuardState[S]]:
+    def recheck(self, now: float, sensors: Sensors, state: GuardState[S]) -> Decision[GuardState[S]]:
         """Check the last decision, less target and region, against a newer scan, `now` on the robot's own clock [s]."""
-        if fault := scan_fault(scan) or _odometry(odometry):
+        if fault := scan_fault(sensors.scan) or _odometry(sensors.odometry):
             return Decision(Twist(), state, Mode.BLOCKED, fault)
-        state = self._heard(now, scan, odometry, state)
+        state = self._heard(now, sensors, state)
         fault = self._missing(now, state) or state.arrivals.disagreement(self.max_age_s, self.max_late_s)
-        if not fault and state.proposed is None:
-            fault = "no usable camera frame"
         if fault or state.proposed is None:
-            return Decision(Twist(), state, Mode.BLOCKED, fault)
+            return Decision(Twist(), state, Mode.BLOCKED, fault or "no usable camera frame")
         proposed = replace(state.proposed, target=None, region=None)
-        return self._limited(proposed, self._remember(state, scan, odometry), scan, odometry, now)
+        return self._limited(proposed, self._remember(state, sensors), sensors, now)
 
     def _heard(
-        self,
-        now: float,
-        scan: Scan | None,
-        odometry: Odometry | None,
-        state: GuardState[S],
-        seen: Observation | None = None,
+        self, now: float, sensors: Sensors, state: GuardState[S], seen: Observation | None = None
     ) -> GuardState[S]:
         """Note which readings are new at `now` on the robot's own clock [s]."""
-        stamps = {SCAN: scan.stamp if scan else math.nan, ODOMETRY: odometry.stamp if odometry else math.nan}
+        senses = (SCAN, sensors.scan), (ODOMETRY, sensors.odometry)
+        stamps = {name: reading.stamp for name, reading in senses if reading}
         if seen is not None:
             depth = seen.stamp if seen.depth_stamp is None else seen.depth_stamp
             stamps |= {CAMERA: seen.stamp, DEPTH: math.nan if seen.depth is None else depth}
@@ -157,9 +150,9 @@ class Guard(Generic[S]):
         return state.arrivals.missing(now, needed, self.max_age_s)
 
     def _limited(
-        self, proposed: Decision[S], state: GuardState[S], scan: Scan | None, odometry: Odometry | None, now: float
+        self, proposed: Decision[S], state: GuardState[S], sensors: Sensors, now: float
     ) -> Decision[GuardState[S]]:
-        pose = odometry or Odometry()
+        pose = sensors.odometry or Odometry()
 
         def decision(twist: Twist, mode: Mode, reason: str) -> Decision[GuardState[S]]:
             return Decision(twist, state, mode, reason, proposed.target, proposed.region, proposed.belief)
@@ -173,7 +166,7 @@ class Guard(Generic[S]):
         ahead = speed_within(room, self.braking, self.reaction_s)
         behind = speed_within(room_ahead(-around, self.margin, self.robot), self.braking, self.reaction_s)
         fastest, backward = self.robot.max_speed, self.max_backward if self.robot.may_back else 0.0
-        if scan is None or odometry is None:
+        if sensors.scan is None or sensors.odometry is None:
             fastest, backward = min(fastest, self.max_blind), 0.0
         elif proposed.twist.linear < 0:
             seen = speed_within(room_seen_behind(state.looks, pose, self.robot), self.braking, self.reaction_s)
@@ -200,13 +193,12 @@ class Guard(Generic[S]):
         most = self.robot.acceleration * max(self.stands_s - age, 0.0)
         return twist if rim <= most else Twist(twist.linear * most / rim, twist.angular * most / rim)
 
-    def _remember(self, state: GuardState[S], scan: Scan | None, odometry: Odometry | None) -> GuardState[S]:
+    def _remember(self, state: GuardState[S], sensors: Sensors) -> GuardState[S]:
         """Add a new scan; of earlier returns, keep those that are recent and out of the lidar's field of view now."""
-        pose = odometry or Odometry()
-        if odometry is None:
+        scan, pose = sensors.scan, sensors.odometry or Odometry()
+        if sensors.odometry is None:
             # What is remembered cannot be carried along.
-            nothing = NO_POINTS, np.empty(0)
-            state = replace(state, scan_points=nothing[0], scan_points_at=nothing[1], scan_stamp=-math.inf, looks=())
+            state = replace(state, scan_points=NO_POINTS, scan_points_at=np.empty(0), scan_stamp=-math.inf, looks=())
         if scan is None or scan.stamp == state.scan_stamp:
             return state
         new = scan_points(scan, self.robot)
@@ -215,21 +207,12 @@ class Guard(Generic[S]):
         out_of_view = ~scan.looks_at(np.arctan2(old[:, 1], old[:, 0] - self.robot.lidar_x))
         age = scan.stamp - state.scan_points_at
         kept = out_of_view & (age >= 0) & (age < self.memory_s)
-        return replace(
-            state,
-            scan_stamp=scan.stamp,
-            scan_points=np.concatenate([state.scan_points[kept], new]),
-            scan_points_at=np.concatenate([state.scan_points_at[kept], np.full(len(new), scan.stamp)]),
-            looks=self._looked(state.looks, scan, pose),
-        )
-
-    def _looked(self, looks: tuple[Look, ...], scan: Scan, pose: Odometry) -> tuple[Look, ...]:
-        young = looks
-        if looks and not 0 <= scan.stamp - looks[-1].scan.stamp <= scan.stamp - looks[0].scan.stamp < self.memory_s:
-            young = tuple(look for look in looks if 0 <= scan.stamp - look.scan.stamp < self.memory_s)
-        if young and scan.stamp - young[-1].scan.stamp < self.look_every_s:
-            return young
-        return (*young, Look(scan, pose))
+        points = np.concatenate([state.scan_points[kept], new])
+        points_at = np.concatenate([state.scan_points_at[kept], np.full(len(new), scan.stamp)])
+        looks = tuple(look for look in state.looks if 0 <= scan.stamp - look.scan.stamp < self.memory_s)
+        if not looks or scan.stamp - looks[-1].scan.stamp >= self.look_every_s:
+            looks = (*looks, Look(scan, pose))
+        return replace(state, scan_stamp=scan.stamp, scan_points=points, scan_points_at=points_at, looks=looks)
 
 
 def find_fault(observation: Observation, last_stamp: float | None) -> str:
@@ -257,10 +240,6 @@ def _boxes(observation: Observation) -> str:
         if not inside or w <= 0 or h <= 0:
             return f"box ({x}, {y}, {w}, {h}) lies outside the {observation.width}x{observation.height} image"
     return ""
-
-
-#: One in so many rows and columns of the depth image is looked at first [px].
-_STEP = 40
 
 
 def _depth(observation: Observation) -> str:

@@ -30,7 +30,7 @@ def free_ground() -> Ground:
     """Ground that nothing stands on, seen by a robot that turned once about itself."""
     ground = None
     for turn in (0.0, 1.5, 3.0, 4.5):
-        ground = GRID.update(ground, scan(stamp=NOW - 5 + turn), replace(HERE, yaw=turn), NO_POINTS, NO_POINTS)
+        ground = GRID.update(ground, scan(stamp=NOW - 5 + turn), replace(HERE, yaw=turn), NO_POINTS, NO_POINTS, LIMO)
     assert ground is not None
     return ground
 
@@ -63,11 +63,9 @@ class Counted(Grid):
 
     asked: list[tuple[int, int]] = field(default_factory=list)
 
-    def sees(
-        self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24
-    ) -> NDArray[np.bool_]:
+    def sees(self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
         self.asked.append((len(origins), len(places)))
-        return Grid.sees(self, ground, origins, places, lasting=lasting, samples=samples)
+        return Grid.sees(self, ground, origins, places, lasting=lasting)
 
 
 @pytest.mark.parametrize("count", [1, 40, 150, 1000])

@@ -11,7 +11,7 @@ from tests.follow.safety.headstrong import Headstrong, ahead
 from tests.follow.views import NOBODY, boxes, flat, look, scan, scan_of
 
 from limo_hog.detections import Detections
-from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Twist
+from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Sensors, Twist
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.safety import scan_fault
 from limo_hog.follow.sense.clearance import Look, room_seen_behind, speed_within
@@ -329,20 +329,20 @@ def test_an_old_scan_is_not_trusted() -> None:
 def test_between_frames_a_newer_scan_stops_the_last_command() -> None:
     guard = ahead()
     state = guard.step(whole(scan=scan()), guard.start()).state
-    assert guard.recheck(0.1, scan(stamp=0.1), Odometry(0.1), state).twist.linear == 0.5
-    assert guard.recheck(0.1, scan_of([(0.6, 0.0)], 0.1), Odometry(0.1), state).twist.linear == 0
+    assert guard.recheck(0.1, Sensors(scan(stamp=0.1), Odometry(0.1)), state).twist.linear == 0.5
+    assert guard.recheck(0.1, Sensors(scan_of([(0.6, 0.0)], 0.1), Odometry(0.1)), state).twist.linear == 0
 
 
 @pytest.mark.parametrize("why", [why for why in BAD if scan_fault(BAD[why].scan)])
 def test_between_frames_a_bad_scan_stops_the_robot_and_is_not_remembered(why: str) -> None:
     guard = ahead()
     state = guard.step(whole(scan=scan(), odometry=Odometry()), guard.start()).state
-    bad = guard.recheck(0.1, BAD[why].scan, Odometry(0.1), state)
+    bad = guard.recheck(0.1, Sensors(BAD[why].scan, Odometry(0.1)), state)
     assert bad.twist == Twist()
     assert bad.mode is Mode.BLOCKED
     assert why in bad.reason
     assert bad.state == state
-    assert guard.recheck(0.2, scan(stamp=0.2), Odometry(0.2), bad.state).twist.linear == 0.5
+    assert guard.recheck(0.2, Sensors(scan(stamp=0.2), Odometry(0.2)), bad.state).twist.linear == 0.5
 
 
 @pytest.mark.parametrize("speed", [Twist(0.75, 0.0), Twist(0.7, 0.9), Twist(0.2, 3.0), Twist(-0.6, 1.0)])
@@ -361,7 +361,7 @@ def test_the_wheels_stand_a_second_after_the_last_reading(lost: str, speed: Twis
             if heard["camera"] == now:
                 decision = guard.step(whole(now, scan=turn, odometry=wheels), state)
             else:
-                decision = guard.recheck(now, turn, wheels, state)
+                decision = guard.recheck(now, Sensors(turn, wheels), state)
             state = decision.state
             drive.command(decision.twist, now)
         drive.advance(now, 0.02)
@@ -377,10 +377,10 @@ def test_silence_of_the_camera_stops_the_robot_on_any_clock(began: float) -> Non
     state = guard.step(whole(began, scan=scan(stamp=began)), guard.start()).state
     for age, share in ((0.15, 1.0), (0.4, 0.95)):  # a late frame slows it down
         now = began + age
-        assert guard.recheck(now, scan(stamp=now), Odometry(now), state).twist.linear == pytest.approx(
+        assert guard.recheck(now, Sensors(scan(stamp=now), Odometry(now)), state).twist.linear == pytest.approx(
             0.5 * share, 0.01
         )
-    decision = guard.recheck(began + 0.6, scan(stamp=began + 0.6), Odometry(began + 0.6), state)
+    decision = guard.recheck(began + 0.6, Sensors(scan(stamp=began + 0.6), Odometry(began + 0.6)), state)
     assert decision.twist == Twist()
     assert "no camera frame for 0.6 s" in decision.reason
 
@@ -390,12 +390,12 @@ def test_the_age_of_a_frame_counts_from_when_it_was_decided_on() -> None:
     guard = ahead()
     late = whole(100.0, scan=scan(stamp=100.4), odometry=Odometry(100.4))
     state = guard.step(late, guard.start()).state
-    assert guard.recheck(100.8, scan(stamp=100.8), Odometry(100.8), state).twist.linear > 0.4
-    assert guard.recheck(101.0, scan(stamp=101.0), Odometry(101.0), state).twist == Twist()
+    assert guard.recheck(100.8, Sensors(scan(stamp=100.8), Odometry(100.8)), state).twist.linear > 0.4
+    assert guard.recheck(101.0, Sensors(scan(stamp=101.0), Odometry(101.0)), state).twist == Twist()
 
 
 def test_before_the_first_frame_and_after_a_fault_a_recheck_stands() -> None:
     guard = ahead()
-    assert guard.recheck(0.0, scan(), None, guard.start()).twist == Twist()
+    assert guard.recheck(0.0, Sensors(scan(), None), guard.start()).twist == Twist()
     faulty = guard.step(whole(fault="dark"), guard.start())
-    assert guard.recheck(0.1, scan(stamp=0.1), Odometry(0.1), faulty.state).reason == "no usable camera frame"
+    assert guard.recheck(0.1, Sensors(scan(stamp=0.1), Odometry(0.1)), faulty.state).reason == "no usable camera frame"

@@ -7,18 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.follow.tracks.people import NOISE, POSE, a_person, box
+from tests.follow.tracks.people import POSE, a_person, box
 from tests.follow.views import FOCAL, HEIGHT, before_wall, flat
 
 from limo_hog.follow.sense.measurement import stands_out, top_row
-from limo_hog.follow.tracks.person import Existence, Person, Recall, UnknownRange, initiate
+from limo_hog.follow.tracks.person import Existence, Person, Recall
+from limo_hog.follow.tracks.tracker import Tracker
 
 EXISTENCE = Existence()
 BOX = np.array([260, 120, 120, 240], np.int32)
 
 
 def new() -> Person:
-    return initiate(1, box(2.5), 0.0, POSE, NOISE, UnknownRange(), EXISTENCE.prior)
+    return replace(Tracker().begin(1, box(2.5), 0.0, POSE), log_odds=EXISTENCE.prior)
 
 
 def after(recall: float, score: float, frames: int, seed: int) -> Person:

@@ -86,7 +86,7 @@ def test_what_the_camera_has_shown_for_long_is_counted() -> None:
     movers: tuple[Mover, ...] = ()
     for index in range(10):
         points = np.array(legs(2.0, 0.06 * index - 0.3, 1.0 * index))
-        movers = MOVERS.update(movers, Returns(index * SCAN_S, points, Odometry()), HALF_VIEW, NOISE, GRID, FREE, 0.5)
+        movers = MOVERS.update(movers, Returns(index * SCAN_S, points, Odometry()), (HALF_VIEW, 0.5), NOISE, GRID, FREE)
     assert movers[0].shown == movers[0].scans - 1
 
 
@@ -109,14 +109,14 @@ def test_what_begins_is_where_its_returns_are_wherever_the_robot_is() -> None:
     for pose in (Odometry(), Odometry(0.0, -1.0, 1.5, 0.7), Odometry(0.0, 2.0, -0.8, -2.5)):
         angle = pose.yaw - 0.4
         place = (pose.x + 2.0 * math.cos(angle), pose.y + 2.0 * math.sin(angle))
-        (mover,) = MOVERS.update((), Returns(0.0, np.array([place, place]), pose), HALF_VIEW, NOISE, GRID, FREE)
+        (mover,) = MOVERS.update((), Returns(0.0, np.array([place, place]), pose), (HALF_VIEW, 0.0), NOISE, GRID, FREE)
         np.testing.assert_allclose(mover.track.mean, [*place, 0.0, 0.0], atol=1e-9)
 
 
 def begun(*points: Place, pose: Odometry | None = None) -> list[Place]:
     """Return where groups of these returns begin to be followed."""
     returns = Returns(0.0, np.array(points).reshape(-1, 2), pose or Odometry())
-    return [mover.began for mover in MOVERS.update((), returns, HALF_VIEW, NOISE, GRID, FREE)]
+    return [mover.began for mover in MOVERS.update((), returns, (HALF_VIEW, 0.0), NOISE, GRID, FREE)]
 
 
 def test_returns_three_decimetres_apart_are_of_two_groups() -> None:

@@ -15,7 +15,7 @@ from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.measurement import Measurement, Visibility, measure
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.tracks import kalman
-from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to, initiate, predict
+from limo_hog.follow.tracks.person import Person, distance_to, predict
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
 
 TRACKER = Tracker()
@@ -103,7 +103,7 @@ def test_a_box_without_a_range_is_as_far_off_as_across_the_line_of_sight() -> No
 
 
 def test_a_new_person_without_a_range_may_be_anywhere_along_the_line_of_sight() -> None:
-    person = initiate(1, replace(box(2.0), range=None), 0.0, POSE, NOISE, UnknownRange(3.0, 1.5))
+    person = TRACKER.begin(1, replace(box(2.0), range=None), 0.0, POSE)
     assert person.track.mean[:2] == pytest.approx([3.0, 0.0])
     assert person.track.matrix[0, 0] == pytest.approx(1.5**2)
     assert person.track.matrix[1, 1] == pytest.approx((3.0 * NOISE.bearing) ** 2)
@@ -175,7 +175,7 @@ def test_a_person_behind_something_is_not_expected() -> None:
 @pytest.mark.parametrize(("turn", "range_"), [(0.0, 2.5), (0.4, 2.0), (-0.7, 3.1), (2.0, 1.0)])
 def test_the_distance_to_a_box_with_a_range_is_that_of_two_points_in_the_plane(turn: float, range_: float) -> None:
     pose = Odometry(0.0, 1.0, -2.0, 0.8)
-    person = initiate(1, Measurement(0.2, 2.0, 120, 0.0, 1.0), 0.0, pose, NOISE, UnknownRange())
+    person = TRACKER.begin(1, Measurement(0.2, 2.0, 120, 0.0, 1.0), 0.0, pose)
     seen = Measurement(0.2 + turn, range_, 120, 0.0, 1.0)
     there = [(r * math.cos(b), r * math.sin(b)) for b, r in ((0.2, 2.0), (0.2 + turn, range_))]
     assert distance_to(person, seen, pose) == pytest.approx(math.dist(*there))

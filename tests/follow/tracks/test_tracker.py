@@ -163,7 +163,7 @@ def come_back(lost: Person, *movers: tuple[float, float], since: float = 0.5) ->
     legs = tuple(replace(walker(None, x, y), since=since) for x, y in movers)
     scan = Returns(1.0, np.array([(x, y + dy) for x, y in movers for dy in (-0.02, 0.02)]), Odometry())
     tracks = Tracks((lost,), scans=(scan,), stamp=1.0, movers=legs, moved_at=0.9)
-    return TRACKER.follow_movers(tracks, 2.0, 0.5, GRID, FREE).people[0].felt == 1.0
+    return TRACKER.follow_movers(tracks, (2.0, 0.5), GRID, FREE).people[0].felt == 1.0
 
 
 def test_legs_are_a_lost_persons_as_far_off_as_a_brisk_walk_takes_them() -> None:
@@ -315,10 +315,10 @@ def test_legs_that_walk_continue_a_person_for_longer_than_legs_that_stand() -> N
         legs = replace(walker(7, 2.0, 0.1), began=(2.0 - walks, 0.1))
         scan = Returns(1.0, np.array([(2.0, 0.08), (2.0, 0.12)]), Odometry())
         tracks = Tracks((one,), scans=(scan,), stamp=1.0, movers=(replace(legs, felt=0.9),), moved_at=0.9)
-        assert (TRACKER.follow_movers(tracks, 2.0, 0.5, GRID, FREE).people[0].felt == 1.0) == goes_on
+        assert (TRACKER.follow_movers(tracks, (2.0, 0.5), GRID, FREE).people[0].felt == 1.0) == goes_on
     # One who was found in this frame is where the box is.
     found = Tracks((unseen(7, 1.0),), scans=(scan,), stamp=1.0, movers=(replace(legs, felt=0.9),), moved_at=0.9)
-    assert TRACKER.follow_movers(found, 2.0, 0.5, GRID, FREE).people[0].felt < 0
+    assert TRACKER.follow_movers(found, (2.0, 0.5), GRID, FREE).people[0].felt < 0
 
 
 def test_a_box_exactly_half_a_metre_from_everyone_found_is_a_new_person() -> None:

@@ -25,7 +25,7 @@ def test_the_legs_of_a_person_continue_the_track_that_the_camera_does_not_show()
     movers = MOVERS.assign(walk((1.5, -0.4), (0.0, 0.5), 8), [known], 0.875)
     assert [one.number for one in movers] == [7]
     returns = Returns(1.0, np.array(legs(1.5, 0.1, 9.0)), Odometry())
-    movers = MOVERS.update(movers, returns, HALF_VIEW, NOISE, GRID, FREE)
+    movers = MOVERS.update(movers, returns, (HALF_VIEW, 0.0), NOISE, GRID, FREE)
     continued = MOVERS.continued(known, movers, returns, NOISE)
     assert continued.felt == 1.0
     assert math.dist(continued.track.mean[:2], (1.5, 0.1)) < math.dist(known.track.mean[:2], (1.5, 0.1))
@@ -74,7 +74,7 @@ def test_legs_that_begin_to_walk_where_one_lost_person_can_be_are_theirs() -> No
     for people, found in (((lost,), True), ((lost, another), False), ((seen_together,), False), ((far_off,), False)):
         scan = Returns(1.0, np.array(legs(1.5, 0.1, 9.0)), Odometry())
         tracks = Tracks(people, scans=(scan,), stamp=1.0, movers=walk((1.5, -0.4), (0.0, 0.5), 8), moved_at=0.875)
-        after = Tracker().follow_movers(tracks, HALF_VIEW, 0.5, GRID, FREE)
+        after = Tracker().follow_movers(tracks, (HALF_VIEW, 0.5), GRID, FREE)
         assert (after.people[0].felt == 1.0) == found
 
 

@@ -44,7 +44,7 @@ def update(
 ) -> tuple[Mover, ...]:
     """What moves after a scan of a robot that stands and sees ±115°."""
     returns = Returns(stamp, np.array(points).reshape(-1, 2), Odometry())
-    return MOVERS.update(movers, returns, HALF_VIEW, NOISE, GRID, ground)
+    return MOVERS.update(movers, returns, (HALF_VIEW, 0.0), NOISE, GRID, ground)
 
 
 def walk(start: tuple[float, float], velocity: tuple[float, float], scans: int) -> tuple[Mover, ...]:

@@ -82,8 +82,7 @@ class Lookout:
         if len(hunt.way) and math.dist(hunt.way[-1], (pose.x, pose.y)) > self.arrived:
             x, y = along(hunt.way, pose, np.array([self.ahead]))[0]
             places = from_odometry(along(hunt.way, pose, self.speed * times), pose)
-            heading = situation.bearing_of(x, y)
-            goal = Goal(heading, speed=self.speed, speed_later=self.speed, places=places, faces=False)
+            goal = Goal(situation.bearing_of(x, y), 0.0, self.speed, self.speed, places, faces=False)
             return goal, "looking round for the lost person"
         if hunt.facing is not None:
             return self.facing(situation.bearing_of(*hunt.facing)), "turning to where the lost person may be"
@@ -102,10 +101,9 @@ class Lookout:
         now, pose, grid, ground = situation.now, situation.pose, situation.grid, situation.mapped
         routes = self.router.field(grid, ground, pose)
         cells = np.argwhere(np.isfinite(routes))
-        here = np.array([[pose.x, pose.y]])
         step = max(len(cells) // self.candidates, 1)
         cells = cells[step // 2 :: step]
-        origins = np.concatenate([here, grid.middle_of(ground, cells)])
+        origins = np.concatenate([[[pose.x, pose.y]], grid.middle_of(ground, cells)])
         far = np.concatenate([[0.0], routes[cells[:, 0], cells[:, 1]]])
         points = hunt.places.points[:: max(len(hunt.places.points) // 50, 1)]
         near = np.hypot(*(origins[:, None] - points[None, :]).transpose(2, 0, 1)) < self.view

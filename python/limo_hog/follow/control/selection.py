@@ -43,47 +43,31 @@ class Selection:
     """Chooses the person to follow."""
 
     # Chosen: three clear frames.
-    min_existence: float = param(
-        0.4, "of 1", "Probability of being a person from which one too far away for HOG is approached.", 0, 1
-    )
+    min_existence: float = param(0.4, "of 1", "A track too far away for HOG is approached if this probable.", 0, 1)
     # Chosen: 3 s, longer than a person takes to be confirmed who is found in every third frame.
-    max_unconfirmed_frames: int = param(
-        30, "frames", "After these a track that is neither confirmed nor likely is given up.", 1, 1000
-    )
+    max_unconfirmed_frames: int = param(30, "frames", "Older tracks neither confirmed nor likely are dropped.", 1, 1000)
     # Chosen: two full turns of the search.
     reidentify_s: float = param(20.0, "s", "How long to look for a lost person before another is followed.", 0, 600)
     # Chosen: one frame of evidence.
-    switch_lead: float = param(
-        0.1, "of 1", "Probability by which another must exceed the person who is faced already.", 0, 1
-    )
+    switch_lead: float = param(0.1, "of 1", "By this another must be likelier than the person faced already.", 0, 1)
     # Chosen: at the image's edge three frames of evidence; two metres are worth two.
-    bearing_cost: float = param(
-        0.6, "1/rad", "Probability that each radian off straight ahead takes from whom to choose.", 0, 5
-    )
-    distance_cost: float = param(0.1, "1/m", "Probability that each metre of distance takes from whom to choose.", 0, 5)
+    bearing_cost: float = param(0.6, "1/rad", "Probability that a radian off straight ahead takes from a person.", 0, 5)
+    distance_cost: float = param(0.1, "1/m", "Probability that a metre of distance takes from a person.", 0, 5)
     # Chosen: more likely than not.
-    min_same: float = param(
-        0.5, "of 1", "Probability from which a track in view is taken for the person followed.", 0, 1
-    )
+    min_same: float = param(0.5, "of 1", "Probability from which a track in view is the person followed.", 0, 1)
     # Chosen: one wrong in four guesses would be too many.
-    min_same_odds: float = param(
-        3.0, "times", "The surest track must be this much likelier than any other in view.", 1, 100
-    )
+    min_same_odds: float = param(3.0, "times", "The surest track must be likelier by this than any in view.", 1, 100)
     other_below: float = param(0.1, "of 1", "Probability below which a track in view is another person.", 0, 1)
     # Chosen: people part within a few seconds, or leave the view.
     decide_s: float = param(4.0, "s", "After this time of doubt the likeliest is taken.", 0, 60)
     # Chosen: HOG misses a person in several frames of ten.
-    settles_s: float = param(
-        1.0, "s", "People are looked at for this time before one asked for by a word is taken.", 0, 60
-    )
+    settles_s: float = param(1.0, "s", "Time to look at people before one asked for by a word is taken.", 0, 60)
     identity: Identity = field(default_factory=Identity)  #: Which track the person followed is.
 
     def choose(self, tracks: Tracks, choice: Choice) -> Choice:
         """Follow the person asked for, then whoever is followed so far; before there is one, the likeliest in view."""
-        if choice.asked is None:
-            return self._known(tracks, choice)
-        answer = self._asked(choice.asked, tracks, choice)
-        return replace(self._known(tracks, choice), asked=choice.asked) if answer is None else answer
+        answer = None if choice.asked is None else self._asked(choice.asked, tracks, choice)
+        return answer or replace(self._known(tracks, choice), asked=choice.asked)
 
     def _known(self, tracks: Tracks, choice: Choice) -> Choice:
         now = tracks.stamp or 0.0
@@ -117,12 +101,11 @@ class Selection:
                 return replace(choice, candidates=(best.number,))
         choice = replace(choice, candidates=(), unsure_at=choice.unsure_at if about else None)
         followed = tracks.person(choice.number)
-        if followed is not None and followed in measured and chances[followed.number] < self.other_below:
-            # The track went over to another person.
-            return replace(choice, number=None)
-        if followed is not None and not self.is_candidate(followed):
-            return replace(choice, number=None)
-        return choice
+        if followed is None:
+            return choice
+        # The track may have gone over to another person.
+        strange = followed in measured and chances[followed.number] < self.other_below
+        return replace(choice, number=None) if strange or not self.is_candidate(followed) else choice
 
     def measured(self, tracks: Tracks) -> list[Person]:
         """Return the people who may be followed and were measured just now."""
@@ -198,16 +181,9 @@ def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, 
     """Return everyone tracked, in the base frame, as of the newest stamp `now` [s]."""
     boxes, likeness, people = dict(state.tracks.boxes), state.choice.likeness, state.tracks.people
     means = np.array([predict(one.track, now, noise).mean for one in people]).reshape(-1, 4)
+    moved = carried(means, pose_at(state.tracks.poses, now)).tolist()
+    same = [None if likeness is None else likeness.of(one.number) for one in people]
     return tuple(
-        Believed(
-            x,
-            y,
-            one.existence,
-            one.number,
-            vx,
-            vy,
-            boxes.get(one.number),
-            None if likeness is None else likeness.of(one.number),
-        )
-        for one, (x, y, vx, vy) in zip(people, carried(means, pose_at(state.tracks.poses, now)).tolist(), strict=True)
+        Believed(x, y, one.existence, one.number, vx, vy, boxes.get(one.number), chance)
+        for one, chance, (x, y, vx, vy) in zip(people, same, moved, strict=True)
     )

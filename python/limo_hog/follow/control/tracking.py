@@ -17,8 +17,8 @@ from limo_hog.follow.decision import Belief, Decision, Mode
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, DepthGrid, from_odometry, scan_points, to_odometry
-from limo_hog.follow.sense.detectors import Region, RegionSize
-from limo_hog.follow.sense.measurement import PERSON_RADIUS
+from limo_hog.follow.sense.detectors import Region
+from limo_hog.follow.sense.measurement import PERSON_RADIUS, RegionSize
 from limo_hog.follow.sense.observation import Observation, pose_at
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
@@ -34,9 +34,7 @@ class TrackingController:
 
     target_distance: float = param(1.5, "m", "Distance to hold, as the depth image measures it.", 0.1, 8)
     # Chosen: another person is noticed within 1.5 s.
-    whole_image_every: int = param(
-        15, "frames", "Once in this many frames the whole image is searched, else a region.", 1, 1000
-    )
+    whole_image_every: int = param(15, "frames", "One in this many frames is searched whole, else a region.", 1, 1000)
     slowest: float = param(0.3, "m/s", "People slower than this stand: the lidar shows them where they are.", 0, 2)
     #: Where to be while the person is known to be somewhere, and where to look for one who is lost.
     near_behind: float = param(1.2, "m", "Behind the robot, what the map shows this near counts as well.", 0, 5)
@@ -55,10 +53,9 @@ class TrackingController:
     person: Whom | None = None  #: Whom to follow first; None for who is ahead and near.
 
     def __post_init__(self) -> None:
-        tracker = self.tracker
-        if tracker.robot != self.robot:
-            tracker = replace(tracker, robot=self.robot, movers=replace(tracker.movers, robot=self.robot))
-            object.__setattr__(self, "tracker", tracker)
+        if self.tracker.robot != self.robot:
+            movers = replace(self.tracker.movers, robot=self.robot)
+            object.__setattr__(self, "tracker", replace(self.tracker, robot=self.robot, movers=movers))
 
     def start(self) -> TrackingState:
         """Return the state before the first observation: no people."""
@@ -87,9 +84,7 @@ class TrackingController:
             moves = Mode.BLOCKED if plan.reason == NO_WAY else Mode.FOLLOW
             mode, reason = mode if mode in (Mode.LOST, Mode.SEARCH) else moves, plan.reason
         if observation.odometry is not None:
-            twist = self.wheels.within_reach(
-                twist, situation.driven, state.acceleration, situation.period, situation.robot
-            )
+            twist = self.wheels.within_reach(twist, situation.driven, state.acceleration, situation.period, self.robot)
         in_view = person is not None and person.seen == observation.stamp and belief.followed is not None
         target = dict(tracks.boxes).get(person.number) if person and belief.followed is not None else None
         region = self._region(person, state, observation) if person and in_view else None
@@ -117,7 +112,7 @@ class TrackingController:
         if scan is None or observation.odometry is None:
             return state
         half_view = min(self.robot.lidar_yaw - scan.angle_min, scan.angle_max - self.robot.lidar_yaw)
-        tracks = self.tracker.follow_movers(tracks, half_view, self.lookout.half_view, self.grid, state.ground)
+        tracks = self.tracker.follow_movers(tracks, (half_view, self.lookout.half_view), self.grid, state.ground)
         if state.ground is not None and scan.stamp < state.ground.stamp + self.grid.period_s:
             return replace(state, tracks=tracks)
         pose = pose_at(tracks.poses, scan.stamp)
@@ -274,5 +269,4 @@ class TrackingController:
         stamp = observation.stamp + state.tracks.period
         pose = pose_at(state.tracks.poses, stamp)
         bearing, distance = bearing_range(predict(person.track, stamp, self.tracker.noise), pose)
-        width, height = observation.width, observation.height
-        return self.region.around(bearing, distance, person.window, person.centre, observation.focal_px, width, height)
+        return self.region.around(bearing, distance, person.window, person.centre, observation)

@@ -36,14 +36,12 @@ class Wheels:
                 believed += self.lower_share * (measured - believed)
         return believed
 
-    def within_reach(
-        self, wanted: Twist, now: Twist, acceleration: float, period: float, robot: RobotGeometry
-    ) -> Twist:
-        """Return the command nearest to `wanted` that wheels that do `now` reach in a period [s]: the turn first."""
+    def within_reach(self, asked: Twist, now: Twist, acceleration: float, period: float, robot: RobotGeometry) -> Twist:
+        """Return the command nearest to `asked` that wheels that do `now` reach in a period [s]: the turn first."""
         most, half = acceleration * self.reserve * period, robot.wheel_separation / 2
-        turn = min(max(wanted.angular - now.angular, -most / half), most / half)
+        turn = min(max(asked.angular - now.angular, -most / half), most / half)
         left = most - half * abs(turn)
-        return Twist(now.linear + min(max(wanted.linear - now.linear, -left), left), now.angular + turn)
+        return Twist(now.linear + min(max(asked.linear - now.linear, -left), left), now.angular + turn)
 
 
 def turn_acceleration(acceleration: float, robot: RobotGeometry) -> float:

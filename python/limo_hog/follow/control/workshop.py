@@ -60,11 +60,8 @@ class ProxemicController:
         distance = None if observation.depth is None else person_depth(observation.depth, box)
         if distance is None:
             return Decision(Twist(), True, Mode.BLOCKED, "no depth at the person", target)
-        linear = self.linear_gain * (distance - self.target_distance)
-        twist = Twist(
-            min(max(linear, -self.max_linear), self.max_linear),
-            min(max(self.angular_gain * error, -self.max_angular), self.max_angular),
-        )
+        linear = min(max(self.linear_gain * (distance - self.target_distance), -self.max_linear), self.max_linear)
+        twist = Twist(linear, min(max(self.angular_gain * error, -self.max_angular), self.max_angular))
         return Decision(twist, True, Mode.FOLLOW, f"person in the {zone_of(distance).value} zone", target)
 
 

@@ -18,11 +18,8 @@ class Arrivals:
 
     def after(self, now: float, stamps: Mapping[str, float]) -> Arrivals:
         """Add the readings at hand at `now` [s]: a new one has another stamp than the last, NaN is none."""
-        new = {
-            name: (stamp, now)
-            for name, stamp in stamps.items()
-            if math.isfinite(stamp) and (name not in self.newest or self.newest[name][0] != stamp)
-        }
+        known = {name: stamp for name, (stamp, _) in self.newest.items()}
+        new = {name: (at, now) for name, at in stamps.items() if math.isfinite(at) and known.get(name) != at}
         return Arrivals({**self.newest, **new}) if new else self
 
     def missing(self, now: float, needed: tuple[str, ...], max_age: float) -> str:

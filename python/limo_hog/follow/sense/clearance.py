@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
-from limo_hog.follow.sense.observation import Frame, Odometry, Scan, beams_at
+from limo_hog.follow.sense.observation import Array, Frame, Mask, Odometry, Scan, beams_at
 
-Points = NDArray[np.float64]
+Points = Array
 
 NO_POINTS: Points = np.empty((0, 2))
 
@@ -72,9 +72,8 @@ def completed(scan: Scan, frame: Frame, odometry: Odometry | None, robot: RobotG
     step = (scan.angle_max - scan.angle_min) / max(len(scan.ranges) - 1, 1)
     count = max(math.floor(math.tau / step), len(scan.ranges))
     ranges = np.full(count, np.nan)
-    here = odometry or Odometry()
     known = (row > 0) & (row < np.inf)
-    late = scan.stamp - frame.stamp
+    here, late = odometry or Odometry(), scan.stamp - frame.stamp
     moved = Odometry(x=here.linear * late, yaw=here.angular * late)
     points = from_odometry(np.stack([robot.camera_x + row, left * row], axis=1)[known], moved) - (robot.lidar_x, 0.0)
     angle_max = scan.angle_min + step * (count - 1)
@@ -87,9 +86,7 @@ def completed(scan: Scan, frame: Frame, odometry: Odometry | None, robot: RobotG
 
 
 @functools.lru_cache(maxsize=8)
-def _pixel_slopes(
-    height: int, width: int, step: int, focal_px: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pixel_slopes(height: int, width: int, step: int, focal_px: float) -> tuple[Array, Array]:
     """Return how far down, (R, 1), and left, (C,), every so many rows and columns look [m/m]; the same for a camera."""
     rows, columns = (np.arange(step // 2, size, step) for size in (height, width))
     down, left = (rows[:, None] + 0.5 - height / 2) / focal_px, (width / 2 - columns - 0.5) / focal_px
@@ -111,9 +108,7 @@ class DepthGrid:
             above_floor = robot.camera_z - down * z
             (seen,) = ((z > 0) & (z < reach) & (above_floor > self.floor)).ravel().nonzero()
         ahead = z.ravel()[seen]
-        points = np.empty((len(seen), 2))
-        points[:, 0], points[:, 1] = robot.camera_x + ahead, left[seen % z.shape[1]] * ahead
-        return points
+        return np.stack([robot.camera_x + ahead, left[seen % z.shape[1]] * ahead], axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +124,7 @@ def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
     return float(rooms_ahead(points, np.zeros(1), margin, robot)[0])
 
 
-def rooms_ahead(
-    points: Points, headings: NDArray[np.float64], margin: Margin, robot: RobotGeometry
-) -> NDArray[np.float64]:
+def rooms_ahead(points: Points, headings: Array, margin: Margin, robot: RobotGeometry) -> Array:
     """Return how far the robot, turned to each of H headings [rad], can drive until a point is too near, float64 (H,).
 
     In metres: negative where a point ahead is too near already, inf where nothing is in the way. Backwards: `-points`.
@@ -151,23 +144,19 @@ def speed_within(room: float, braking: float, reaction: float) -> float:
     """
     if room <= 0:
         return 0.0
-    if math.isinf(room):
-        return math.inf
     return -braking * reaction + math.sqrt((braking * reaction) ** 2 + 2 * braking * room)
 
 
 def to_odometry(points: Points, pose: Odometry) -> Points:
     """Carry points from the base frame into the odometry frame."""
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    turned: Points = points @ np.array([[cos, sin], [-sin, cos]]) + (pose.x, pose.y)
-    return turned
+    return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]) + (pose.x, pose.y))
 
 
 def from_odometry(points: Points, pose: Odometry) -> Points:
     """Carry points from the odometry frame into the base frame."""
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    turned: Points = (points - (pose.x, pose.y)) @ np.array([[cos, -sin], [sin, cos]])
-    return turned
+    return np.asarray((points - (pose.x, pose.y)) @ np.array([[cos, -sin], [sin, cos]]))
 
 
 #: Ground is looked at so far behind the outline, in such steps [m]. Chosen: from .6 m/s the robot stops within .51 m.
@@ -195,17 +184,12 @@ def room_seen_behind(looks: Sequence[Look], pose: Odometry, robot: RobotGeometry
     return _DEPTHS_BEHIND[int(np.argmax(unseen))] - STEP_BEHIND if unseen.any() else FARTHEST_BEHIND
 
 
-def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> NDArray[np.bool_]:
+def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> Mask:
     """Return whether a beam of each look passed over each point, or the robot stood there, bool (L, N): all at once."""
-    numbers = [
-        (
-            *(look.pose.x, look.pose.y, math.cos(look.pose.yaw), math.sin(look.pose.yaw)),
-            *(look.scan.angle_min, look.scan.angle_max, look.scan.range_min, look.scan.range_max),
-            len(look.scan.ranges),
-        )
-        for look in looks
-    ]
-    x, y, cos, sin, angle_min, angle_max, range_min, range_max, count = np.array(numbers).T[:, :, None]
+    scans, poses = [look.scan for look in looks], [look.pose for look in looks]
+    limits = [(one.angle_min, one.angle_max, one.range_min, one.range_max, len(one.ranges)) for one in scans]
+    x, y, cos, sin = np.array([(one.x, one.y, math.cos(one.yaw), math.sin(one.yaw)) for one in poses]).T[:, :, None]
+    angle_min, angle_max, range_min, range_max, count = np.array(limits).T[:, :, None]
     dx, dy = points[:, 0] - x, points[:, 1] - y
     ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
     # Half a step of grace: the ground just behind the outline was under it a moment ago.
@@ -217,9 +201,8 @@ def _were_free(points: Points, looks: Sequence[Look], robot: RobotGeometry) -> N
     inside = (beam >= 0) & (beam < count)
     # The scans one after the other, and where each begins.
     begins = np.cumsum(count, axis=0) - count
-    ranges = np.concatenate([look.scan.ranges for look in looks])[
-        (begins + np.minimum(np.maximum(beam, 0), count - 1)).astype(np.int64)
-    ]
+    at = (begins + np.minimum(np.maximum(beam, 0), count - 1)).astype(np.int64)
+    ranges = np.concatenate([one.ranges for one in scans])[at]
     # A beam that is no number, or shorter than the lidar can measure, shows nothing.
     passed = inside & (ranges >= range_min) & (np.minimum(ranges, range_max) > distance + BEAM_BEYOND)
     return np.asarray(covered | passed)

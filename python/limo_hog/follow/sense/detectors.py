@@ -15,7 +15,6 @@ from limo_hog.atomic import is_utf8
 from limo_hog.detections import Detections, Detector
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
-from limo_hog.follow.parameters import param
 from limo_hog.models import PERSON_BOX, WHOLE_WINDOW, PersonBox
 from limo_hog.suppression import nms
 
@@ -137,9 +136,8 @@ class OnnxDetector:
     path: Path  #: The ONNX file.
     size: int = 640  #: Side of the network's input [px].
     threshold: float = 0.25  #: Least score of a person [0..1].
-    overlap: float = (
-        0.45  #: Boxes with a larger intersection over union are one person [1]; both are YOLOv8's defaults.
-    )
+    #: Boxes with a larger intersection over union are one person [1]; both are YOLOv8's defaults.
+    overlap: float = 0.45
 
     def __post_init__(self) -> None:
         # A wrong file is an error before the robot starts, not a fault of every frame.
@@ -199,41 +197,3 @@ class Region:
         """Whether an image column [px] is within the region, by half an expected window's width."""
         margin = self.window_height / 4
         return self.x + margin <= column <= self.x + self.width - margin
-
-
-@dataclass(frozen=True, slots=True)
-class RegionSize:
-    """How large a region is around the expected window."""
-
-    widths: float = param(2.0, "window widths", "Width of a region.")
-    heights: float = param(1.25, "window heights", "Height of a region.")
-    grid: int = param(16, "px", "Sides are multiples of this, so that buffers are used again.")
-    most: float = param(0.7, "1", "Of a region larger than this share of the image all is searched.")
-    widest: float = param(1.2, "rad", "Larger bearings are out of any image.")
-    nearest: float = param(0.3, "m", "A nearer person fills the image.")
-
-    def around(
-        self, bearing: float, distance: float, window: float, centre: float, focal_px: float, width: int, height: int
-    ) -> Region | None:
-        """Return where to look for a person expected at a bearing [rad] and a distance [m] from the camera.
-
-        `window` is the height of the detection window and `centre` its middle below the image's, times the distance [px
-        m]; the rest is the camera's [px]. None where that is not in the image, or would be most of it.
-        """
-        if abs(bearing) > self.widest or distance < self.nearest:
-            return None
-        expected = window / distance
-        x = width / 2 - focal_px * math.tan(bearing)
-        y = height / 2 + centre / distance
-        if not 0 <= x < width:
-            return None
-        left, right = self._span(x, self.widths * expected / 2, width)
-        top, bottom = self._span(y, self.heights * expected, height)
-        if (right - left) * (bottom - top) > self.most * width * height:
-            return None
-        return Region(left, top, right - left, bottom - top, expected)
-
-    def _span(self, middle: float, length: float, limit: int) -> tuple[int, int]:
-        low = max(0, math.floor((middle - length / 2) / self.grid) * self.grid)
-        high = min(limit, math.ceil((middle + length / 2) / self.grid) * self.grid)
-        return low, max(high, low)

@@ -1,9 +1,9 @@
-"""A detection as a measurement: bearing, range and size by the depth image, and whether one is to be expected."""
+"""A detection as bearing, range and size, by the depth image; whether and where one is to be expected."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -60,17 +60,16 @@ def measure(observation: Observation, robot: RobotGeometry) -> list[Measurement]
         slope = (observation.width / 2 - column) / observation.focal_px
         height, centre = int(box[3]), row - observation.height / 2
         depth = None if depths is None else person_depth(depths, box)
-        if depths is None or depth is None:
-            measurements.append(Measurement(math.atan(slope), None, height, centre, score, clothes))
-            continue
-        x, y, relief = robot.camera_x + depth, slope * depth, stands_out(depths, box)
-        bearing, distance = math.atan2(y, x), math.hypot(x, y)
-        seen = Measurement(bearing, distance, height, centre, score, clothes, relief)
-        top = top_row(depths, box, depth)
-        stature = robot.camera_z + (observation.height / 2 - top) / observation.focal_px * depth
-        window = WINDOW_PER_STATURE * stature * observation.focal_px
-        middle = (robot.camera_z - stature / 2) * observation.focal_px
-        measurements.append(replace(seen, window=window, middle=middle, whole=top > 0))
+        seen = Measurement(math.atan(slope), None, height, centre, score, clothes)
+        if depths is not None and depth is not None:
+            x, y, relief = robot.camera_x + depth, slope * depth, stands_out(depths, box)
+            bearing, distance = math.atan2(y, x), math.hypot(x, y)
+            top = top_row(depths, box, depth)
+            stature = robot.camera_z + (observation.height / 2 - top) / observation.focal_px * depth
+            window = WINDOW_PER_STATURE * stature * observation.focal_px
+            middle = (robot.camera_z - stature / 2) * observation.focal_px
+            seen = Measurement(bearing, distance, height, centre, score, clothes, relief, window, middle, top > 0)
+        measurements.append(seen)
     return measurements
 
 
@@ -115,17 +114,14 @@ class Strips:
     known: float = param(0.2, "1", "Share of pixels that must be valid for a depth to be known.")
 
 
-STRIPS = Strips()
-
-
-def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32], strips: Strips = STRIPS) -> float | None:
+def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32]) -> float | None:
     """Return how far the surroundings of a box are behind its middle [m]; None where the depth does not tell.
 
     The inverse depth of a plane is linear in the image, so the plane through the strips left and right of the person
     has, in the middle between them, the mean of their inverse depths. A picture on a wall is in that plane, seen from
     whatever side: 0. `depth` is float32 (H, W) [m], `box` int32 (4,): x, y, w, h [px].
     """
-    x, y, w, h = box.tolist()
+    (x, y, w, h), strips = box.tolist(), Strips()
     band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
     centre = x + w / 2
     depths = []
@@ -152,15 +148,12 @@ class Outline:
     gap_px: int = param(5, "px", "Rows without the person that end the outline.")
 
 
-OUTLINE = Outline()
-
-
-def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float, outline: Outline = OUTLINE) -> int:
+def top_row(depth: NDArray[np.float32], box: NDArray[np.int32], person: float) -> int:
     """Return the highest image row [px] of the person in a box; 0 where they reach the image's edge or beyond.
 
     `depth` is float32 (H, W) [m], `box` int32 (4,): x, y, w, h [px], `person` the depth of the person [m].
     """
-    column, row = box_centre(box)
+    (column, row), outline = box_centre(box), Outline()
     half = max(round(outline.half_width * int(box[2])), outline.least_half_px)
     # A copy by columns: the sums over a row's few pixels are sums of long vectors.
     strip = np.ascontiguousarray(depth[: max(row, 1), max(column - half, 0) : max(column + half, 1)].T)
@@ -202,25 +195,59 @@ class Visibility:
         `Person`. Near by, the head and the space HOG wants above it are out of the image: that excuses a miss of a
         `confirmed` person, and not of a track that has yet to prove itself.
         """
-        if abs(bearing) > self.widest:
+        height = window / max(distance, 0.3)
+        if abs(bearing) > self.widest or height < self.smallest_window:
             return False
         column = observation.width / 2 - observation.focal_px * math.tan(bearing)
-        height = window / max(distance, 0.3)
         middle = observation.height / 2 + centre / max(distance, 0.3)
-        if height < self.smallest_window:
-            return False
         cut_off = not self.shown * height <= middle <= observation.height - self.shown * height
         if confirmed and (cut_off or distance < self.near):
             return False
         if not (observation.region or Region(0, 0, observation.width, observation.height, height)).holds(column):
             return False
-        return not self._hidden(observation.depth, column, middle, distance)
+        if observation.depth is None:
+            return True
+        there = person_depth(observation.depth, np.array([column, middle, 0, 0], np.int32))
+        return there is None or there >= distance - self.occluder
 
-    def _hidden(self, depth: NDArray[np.float32] | None, column: float, row: float, distance: float) -> bool:
-        if depth is None:
-            return False
-        there = person_depth(depth, np.array([column, row, 0, 0], np.int32))
-        return there is not None and there < distance - self.occluder
+
+@dataclass(frozen=True, slots=True)
+class RegionSize:
+    """How large a region is around the expected window."""
+
+    widths: float = param(2.0, "window widths", "Width of a region.")
+    heights: float = param(1.25, "window heights", "Height of a region.")
+    grid: int = param(16, "px", "Sides are multiples of this, so that buffers are used again.")
+    most: float = param(0.7, "1", "Of a region larger than this share of the image all is searched.")
+    widest: float = param(1.2, "rad", "Larger bearings are out of any image.")
+    nearest: float = param(0.3, "m", "A nearer person fills the image.")
+
+    def around(
+        self, bearing: float, distance: float, window: float, centre: float, image: Observation
+    ) -> Region | None:
+        """Return where to look for a person expected at a bearing [rad] and a distance [m] from the camera.
+
+        `window` and `centre` as in `Person`; `image` is one of the camera's. None where the person is not in it, or the
+        region would be most of it.
+        """
+        if abs(bearing) > self.widest or distance < self.nearest:
+            return None
+        expected = window / distance
+        width, height = image.width, image.height
+        x = width / 2 - image.focal_px * math.tan(bearing)
+        y = height / 2 + centre / distance
+        if not 0 <= x < width:
+            return None
+        left, right = self._span(x, self.widths * expected / 2, width)
+        top, bottom = self._span(y, self.heights * expected, height)
+        if (right - left) * (bottom - top) > self.most * width * height:
+            return None
+        return Region(left, top, right - left, bottom - top, expected)
+
+    def _span(self, middle: float, length: float, limit: int) -> tuple[int, int]:
+        low = max(0, math.floor((middle - length / 2) / self.grid) * self.grid)
+        high = min(limit, math.ceil((middle + length / 2) / self.grid) * self.grid)
+        return low, max(high, low)
 
 
 class Zone(str, Enum):
@@ -238,7 +265,4 @@ ZONE_ENDS = {Zone.INTIMATE: 0.45, Zone.PERSONAL: 1.2, Zone.SOCIAL: 3.6}
 
 def zone_of(distance: float) -> Zone:
     """Return the zone of a person `distance` [m] away."""
-    for zone, end in ZONE_ENDS.items():
-        if distance <= end:
-            return zone
-    return Zone.PUBLIC
+    return next((zone for zone, end in ZONE_ENDS.items() if distance <= end), Zone.PUBLIC)

@@ -14,7 +14,9 @@ from limo_hog.detections import Detections
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.detectors import Region
 
-Clothes = NDArray[np.float64]
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Clothes = Array
 """(2, 3): shirt and trousers; share of red, share of green and logarithm of the brightness, each in standard
 deviations of `ColourSampling`."""
 
@@ -30,9 +32,9 @@ class Scan:
     range_min: float  #: Limits between which a range is valid [m].
     range_max: float
     #: bool (N,): the beams by which anything is measured; None where that is all of them.
-    measured: NDArray[np.bool_] | None = None
+    measured: Mask | None = None
 
-    def looks_at(self, angles: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def looks_at(self, angles: Array) -> Mask:
         """Return whether each direction [rad] is measured, bool (N,)."""
         if self.measured is not None:
             beams = beams_at(angles, self.angle_min, self.angle_max, len(self.ranges)).astype(np.int64)
@@ -45,12 +47,7 @@ class Scan:
         return replace(self, angle_min=self.angle_min + yaw, angle_max=self.angle_max + yaw) if yaw else self
 
 
-def beams_at(
-    angles: NDArray[np.float64],
-    angle_min: float | NDArray[np.float64],
-    angle_max: float | NDArray[np.float64],
-    count: int | NDArray[np.float64],
-) -> NDArray[np.float64]:
+def beams_at(angles: Array, angle_min: float | Array, angle_max: float | Array, count: int | Array) -> Array:
     """Return which of a scan's `count` beams looks nearest to each angle [rad]; none where that is no index.
 
     The limits may be those of several scans, and lie beyond half a turn.
@@ -118,7 +115,7 @@ class Observation:
     between: tuple[tuple[Scan, Odometry], ...] = ()
     #: float64 (N, 2) [m], base frame as of `odometry`: what earlier scans showed near the robot where the newest does
     #: not look. `Guard` fills it in; None without it.
-    remembered: NDArray[np.float64] | None = None
+    remembered: Array | None = None
     #: When the readings were at hand, on the robot's own clock [s], which is no sensor's; None where `now` serves.
     clock: float | None = None
     depth_stamp: float | None = None  #: Of the newest depth image that has come [s]; None for `stamp`.
@@ -135,34 +132,12 @@ class Observation:
         return self.now if self.clock is None else self.clock
 
 
-def observed(
-    frame: Frame,
-    sensors: Sensors,
-    detections: Detections,
-    region: Region | None = None,
-    fault: str = "",
-    between: tuple[tuple[Scan, Odometry], ...] = (),
-    clock: float | None = None,
-) -> Observation:
+def observed(frame: Frame, sensors: Sensors, detections: Detections, region: Region | None, fault: str) -> Observation:
     """Return the observation of a frame and what was found in it: its size and people's clothes are filled in."""
     height, width = frame.image.shape[:2]
-    clothes = clothes_in(frame.image, detections.windows)
-    return Observation(
-        frame.stamp,
-        width,
-        height,
-        frame.focal_px,
-        detections,
-        region,
-        frame.depth,
-        sensors.scan,
-        sensors.odometry,
-        fault,
-        clothes,
-        between,
-        clock=clock,
-        depth_stamp=frame.depth_stamp,
-    )
+    seen = Observation(frame.stamp, width, height, frame.focal_px, detections, region, frame.depth)
+    seen = replace(seen, clothes=clothes_in(frame.image, detections.windows), depth_stamp=frame.depth_stamp)
+    return replace(seen, scan=sensors.scan, odometry=sensors.odometry, fault=fault)
 
 
 def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
@@ -177,22 +152,17 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
         return last
     if stamp > last.stamp:
         ahead = stamp - last.stamp
-        yaw = last.yaw + last.angular * ahead
         x = last.x + last.linear * ahead * math.cos(last.yaw)
         y = last.y + last.linear * ahead * math.sin(last.yaw)
-        return Odometry(stamp, x, y, yaw, last.linear, last.angular)
+        return replace(last, stamp=stamp, x=x, y=y, yaw=last.yaw + last.angular * ahead)
     after = bisect.bisect_left(poses, stamp, key=attrgetter("stamp"))
     if after == 0:
-        first = poses[0]
-        return Odometry(stamp, first.x, first.y, first.yaw, last.linear, last.angular)
+        return replace(poses[0], stamp=stamp, linear=last.linear, angular=last.angular)
     one, other = poses[after - 1], poses[after]
     share = (stamp - one.stamp) / (other.stamp - one.stamp)
     yaw = one.yaw + share * math.remainder(other.yaw - one.yaw, math.tau)
-    x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
-    linear, angular = (
-        one.linear + share * (other.linear - one.linear),
-        one.angular + share * (other.angular - one.angular),
-    )
+    ends = (one.x, other.x), (one.y, other.y), (one.linear, other.linear), (one.angular, other.angular)
+    x, y, linear, angular = (begun + share * (ended - begun) for begun, ended in ends)
     return Odometry(stamp, x, y, yaw, linear, angular)
 
 
@@ -209,15 +179,12 @@ class ColourSampling:
     brightness: float = param(0.5, "1", "The same of the logarithm of its brightness.")
 
 
-def clothes_in(
-    image: NDArray[np.uint8], boxes: NDArray[np.int32], sampling: ColourSampling | None = None
-) -> NDArray[np.float64]:
+def clothes_in(image: NDArray[np.uint8], boxes: NDArray[np.int32]) -> Clothes:
     """Return what the person in each box wears, float64 (N, 2, 3); NaN where that is out of the image.
 
     `image` is uint8 (H, W, 3), BGR, or (H, W), in which all clothes are gray; `boxes` are windows int32 (N, 4) [px].
     """
-    sampling = sampling or ColourSampling()
-    worn: NDArray[np.float64] = np.full((len(boxes), 2, 3), np.nan)
+    sampling, worn = ColourSampling(), np.full((len(boxes), 2, 3), np.nan)
     # An array of another shape is a fault; the safety layer reports it and stops the robot.
     for index, (x, y, w, h) in enumerate(boxes.tolist() if boxes.shape[1:] == (4,) else ()):
         middle, half = x + w / 2, max(sampling.half_width * h, 1)
@@ -254,9 +221,7 @@ class Appearance:
         seen_shirt, seen_trousers = seen.tolist()
         of_trousers = min(chi_squared(trousers, seen_trousers), self.max_trousers)
         cost = min(chi_squared(shirt, seen_shirt), self.max_shirt) + of_trousers
-        if slips:
-            cost = min(cost, min(chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers)
-        return cost
+        return min(cost, min(chi_squared(trousers, seen_shirt), self.max_shirt) + of_trousers) if slips else cost
 
     def learn(self, known: Clothes, seen: Clothes) -> Clothes:
         """Move known clothes towards those in a box; a shirt or trousers that clearly differ are left out."""

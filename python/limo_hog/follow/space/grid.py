@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
-from limo_hog.follow.robot import LIMO, RobotGeometry
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, beam_directions, lidar_at, to_odometry
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
-from limo_hog.follow.sense.observation import Odometry, Scan
+from limo_hog.follow.sense.observation import Array, Mask, Odometry, Scan
 
 Cells = NDArray[np.int64]
 """(N, 2): row (x) and column (y) of cells."""
@@ -32,8 +32,8 @@ class Ground:
     occupied: NDArray[np.float32]
     #: float64 (N, N): when each cell was last seen to be free or occupied [s]; -inf for never. On a robot times count
     #: from 1970: in float32 they would be two minutes apart.
-    seen: NDArray[np.float64]
-    freed: NDArray[np.float64]  #: float64 (N, N): when each cell was last seen to be free [s]; -inf for never.
+    seen: Array
+    freed: Array  #: float64 (N, N): when each cell was last seen to be free [s]; -inf for never.
     stamp: float = -math.inf  #: Of the last scan [s].
 
 
@@ -53,26 +53,20 @@ class Grid:
     person_radius: float = param(PERSON_RADIUS, "m", "Returns nearer than this to a tracked person fill no cell.")
     period_s: float = param(0.2, "s", "A scan sooner after the last one entered is left out.")
     lasts_s: float = param(6.0, "s", "What stands for this time is taken to last.")
+    samples: int = param(24, "1", "Points on a line of sight at which something may stand.")
     own_radius: float = param(0.2, "m", "The ground under the robot is free: the circle around its outline.")
 
     def start(self, pose: Odometry) -> Ground:
         """Return ground of which nothing is known, around the robot."""
-        shape = self.cells, self.cells
-        never = np.full(shape, -np.inf)
-        return Ground(self._corner(pose), np.zeros(shape, np.float32), never, never.copy())
+        never = np.full((self.cells, self.cells), -np.inf)
+        return Ground(self._corner(pose), np.zeros(never.shape, np.float32), never, never.copy())
 
     def update(
-        self,
-        ground: Ground | None,
-        scan: Scan,
-        pose: Odometry,
-        people: Points,
-        depth_points: Points,
-        robot: RobotGeometry = LIMO,
+        self, ground: Ground | None, scan: Scan, pose: Odometry, people: Points, depths: Points, robot: RobotGeometry
     ) -> Ground:
         """Enter a scan, taken at `pose`, into what was known: None before the first.
 
-        `people` and `depth_points` are float64 (N, 2) [m], odometry frame: people who are tracked are no part of the
+        `people` and `depths` are float64 (N, 2) [m], odometry frame: people who are tracked are no part of the
         ground; what the depth image shows above the floor fills cells and clears none.
         """
         ground = self._moved(ground or self.start(pose), pose)
@@ -84,14 +78,14 @@ class Grid:
         turn = replace(pose, x=0.0, y=0.0)
         directions = to_odometry(beam_directions(scan.angle_min, scan.angle_max, len(ranges)), turn)
         near = returned & (ranges < self.reach)
-        ends = at + ranges[near, None] * directions[near]
-        ends = np.concatenate([ends, depth_points])
+        ends = np.concatenate([at + ranges[near, None] * directions[near], depths])
         if len(people) and len(ends):
             gaps = np.hypot(ends[:, None, 0] - people[None, :, 0], ends[:, None, 1] - people[None, :, 1])
             ends = ends[gaps.min(axis=1) > self.person_radius]
         under = np.array([pose.x, pose.y]) + _square(self.own_radius, self.cell)
         passed = self._passed(ground, at, directions[:: self.every], clear[:: self.every])
-        cleared, filled = self._mask(passed, self.flat(ground, under)), self._mask(self.flat(ground, ends))
+        crossed = np.concatenate([passed, self.flat(ground, under)])
+        cleared, filled = self._mask(crossed), self._mask(self.flat(ground, ends))
         before = ground.occupied
         lower = np.maximum(before - np.float32(self.free), np.float32(self.lowest))
         higher = np.minimum(before + np.float32(self.hit), np.float32(self.highest))
@@ -100,38 +94,35 @@ class Grid:
         freed = np.where(cleared & (occupied <= 0), scan.stamp, ground.freed)
         return Ground(ground.corner, occupied, seen, freed, scan.stamp)
 
-    def index(self, ground: Ground, points: Points) -> tuple[Cells, NDArray[np.bool_]]:
+    def index(self, ground: Ground, points: Points) -> tuple[Cells, Mask]:
         """Return the cell of each point, int64 (N, 2), and whether it is in the square, bool (N,)."""
         cells: Cells = np.floor(points / self.cell).astype(np.int64) - ground.corner
         # As unsigned numbers, what is below 0 is large.
         within = cells.view(np.uint64) < self.cells
-        inside: NDArray[np.bool_] = within[:, 0] & within[:, 1]
-        return cells, inside
+        return cells, np.asarray(within[:, 0] & within[:, 1])
 
     def flat(self, ground: Ground, points: Points) -> NDArray[np.int64]:
         """Return the flat indices of the cells of those points that are in the square."""
         cells, inside = self.index(ground, points)
-        flat: NDArray[np.int64] = cells[inside, 0] * self.cells + cells[inside, 1]
-        return flat
+        return np.asarray(cells[inside, 0] * self.cells + cells[inside, 1])
 
     def middle_of(self, ground: Ground, cells: Cells) -> Points:
         """Return the middle of each cell [m], float64 (N, 2)."""
         return np.asarray((cells + ground.corner + 0.5) * self.cell, np.float64)
 
-    def is_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
+    def is_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether each point is in an occupied cell; `lasting`: one not free within `lasts_s`. bool (N,)."""
         cells, inside = self.index(ground, points)
         flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
         return inside & self._is_occupied(ground, flat, lasting)
 
-    def is_free_since(self, ground: Ground, points: Points, stamps: float | NDArray[np.float64]) -> NDArray[np.bool_]:
+    def is_free_since(self, ground: Ground, points: Points, stamps: float | Array) -> Mask:
         """Return whether each point was seen to be free after its stamp [s], bool (N,); outside of the square none."""
         cells, inside = self.index(ground, points)
-        free = np.zeros(len(points), bool)
-        free[inside] = ground.freed[cells[inside, 0], cells[inside, 1]] > np.broadcast_to(stamps, len(points))[inside]
-        return free
+        flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
+        return inside & (ground.freed.take(flat) > stamps)
 
-    def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> NDArray[np.bool_]:
+    def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether an occupied cell is within half a cell of each point, bool (N,); at the edge none is."""
         lowest, _ = self.index(ground, points - self.cell / 2)
         within = lowest.view(np.uint64) < self.cells - 1
@@ -148,27 +139,21 @@ class Grid:
         lasts = (ground.occupied[rows, columns] > 0) & (ground.freed[rows, columns] < ground.stamp - self.lasts_s)
         return self.middle_of(ground, np.argwhere(lasts) + np.array([rows.start, columns.start]))
 
-    def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> NDArray[np.bool_]:
+    def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> Mask:
         """Return whether the cells of flat indices are occupied, bool of their shape; `lasting` as `is_blocked`."""
         occupied = ground.occupied.take(flat) > 0
         if lasting:
             occupied &= ground.freed.take(flat) < ground.stamp - self.lasts_s
         return np.asarray(occupied)
 
-    def sees(
-        self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False, samples: int = 24
-    ) -> NDArray[np.bool_]:
+    def sees(self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False) -> Mask:
         """Return whether nothing occupied is between (K, 2) origins and (N, 2) places, at `samples` points, (K, N)."""
-        shares = (np.arange(samples) + 0.5) / samples
+        shares = (np.arange(self.samples) + 0.5) / self.samples
         way = origins[:, None, None, :] + shares[None, None, :, None] * (places[None, :] - origins[:, None])[:, :, None]
-        blocked = self.is_blocked(ground, way.reshape(-1, 2), lasting=lasting).reshape(
-            len(origins), len(places), samples
-        )
-        return np.asarray(~blocked.any(axis=2))
+        blocked = self.is_blocked(ground, way.reshape(-1, 2), lasting=lasting)
+        return np.asarray(~blocked.reshape(way.shape[:3]).any(axis=2))
 
-    def _passed(
-        self, ground: Ground, at: NDArray[np.float64], directions: Points, clear: NDArray[np.float64]
-    ) -> NDArray[np.int64]:
+    def _passed(self, ground: Ground, at: Array, directions: Points, clear: Array) -> NDArray[np.int64]:
         """Return the flat indices of the cells that beams from a place (2,) pass, each as far as it is clear [m]."""
         steps = np.arange(0.5, self.reach / self.cell) * self.cell
         # So far before the end that it is in another cell.
@@ -176,14 +161,12 @@ class Grid:
         row = np.floor((at[0] + steps * directions[:, :1]) / self.cell).astype(np.int64) - ground.corner[0]
         column = np.floor((at[1] + steps * directions[:, 1:]) / self.cell).astype(np.int64) - ground.corner[1]
         inside = (row.view(np.uint64) < self.cells) & (column.view(np.uint64) < self.cells)
-        passed: NDArray[np.int64] = (row * self.cells + column)[free & inside]
-        return passed
+        return np.asarray((row * self.cells + column)[free & inside])
 
-    def _mask(self, *flat: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _mask(self, flat: NDArray[np.int64]) -> Mask:
         """Return which cells are among those of flat indices, bool (N, N)."""
         mask = np.zeros(self.cells**2, bool)
-        for cells in flat:
-            mask[cells] = True
+        mask[flat] = True
         return mask.reshape(self.cells, self.cells)
 
     def _corner(self, pose: Odometry) -> tuple[int, int]:
@@ -193,15 +176,15 @@ class Grid:
     def _moved(self, ground: Ground, pose: Odometry) -> Ground:
         """Return the ground with the robot near the square's middle; what comes in at the edges is unknown."""
         corner = self._corner(pose)
-        by = corner[0] - ground.corner[0], corner[1] - ground.corner[1]
-        if max(abs(by[0]), abs(by[1])) * self.cell <= self.shift_after:
+        moved = corner[0] - ground.corner[0], corner[1] - ground.corner[1]
+        if max(map(abs, moved)) * self.cell <= self.shift_after:
             return ground
         fresh = self.start(pose)
-        (to_x, from_x), (to_y, from_y) = (_overlap(step, self.cells) for step in by)
-        fresh.occupied[to_x, to_y] = ground.occupied[from_x, from_y]
-        fresh.seen[to_x, to_y] = ground.seen[from_x, from_y]
-        fresh.freed[to_x, to_y] = ground.freed[from_x, from_y]
-        return replace(ground, corner=corner, occupied=fresh.occupied, seen=fresh.seen, freed=fresh.freed)
+        # Where old cells go, and where they come from, along each axis.
+        steps = [min(max(step, -self.cells), self.cells) for step in moved]
+        to, of = (tuple(slice(max(way * by, 0), self.cells + min(way * by, 0)) for by in steps) for way in (-1, 1))
+        fresh.occupied[to], fresh.seen[to], fresh.freed[to] = ground.occupied[of], ground.seen[of], ground.freed[of]
+        return replace(fresh, stamp=ground.stamp)
 
 
 @functools.lru_cache(maxsize=4)
@@ -211,9 +194,3 @@ def _square(radius: float, step: float) -> Points:
     points = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
     points.flags.writeable = False
     return points
-
-
-def _overlap(step: int, cells: int) -> tuple[slice, slice]:
-    """Return where old cells go, and where they come from, along one axis of a square moved by `step` cells."""
-    low, high = max(-step, 0), min(cells - step, cells)
-    return slice(low, max(high, low)), slice(low + step, max(high, low) + step)

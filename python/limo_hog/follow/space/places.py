@@ -10,12 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Points, lidar_at
-from limo_hog.follow.sense.observation import Odometry, Scan, beams_at
+from limo_hog.follow.sense.observation import Array, Mask, Odometry, Scan, beams_at
 from limo_hog.follow.space.grid import Grid, Ground
 
 
@@ -25,7 +24,7 @@ class Places:
 
     stamp: float  #: Time of the estimate [s].
     points: Points  #: float64 (N, 2) [m, m/s], odometry frame: each as likely as the others.
-    velocities: NDArray[np.float64]
+    velocities: Array
     seed: int = 0  #: Of the next step's random numbers.
 
 
@@ -43,7 +42,7 @@ class Wandering:
     far: float = param(4.0, "m", "Beams do not tell further away.")
     found: float = param(0.15, "1", "Chance that the camera finds a person in one frame who is not hidden.")
 
-    def start(self, stamp: float, mean: tuple[float, ...], covariance: NDArray[np.float64], seed: int) -> Places:
+    def start(self, stamp: float, mean: tuple[float, ...], covariance: Array, seed: int) -> Places:
         """Begin with a track: `mean` is x, y, vx, vy in the odometry frame, `covariance` (4, 4) its."""
         random = np.random.default_rng([seed, 0])
         drawn = random.multivariate_normal(mean, covariance, self.count, method="cholesky")
@@ -66,10 +65,8 @@ class Wandering:
         velocities[change & stands] = fresh[change & stands]
         velocities[change & ~stands] = 0.0
         turn = self.turn * math.sqrt(dt) * random.standard_normal(count)
-        cos, sin = np.cos(turn), np.sin(turn)
-        velocities = np.stack(
-            [cos * velocities[:, 0] - sin * velocities[:, 1], sin * velocities[:, 0] + cos * velocities[:, 1]], axis=1
-        )
+        (u, v), (cos, sin) = velocities.T, (np.cos(turn), np.sin(turn))
+        velocities = np.stack([cos * u - sin * v, sin * u + cos * v], axis=1)
         points = places.points + dt * velocities
         # Not through a wall: the middle of the way counts too, since a step may be longer than the wall is thick.
         blocked = grid.is_blocked(ground, points) | grid.is_blocked(ground, (points + places.points) / 2)
@@ -78,9 +75,7 @@ class Wandering:
         velocities[blocked] = speed / self.walk * fresh[blocked]
         return Places(stamp, points, velocities, places.seed + 1)
 
-    def look(
-        self, places: Places, scan: Scan, shown: NDArray[np.bool_], pose: Odometry, robot: RobotGeometry
-    ) -> Places | None:
+    def look(self, places: Places, scan: Scan, shown: Mask, pose: Odometry, robot: RobotGeometry) -> Places | None:
         """Remove places where the person was not found, in favour of the others; None where no place is left.
 
         Nobody is where the beams of the newest scan, taken at `pose`, pass; `shown`, bool (N,), are the places that the
@@ -97,7 +92,7 @@ class Wandering:
         chosen = np.concatenate([left, left[random.integers(len(left), size=(~kept).sum())]])
         return Places(places.stamp, places.points[chosen], places.velocities[chosen], places.seed)
 
-    def looked_through(self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry) -> NDArray[np.bool_]:
+    def looked_through(self, points: Points, scan: Scan, pose: Odometry, robot: RobotGeometry) -> Mask:
         """Return for each point, bool (N,), whether all beams near it pass."""
         x, y = lidar_at(pose, robot)
         dx, dy = points[:, 0] - x, points[:, 1] - y

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
-from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.sense.observation import Array, Mask, Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 
 _NEIGHBOURS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
@@ -41,9 +41,8 @@ class Router:
             return distance
         x, y = cells[0]
         # The robot may stand nearer to something than a way should lead.
-        free[max(x - reach, 0) : x + reach + 1, max(y - reach, 0) : y + reach + 1] |= ~blocked[
-            max(x - reach, 0) : x + reach + 1, max(y - reach, 0) : y + reach + 1
-        ]
+        here = tuple(slice(max(at - reach, 0), at + reach + 1) for at in (x, y))
+        free[here] |= ~blocked[here]
         distance[x, y] = 0.0
         closed = np.where(free, np.float32(self.detour * grid.cell) * wider, np.float32(np.inf)).astype(np.float32)
         straight, diagonal = np.float32(grid.cell), np.float32(math.sqrt(2) * grid.cell)
@@ -91,24 +90,19 @@ class Router:
         return grid.middle_of(ground, np.array(cells[::-1]))
 
 
-def along(way: Points, pose: Odometry, far: NDArray[np.float64]) -> Points:
+def along(way: Points, pose: Odometry, far: Array) -> Points:
     """Return the points of a way (N, 2) that are so far (M,) along it from where it is nearest to the robot [m]."""
     rest = way[int(np.argmin(np.hypot(way[:, 0] - pose.x, way[:, 1] - pose.y))) :]
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rest, axis=0).T))])
     return np.stack([np.interp(far, arc, rest[:, 0]), np.interp(far, arc, rest[:, 1])], axis=1)
 
 
-def _dilated(cells: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
+def _dilated(cells: Mask, radius: float) -> Mask:
     """Return the cells within a radius [cells] of those that are true."""
-    wide, reach = cells.copy(), int(radius)
-    for dx in range(-reach, reach + 1):
-        for dy in range(-reach, reach + 1):
-            if (dx or dy) and math.hypot(dx, dy) <= radius:
-                wide[_at(dx), _at(dy)] |= cells[_at(-dx), _at(-dy)]
-    widened: NDArray[np.bool_] = wide
-    return widened
-
-
-def _at(step: int) -> slice:
-    """Return the part of an axis that has a neighbour `step` cells before it."""
-    return slice(max(step, 0), step if step < 0 else None)
+    wide, reach, (rows, columns) = cells.copy(), int(radius), cells.shape
+    edged = np.pad(cells, reach)
+    for dx in range(2 * reach + 1):
+        for dy in range(2 * reach + 1):
+            if math.hypot(dx - reach, dy - reach) <= radius:
+                wide |= edged[dx : dx + rows, dy : dy + columns]
+    return np.asarray(wide)

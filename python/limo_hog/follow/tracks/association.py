@@ -13,14 +13,13 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import Points
 from limo_hog.follow.sense.measurement import Measurement
-from limo_hog.follow.sense.observation import Appearance, Clothes, Odometry
+from limo_hog.follow.sense.observation import Appearance, Array, Clothes, Mask, Odometry
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation, predict, update
-from limo_hog.follow.tracks.person import Person, UnknownRange, distance_to
+from limo_hog.follow.tracks.person import Person, distance_to
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +31,9 @@ class Association:
     same_place: float = param(0.5, "m", "Boxes and people nearer than this to each other are the same person.")
     size_tolerance: float = param(0.35, "1", "Share by which height times range may differ from the known window.")
     low: float = param(0.12, "window heights", "Lower boxes show trousers in the shirt's place.")
+    unknown: float = param(3.0, "m", "Distance assumed of a first box without depth.")
+    unknown_sigma: float = param(1.5, "m", "Its standard deviation.")
     appearance: Appearance = field(default_factory=Appearance)  #: Compares clothes.
-    unknown: UnknownRange = field(default_factory=UnknownRange)  #: Distance assumed of a box without depth.
 
     def pair(
         self,
@@ -72,10 +72,9 @@ class Association:
                     matches.append((not person.confirmed, cost, who, which))
         pairs: dict[int, int] = {}
         for _, _, who, which in sorted(matches):
-            if who not in pairs:
-                seen = measurements[which]
-                if not any(self._is_double(seen, measurements[other]) for other in pairs.values()):
-                    pairs[who] = which
+            doubles = (self._is_double(measurements[which], measurements[other]) for other in pairs.values())
+            if who not in pairs and not any(doubles):
+                pairs[who] = which
         return pairs
 
     def is_new(self, seen: Measurement, people: Sequence[Person], pose: Odometry) -> bool:
@@ -85,9 +84,7 @@ class Association:
 
     def fits_size(self, person: Person, seen: Measurement) -> bool:
         """Whether a box is as high as the person's window at its range; true where the range is unknown."""
-        if seen.range is None:
-            return True
-        return abs(seen.range * seen.height - person.window) < self.size_tolerance * person.window
+        return seen.range is None or abs(seen.range * seen.height - person.window) < self.size_tolerance * person.window
 
     def worn(self, seen: Measurement) -> Clothes | None:
         """Return the clothes in a box; None where the head is cut off or the box sits low, and shows other parts."""
@@ -100,7 +97,7 @@ class Association:
         turn = math.remainder(seen.bearing - other.bearing, math.tau)
         one, two = seen.range or other.range, other.range or seen.range
         if one is None or two is None:
-            return abs(turn) < self.same_place / self.unknown.distance
+            return abs(turn) < self.same_place / self.unknown
         return math.hypot(one - two * math.cos(turn), two * math.sin(turn)) < self.same_place
 
 
@@ -125,16 +122,10 @@ class Legs:
     fewest: int = param(2, "1", "Returns that legs have at least.")
 
     def update(
-        self,
-        track: Track,
-        returns: Returns,
-        noise: Noise,
-        is_ground: Callable[[Points], NDArray[np.bool_]] | None = None,
+        self, track: Track, returns: Returns, noise: Noise, is_ground: Callable[[Points], Mask] | None = None
     ) -> Track | None:
         """Return the track at a scan's stamp, corrected by legs that are not on the ground known; None without any."""
         track = predict(track, returns.stamp, noise)
-        if math.dist(track.mean[:2], (returns.pose.x, returns.pose.y)) > self.reach:
-            return None
         legs = returns.points.compress(distances(returns.points, track) < self.radius, axis=0)
         if is_ground is not None and len(legs):
             legs = legs[~is_ground(legs)]
@@ -160,13 +151,13 @@ class Legs:
         return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma).turning(pose.angular)
 
 
-def distances(points: Points, track: Track) -> NDArray[np.float64]:
+def distances(points: Points, track: Track) -> Array:
     """Return the distance from a track to each of (N, 2) points, odometry frame, float64 (N,) [m]."""
     x, y, _, _ = track.mean
     return np.asarray(np.hypot(points[:, 0] - x, points[:, 1] - y))
 
 
-def all_distances(points: Points, tracks: Sequence[Track]) -> NDArray[np.float64]:
+def all_distances(points: Points, tracks: Sequence[Track]) -> Array:
     """Return `distances` of M tracks at once, float64 (M, N) [m]."""
     means = np.array([track.mean for track in tracks]).reshape(-1, 4, 1)
     return np.asarray(np.hypot(points[:, 0] - means[:, 0], points[:, 1] - means[:, 1]))

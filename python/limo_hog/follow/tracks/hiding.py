@@ -45,11 +45,8 @@ class Hiding:
         """
         # Of a few places, lists are faster than arrays.
         own, legs = followed.tolist(), felt.tolist()
-        left = [
-            one
-            for one in others
-            if now - one.at < self.remembers_s and all(math.dist(place, (one.x, one.y)) > self.same for place in own)
-        ]
+        known = [one for one in others if now - one.at < self.remembers_s]
+        left = [one for one in known if all(math.dist(place, (one.x, one.y)) > self.same for place in own)]
         kept: list[Other] = []
         for person in seen:
             same = [number for number, one in enumerate(left) if self._may_be(one, person, now)]

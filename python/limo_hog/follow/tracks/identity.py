@@ -80,23 +80,20 @@ class Identity:
 
     def begin(self, person: Person) -> Likeness:
         """Begin with a person who is followed from now on."""
-        x, y, _, _ = person.track.mean
         traits = Traits(person.number, person.clothes, person.window)
-        return Likeness(traits, (x, y), person.measured, ((person.number, 1.0 - self.passes),))
+        return Likeness(traits, person.track.place, person.measured, ((person.number, 1.0 - self.passes),))
 
     def update(self, known: Likeness, tracks: Tracks) -> Likeness:
         """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
         people, seen = {one.number: one for one in tracks.people}, tracks.in_view
         walking = {one.number for one in tracks.people if self._walks_on(one, tracks)}
-        alone = {one.number for one in seen if self._is_alone(one, tracks)}
+        alone = {one.number: one for one in seen if self._is_alone(one, tracks)}
         chances = self._passed(known, people, tracks, walking)
         odds, before = dict(chances), dict(known.chances)
-        for one in seen:
-            if one.number not in alone:
-                continue
-            stays = before.get(one.number, 0.0) >= self.stays and one.number in walking
+        for number, one in alone.items():
+            stays = before.get(number, 0.0) >= self.stays and number in walking
             evidence = self._evidence(known, one, first=one.age <= 1)
-            odds[one.number] *= math.exp(self.steady * evidence if stays else evidence)
+            odds[number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
         chances = {number: value / total for number, value in odds.items()}
         known = replace(known, chances=tuple(chances.items()))
@@ -128,10 +125,9 @@ class Identity:
             taken = share if near else 0.0
             gone = [other for other in chances if stamp - people[other].measured > self.unseen_s]
             absent = max(1.0 - sum(chances.values()), 0.0)
-            gained = taken * (absent + sum(chances[other] for other in gone))
+            chances[number] = taken * (absent + sum(chances[other] for other in gone))
             for other in gone:
                 chances[other] *= 1.0 - taken
-            chances[number] = gained
         measured = [one for one in people.values() if stamp - one.measured <= self.unseen_s]
         absent = max(1.0 - sum(chances.values()), 0.0)
         own = known.traits.number
@@ -150,12 +146,8 @@ class Identity:
     def _walks_on(self, person: Person, tracks: Tracks) -> bool:
         """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""
         others = [one.track.place for one in tracks.movers if one.left and one.number != person.number]
-        for own in tracks.movers:
-            if own.number == person.number and own.felt - own.named >= self.legs_s:
-                gaps = [math.dist(own.track.place, place) for place in others]
-                if min(gaps, default=math.inf) > self.legs_apart:
-                    return True
-        return False
+        legs = [one for one in tracks.movers if one.number == person.number and one.felt - one.named >= self.legs_s]
+        return any(all(math.dist(own.track.place, place) > self.legs_apart for place in others) for own in legs)
 
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:
         """Whether nobody is so near that a person's box may show both or the other."""
@@ -176,10 +168,8 @@ class Identity:
         """Return how likely a person's last box is on one who looks like this, or on anybody [log]."""
         clothes = stature = 0.0
         if person.worn is not None:
-            for part, strange, odd in (
-                (0, self.strange_shirt, self.odd_shirt),
-                (1, self.strange_trousers, self.odd_trousers),
-            ):
+            parts = (self.strange_shirt, self.odd_shirt), (self.strange_trousers, self.odd_trousers)
+            for part, (strange, odd) in enumerate(parts):
                 if traits is None or traits.clothes is None:
                     clothes += math.log(strange)
                 else:
@@ -195,9 +185,8 @@ class Identity:
     def _learnt(self, known: Likeness, person: Person, chance: float, *, alone: bool) -> Likeness:
         """Learn who looks how: the person followed where `chance` is sure and they are `alone` in it, else others."""
         if chance >= self.sure:
-            x, y, _, _ = person.track.mean
             traits = self._moved(known.traits, person) if alone else known.traits
-            return replace(known, place=(x, y), at=person.measured, traits=traits)
+            return replace(known, place=person.track.place, at=person.measured, traits=traits)
         if not person.confirmed or chance > 1.0 - self.sure:
             return known
         rest = [traits for traits in known.others if traits.number != person.number]

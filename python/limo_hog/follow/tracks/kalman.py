@@ -66,15 +66,13 @@ class Track:
 
 def initiate(stamp: float, bearing: float, distance: float, pose: Odometry, noise: Noise) -> Track:
     """Begin a track from one measurement of bearing [rad] and distance [m], with zero velocity."""
-    direction = pose.yaw + bearing
-    x = pose.x + distance * math.cos(direction)
-    y = pose.y + distance * math.sin(direction)
     # The position's covariance is the measurement's, turned from bearing and range into the odometry frame.
-    cos, sin = math.cos(direction), math.sin(direction)
+    cos, sin = math.cos(pose.yaw + bearing), math.sin(pose.yaw + bearing)
     turn = np.array([[cos, -distance * sin], [sin, distance * cos]])
     (xx, xy), (_, yy) = ((turn * (noise.range**2, noise.bearing**2)) @ turn.T).tolist()
     moves = noise.velocity**2
-    return Track(stamp, (x, y, 0.0, 0.0), (xx, xy, 0.0, 0.0, yy, 0.0, 0.0, moves, 0.0, moves))
+    mean = pose.x + distance * cos, pose.y + distance * sin, 0.0, 0.0
+    return Track(stamp, mean, (xx, xy, 0.0, 0.0, yy, 0.0, 0.0, moves, 0.0, moves))
 
 
 def predict(track: Track, stamp: float, noise: Noise) -> Track:
@@ -89,21 +87,15 @@ def predict(track: Track, stamp: float, noise: Noise) -> Track:
     far = noise.persistence * (1 - kept)
     q = noise.acceleration**2
     place, cross, speed = q * dt**3 / 3, q * dt**2 / 2, q * dt
-    # The products of 4 x 4 matrices, written out.
+    # The products of 4 x 4 matrices, written out: places, then what they have in common with velocities, then these.
     xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = track.covariance
-    covariance = (
-        xx + 2 * far * xu + far * far * uu + place,
-        xy + far * (xv + yu) + far * far * uv,
-        kept * (xu + far * uu) + cross,
-        kept * (xv + far * uv),
-        yy + 2 * far * yv + far * far * vv + place,
-        kept * (yu + far * uv),
-        kept * (yv + far * vv) + cross,
-        kept * kept * uu + speed,
-        kept * kept * uv,
-        kept * kept * vv + speed,
-    )
-    return Track(stamp, (x + far * vx, y + far * vy, kept * vx, kept * vy), covariance)
+    xx, yy = xx + 2 * far * xu + far * far * uu + place, yy + 2 * far * yv + far * far * vv + place
+    xy = xy + far * (xv + yu) + far * far * uv
+    xu, xv = kept * (xu + far * uu) + cross, kept * (xv + far * uv)
+    yu, yv = kept * (yu + far * uv), kept * (yv + far * vv) + cross
+    uu, uv, vv = kept * kept * uu + speed, kept * kept * uv, kept * kept * vv + speed
+    mean = x + far * vx, y + far * vy, kept * vx, kept * vy
+    return Track(stamp, mean, (xx, xy, xu, xv, yy, yu, yv, uu, uv, vv))
 
 
 def bearing_range(track: Track, pose: Odometry) -> tuple[float, float]:
@@ -190,25 +182,13 @@ def update(track: Track, measured: Innovation) -> Track:
         ku, lu = (d * bu - b * ru) / det, (a * ru - b * bu) / det
         kv, lv = (d * bv - b * rv) / det, (a * rv - b * bv) / det
     x, y, u, v = track.mean
-    mean = (
-        x + kx * turned + lx * further,
-        y + ky * turned + ly * further,
-        u + ku * turned + lu * further,
-        v + kv * turned + lv * further,
-    )
-    left = (
-        xx - kx * bx - lx * rx,
-        xy - kx * by - lx * ry,
-        xu - kx * bu - lx * ru,
-        xv - kx * bv - lx * rv,
-        yy - ky * by - ly * ry,
-        yu - ky * bu - ly * ru,
-        yv - ky * bv - ly * rv,
-        uu - ku * bu - lu * ru,
-        uv - ku * bv - lu * rv,
-        vv - kv * bv - lv * rv,
-    )
-    return Track(track.stamp, mean, left)
+    place = x + kx * turned + lx * further, y + ky * turned + ly * further
+    velocity = u + ku * turned + lu * further, v + kv * turned + lv * further
+    # What is left of the covariance, a row of the upper triangle in each line.
+    of_x = xx - kx * bx - lx * rx, xy - kx * by - lx * ry, xu - kx * bu - lx * ru, xv - kx * bv - lx * rv
+    of_y = yy - ky * by - ly * ry, yu - ky * bu - ly * ru, yv - ky * bv - ly * rv
+    of_u = uu - ku * bu - lu * ru, uv - ku * bv - lu * rv
+    return Track(track.stamp, (*place, *velocity), (*of_x, *of_y, *of_u, vv - kv * bv - lv * rv))
 
 
 def loosened(track: Track, place: float, speed: float) -> Track:

@@ -66,18 +66,17 @@ class Movers:
         self,
         movers: tuple[Mover, ...],
         returns: Returns,
-        half_view: float,
+        views: tuple[float, float],
         noise: Noise,
         grid: Grid,
         ground: Ground | None,
-        camera: float = 0.0,
     ) -> tuple[Mover, ...]:
-        """Return what may move after a scan; lidar and camera look `half_view` and `camera` [rad] to either side.
+        """Return what may move after a scan; `views` is how far lidar and camera look to either side [rad].
 
         `grid` and `ground` tell what has stood for long, whose returns are not looked at, and what is empty; before the
         first map nothing moves.
         """
-        points = returns.points
+        points, (lidar, camera) = returns.points, views
         if ground is not None:
             points = points[~grid.is_near_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
@@ -92,16 +91,15 @@ class Movers:
                 shown = mover.shown + is_in_view(track, returns, camera, self.robot)
                 kept.append(replace(mover, track=track, felt=returns.stamp, scans=mover.scans + 1, shown=shown))
                 free &= ~own | (distances(points, track) > self.legs.radius)
-            elif returns.stamp - mover.felt < self._patience(expected[index], returns, half_view):
+                continue
+            due = is_in_view(expected[index], returns, lidar, self.robot, self.robot.lidar_yaw)
+            if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
                 kept.append(mover)
-        still = [index for index, one in enumerate(kept) if not one.left]
-        if ground is not None and still:
-            began = np.array([kept[index].began for index in still])
-            since = np.array([kept[index].since for index in still])
+        if ground is not None and not all(one.left for one in kept):
+            began, since = np.array([one.began for one in kept]), np.array([one.since for one in kept])
             # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
-            for index in np.array(still)[left].tolist():
-                kept[index] = replace(kept[index], left=True)
+            kept = [replace(one, left=True) if gone else one for one, gone in zip(kept, left.tolist(), strict=True)]
         places = self._groups(returns)
         if ground is not None and len(places):
             places = places[~grid.is_blocked(ground, places, lasting=True)]
@@ -111,11 +109,8 @@ class Movers:
 
     def moving(self, movers: tuple[Mover, ...]) -> list[Mover]:
         """Return those that have moved."""
-        return [
-            one
-            for one in movers
-            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.place, one.began) > self.least_way
-        ]
+        gone = [one for one in movers if one.left and one.scans >= self.fewest_scans]
+        return [one for one in gone if math.dist(one.track.place, one.began) > self.least_way]
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
@@ -143,12 +138,7 @@ class Movers:
         )
 
     def others(
-        self,
-        moving: Sequence[Mover],
-        people: Sequence[Person],
-        boxes: Sequence[Measurement],
-        pose: Odometry,
-        noise: Noise,
+        self, moving: Sequence[Mover], people: list[Person], boxes: list[Measurement], pose: Odometry, noise: Noise
     ) -> set[tuple[int, int]]:
         """Return the pairs, person and box, of people whose own legs walk while the box is on other legs that walk."""
         pairs: set[tuple[int, int]] = set()
@@ -188,10 +178,6 @@ class Movers:
         gaps = gaps[: len(numbers)]
         return np.where(gaps.min(axis=0) < self.legs.radius, numbers.take(gaps.argmin(axis=0)), 0)
 
-    def _patience(self, expected: Track, returns: Returns, half_view: float) -> float:
-        seen = is_in_view(expected, returns, half_view, self.robot, self.robot.lidar_yaw)
-        return self.forget_s if seen else self.unseen_s
-
     def _passed(self, returns: Returns, places: Points) -> NDArray[np.bool_]:
         """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
         pose, points = returns.pose, returns.points
@@ -225,17 +211,14 @@ class Movers:
         legs[:-1] &= begun >= ended
         extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
         legs &= np.hypot(*extent.T) < self.legs.widest
-        middle = np.empty((len(first), 2))
-        middle[:, 0], middle[:, 1] = np.bincount(group, x) / count, np.bincount(group, y) / count
+        middle = np.stack([np.bincount(group, x) / count, np.bincount(group, y) / count], axis=1)
         near = np.hypot(middle[:, 0] - here.x, middle[:, 1] - here.y) < self.legs.reach
         return np.asarray(middle[legs & near])
 
     def _begin(self, place: Points, returns: Returns, noise: Noise) -> Mover:
         pose = returns.pose
-        far, bearing = (
-            math.hypot(place[0] - pose.x, place[1] - pose.y),
-            math.atan2(place[1] - pose.y, place[0] - pose.x),
-        )
+        dx, dy = place[0] - pose.x, place[1] - pose.y
+        far, bearing = math.hypot(dx, dy), math.atan2(dy, dx)
         track = kalman.initiate(returns.stamp, bearing - pose.yaw, far, pose, self.legs.noise_at(far, noise, pose))
         return Mover(track, (float(place[0]), float(place[1])), returns.stamp, returns.stamp)
 
@@ -247,7 +230,6 @@ def named(mover: Mover, number: int, stamp: float) -> Mover:
 
 def is_in_view(track: Track, returns: Returns, half_view: float, robot: RobotGeometry, towards: float = 0.0) -> bool:
     """Whether a track's place, from the lidar, was at most `half_view` [rad] to either side of `towards`."""
-    pose = returns.pose
-    x, y = lidar_at(pose, robot)
-    off = math.atan2(track.mean[1] - y, track.mean[0] - x) - pose.yaw
+    x, y = lidar_at(returns.pose, robot)
+    off = math.atan2(track.mean[1] - y, track.mean[0] - x) - returns.pose.yaw
     return abs(math.remainder(off - towards, math.tau)) < half_view

@@ -47,34 +47,6 @@ class Person:
         return 1.0 / (1.0 + math.exp(-self.log_odds))
 
 
-@dataclass(frozen=True, slots=True)
-class UnknownRange:
-    """Where a new track begins whose first box has no depth."""
-
-    distance: float = param(3.0, "m", "Distance assumed of a first box without depth.")
-    sigma: float = param(1.5, "m", "Its standard deviation.")
-
-
-def initiate(
-    number: int,
-    seen: Measurement,
-    stamp: float,
-    pose: Odometry,
-    noise: Noise,
-    unknown: UnknownRange,
-    log_odds: float = 0.0,
-) -> Person:
-    """Begin to track a box that belongs to no known person."""
-    distance = unknown.distance if seen.range is None else seen.range
-    if seen.range is None:
-        noise = replace(noise, range=unknown.sigma)
-    track = kalman.initiate(stamp, seen.bearing, distance, pose, noise)
-    window = seen.window or seen.height * distance
-    centre = seen.middle if seen.window else seen.centre * distance
-    worn, tall = seen.clothes, window if seen.whole and seen.window else None
-    return Person(number, track, stamp, log_odds, window, centre, clothes=worn, worn=worn, tall=tall)
-
-
 def predict(person: Person, stamp: float, noise: Noise) -> Person:
     """Predict the person's track for `stamp` [s]."""
     return replace(person, track=kalman.predict(person.track, stamp, noise))

@@ -19,7 +19,7 @@ from limo_hog.follow.tracks.association import Association, Legs, Returns
 from limo_hog.follow.tracks.hiding import Other
 from limo_hog.follow.tracks.kalman import Noise, Track, bearing_range, innovation
 from limo_hog.follow.tracks.movers import Mover, Movers, named
-from limo_hog.follow.tracks.person import Existence, Person, Recall, initiate, predict
+from limo_hog.follow.tracks.person import Existence, Person, Recall, predict
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +79,10 @@ class Tracker:
         """Bring all tracks up to a frame; also number -> index of the box of each person found."""
         tracks = self._remember(observation, tracks)
         stamp, pose = observation.stamp, pose_at(tracks.poses, observation.stamp)
-        known: list[Person] = []
-        for one in tracks.people:
-            if stamp - one.measured < self.forget_s:
-                walked = self._walked(one, tracks.scans, stamp) if observation.between else one
-                known.append(predict(walked, stamp, self.noise))
+        known = [one for one in tracks.people if stamp - one.measured < self.forget_s]
+        if observation.between:
+            known = [self._walked(one, tracks.scans, stamp) for one in known]
+        known = [predict(one, stamp, self.noise) for one in known]
         measured = measure(observation, self.robot)
         flat = {which for which, seen in enumerate(measured) if not self.existence.is_solid(seen)}
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
@@ -101,21 +100,18 @@ class Tracker:
             if expected and person.confirmed:
                 recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
-                people.append(self.correct(person, measured[pairs[who]], pose, chance))
+                person = self.correct(person, measured[pairs[who]], pose, chance)
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
                 # that there is one.
                 walks = any(one.number == person.number for one in moving)
                 evidence = 0.0 if walks else self.existence.of_miss(chance)
-                people.append(self.existence.update(person, evidence, found=False))
-            else:
-                people.append(person)
+                person = self.existence.update(person, evidence, found=False)
+            people.append(person)
         boxes = {people[who].number: which for who, which in pairs.items()}
         number = tracks.next_number
         for which, seen in enumerate(measured):
-            if which in boxes.values() or which in flat:
-                continue
-            if self.association.is_new(seen, people, pose):
+            if which not in boxes.values() and which not in flat and self.association.is_new(seen, people, pose):
                 people.append(self.begin(number, seen, stamp, pose))
                 boxes[number] = which
                 number += 1
@@ -125,8 +121,14 @@ class Tracker:
     def begin(self, number: int, seen: Measurement, stamp: float, pose: Odometry) -> Person:
         """Begin to track a box that belongs to no known person."""
         odds = self.existence.prior + self.existence.of_box(seen, self.existence.recall)
-        seen = replace(seen, clothes=self.association.worn(seen))
-        return initiate(number, seen, stamp, pose, self.noise.turning(pose.angular), self.association.unknown, odds)
+        distance, noise = seen.range, self.noise.turning(pose.angular)
+        if distance is None:
+            distance, noise = self.association.unknown, replace(noise, range=self.association.unknown_sigma)
+        track = kalman.initiate(stamp, seen.bearing, distance, pose, noise)
+        window = seen.window or seen.height * distance
+        centre = seen.middle if seen.window else seen.centre * distance
+        worn, tall = self.association.worn(seen), window if seen.whole and seen.window else None
+        return Person(number, track, stamp, odds, window, centre, clothes=worn, worn=worn, tall=tall)
 
     def correct(self, person: Person, seen: Measurement, pose: Odometry, recall: float = 0.9) -> Person:
         """Update a person, found with `recall`, by their box; the track is at the box's stamp."""
@@ -143,9 +145,8 @@ class Tracker:
         in_place = off < self.astray
         worn = self.association.worn(seen) if fits else None
         # A box on a part of the body still shows the stature, by the depth image.
-        tall = seen.window if in_place and seen.whole and seen.window and seen.range else None
-        if seen.range is not None and seen.range < self.stature_from:
-            tall = None
+        far = (seen.range or 0.0) >= self.stature_from
+        tall = seen.window if in_place and far and seen.whole and seen.window else None
         evidence = self.existence.of_box(seen, recall)
         if person.confirmed and solid:
             # Near by, and on parts of the body, HOG's scores are low for people, too.
@@ -161,28 +162,19 @@ class Tracker:
         if strained:
             track = kalman.loosened(track, self.association.same_place, self.turn_speed)
             fit = innovation(track, seen.bearing, seen.range, pose, noise)
-        return replace(
-            self.existence.update(person, evidence, found=True),
-            track=kalman.update(track, fit),
-            seen=track.stamp,
-            window=window,
-            centre=centre,
-            clothes=self._clothes(person, worn),
-            worn=worn,
-            tall=tall,
-            strained=strained or not in_place,
-        )
+        clothes, track = self._clothes(person, worn), kalman.update(track, fit)
+        person = replace(self.existence.update(person, evidence, found=True), seen=track.stamp, track=track)
+        person = replace(person, window=window, centre=centre, clothes=clothes)
+        return replace(person, worn=worn, tall=tall, strained=strained or not in_place)
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
         """Bring a person up to the newest scan, if their legs are in it; returns on the known `ground` are none.
 
         Among the tracks returned, a person found in the last frame stays at its stamp: the next may be older.
         """
-        if tracks.stamp is None:
+        if tracks.stamp is None or not person.confirmed:
             return person, tracks
         unseen = tracks.stamp - person.seen
-        if not person.confirmed:
-            return person, tracks
         if person.misses:
             height = person.window / max(bearing_range(person.track, pose_at(tracks.poses, tracks.stamp))[1], 0.3)
             if not self.existence.is_chance(person.misses, self.existence.recall_of(tracks.recall, height)):
@@ -215,9 +207,7 @@ class Tracker:
                 person = person if track is None else replace(person, track=track, felt=returns.stamp)
         return person
 
-    def follow_movers(
-        self, tracks: Tracks, half_view: float, camera: float, grid: Grid, ground: Ground | None
-    ) -> Tracks:
+    def follow_movers(self, tracks: Tracks, views: tuple[float, float], grid: Grid, ground: Ground | None) -> Tracks:
         """Enter the new scans into what moves; see `Movers.update`."""
         movers, new = tracks.movers, [one for one in tracks.scans if one.stamp > tracks.moved_at]
         if not new:
@@ -225,20 +215,15 @@ class Tracker:
         people = tracks.people
         seen = [one for one in people if one.confirmed and one.seen == tracks.stamp]
         for returns in new:
-            movers = self.movers.update(movers, returns, half_view, self.noise, grid, ground, camera)
+            movers = self.movers.update(movers, returns, views, self.noise, grid, ground)
             movers = self.movers.assign(movers, seen, returns.stamp)
             movers = self._come_back(movers, people, returns.stamp)
-            unseen = {one.number for one in people if one.confirmed and one.seen != tracks.stamp}
-            if not unseen:
-                continue
             walking = {one.number for one in self.movers.moving(movers)}
-            people = tuple(
-                self.movers.continued(one, movers, returns, self.noise)
-                if one.number in unseen
-                and ((tracks.stamp or 0.0) - one.seen < self.legs_only_s or one.number in walking)
-                else one
-                for one in people
-            )
+            unseen = [one for one in people if one.confirmed and one.seen != tracks.stamp]
+            for one in unseen:
+                if (tracks.stamp or 0.0) - one.seen < self.legs_only_s or one.number in walking:
+                    now = self.movers.continued(one, movers, returns, self.noise)
+                    people = tuple(now if other is one else other for other in people)
         return replace(tracks, people=people, movers=movers, moved_at=new[-1].stamp)
 
     def _come_back(self, movers: tuple[Mover, ...], people: tuple[Person, ...], stamp: float) -> tuple[Mover, ...]:
@@ -247,19 +232,13 @@ class Tracker:
         Only where they can be one person's alone, and that person has no others to choose from.
         """
         lost = [one for one in people if one.confirmed and self.scan_period_s < stamp - one.measured < self.legs_only_s]
-        if not lost:
-            return movers
         walking = [one for one in self.movers.moving(movers) if one.number is None and one.felt == stamp]
-        pairs = [
-            (one.number, mover)
-            for one in lost
-            for mover in walking
-            if mover.since > one.measured and self._is_near(one, mover.track)
-        ]
+        pairs = [(one, mover) for one in lost for mover in walking if mover.since > one.measured]
+        pairs = [(one, mover) for one, mover in pairs if self._is_near(one, mover.track)]
         if len(pairs) != 1:
             return movers
-        number, legs = pairs[0]
-        return tuple(named(mover, number, stamp) if mover is legs else mover for mover in movers)
+        one, legs = pairs[0]
+        return tuple(named(mover, one.number, stamp) if mover is legs else mover for mover in movers)
 
     def around(
         self, tracks: Tracks, followed: Person | None, now: float, lately_s: float
@@ -284,9 +263,8 @@ class Tracker:
         places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)
-            if mover.number in people or any(
-                math.dist(track.place, place) <= self.association.same_place for place in places
-            ):
+            gap = min((math.dist(track.place, place) for place in places), default=math.inf)
+            if mover.number in people or gap <= self.association.same_place:
                 continue
             nameless.append(track)
             may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))
@@ -301,12 +279,8 @@ class Tracker:
 
     def may_be(self, number: int | None, tracks: Tracks, now: float) -> list[Track]:
         """Return what moves in the scan and may be the person of a number, or one not shown yet, as of `now` [s]."""
-        moving = [
-            one
-            for one in self.movers.moving(tracks.movers)
-            if one.number in (number, None) and one.shown < self.movers.looks
-        ]
-        return [kalman.predict(one.track, now, self.noise) for one in moving]
+        moving = [one for one in self.movers.moving(tracks.movers) if one.number in (number, None)]
+        return [kalman.predict(one.track, now, self.noise) for one in moving if one.shown < self.movers.looks]
 
     def _remember(self, observation: Observation, tracks: Tracks) -> Tracks:
         poses, scans = tracks.poses, tracks.scans

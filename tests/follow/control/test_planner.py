@@ -11,9 +11,9 @@ import pytest
 
 from limo_hog.follow.control.planner import NO_WAY, Move, Planner
 from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre, Rollouts
-from limo_hog.follow.control.situation import Array, Goal, Situation
+from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.robot import LIMO, Twist
-from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.sense.observation import Array, Odometry
 from limo_hog.follow.space.grid import Grid
 
 PLANNER, GRID, POSE = Planner(), Grid(), Odometry(10.0)

@@ -19,11 +19,12 @@ from limo_hog.follow.control.critics.room_to_others import RoomToOthers
 from limo_hog.follow.control.critics.unseen_ground import UnseenGround
 from limo_hog.follow.control.critics.walls import Walls
 from limo_hog.follow.control.rollouts import DIRECT, Manoeuvre, Rollouts, Sampling
-from limo_hog.follow.control.situation import Array, Goal, Situation
+from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.control.wheels import stoppable_turn
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.clearance import Points
+from limo_hog.follow.sense.observation import Array
 
 
 class Critic(Protocol):

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from limo_hog.follow.control.situation import Array, Goal, Situation
+from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.control.wheels import turn_acceleration
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Margin, rooms_ahead
+from limo_hog.follow.sense.observation import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry, Twist
 from limo_hog.follow.sense.clearance import Points, from_odometry, places_behind, to_odometry
-from limo_hog.follow.sense.observation import Odometry
+from limo_hog.follow.sense.observation import Array, Odometry
 from limo_hog.follow.space.grid import Grid, Ground
-
-Array = NDArray[np.float64]
 
 #: Ground behind the robot is looked at so far behind its outline [m]: from .6 m/s it stops within .33 m.
 DEPTHS = (0.1, 0.2, 0.3)

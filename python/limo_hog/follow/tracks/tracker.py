@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import numpy as np
-
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import LIMO, RobotGeometry
-from limo_hog.follow.sense.clearance import Points, scan_points, to_odometry
+from limo_hog.follow.sense.clearance import scan_points, to_odometry
 from limo_hog.follow.sense.measurement import WALK, Measurement, Visibility, measure
 from limo_hog.follow.sense.observation import Clothes, Observation, Odometry, pose_at
 from limo_hog.follow.space.grid import Grid, Ground

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from limo_hog.follow.control.rollouts import Rollouts
-from limo_hog.follow.control.situation import Array, Situation
+from limo_hog.follow.control.situation import Situation
 from limo_hog.follow.parameters import param
+from limo_hog.follow.sense.observation import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,9 @@ import numpy as np
 
 from limo_hog.follow.control.critics.room import Room
 from limo_hog.follow.control.rollouts import Rollouts
-from limo_hog.follow.control.situation import Array, Situation
+from limo_hog.follow.control.situation import Situation
 from limo_hog.follow.parameters import param
+from limo_hog.follow.sense.observation import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from limo_hog.follow.robot import LIMO, RobotError, RobotGeometry, Twist
 from limo_hog.follow.sense.detectors import Region
 from limo_hog.follow.sense.observation import Observation
@@ -50,6 +53,8 @@ class Belief:
     way: tuple[tuple[float, float], ...] = ()  #: The way it means to drive: x, y in the base frame [m].
     followed: int | None = None  #: Number of the person followed; None while there is none.
     rollout: tuple[tuple[float, float], ...] = ()  #: Where the command leads: x, y in the base frame [m].
+    #: float64 (K, T, 2) [m], base frame: where each of the commands compared leads; None without any.
+    rollouts: NDArray[np.float64] | None = field(default=None, compare=False)
     shares: tuple[tuple[str, float], ...] = ()  #: What each critic adds to its cost, by name.
 
 

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 _BASELINES = ("pursuit", "ppo")
 #: Simulated time of a run that is not of a suite [s].
 _SECONDS = 60.0
+#: Figures of a card that are tables by name.
+_NAMED = ("modes", "reasons", "critics")
 #: Columns of the table: a figure of the score card, its heading, its unit, how it is written.
 _COLUMNS = (
     ("success", "suc-\ncess", "%", ".0f"),
@@ -182,10 +184,8 @@ def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
 
 
 def _write_csv(path: Path, cards: Sequence[ScoreCard]) -> None:
-    """Write one line for each card; shares of modes and reasons, which have no fixed names, are left out."""
-    rows = [
-        {name: value for name, value in card.to_json().items() if name not in ("modes", "reasons")} for card in cards
-    ]
+    """Write one line for each card; what has no fixed names, `_NAMED`, is left out."""
+    rows = [{name: value for name, value in card.to_json().items() if name not in _NAMED} for card in cards]
     with whole_file(path) as part, about(path), part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, rows[0], lineterminator="\n")
         writer.writeheader()

@@ -36,8 +36,11 @@ class Step:
     passed: tuple[Passed, ...] = ()  #: what the faster sensors read since the control period before
 
     def bare(self) -> Step:
-        """Return the step without images and scans: 4 kB instead of 3 MB."""
-        return replace(self, log=replace(self.log, frame=None, sensors=Sensors()), windows={}, passed=())
+        """Return the step without images, scans and rollouts: 4 kB instead of 3 MB."""
+        decision = self.log.decision
+        decision = replace(decision, belief=replace(decision.belief, rollouts=None))
+        log = replace(self.log, frame=None, sensors=Sensors(), decision=decision)
+        return replace(self, log=log, windows={}, passed=())
 
 
 #: Is given every control period of a run.

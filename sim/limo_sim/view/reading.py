@@ -113,15 +113,30 @@ def believed(step: Step) -> list[list[float | None]]:
 
     They are of being a person, and of being the person followed; None for that before one was followed.
     """
+    people = step.log.decision.belief.people
+    places = _in_arena(np.array([(one.x, one.y) for one in people]).reshape(-1, 2), step).tolist()
+    return [
+        [x, y, round(one.probability, 2), None if one.same is None else round(one.same, 2), one.number]
+        for one, (x, y) in zip(people, places, strict=True)
+    ]
+
+
+def rollouts(step: Step) -> list[list[list[float]]]:
+    """Return where the commands lead that the follower compared, every third point, x, y [m] in the arena's frame.
+
+    The chosen one comes first; of those that end at the same place [dm] there is one.
+    """
+    belief = step.log.decision.belief
+    if belief.rollouts is None:
+        return []
+    _, which = np.unique(np.round(belief.rollouts[:, -1], 1), axis=0, return_index=True)
+    ways = np.concatenate([[belief.rollout], belief.rollouts[np.sort(which)]])
+    drawn: list[list[list[float]]] = _in_arena(ways[:, 2::3], step).tolist()
+    return drawn
+
+
+def _in_arena(places: NDArray[np.float64], step: Step) -> NDArray[np.float64]:
+    """Carry places (..., 2) from the base frame into the arena's [m], to the centimetre."""
     x, y, yaw = step.truth.robot
     cos, sin = math.cos(yaw), math.sin(yaw)
-    return [
-        [
-            round(x + cos * one.x - sin * one.y, 2),
-            round(y + sin * one.x + cos * one.y, 2),
-            round(one.probability, 2),
-            None if one.same is None else round(one.same, 2),
-            one.number,
-        ]
-        for one in step.log.decision.belief.people
-    ]
+    return np.asarray(np.round(places @ np.array([[cos, sin], [-sin, cos]]) + (x, y), 2))

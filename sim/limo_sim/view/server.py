@@ -24,6 +24,7 @@ from limo_sim.view.reading import (
     followed_person,
     hits,
     measured_m,
+    rollouts,
 )
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.furniture import Disc
@@ -110,6 +111,8 @@ class View(Live[Step]):
             "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
             "followed": self._followed,
             "believed": believed(step),
+            "rollouts": rollouts(step),
+            "shares": log.decision.belief.shares,
             "measured_m": measured_m(log),
             "scan": hits(log.sensors.scan, self._scenario.robot.geometry, list(self._poses)),
             "detect_ms": log.detect_ms or None,

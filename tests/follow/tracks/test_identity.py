@@ -85,6 +85,18 @@ def test_legs_that_were_just_taken_for_the_persons_tell_nothing() -> None:
     assert known.of(1) < 0.5
 
 
+def test_a_track_kept_by_legs_beside_another_person_alone_may_not_be_the_person_any_more() -> None:
+    # The camera does not find the person, and legs of somebody else are .3 m beside those taken for theirs.
+    for beside, low, high in ((0.3, 0.2, 0.6), (2.0, 0.9, 1.0)):
+        known = followed()
+        for frame in range(11, 31):
+            stamp = 0.1 * frame
+            one = replace(person(1, stamp, measured=1.0), felt=stamp)
+            other = replace(legs(person(2, stamp, beside), stamp), number=None)
+            known = IDENTITY.update(known, replace(at(stamp, one), movers=(legs(one, stamp), other)))
+        assert low <= known.of(1) <= high
+
+
 def test_a_lost_person_is_known_again_by_the_clothes_and_another_is_not() -> None:
     for clothes, low, high in ((IN_RED, 0.8, 1.0), (IN_GREEN, 0.0, 0.2)):
         known = followed()

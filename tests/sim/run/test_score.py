@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from tests.sim.run.steps import CAMERA, OFF, ON, TRUNK, add, card, followed, other_person, person, step
 
+from limo_hog.follow.decision import Belief
 from limo_sim.run.log import Step
 from limo_sim.run.matching import Criteria
 from limo_sim.run.score import Scorer
@@ -303,6 +304,20 @@ def test_the_shares_of_modes_and_reasons_add_up_to_one_however_short_the_log() -
         result = card(*(step(k, person()) for k in range(count)))
         assert sum(result.modes.values()) == sum(result.reasons.values()) == 1.0
         assert result.modes["follow"] == result.reasons["because"] == 1.0
+
+
+def test_the_critics_are_the_mean_of_what_each_adds_to_the_command_sent() -> None:
+    told = [step(k, person()) for k in range(4)]
+    costs = [{"walls": 0.2}, {"walls": 0.4, "effort": 0.1}, {}, {}]
+    steps = [
+        replace(
+            one,
+            log=replace(one.log, decision=replace(one.log.decision, belief=Belief(shares=tuple(cost.items())))),
+        )
+        for one, cost in zip(told, costs, strict=True)
+    ]
+    assert card(*steps).critics == pytest.approx({"walls": 0.15, "effort": 0.025})
+    assert card(*told).critics == {}
 
 
 def test_a_run_fails_only_beyond_the_time_unseen_that_the_criteria_allow() -> None:

@@ -54,6 +54,7 @@ def test_a_browser_sees_the_run_move_and_steers_it(running: tuple[View, Tunable[
         _see_no_icon_of_a_broken_picture(page)
         _see_it_move(page)
         _read_the_words_on_the_map(page)
+        _read_why_it_does_that(page)
         _steer_it(page, view)
         _see_it_on_a_phone(browser, view, controller)
         view.pace.set_speed(0)
@@ -94,6 +95,16 @@ def _read_the_words_on_the_map(page: Page) -> None:
     assert {"person 1: 99 %", "followed 100 %", "person 2: 98 %", "followed 50 %"} <= set(drawn)
     width = page.evaluate("document.getElementById('map').clientWidth")
     assert all(left >= 0 and right <= width for left, right in drawn.values())
+
+
+def _read_why_it_does_that(page: Page) -> None:
+    """A bar for each critic, as wide as what it adds, and nothing of the rollouts but lines from the robot."""
+    page.evaluate("now.shares = [['walls', 0.5], ['goal_distance', 1.0], ['effort', 0.001]]; shares()")
+    bars = page.evaluate("[...document.querySelectorAll('#shares span')].map((bar) => [bar.title, bar.offsetWidth])")
+    assert [title for title, _ in bars] == ["walls: 0.50", "goal distance: 1.00"]
+    assert bars[1][1] == pytest.approx(2 * bars[0][1], rel=0.1)
+    page.evaluate("now.shares = []; shares()")
+    assert page.evaluate("document.getElementById('shares').hidden")
 
 
 def _see_it_move(page: Page) -> None:

@@ -57,7 +57,7 @@ class Following:
     fall: float = param(0.0015, "of 1", "Share by which a slower frame moves it.", 0, 1)
     prompt_s: float = param(0.1, "s", "An image this late costs no distance.", 0, 5)
     near_hiding: float = param(1.2, "m", "Distance to hold to a person who will soon be out of sight.", 0.5, 8)
-    foresight_s: float = param(1.0, "s", "How soon.", 0, 5)
+    foresight_s: float = param(1.0, "s", "How soon that is, in their way.", 0, 5)
     occluder_half_width: float = param(0.12, "m", "Something this near to the line of sight hides the person.")
     margin: Margin = field(default_factory=lambda: Margin(0.65, 0.25))
     look_ahead: float = param(1.2, "m", "So much of the direct way must be free, else one is planned.")

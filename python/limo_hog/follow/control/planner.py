@@ -61,7 +61,8 @@ class Move:
     manoeuvre: Manoeuvre
     reason: str  #: Why it is not the goal's own; "" where it is.
     shares: tuple[tuple[str, float], ...]  #: Name of each critic and its share of the cost.
-    rollout: Points  #: float64 (T, 2) [m]: where it leads, base frame.
+    rollout: Points  #: float64 (T, 2) [m]: where it leads, base frame; and all that were compared, float64 (K, T, 2).
+    rollouts: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ class Planner:
     effort: Effort = field(default_factory=Effort)
     change_of_mind: ChangeOfMind = field(default_factory=ChangeOfMind)
     turn_gain: float = param(2.5, "1/s", "Turn rate for each radian to turn.", 0, 10)
-    stay: float = param(0.4, "1", "Share by which a manoeuvre begun may cost more than another, and is kept.", 0, 5)
+    stay: float = param(0.4, "of 1", "Share by which a manoeuvre begun may cost more than another, and is kept.", 0, 5)
     nowhere: float = param(0.02, "m", "A rollout that leads no further beyond the way to stop leads nowhere.", 0, 1)
     max_turn: float = param(3.0, "rad/s", "Limit of the turn rate.", 0, 6)
 
@@ -117,4 +118,5 @@ class Planner:
             if abs(speed) > self.nowhere:
                 twist, reason = replace(twist, linear=0.0), NO_WAY
         shares = tuple(zip(names, costs[:, best].tolist(), strict=True))
-        return Move(twist, manoeuvre, reason, shares, rollouts.poses[best, :, :2])
+        ways = rollouts.poses[..., :2]
+        return Move(twist, manoeuvre, reason, shares, ways[best], ways)

@@ -93,7 +93,7 @@ class TrackingController:
         if (asked := choice.asked) is not None:
             reason = f"{reason}; asked for {named(asked)}, not found yet"
         people, leads = believed(state, observation.now, self.tracker.noise), tuple(map(tuple, plan.rollout.tolist()))
-        belief = replace(belief, people=people, rollout=leads, shares=plan.shares)
+        belief = replace(belief, people=people, rollout=leads, rollouts=plan.rollouts, shares=plan.shares)
         return Decision(twist, state, mode, reason, target, region, belief)
 
     def _estimate(self, observation: Observation, state: TrackingState) -> TrackingState:

@@ -107,9 +107,10 @@ class Identity:
         """Return the tracks' probabilities before the frame's boxes; `walking` are those whose legs go on."""
         stamp = tracks.stamp or 0.0
         chances = {number: chance for number, chance in known.chances if number in people}
+        gone = {one.number for one in people.values() if self._is_gone(one, tracks, walking)}
         for number in chances:
             one = people[number]
-            if stamp - one.measured > self.unseen_s:
+            if number in gone:
                 leaves = 1.0 - math.exp(-tracks.period / self.fades_s)
             elif number in walking:
                 leaves = 0.0
@@ -123,10 +124,10 @@ class Identity:
                 continue
             near = math.dist(one.track.place, known.place) < self.reach + self.speed * lost_s
             taken = share if near else 0.0
-            gone = [other for other in chances if stamp - people[other].measured > self.unseen_s]
             absent = max(1.0 - sum(chances.values()), 0.0)
-            chances[number] = taken * (absent + sum(chances[other] for other in gone))
-            for other in gone:
+            leaving = gone & chances.keys()
+            chances[number] = taken * (absent + sum(chances[other] for other in leaving))
+            for other in leaving:
                 chances[other] *= 1.0 - taken
         measured = [one for one in people.values() if stamp - one.measured <= self.unseen_s]
         absent = max(1.0 - sum(chances.values()), 0.0)
@@ -142,6 +143,17 @@ class Identity:
                 chances[left.number] += swapped
                 chances[right.number] -= swapped
         return chances
+
+    def _is_gone(self, person: Person, tracks: Tracks, walking: AbstractSet[int]) -> bool:
+        """Whether a track is not measured, or only by legs that may be those of somebody beside it."""
+        stamp = tracks.stamp or 0.0
+        if stamp - person.measured > self.unseen_s:
+            return True
+        if stamp - person.seen <= self.unseen_s or person.number in walking:
+            return False
+        beside = [one.track.place for one in tracks.movers if one.number != person.number]
+        near = any(math.dist(place, person.track.place) < self.meets for place in beside)
+        return near or not self._is_alone(person, tracks)
 
     def _walks_on(self, person: Person, tracks: Tracks) -> bool:
         """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""

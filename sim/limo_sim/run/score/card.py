@@ -79,6 +79,7 @@ class ScoreCard:
     path_m: float  #: distance the robot's centre travelled [m]
     modes: dict[str, float]  #: share of control periods in each mode
     reasons: dict[str, float]  #: share of control periods for each reason
+    critics: dict[str, float]  #: mean cost that each critic of the planner adds to the command sent; empty without one
     #: detect_ms_…, render_ms_p50, real_time_factor: wall time, the only figures that differ between two runs of one
     #: seed.
     detect_ms_p50: float | None

@@ -50,6 +50,7 @@ class Scorer:
         self._nearest: Counter[Zone] = Counter()
         self._modes: Counter[str] = Counter()
         self._reasons: Counter[str] = Counter()
+        self._costs: Counter[str] = Counter()
 
     def add(self, step: Step) -> None:
         """Add the next step."""
@@ -74,6 +75,7 @@ class Scorer:
         self._driven += bool(step.log.decision.twist.linear or step.log.decision.twist.angular)
         self._modes[step.log.decision.mode.value] += 1
         self._reasons[step.log.decision.reason] += 1
+        self._costs.update(dict(step.log.decision.belief.shares))
         self._motion.add(step, target)
         self._clearance = min(self._clearance, _clearance(self._scenario.robot.geometry, step.truth, self._radii))
         distances = [person.distance for person in people if person]
@@ -155,6 +157,7 @@ class Scorer:
             path_m=motion.path,
             modes=_shares(self._modes, [mode.value for mode in Mode if mode not in (Mode.DRIVE, Mode.STAND)]),
             reasons=_shares(self._reasons, []),
+            critics={name: cost / self._steps for name, cost in self._costs.items()},
             detect_ms_p50=_percentile(detect_ms, 50),
             detect_ms_p95=_percentile(detect_ms, 95),
             detect_ms_mean=_share(float(detect_ms.sum()), len(detect_ms)),

@@ -57,6 +57,7 @@ function state(next, rows) {
   if (document.activeElement !== $("speed")) $("speed").value = String(now.speed);
   $("boxes").textContent = now.boxes;
   choose();
+  shares();
   if (now.detect_ms !== null) put("detect", now.detect_ms, 1, "ms");
   $("contacts").textContent = now.contacts.person + now.contacts.wall;
   if (!past && history.length) numbers(history.at(-1));
@@ -134,6 +135,23 @@ $("camera").onclick = ({ offsetX, offsetY, target }) => {
   hit.sort((a, b) => a[4] * a[5] - b[4] * b[5]);
   if (hit.length) send({ follow: hit[0][0] });
 };
+
+// Why this command: a bar as wide as its cost is high, a part for each critic, by name where there is room for it.
+
+const FULL_COST = 2; // a bar over the whole width
+
+function shares() {
+  const costs = past ? [] : now.shares.filter(([, cost]) => cost > 0.01);
+  const sum = costs.reduce((all, [, cost]) => all + cost, 0);
+  $("shares").hidden = !now.shares.length;
+  const part = ([name, cost], i) => {
+    const words = name.replaceAll("_", " ");
+    const piece = element("span", { textContent: words, title: `${words}: ${number(cost, 2)}`, className: `share-${i % 4}` });
+    piece.style.width = `${(100 * cost) / Math.max(sum, FULL_COST)}%`;
+    return piece;
+  };
+  $("shares").replaceChildren(...(costs.length ? costs.map(part) : [element("small", { textContent: "costs nothing" })]));
+}
 
 // The timeline
 
@@ -337,7 +355,15 @@ function drawMap() {
     pen.strokeStyle = colours[colour];
     line(pen, trail.filter((row) => row[column] !== null).slice(-1200).map((row) => at(row[column], row[column + 1])));
   }
+  // Where the commands lead that were compared: faint, and the one sent in bold.
+  pen.strokeStyle = colours.robot;
+  const [sent, ...compared] = past ? [] : now.rollouts.map((way) => [[robotX, robotY], ...way].map(([x, y]) => at(x, y)));
+  pen.globalAlpha = 0.18;
+  pen.lineWidth = 1;
+  for (const way of compared) line(pen, way);
   pen.globalAlpha = 1;
+  pen.lineWidth = 3;
+  if (sent) line(pen, sent);
   pen.fillStyle = colours.scan;
   for (const [x, y] of past ? [] : now.scan) pen.fillRect(at(x, y)[0] - 1, at(x, y)[1] - 1, 2, 2);
   pen.lineWidth = 2.5;

@@ -16,7 +16,7 @@ from limo_hog.follow.sense.observation import Array
 class ChangeOfMind:
     """One for a command other than the one begun, and more the further its direction is from that one's."""
 
-    weight: float = param(0.1, "1", "What another command must gain.", 0, 100)
+    weight: float = param(0.1, "cost", "What another command must gain.", 0, 100)
     turned: float = param(1.5, "1/rad", "What each radian to the direction of the command begun costs besides.", 0, 10)
 
     def cost(self, rollouts: Rollouts, _: Situation) -> Array:

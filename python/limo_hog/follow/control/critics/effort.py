@@ -16,7 +16,7 @@ from limo_hog.follow.sense.observation import Array
 class Effort:
     """Change of speed, and angle off the goal's direction."""
 
-    weight: float = param(0.08, "1", "Cost of a change by 1 m/s, or of a radian.", 0, 100)
+    weight: float = param(0.08, "s/m", "Cost of a change by 1 m/s, or of a radian.", 0, 100)
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,)."""

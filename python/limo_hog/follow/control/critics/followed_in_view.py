@@ -18,7 +18,7 @@ class FollowedInView:
 
     weight: float = param(3.0, "1/rad", "Cost of a radian.", 0, 100)
     edge: float = param(0.5, "rad", "Further to either side than this the camera does not show a whole person.", 0, 2)
-    share: float = param(0.1, "1", "Share that a radian off the middle counts for.", 0, 1)
+    share: float = param(0.1, "of 1", "Share that a radian off the middle counts for.", 0, 1)
     most: float = param(0.9, "rad", "Further off costs no more: out of the image is out of the image.", 0, 4)
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:

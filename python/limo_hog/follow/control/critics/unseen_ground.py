@@ -16,8 +16,8 @@ from limo_hog.follow.sense.observation import Array
 class UnseenGround:
     """Share of the time in which it backs onto ground where somebody can be; the near future counts most."""
 
-    weight: float = param(6.0, "1", "Cost of backing so all the time.", 0, 100)
-    unknown: float = param(0.3, "1", "Share that ground counts for that was not seen at all.", 0, 1)
+    weight: float = param(6.0, "cost", "Cost of backing so all the time.", 0, 100)
+    unknown: float = param(0.3, "of 1", "Share that ground counts for that was not seen at all.", 0, 1)
     stands: float = param(0.02, "m/s", "A slower robot stands.", 0, 1)
     fades_s: float = param(1.2, "s", "Time constant with which the future counts less.", 0.1, 60)
 

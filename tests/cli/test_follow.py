@@ -44,7 +44,7 @@ def test_another_robot_is_the_controllers_too(tmp_path: Path, capsys: pytest.Cap
     card = json.loads(capsys.readouterr().out)
     controller, detector = controller_named("tracking", 1.5), detector_named("hog")
     same = score(run_episode(Scenario.load("followable", path), controller, detector, 3.0, 0)).to_json()
-    for figure in ("distance_mean_m", "path_m", "modes", "reasons"):
+    for figure in ("distance_mean_m", "path_m", "modes", "reasons", "critics"):
         assert card[figure] == same[figure]
 
 
@@ -97,7 +97,7 @@ def test_score_writes_a_line_for_each_run_from_the_first_seed_on(tmp_path: Path)
             assert text == ("" if card[name] is None else str(card[name]))
         assert len(row["scenario_hash"]) == 16
         assert row["code_version"].startswith("limo-hog ")
-    assert set(cards[0]) - set(rows[0]) == {"modes", "reasons"}
+    assert set(cards[0]) - set(rows[0]) == {"modes", "reasons", "critics"}
 
 
 def test_score_compares_with_one_of_the_controllers_run_by_run(

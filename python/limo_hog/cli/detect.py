@@ -147,8 +147,7 @@ def run(args: argparse.Namespace) -> int:
             from limo_hog.cli.support.progress import progress
 
             bar = stack.enter_context(progress("pictures"))
-        run = Run(args, detector, threshold, bar)
-        run.find(stack)
+        run = Run(args, detector, threshold, bar, stack)
         if args.view:
             # Imported here: the server is an extra.
             from limo_hog.cli.support.film_page import FilmPage

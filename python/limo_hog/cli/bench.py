@@ -20,7 +20,7 @@ from limo_hog.cli.support.console import console
 from limo_hog.cli.support.environment import environment
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
-from limo_hog.cli.support.race import Rounds, Timing, race
+from limo_hog.cli.support.race import Timing, race
 from limo_hog.cli.support.scene import street
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
@@ -30,7 +30,8 @@ from limo_hog.parallel import cores
 #: The workshop's parameters.
 PARAMETERS: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
 SIZES = [(640, 480), (1280, 720), (1920, 1080)]
-ROUNDS = Rounds(seconds=3.0)
+#: How long the calls of a row are timed [s].
+SECONDS = 3.0
 
 Image = NDArray[np.uint8]
 #: Rectangles and weights found in an image; a second argument is the group threshold.
@@ -161,7 +162,7 @@ def _row(image: Image, threads: int, backend: str, search: str, opencv: Any) -> 
     height, width = image.shape[:2]
     size, channels = (width, height), 1 if image.ndim == 2 else 3
     if opencv is None:
-        (ours,) = race([partial(find, image)], ROUNDS)
+        (ours,) = race([partial(find, image)], SECONDS)
         return Row(size, channels, threads, backend, search, ours, None, None, None, None)
     import cv2
 
@@ -170,7 +171,7 @@ def _row(image: Image, threads: int, backend: str, search: str, opencv: Any) -> 
     rival = partial(_method, opencv)
     equal, difference = _parity(find, rival, image)
     cv2.setNumThreads(threads)
-    ours, theirs = race([partial(each, image) for each in (find, rival)], ROUNDS)
+    ours, theirs = race([partial(each, image) for each in (find, rival)], SECONDS)
     return Row(size, channels, threads, backend, search, ours, theirs, theirs.min / ours.min, equal, difference)
 
 

@@ -29,13 +29,8 @@ _STEPS, _SETTLED = 50, 1e-10
 _BINS = 10
 
 
-def card_path(model: Path) -> Path:
-    """Return the name of a model's card: the model's with `.json` after it."""
-    return model.with_name(f"{model.name}.json")
-
-
 def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShape, card: dict[str, Any]) -> None:
-    """Write a detector and its card.
+    """Write a detector and its card, whose name is the detector's with `.json` after it.
 
     Raises
     ------
@@ -43,7 +38,7 @@ def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShap
         A file cannot be written; no part of it is left behind.
     """
     model_files.save(path, Geometry(winSize=shape.size), coefficients.astype(np.float32))
-    write_text(card_path(path), json_text(card, indent=2) + "\n")
+    write_text(path.with_name(f"{path.name}.json"), json_text(card, indent=2) + "\n")
 
 
 def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:

@@ -139,7 +139,9 @@ def _continue(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result
         if not _is_result(result):
             raise LimoHogError(f"{path}: not the JSON lines of an earlier run: line {number} is another")
         if result["parameters"] != parameters:
-            different = _difference(result["parameters"], parameters)
+            was = result["parameters"]
+            names = [name for name in {**parameters, **was} if was.get(name) != parameters.get(name)]
+            different = ", ".join(f"{name} {was.get(name)}, now {parameters.get(name)}" for name in names)
             raise LimoHogError(f"{path} was made with other parameters: {different}")
     found.replace(part)
     with part.open("rb+") as file:
@@ -169,11 +171,6 @@ def _people(result: Result) -> Iterator[tuple[list[int], list[int], float, float
     """Yield box, window, margin, probability and number of each person; without a tracker the number is None."""
     ids = result.get("ids", [None] * len(result["boxes"]))
     return zip(*(result[name] for name in _EACH), ids, strict=True)
-
-
-def _difference(was: dict[str, Any], now: dict[str, Any]) -> str:
-    names = [name for name in {**now, **was} if was.get(name) != now.get(name)]
-    return ", ".join(f"{name} {was.get(name)}, now {now.get(name)}" for name in names)
 
 
 def write_csv(path: Path, results: Iterable[Result]) -> None:

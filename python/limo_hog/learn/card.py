@@ -15,7 +15,7 @@ from limo_hog.atomic import json_text, write_text
 from limo_hog.cv2_api import model_files
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
-from limo_hog.learn.evaluation.run import EvaluationParameters, Rival, evaluate
+from limo_hog.learn.evaluation.run import DRAWS, Rival, evaluate
 from limo_hog.learn.sources import TrainingData
 from limo_hog.learn.training import Round, TrainingParameters
 from limo_hog.learn.windows import WindowShape
@@ -52,8 +52,7 @@ def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
         return {}
     model = Model(Geometry(winSize=data.shape.size), done.coefficients.astype(np.float32), data.shape.object_box)
     detector = PeopleDetector(model=model, min_height=data.min_height, threshold=LEAST_SCORE)
-    how = EvaluationParameters(draws=1000 if final else 1)
-    _, (evaluation,) = evaluate([Rival("trained", detector)], data.validation, how)
+    _, (evaluation,) = evaluate([Rival("trained", detector)], data.validation, DRAWS if final else 1)
     outcomes = evaluation.outcomes
     calibration = calibrate(outcomes.scores, outcomes.right)
     probabilities = calibration.probabilities(outcomes.scores)

@@ -6,6 +6,7 @@ import argparse
 import math
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -74,7 +75,9 @@ class Run:
         self._copies: dict[Source, Path] = {}
         self._workers = 1
         self._write: Callable[[Result], None]
-        self._done: dict[str, set[int]] | None = None
+        self._earlier: list[Result] | None = None
+        # The frames of each source that an earlier run has done.
+        self._done: dict[str, set[int]] = defaultdict(set)
         #: The result of each picture, kept if a table is written at the end.
         self.results: list[Result] | None = [] if args.csv or args.coco or args.mot else None
         #: The live page, where one is wanted.
@@ -113,10 +116,11 @@ class Run:
 
     def look(self, results: Results) -> None:
         """Search every input."""
-        self._write = results.write
-        self._done = None if results.earlier is None else results.done()
+        self._write, self._earlier = results
+        for result in self._earlier or []:
+            self._done[result["source"]].add(result["frame"])
         if self.results is not None:
-            self.results += results.earlier or []
+            self.results += self._earlier or []
         self._share_cores()
         self._expect(sum(source.kind is Kind.IMAGE for source in self._sources))
         for images, group in groupby(self._sources, key=lambda source: source.kind is Kind.IMAGE):
@@ -181,7 +185,7 @@ class Run:
                 found, picture = self._finished(*result, None)
                 if picture is not None and source in self._copies and self._identities:
                     write_image(self._copies[source], picture)
-                if found.frame not in self._done_of(found.source):
+                if found.frame not in self._done[found.source]:
                     self._keep(found)
             self._advance()
 
@@ -194,7 +198,7 @@ class Run:
     def _look_at_frames(self, source: Source) -> None:
         copy = self._copies.get(source)
         if self._args.resume and copy is not None and copy.exists():
-            if self._done is None:
+            if self._earlier is None:
                 self.known += 1
                 return
             # The copy is whole; frames may lack their line.
@@ -205,7 +209,7 @@ class Run:
             except OSError as error:
                 self._fail(_named(source, error))
                 return
-            rate, done = video.fps / self._args.every, self._done_of(source.name)
+            rate, done = video.fps / self._args.every, self._done[source.name]
             newest = None
             if video.live:
                 # The thread that reads it owns it from now on.
@@ -281,12 +285,8 @@ class Run:
     def _is_done(self, source: Source) -> bool:
         if not self._args.resume:
             return False
-        written = self._done is None or 0 in self._done_of(source.name)
+        written = self._earlier is None or 0 in self._done[source.name]
         return written and (source not in self._copies or self._copies[source].exists())
-
-    def _done_of(self, name: str) -> set[int]:
-        """Return the frames of a source that an earlier run has done."""
-        return (self._done or {}).get(name, set())
 
     def _expect(self, pictures: int) -> None:
         if self._bar and self._task is not None:

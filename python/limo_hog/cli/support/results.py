@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from limo_hog.atomic import about, json_text, part_of, write_text
 from limo_hog.cli.support.output import STDOUT, emit, refuse_to_overwrite
@@ -56,18 +55,8 @@ class Row:
         }
 
 
-class Results(NamedTuple):
-    """A function that writes a result, and the results of an earlier run (None if no file is kept)."""
-
-    write: Callable[[Result], None]
-    earlier: list[Result] | None
-
-    def done(self) -> dict[str, set[int]]:
-        """Return the frames of each source that an earlier run has done."""
-        frames: dict[str, set[int]] = defaultdict(set)
-        for result in self.earlier or []:
-            frames[result["source"]].add(result["frame"])
-        return frames
+#: A function that writes a result, and the results of an earlier run (None if no file is kept).
+Results = tuple[Callable[[Result], None], list[Result] | None]
 
 
 @contextmanager
@@ -92,7 +81,7 @@ def json_lines(
         # Flushed line by line for a reader at the other end of a pipe.
         say = emit if only else partial(print, flush=True)
         show = (lambda result: say(json_text(result | {"parameters": parameters}))) if target else lambda _: None
-        yield Results(show, None)
+        yield show, None
         return
     path = Path(target)
     part = part_of(path)
@@ -116,7 +105,7 @@ def json_lines(
             whole += len(line)
 
         try:
-            yield Results(write, earlier)
+            yield write, earlier
         finally:
             if kept:
                 # A full disk may have taken half a line.

@@ -14,21 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import aiohttp
-import av
 import cv2
 import numpy as np
 import pytest
-from tests.cli.material import PICTURE, film_of, lines_of
+from tests.cli.material import PICTURE, film_of, frames_of, lines_of
 
 from limo_hog import Detections, PeopleDetector
 from limo_hog.cli.main import main
 from limo_hog.imaging import reading
 from limo_hog.models import load_model
-
-
-def frames_of(path: Path) -> int:
-    with av.open(path) as container:
-        return len(list(container.decode(video=0)))
 
 
 @pytest.fixture

@@ -74,7 +74,6 @@ WRONG_ARGUMENTS = [
     ("info more", "unrecognized arguments: more"),
     ("xyz", "no command 'xyz'; limo-hog --help lists them all"),
     ("folow", "no command 'folow'; did you mean follow?"),
-    ("detect a.jpg --json there.txt", "there.txt would be overwritten: --overwrite replaces it"),
     ("detect a.jpg --outt found", "did you mean --out?"),
     ("detect a.jpg --model nobody.yml", "model is 'nobody.yml': no such file, and none of the names opencv,"),
     ("bench --size 640", "'640' is no size; wanted is WIDTHxHEIGHT such as 640x480"),

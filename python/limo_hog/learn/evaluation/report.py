@@ -101,11 +101,10 @@ def _page(pictures: int, objects: int, evaluations: Sequence[Evaluation], mistak
     if warning := few(objects):
         parts.insert(2, f"<p><b>{warning}</b></p>")
     if differences:
-        note = "If the interval excludes 0, the difference is unlikely to be chance."
         parts += [
             "<h2>Differences, paired</h2>",
             _table(("models", "figure", "difference", "interval"), differences),
-            f"<p><small>{note}</small></p>",
+            "<p><small>If the interval excludes 0, the difference is unlikely to be chance.</small></p>",
         ]
     parts += ["<h2>By height</h2>", _table(("objects", "how many", *recalls), heights)]
     if mistakes:

@@ -72,7 +72,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Bench every combination, print a table and, if asked, JSON."""
     facts = environment()
-    opencv = _opencv() if facts["opencv_has_hog"] else None
+    opencv: Any = None
+    if facts["opencv_has_hog"]:
+        import cv2
+
+        opencv = cv2.HOGDescriptor()
+        opencv.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
     images = [
         _picture(size, channels, args.image)
         for size in (args.size or ([None] if args.image else SIZES))
@@ -123,14 +128,6 @@ def _refuse_less_than_a_window(width: int, height: int) -> None:
             f"a picture of {width}x{height} is smaller than the detector's window; {least[0]}x{least[1]} or more is "
             "wanted"
         )
-
-
-def _opencv() -> Any:
-    import cv2
-
-    hog = cv2.HOGDescriptor()
-    hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
-    return hog
 
 
 def _find(search: str) -> Find:
@@ -212,6 +209,7 @@ def _print(facts: dict[str, Any], rows: list[Row]) -> None:
     for name in ("size", "image", "threads", "limo-hog", "OpenCV", "faster", "rectangles"):
         table.add_column(name, justify="right", no_wrap=True)
     for row in rows:
+        agreement = f"equal ±{row.max_weight_diff:.0e}" if row.rects_equal else "[bold red]differ[/]"
         table.add_row(
             f"{row.size[0]}×{row.size[1]}",
             "gray" if row.channels == 1 else "BGR",
@@ -219,16 +217,10 @@ def _print(facts: dict[str, Any], rows: list[Row]) -> None:
             _ms(row.limo_ms),
             _ms(row.cv2_ms),
             "" if row.ratio is None else f"[bold]{row.ratio:.1f}×[/]",
-            _agreement(row),
+            "" if row.rects_equal is None else agreement,
         )
     screen.print(table)
 
 
 def _ms(timing: Timing | None) -> str:
     return "" if timing is None else f"{timing.min:.1f} ({timing.p50:.1f})"
-
-
-def _agreement(row: Row) -> str:
-    if row.rects_equal is None:
-        return ""
-    return f"equal ±{row.max_weight_diff:.0e}" if row.rects_equal else "[bold red]differ[/]"

@@ -58,7 +58,8 @@ def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
     probabilities = calibration.probabilities(outcomes.scores)
     figures = {name: round(value, 4) for name, value in evaluation.figures._asdict().items()}
     return {
-        "threshold": _rounded(evaluation.threshold_01),
+        # None but infinity means no detection at all, which 100 does as well.
+        "threshold": round(evaluation.threshold_01, 4) if np.isfinite(evaluation.threshold_01) else 100.0,
         "calibration": calibration._asdict(),
         "figures": {
             "pictures": len(data.validation),
@@ -69,11 +70,6 @@ def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
             "calibration_error": round(calibration_error(probabilities, outcomes.right), 4),
         },
     }
-
-
-def _rounded(threshold: float) -> float:
-    """Return a threshold that a card can hold: none but infinity means no detection at all, which 100 does as well."""
-    return round(threshold, 4) if np.isfinite(threshold) else 100.0
 
 
 def calibrate(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Calibration:

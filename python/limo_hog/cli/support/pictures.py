@@ -121,7 +121,12 @@ class Run:
             self._done[result["source"]].add(result["frame"])
         if self.results is not None:
             self.results += self._earlier or []
-        self._share_cores()
+        # A core for each of many pictures, and all cores for a single one.
+        threads = self._args.threads or cores()
+        many = len(self._sources) > 1 or any(source.kind is Kind.VIDEO for source in self._sources)
+        self._workers = threads if many else 1
+        limo_hog.set_num_threads(1 if many else threads)
+        cv2.setNumThreads(1 if many else threads)
         self._expect(sum(source.kind is Kind.IMAGE for source in self._sources))
         for images, group in groupby(self._sources, key=lambda source: source.kind is Kind.IMAGE):
             if images:
@@ -162,14 +167,6 @@ class Run:
             # Copies of an earlier run, in a folder below the pictures', are no inputs.
             found = [source for source in found if out not in real(source.path).parents]
         return found
-
-    def _share_cores(self) -> None:
-        """Use a core for each of many pictures, and all cores for a single one."""
-        threads = self._args.threads or cores()
-        many = len(self._sources) > 1 or any(source.kind is Kind.VIDEO for source in self._sources)
-        self._workers = threads if many else 1
-        limo_hog.set_num_threads(1 if many else threads)
-        cv2.setNumThreads(1 if many else threads)
 
     def _look_at_images(self, sources: list[Source]) -> None:
         self._identities = self._identities_at(_PICTURES_HZ)

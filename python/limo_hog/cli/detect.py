@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import os
 import sys
 import time
@@ -20,7 +19,7 @@ from limo_hog.cli.support.page import PORT, add_view, announce
 from limo_hog.cli.support.results import Result, json_lines, write_coco, write_csv, write_mot
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
-from limo_hog.tracking import FED, TRACKERS
+from limo_hog.tracking import TRACKERS
 
 #: What the results of a run depend on, and its JSON lines hold.
 PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "every", "search", "second_look")
@@ -120,10 +119,8 @@ def run(args: argparse.Namespace) -> int:
         detector = PeopleDetector(**{name: value for name, value in parameters.items() if name != "every"})
     except ParameterError as error:
         raise UsageError(str(error)) from error
-    threshold = detector.least_score
     if args.track:
         parameters["track"] = args.track
-        detector = dataclasses.replace(detector, threshold=threshold - FED)
     tables = _tables(args)
     # The error names a broken file in one line; the decoders' own lines are switched off.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
@@ -139,12 +136,12 @@ def run(args: argparse.Namespace) -> int:
             from limo_hog.cli.support.progress import progress
 
             bar = stack.enter_context(progress("pictures"))
-        run = Run(args, detector, threshold, bar, stack)
+        run = Run(args, detector, bar, stack)
         if args.view:
             # Imported here: the server is an extra.
             from limo_hog.cli.support.film_page import FilmPage
 
-            run.page = stack.enter_context(FilmPage(threshold, run.set_threshold, *args.view))
+            run.page = stack.enter_context(FilmPage(detector.least_score, run.set_threshold, *args.view))
             announce(run.page.url)
         only = args.out is None and not tables
         results = stack.enter_context(json_lines(args.json, parameters, args.resume, args.overwrite, only))

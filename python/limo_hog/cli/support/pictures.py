@@ -64,14 +64,9 @@ class Run:
     """
 
     def __init__(
-        self,
-        args: argparse.Namespace,
-        detector: PeopleDetector,
-        threshold: float,
-        bar: Progress | None,
-        stack: ExitStack,
+        self, args: argparse.Namespace, detector: PeopleDetector, bar: Progress | None, stack: ExitStack
     ) -> None:
-        self._args, self._detector, self._threshold, self._bar = args, detector, threshold, bar
+        self._args, self._detector, self._bar = args, detector, bar
         self._copies: dict[Source, Path] = {}
         self._workers = 1
         self._write: Callable[[Result], None]
@@ -83,6 +78,7 @@ class Run:
         #: The live page, where one is wanted.
         self.page: FilmPage | None = None
         self._identities: Identities | None = None
+        self.set_threshold(detector.least_score)
         self._task = bar.add_task("looking", total=0) if bar else None
         self.pictures = self.peopled = self.people = self.failed = self.known = self.dropped = 0
         self._ms = 0.0

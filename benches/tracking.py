@@ -48,18 +48,18 @@ class Frame:
     ignored: NDArray[np.bool_]
 
 
-def tud(pictures: Path, truth: Path, detector: PeopleDetector, numbers: range = range(1, 42)) -> Iterator[Frame]:
+def tud(pictures: Path, truth: Path, detector: PeopleDetector) -> Iterator[Frame]:
     """Yield the frames of TUD-Stadtmitte; MOTChallenge counts pixels from 1."""
     rows = np.loadtxt(truth, delimiter=",", ndmin=2)
-    for number in numbers:
+    for number in range(1, 42):
         here = rows[rows[:, 0] == number]
         found = detector.detect(cv2.imread(str(pictures / f"{number:06d}.jpg")))
         yield Frame(found, here[:, 1].astype(int), here[:, 2:6] - [1, 1, 0, 0], np.zeros(len(here), bool))
 
 
-def arena(name: str, detector: PeopleDetector, seed: int = 0) -> Iterator[Frame]:
+def arena(name: str, detector: PeopleDetector) -> Iterator[Frame]:
     """Yield what a robot that stands sees of a scenario."""
-    arena = Arena(Scenario.load(name), seed)
+    arena = Arena(Scenario.load(name), seed=0)
     for _ in range(PICTURES):
         for _ in range(STEPS_PER_SECOND // ARENA_HZ):
             arena.step()

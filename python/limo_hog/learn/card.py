@@ -50,7 +50,8 @@ def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
     """
     if not data.validation:
         return {}
-    model = Model(Geometry(winSize=data.shape.size), done.coefficients.astype(np.float32), data.shape.object_box)
+    weights = done.solution.coefficients.astype(np.float32)
+    model = Model(Geometry(winSize=data.shape.size), weights, data.shape.object_box)
     detector = PeopleDetector(model=model, min_height=data.min_height, threshold=LEAST_SCORE)
     _, (evaluation,) = evaluate([Rival("trained", detector)], data.validation, DRAWS if final else 1)
     outcomes = evaluation.outcomes

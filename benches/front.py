@@ -23,7 +23,7 @@ import limo_hog
 from limo_hog import PeopleDetector
 from limo_hog.atomic import whole_file
 from limo_hog.cli.support.scene import street
-from limo_hog.learn.evaluation.run import EvaluationParameters, Rival, evaluate
+from limo_hog.learn.evaluation.run import Rival, evaluate
 from rivals import heads, tud, usc
 
 PLOT = Path(__file__).parents[1] / "docs" / "images" / "front.png"
@@ -50,11 +50,10 @@ def main() -> None:
         for look in (True, False)
         if not (look and search.get("search") == "guided")
     }
-    how = EvaluationParameters(draws=1)
     lamrs = []
     for pictures, min_height in ((usc(args.data), 64), (tud(args.data, args.frames), 96)):
         rivals = [Rival(name, replace(one, min_height=min_height)) for name, one in detectors.items()]
-        _, evaluations = evaluate(rivals, pictures, how)
+        _, evaluations = evaluate(rivals, pictures, draws=1)
         lamrs.append([evaluation.figures.lamr for evaluation in evaluations])
     times = street_times(list(detectors.values()))
     heads("", "USC-C", "TUD 1–41", "ms", "OpenCV's plain search takes")

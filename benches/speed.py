@@ -22,12 +22,11 @@ import numpy as np
 import limo_hog
 from limo_hog import PeopleDetector, _core
 from limo_hog.cli.bench import PARAMETERS
-from limo_hog.cli.support.race import Rounds, race
+from limo_hog.cli.support.race import race
 from limo_hog.cli.support.scene import street
 from limo_sim.run.arena import Arena
 from limo_sim.world.scenario import Scenario
 
-ROUNDS = Rounds(seconds=0.6, most=100_000)
 WINDOWS = {"people": (64, 128), "Daimler": (48, 96), "random": (64, 128)}
 COEFFICIENTS = {
     "people": cv2.HOGDescriptor_getDefaultPeopleDetector(),
@@ -191,7 +190,7 @@ def main() -> None:
         heads([f"{name} ({_core.backend()})", "limo-hog ms", "cv2 ms", "times faster", "largest difference"])
         for text, *calls in tables[name]():
             apart = difference(*(call() for call in calls))
-            ours, theirs = (timing.min for timing in race(calls, ROUNDS))
+            ours, theirs = (timing.min for timing in race(calls, 0.6, most=100_000))
             print(f"| {text} | {ours:.3f} | {theirs:.3f} | {theirs / ours:.1f} | {apart} |", flush=True)
 
 

@@ -1,6 +1,6 @@
 """Identities by tracker: HOTA, IDF1, MOTA and switches on TUD-Stadtmitte and five sequences of the arena.
 
-    uv run --with trackeval python benches/tracking.py ../shared/data --frames TUD
+    uv run python benches/tracking.py ../shared/data --frames TUD
 
 prints the table of docs/detect.md. TUD is a folder with frames 1 to 41 (docs/models.md says where they are).
 """
@@ -18,7 +18,9 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from trackeval.metrics import CLEAR, HOTA, Identity
+from trackers.eval.clear import aggregate_clear_metrics, compute_clear_metrics
+from trackers.eval.hota import aggregate_hota_metrics, compute_hota_metrics
+from trackers.eval.identity import aggregate_identity_metrics, compute_identity_metrics
 
 from limo_hog import PeopleDetector
 from limo_hog.detections import Detections
@@ -46,18 +48,18 @@ class Frame:
     ignored: NDArray[np.bool_]
 
 
-def tud(pictures: Path, truth: Path, detector: PeopleDetector, numbers: range = range(1, 42)) -> Iterator[Frame]:
+def tud(pictures: Path, truth: Path, detector: PeopleDetector) -> Iterator[Frame]:
     """Yield the frames of TUD-Stadtmitte; MOTChallenge counts pixels from 1."""
     rows = np.loadtxt(truth, delimiter=",", ndmin=2)
-    for number in numbers:
+    for number in range(1, 42):
         here = rows[rows[:, 0] == number]
         found = detector.detect(cv2.imread(str(pictures / f"{number:06d}.jpg")))
         yield Frame(found, here[:, 1].astype(int), here[:, 2:6] - [1, 1, 0, 0], np.zeros(len(here), bool))
 
 
-def arena(name: str, detector: PeopleDetector, seed: int = 0) -> Iterator[Frame]:
+def arena(name: str, detector: PeopleDetector) -> Iterator[Frame]:
     """Yield what a robot that stands sees of a scenario."""
-    arena = Arena(Scenario.load(name), seed)
+    arena = Arena(Scenario.load(name), seed=0)
     for _ in range(PICTURES):
         for _ in range(STEPS_PER_SECOND // ARENA_HZ):
             arena.step()
@@ -79,9 +81,9 @@ def answers(frames: list[Frame], how: str, fps: float) -> Iterator[Detections]:
             yield dataclasses.replace(sure, ids=np.array([next(numbers) for _ in sure.scores], np.int64))
 
 
-def data_of(frames: list[Frame], answers: Iterator[Detections]) -> dict[str, Any]:
+def data_of(frames: list[Frame], answers: Iterator[Detections]) -> dict[str, list[Any]]:
     """Return a sequence as TrackEval has it; a box on somebody to be ignored (IoU ≥ .5) is left out, as they are."""
-    data: dict[str, Any] = {"gt_ids": [], "tracker_ids": [], "similarity_scores": []}
+    data: dict[str, list[Any]] = {"gt_ids": [], "tracker_ids": [], "similarity_scores": []}
     for frame, answer in zip(frames, answers, strict=True):
         shares = intersection_over_union(frame.boxes, answer.boxes)
         wanted = shares[~frame.ignored].max(axis=0, initial=0)
@@ -89,21 +91,15 @@ def data_of(frames: list[Frame], answers: Iterator[Detections]) -> dict[str, Any
         data["gt_ids"].append(frame.ids[~frame.ignored])
         data["tracker_ids"].append(np.asarray(answer.ids)[kept])
         data["similarity_scores"].append(shares[~frame.ignored][:, kept])
-    for side in ("gt", "tracker"):
-        lists = data[f"{side}_ids"]
-        known, flat = np.unique(np.concatenate(lists), return_inverse=True)
-        data[f"{side}_ids"] = np.split(flat, np.cumsum([len(ids) for ids in lists])[:-1])
-        data[f"num_{side}_ids"], data[f"num_{side}_dets"] = len(known), len(flat)
-    return data | {"num_timesteps": len(frames)}
+    return data
 
 
-def figures(sequences: dict[str, dict[str, Any]]) -> dict[str, float]:
-    """Return TrackEval's figures over all boxes of some sequences."""
-    row: dict[str, Any] = {}
-    for metric in (HOTA(), CLEAR({"PRINT_CONFIG": False}), Identity({"PRINT_CONFIG": False})):
-        row |= metric.combine_sequences({name: metric.eval_sequence(data) for name, data in sequences.items()})
-    wanted = ("HOTA", "IDF1", "MOTA", "CLR_Re", "CLR_Pr", "IDSW")
-    return {name: float(np.mean(row[name])) for name in wanted}
+def figures(sequences: list[dict[str, list[Any]]]) -> list[float]:
+    """Return TrackEval's figures, as `trackers` computes them, over all boxes of some sequences."""
+    row = aggregate_hota_metrics([compute_hota_metrics(**data) for data in sequences])
+    row |= aggregate_clear_metrics([compute_clear_metrics(**data) for data in sequences])
+    row |= aggregate_identity_metrics([compute_identity_metrics(**data) for data in sequences])
+    return [row[name] for name in ("HOTA", "IDF1", "MOTA", "CLR_Re", "CLR_Pr", "IDSW")]
 
 
 def main() -> None:
@@ -121,8 +117,7 @@ def main() -> None:
     print("|  | tracker | HOTA | IDF1 | MOTA | recall | precision | switches |\n|---|---|---|---|---|---|---|---|")
     for group, names in groups.items():
         for how in ("none", *TRACKERS):
-            row = figures({name: data_of(sets[name][0], answers(sets[name][0], how, sets[name][1])) for name in names})
-            *shares, switches = row.values()
+            *shares, switches = figures([data_of(sets[n][0], answers(sets[n][0], how, sets[n][1])) for n in names])
             print(f"| {group} | {how} |", " | ".join(f"{x:.3f}" for x in shares), f"| {switches:.0f} |", flush=True)
 
 

@@ -42,9 +42,7 @@ def part_of(path: Path) -> Path:
     """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    if is_stream(path):
-        return path
-    return _hidden(path, "part")
+    return path if is_stream(path) else _hidden(path, "part")
 
 
 def _hidden(path: Path, word: str) -> Path:

@@ -8,12 +8,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 
 from limo_hog.cli.support.scene import street
 from limo_hog.imaging.writing import video_writer
 
 PICTURE = street(192, 256, 3)
+LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 #: With these `detect` gives OpenCV's rectangles.
 OPENCVS = ("--model", "opencv", "--min-height", "none", "--nms", "group")
 
@@ -22,6 +24,11 @@ def film_of(path: Path, frames: int = 12) -> None:
     with video_writer(path, fps=10) as write:
         for i in range(frames):
             write(np.ascontiguousarray(np.roll(PICTURE, 4 * i, axis=1)))
+
+
+def frames_of(path: Path) -> int:
+    with av.open(path) as container:
+        return len(list(container.decode(video=0)))
 
 
 def lines_of(text: str) -> list[dict[str, Any]]:

@@ -14,13 +14,13 @@ import limo_hog
 from limo_hog import detector
 from limo_hog.cli import bench
 from limo_hog.cli.main import main
-from limo_hog.cli.support.race import Rounds, race
+from limo_hog.cli.support.race import race
 from limo_hog.cli.support.scene import street
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench, "ROUNDS", Rounds(seconds=0.05))
+    monkeypatch.setattr(bench, "SECONDS", 0.05)
 
 
 def _bench(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def test_a_picture_of_ones_own_is_benched_in_its_own_size_or_another(
 
 def test_calls_are_timed_in_turn_and_no_more_often_than_asked() -> None:
     called: list[str] = []
-    timings = race([lambda: called.append("a"), lambda: called.append("b")], Rounds(seconds=60, least=2, most=3))
+    timings = race([lambda: called.append("a"), lambda: called.append("b")], seconds=60, least=2, most=3)
     assert "".join(called) == "ab" * 4  # the first call of each does not count
     assert all(0 <= timing.min <= timing.p50 for timing in timings)
 

@@ -7,7 +7,6 @@ import json
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +14,13 @@ import av
 import cv2
 import numpy as np
 import pytest
-from tests.cli.material import OPENCVS, PICTURE, film_of, lines_of
+from tests.cli.material import LIMO_HOG, OPENCVS, PICTURE, film_of, lines_of
 
 import limo_hog
 from limo_hog.cli.main import main
 from limo_hog.cli.support.scene import street
 from limo_hog.detector import PeopleDetector
 from limo_hog.imaging.writing import write_image
-
-LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 
 
 def test_results_are_lines_in_the_order_of_the_inputs(pictures: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,41 +93,6 @@ def test_one_picture_is_summed_up_in_one_unit(pictures: Path, capsys: pytest.Cap
     shown = capsys.readouterr()
     assert "  0 people " in shown.out
     assert re.fullmatch(r"1 picture, 0 people; detection [\d.]+ ms\n", shown.err)
-
-
-def test_ctrl_c_is_the_end_of_a_camera(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    class Camera:
-        """Shows a picture seven times, until its user has seen enough."""
-
-        def __init__(self, _: int) -> None:
-            self.left = 7
-
-        def isOpened(self) -> bool:
-            return True
-
-        def get(self, _: int) -> float:
-            return 0.0
-
-        def grab(self) -> bool:
-            self.left -= 1
-            if self.left < 0:
-                raise KeyboardInterrupt
-            return True
-
-        def retrieve(self) -> tuple[bool, np.ndarray[Any, Any]]:
-            return True, PICTURE
-
-        def release(self) -> None:
-            pass
-
-    monkeypatch.setattr(cv2, "VideoCapture", Camera)
-    out = tmp_path / "out"
-    assert main(["detect", "0", "--json", "-", "--out", str(out)]) == 0
-    results = lines_of(capsys.readouterr().out)
-    with av.open(out / "0.mp4") as container:
-        assert len(list(container.decode(video=0))) == len(results) > 0
 
 
 WIDE = street(320, 240, 3)

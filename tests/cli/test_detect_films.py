@@ -14,21 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import aiohttp
-import av
 import cv2
 import numpy as np
 import pytest
-from tests.cli.material import PICTURE, film_of, lines_of
+from tests.cli.material import PICTURE, film_of, frames_of, lines_of
 
 from limo_hog import Detections, PeopleDetector
 from limo_hog.cli.main import main
 from limo_hog.imaging import reading
 from limo_hog.models import load_model
-
-
-def frames_of(path: Path) -> int:
-    with av.open(path) as container:
-        return len(list(container.decode(video=0)))
 
 
 @pytest.fixture
@@ -61,24 +55,6 @@ def test_people_of_a_film_are_numbered_in_every_format(film: Path, tmp_path: Pat
     half.write_text("".join(names["json"].read_text().splitlines(keepends=True)[:5]))
     assert main(["detect", str(film), "--track", "--json", str(half), "--resume"]) == 0
     assert [result["ids"] for result in lines_of(half.read_text())] == [result["ids"] for result in results]
-
-
-@pytest.mark.parametrize(
-    ("typed", "told"),
-    [
-        ("walk.mp4 --mot a.txt", "add --track"),
-        ("walk.mp4 other.mp4 --track --mot a.txt", "--mot is for one film, or for pictures that are one"),
-        ("walk.mp4 --track --mot -", "want a file's name"),
-        ("walk.mp4 --view here", "'here' is no [HOST:]PORT such as 8488"),
-    ],
-)
-def test_options_that_contradict_each_other_are_told(
-    typed: str, told: str, film: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(film.parent)
-    film_of(film.with_name("other.mp4"), frames=2)
-    assert main(["detect", *typed.split()]) == 2
-    assert told in capsys.readouterr().err
 
 
 def test_a_film_without_the_tracker_names_the_line_that_installs_it(

@@ -8,18 +8,15 @@ import os
 import signal
 import stat
 import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
 
 import cv2
 import pytest
-from tests.cli.material import film_of, lines_of, on_a_full_disk
+from tests.cli.material import LIMO_HOG, film_of, lines_of, on_a_full_disk
 
 from limo_hog.cli.main import main
-
-LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 
 
 def test_resuming_does_only_what_is_left(pictures: Path, tmp_path: Path) -> None:

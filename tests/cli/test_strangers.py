@@ -17,7 +17,7 @@ from pathlib import Path
 
 import cv2
 import pytest
-from tests.cli.material import PICTURE, film_of, lines_of
+from tests.cli.material import LIMO_HOG, PICTURE, film_of, lines_of
 
 from limo_hog.atomic import alone, json_text, whole_file
 from limo_hog.cli.main import main
@@ -26,7 +26,6 @@ from limo_hog.cli.support.console import console
 from limo_hog.imaging.reading import Source
 from limo_hog.imaging.writing import write_image
 
-LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 #: A name with a byte that is no UTF-8, as an old camera or archive leaves it.
 WRONG_BYTE = os.fsdecode(b"caf\xe9")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -43,20 +45,15 @@ def test_no_crops_have_no_descriptors() -> None:
     assert limo_hog.describe(np.empty((0, 128, 64, 3), np.uint8)).shape == (0, 3780)
 
 
-@pytest.mark.parametrize("shape", [(128, 64), (2, 128, 64, 2), (1, 2, 128, 64, 3)])
-def test_another_shape_is_an_image_error(shape: tuple[int, ...]) -> None:
-    with pytest.raises(limo_hog.ImageError, match="N, H, W"):
-        limo_hog.describe(np.zeros(shape, np.uint8))
-
-
-def test_what_is_no_array_of_bytes_is_a_type_error() -> None:
-    with pytest.raises(limo_hog.ImageTypeError, match="uint8"):
-        limo_hog.describe(np.zeros((1, 128, 64), np.float32))
-    with pytest.raises(limo_hog.ImageTypeError, match="list"):
-        limo_hog.describe([np.zeros((128, 64), np.uint8)])  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("size", [(60, 128), (8, 16), (64, 100)])
-def test_a_size_that_is_no_window_is_a_geometry_error(size: tuple[int, int]) -> None:
-    with pytest.raises(limo_hog.GeometryError):
-        limo_hog.describe(np.zeros((1, size[1], size[0]), np.uint8))
+@pytest.mark.parametrize(
+    ("crops", "kind", "told"),
+    [
+        *((np.zeros(s, np.uint8), limo_hog.ImageError, "N, H, W") for s in ((128, 64), (2, 8, 8, 2), (1, 2, 8, 8, 3))),
+        (np.zeros((1, 128, 64), np.float32), limo_hog.ImageTypeError, "uint8"),
+        ([np.zeros((128, 64), np.uint8)], limo_hog.ImageTypeError, "list"),
+        *((np.zeros((1, *s), np.uint8), limo_hog.GeometryError, "block") for s in ((128, 60), (16, 8), (100, 64))),
+    ],
+)
+def test_what_are_no_crops_of_a_windows_size_is_a_named_error(crops: Any, kind: type[Exception], told: str) -> None:
+    with pytest.raises(kind, match=told):
+        limo_hog.describe(crops)

@@ -32,19 +32,16 @@ def picture() -> Image:
     return street(640, 480, 3)
 
 
-def opencv_boxes(image: Image, model: str) -> list[list[int]]:
+def assert_opencvs(image: Image, model: str) -> int:
     if model == "daimler":
         hog = cv2.HOGDescriptor((48, 96), (16, 16), (8, 8), (8, 8), 9)
         hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDaimlerPeopleDetector()))
     else:
         hog = cv2.HOGDescriptor()
         hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
-    return sorted(np.reshape(hog.detectMultiScale(image, padding=(4, 4))[0], (-1, 4)).tolist())
-
-
-def assert_opencvs(image: Image, model: str) -> int:
+    theirs = np.reshape(hog.detectMultiScale(image, padding=(4, 4))[0], (-1, 4)).tolist()
     found = PeopleDetector(model=model, min_height=None, nms="group").detect(image)
-    assert sorted(found.windows.tolist()) == opencv_boxes(image, model)
+    assert sorted(found.windows.tolist()) == sorted(theirs)
     return len(found)
 
 

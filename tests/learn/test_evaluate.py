@@ -33,16 +33,10 @@ def streets(tmp_path: Path) -> Path:
     return tmp_path / "data"
 
 
-def _figures(text: str) -> dict[str, Any]:
-    figures = json.loads(text)
-    assert isinstance(figures, dict)
-    return figures
-
-
 def test_figures_come_as_json(streets: Path, capsys: pytest.CaptureFixture[str]) -> None:
     objects = sum(map(len, json.loads((streets / "boxes.json").read_text()).values()))
     assert main(["evaluate", "opencv", str(streets), "--json", "-"]) == 0
-    result = _figures(capsys.readouterr().out)
+    result = json.loads(capsys.readouterr().out)
     assert (result["pictures"], result["objects"]) == (3, objects)
     (model,) = result["models"]
     found = (objects - 1) / objects
@@ -57,7 +51,7 @@ def test_figures_come_as_json(streets: Path, capsys: pytest.CaptureFixture[str])
 
 def test_others_are_compared_on_the_same_draws(streets: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", "opencv", str(streets), "--against", "daimler", "--json", "-"]) == 0
-    result = _figures(capsys.readouterr().out)
+    result = json.loads(capsys.readouterr().out)
     first, other = result["models"]
     lamr = next(d for d in result["differences"] if d["figure"] == "lamr")
     assert (lamr["model"], lamr["difference"]) == ("daimler", pytest.approx(first["lamr"] - other["lamr"]))
@@ -86,7 +80,7 @@ def test_the_report_is_a_page_with_the_curve_and_the_mistakes(
     assert "False alarms in orange" in page and 'name="viewport"' in page
     warned = re.search(r"only \d+ objects?: below 50 these figures are mostly chance", said)
     assert warned is not None and warned[0] in page
-    mistakes = _figures((out / "figures.json").read_text())["mistakes"]
+    mistakes = json.loads((out / "figures.json").read_text())["mistakes"]
     missed = [m for m in mistakes if m["kind"] == "missed"]
     assert [m["box"] for m in missed] == [[10, 5, 15, 40]]
     sheet = np.asarray(cv2.imread(str(out / "mistakes.png")))

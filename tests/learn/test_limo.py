@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -46,22 +47,15 @@ def test_people_too_small_for_the_large_window_are_found_by_the_small_one() -> N
     assert len(limo) > len(large)
 
 
-@pytest.mark.parametrize("min_height", [64, 96, 200])
-def test_from_64_px_on_the_large_window_alone_is_used(min_height: float) -> None:
+@pytest.mark.parametrize(
+    "options", [*({"min_height": height} for height in (64, 96, 200)), {"min_height": None, "nms": "group"}]
+)
+def test_from_64_px_on_and_in_opencvs_grouping_the_large_window_alone_is_used(options: dict[str, Any]) -> None:
     picture = street(640, 480, 3)
-    limo, large = (PeopleDetector(model=model, min_height=min_height).detect(picture) for model in ("limo", LARGE))
+    limo, large = (PeopleDetector(model=model, **options).detect(picture) for model in ("limo", LARGE))
     assert len(limo) > 0
     assert limo.boxes.tolist() == large.boxes.tolist()
     assert limo.scores.tolist() == large.scores.tolist()
-
-
-def test_opencvs_grouping_knows_one_window() -> None:
-    picture = street(640, 480, 3)
-    limo, large = (
-        PeopleDetector(model=model, min_height=None, nms="group").detect(picture) for model in ("limo", LARGE)
-    )
-    assert len(limo) > 0
-    assert limo.boxes.tolist() == large.boxes.tolist()
 
 
 def test_people_of_48_px_are_found() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from tests.cli.material import LIMO_HOG
 from tests.learn import bollards as drawn
 
 import limo_hog
@@ -20,7 +20,6 @@ from limo_hog.cli.main import main
 from limo_hog.imaging.writing import write_image
 from limo_hog.models import load_model
 
-LIMO_HOG = Path(sys.executable).with_name("limo-hog")
 YARD = "bollards"
 
 

@@ -45,11 +45,11 @@ def test_the_same_data_give_the_same_bits_on_any_number_of_cores(data: TrainingD
     one, many = _train(data, workers=1), _train(data, workers=3)
     assert [done.number for done in one] == [0, 1, 2]
     for a, b in zip(one, many, strict=True):
-        assert np.array_equal(a.coefficients, b.coefficients)
+        assert np.array_equal(a.solution.coefficients, b.solution.coefficients)
         assert (a.negatives, a.new) == (b.negatives, b.new)
     assert one[1].new > 0
     other = _train(data, replace(SMALL, seed=1))
-    assert not np.array_equal(one[-1].coefficients, other[-1].coefficients)
+    assert not np.array_equal(one[-1].solution.coefficients, other[-1].solution.coefficients)
 
 
 def test_labels_choose_the_window_and_pictures_are_held_out(data: TrainingData, bollards: Path) -> None:
@@ -79,7 +79,7 @@ def test_nothing_is_held_out_where_no_object_can_be(bollards: Path, tmp_path: Pa
 def test_negatives_of_labelled_pictures_are_clear_of_the_objects(data: TrainingData) -> None:
     (first,) = _train(data, replace(SMALL, rounds=0))
     miner = Miner(data.negatives, data.shape, SMALL.mining, 0, 2)
-    negatives = list(miner.hard(first.coefficients, {}))
+    negatives = list(miner.hard(first.solution.coefficients, {}))
     assert sum(len(mined.boxes) for mined in negatives) > 0
     for mined in negatives:
         objects = data.negatives.objects[data.negatives.paths[mined.picture]]
@@ -87,17 +87,17 @@ def test_negatives_of_labelled_pictures_are_clear_of_the_objects(data: TrainingD
         assert (overlaps <= 0.3 + 1e-9).all()
     # What is known is not found again.
     known = {mined.picture: set(map(tuple, mined.boxes.tolist())) for mined in negatives}
-    for mined in miner.hard(first.coefficients, known):
+    for mined in miner.hard(first.solution.coefficients, known):
         assert known[mined.picture].isdisjoint(map(tuple, mined.boxes.tolist()))
 
 
 def test_memory_is_bounded_by_leaving_out_the_least_hard_negatives(data: TrainingData) -> None:
     first, free = _train(data, replace(SMALL, rounds=1))
-    room = first.descriptor_bytes + 10 * 4 * (len(first.coefficients) - 1)
+    room = first.descriptor_bytes + 10 * 4 * (len(first.solution.coefficients) - 1)
     _, bounded = _train(data, replace(SMALL, rounds=1, most_bytes=room))
     assert (bounded.new, bounded.left_out) == (10, free.new - 10)
     assert bounded.descriptor_bytes <= room
-    found = list(Miner(data.negatives, data.shape, SMALL.mining, 0, 2).hard(first.coefficients, {}))
+    found = list(Miner(data.negatives, data.shape, SMALL.mining, 0, 2).hard(first.solution.coefficients, {}))
     kept, left_out = hardest(found, 10 * found[0].descriptors[0].nbytes)
     margins = np.sort(np.concatenate([mined.margins for mined in found]))
     assert np.sort(np.concatenate([mined.margins for mined in kept])).tolist() == margins[-10:].tolist()

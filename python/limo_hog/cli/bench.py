@@ -20,7 +20,7 @@ from limo_hog.cli.support.console import console
 from limo_hog.cli.support.environment import environment
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
-from limo_hog.cli.support.race import Rounds, Timing, race
+from limo_hog.cli.support.race import Timing, race
 from limo_hog.cli.support.scene import street
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
@@ -30,7 +30,8 @@ from limo_hog.parallel import cores
 #: The workshop's parameters.
 PARAMETERS: dict[str, Any] = {"winStride": (8, 8), "padding": (4, 4), "scale": 1.05}
 SIZES = [(640, 480), (1280, 720), (1920, 1080)]
-ROUNDS = Rounds(seconds=3.0)
+#: How long the calls of a row are timed [s].
+SECONDS = 3.0
 
 Image = NDArray[np.uint8]
 #: Rectangles and weights found in an image; a second argument is the group threshold.
@@ -71,7 +72,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Bench every combination, print a table and, if asked, JSON."""
     facts = environment()
-    opencv = _opencv() if facts["opencv_has_hog"] else None
+    opencv: Any = None
+    if facts["opencv_has_hog"]:
+        import cv2
+
+        opencv = cv2.HOGDescriptor()
+        opencv.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
     images = [
         _picture(size, channels, args.image)
         for size in (args.size or ([None] if args.image else SIZES))
@@ -124,14 +130,6 @@ def _refuse_less_than_a_window(width: int, height: int) -> None:
         )
 
 
-def _opencv() -> Any:
-    import cv2
-
-    hog = cv2.HOGDescriptor()
-    hog.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
-    return hog
-
-
 def _find(search: str) -> Find:
     """Return the search of an image with the workshop's parameters: by OpenCV's method, or guided."""
     if search == "guided":
@@ -161,7 +159,7 @@ def _row(image: Image, threads: int, backend: str, search: str, opencv: Any) -> 
     height, width = image.shape[:2]
     size, channels = (width, height), 1 if image.ndim == 2 else 3
     if opencv is None:
-        (ours,) = race([partial(find, image)], ROUNDS)
+        (ours,) = race([partial(find, image)], SECONDS)
         return Row(size, channels, threads, backend, search, ours, None, None, None, None)
     import cv2
 
@@ -170,7 +168,7 @@ def _row(image: Image, threads: int, backend: str, search: str, opencv: Any) -> 
     rival = partial(_method, opencv)
     equal, difference = _parity(find, rival, image)
     cv2.setNumThreads(threads)
-    ours, theirs = race([partial(each, image) for each in (find, rival)], ROUNDS)
+    ours, theirs = race([partial(each, image) for each in (find, rival)], SECONDS)
     return Row(size, channels, threads, backend, search, ours, theirs, theirs.min / ours.min, equal, difference)
 
 
@@ -211,6 +209,7 @@ def _print(facts: dict[str, Any], rows: list[Row]) -> None:
     for name in ("size", "image", "threads", "limo-hog", "OpenCV", "faster", "rectangles"):
         table.add_column(name, justify="right", no_wrap=True)
     for row in rows:
+        agreement = f"equal ±{row.max_weight_diff:.0e}" if row.rects_equal else "[bold red]differ[/]"
         table.add_row(
             f"{row.size[0]}×{row.size[1]}",
             "gray" if row.channels == 1 else "BGR",
@@ -218,16 +217,10 @@ def _print(facts: dict[str, Any], rows: list[Row]) -> None:
             _ms(row.limo_ms),
             _ms(row.cv2_ms),
             "" if row.ratio is None else f"[bold]{row.ratio:.1f}×[/]",
-            _agreement(row),
+            "" if row.rects_equal is None else agreement,
         )
     screen.print(table)
 
 
 def _ms(timing: Timing | None) -> str:
     return "" if timing is None else f"{timing.min:.1f} ({timing.p50:.1f})"
-
-
-def _agreement(row: Row) -> str:
-    if row.rects_equal is None:
-        return ""
-    return f"equal ±{row.max_weight_diff:.0e}" if row.rects_equal else "[bold red]differ[/]"

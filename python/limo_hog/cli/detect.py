@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import os
 import sys
 import time
@@ -20,7 +19,7 @@ from limo_hog.cli.support.page import PORT, add_view, announce
 from limo_hog.cli.support.results import Result, json_lines, write_coco, write_csv, write_mot
 from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
-from limo_hog.tracking import FED, TRACKERS
+from limo_hog.tracking import TRACKERS
 
 #: What the results of a run depend on, and its JSON lines hold.
 PARAMETERS = ("model", "threshold", "min_height", "max_height", "nms", "overlap", "every", "search", "second_look")
@@ -34,15 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "http://…) or standard input (-). What cannot be read is named, the rest is done, and the exit code is 1 then.",
     )
     parser.add_argument("inputs", nargs="+", metavar="INPUT")
-    _add_outputs(parser)
-    _add_search(parser)
-    again = parser.add_mutually_exclusive_group()
-    again.add_argument("--resume", action="store_true", help="go on where an earlier run with --json or --out stopped")
-    again.add_argument("--overwrite", action="store_true", help="replace the files of an earlier run")
-
-
-def _add_outputs(parser: argparse.ArgumentParser) -> None:
-    """Add the options of what is written and shown."""
+    # What is written and shown.
     parser.add_argument("--out", type=Path, metavar="DIR", help="write annotated copies of pictures and videos (MP4)")
     parser.add_argument(
         "--format", choices=["jpg", "png"], help="of annotated pictures (JPEG where the picture is, else PNG)"
@@ -65,10 +56,7 @@ def _add_outputs(parser: argparse.ArgumentParser) -> None:
         f"show pictures, boxes and the rate on a live page ({PORT}), with a pause and the threshold; films are no "
         "faster than real time then",
     )
-
-
-def _add_search(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the search."""
+    # The search.
     parser.add_argument("--model", default=PeopleDetector.model, metavar="NAME|FILE", help=f"{MODEL} (%(default)s)")
     add_search(parser)
     parser.add_argument("--threshold", type=arguments.score, metavar="T", help="least score of a hit (the model's own)")
@@ -102,6 +90,9 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
         "--threads", type=arguments.threads, default=0, metavar="N", help="how many cores to keep busy; 0: all (0)"
     )
     parser.add_argument("--every", type=arguments.count, default=1, metavar="N", help="every Nth frame of a video (1)")
+    again = parser.add_mutually_exclusive_group()
+    again.add_argument("--resume", action="store_true", help="go on where an earlier run with --json or --out stopped")
+    again.add_argument("--overwrite", action="store_true", help="replace the files of an earlier run")
 
 
 def _tables(args: argparse.Namespace) -> Mapping[Path, Callable[[Path, Iterable[Result]], None]]:
@@ -128,10 +119,8 @@ def run(args: argparse.Namespace) -> int:
         detector = PeopleDetector(**{name: value for name, value in parameters.items() if name != "every"})
     except ParameterError as error:
         raise UsageError(str(error)) from error
-    threshold = detector.least_score
     if args.track:
         parameters["track"] = args.track
-        detector = dataclasses.replace(detector, threshold=threshold - FED)
     tables = _tables(args)
     # The error names a broken file in one line; the decoders' own lines are switched off.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
@@ -147,13 +136,12 @@ def run(args: argparse.Namespace) -> int:
             from limo_hog.cli.support.progress import progress
 
             bar = stack.enter_context(progress("pictures"))
-        run = Run(args, detector, threshold, bar)
-        run.find(stack)
+        run = Run(args, detector, bar, stack)
         if args.view:
             # Imported here: the server is an extra.
             from limo_hog.cli.support.film_page import FilmPage
 
-            run.page = stack.enter_context(FilmPage(threshold, run.set_threshold, *args.view))
+            run.page = stack.enter_context(FilmPage(detector.least_score, run.set_threshold, *args.view))
             announce(run.page.url)
         only = args.out is None and not tables
         results = stack.enter_context(json_lines(args.json, parameters, args.resume, args.overwrite, only))

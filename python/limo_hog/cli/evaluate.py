@@ -10,7 +10,7 @@ from limo_hog.cli.support.arguments import MODEL, add_json, add_labels, least_he
 from limo_hog.cli.support.output import STDOUT, write_json
 
 if TYPE_CHECKING:
-    from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, Rival
+    from limo_hog.learn.evaluation.run import Evaluation, Rival
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -48,29 +48,28 @@ def run(args: argparse.Namespace) -> int:
     """Measure, print a table and, if asked, write JSON and a page."""
     from limo_hog.cli.support.progress import progress
     from limo_hog.cli.support.warned import warnings_in_one_line
-    from limo_hog.learn.evaluation.run import EvaluationParameters, as_json, evaluate, few
+    from limo_hog.learn.evaluation.run import as_json, evaluate, few
     from limo_hog.learn.formats import read_labels
     from limo_hog.learn.labels import choose
 
     if args.report:
         # What it lacks is said before the work, not after.
         from limo_hog.learn.evaluation.report import write_report
-    how = EvaluationParameters()
     rivals = _rivals(args)
     with warnings_in_one_line():
         pictures = choose(read_labels(args.data, args.pictures), args.label)
         with progress("pictures") as bar:
             task = bar.add_task("evaluating", total=len(pictures))
-            used, evaluations = evaluate(rivals, pictures, how, lambda: bar.advance(task))
+            used, evaluations = evaluate(rivals, pictures, done=lambda: bar.advance(task))
     if args.json:
-        write_json(args.json, as_json(used, evaluations, how))
+        write_json(args.json, as_json(used, evaluations))
     if args.json != STDOUT:
         objects = sum(not box.ignored for picture in used for box in picture.boxes)
-        _print(f"{len(used)} pictures with {objects} objects", evaluations, how)
+        _print(f"{len(used)} pictures with {objects} objects", evaluations)
         if warning := few(objects):
             print(warning)
     if args.report:
-        page = write_report(args.report, used, evaluations, how)
+        page = write_report(args.report, used, evaluations)
         if args.json != STDOUT:
             print(page)
     return 0
@@ -99,16 +98,16 @@ def _rivals(args: argparse.Namespace) -> list[Rival]:
     return rivals
 
 
-def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters) -> None:
+def _print(title: str, evaluations: list[Evaluation]) -> None:
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
     from limo_hog.cli.support.console import console
-    from limo_hog.learn.evaluation.run import compare
+    from limo_hog.learn.evaluation.run import CONFIDENCE, compare
 
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
-    for column in ("model", "LAMR", f"{how.confidence:.0%}", "R at .1", "R at 1", "AP", "T at .1", "ms"):
+    for column in ("model", "LAMR", f"{CONFIDENCE:.0%}", "R at .1", "R at 1", "AP", "T at .1", "ms"):
         table.add_column(column, justify="left" if column == "model" else "right")
     for one in evaluations:
         low, high = one.intervals["lamr"]
@@ -124,7 +123,7 @@ def _print(title: str, evaluations: list[Evaluation], how: EvaluationParameters)
     screen = console()
     screen.print(table)
     for other in evaluations[1:]:
-        lamr = compare(evaluations[0], other, how)[0]
+        lamr = compare(evaluations[0], other)[0]
         low, high = lamr.interval
         sure = "" if low <= 0 <= high else ", unlikely to be chance"
         names = f"{evaluations[0].name} minus {other.name}"

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from limo_hog.cli.support.console import console
-from limo_hog.cli.support.environment import Extra, environment, extras
+from limo_hog.cli.support.environment import environment, extras
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -39,13 +39,8 @@ def run(args: argparse.Namespace) -> int:  # noqa: ARG001
     screen = console()
     screen.print(_table(rows))
     screen.print("\n[bold]extras[/]")
-    screen.print(_table({extra.name: _told(extra) for extra in extras()}))
+    screen.print(_table(extras()))
     return 0
-
-
-def _told(extra: Extra) -> str:
-    missing = f"not installed: {extra.install}" if extra.install else ""
-    return "; ".join([*extra.installed, *filter(None, [missing])])
 
 
 def _table(rows: Mapping[str, object]) -> Table:

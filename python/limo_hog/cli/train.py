@@ -109,7 +109,7 @@ def _keep(done: Round, out: Path, rounds: list[dict[str, Any]], data: TrainingDa
     measured = measure(done, data, final=done.number == how.rounds)
     figures = measured.get("figures", {})
     rounds.append(as_json(done) | {name: figures[name] for name in ("lamr", "ap") if name in figures})
-    write_model(out, done.coefficients, data.shape, make_card(measured, rounds, data, how))
+    write_model(out, done.solution.coefficients, data.shape, make_card(measured, rounds, data, how))
     words = [
         f"round {done.number}: {done.objects} objects, {done.negatives} negatives",
         f"{done.descriptor_bytes / 2**20:.0f} MB of descriptors",

@@ -15,7 +15,7 @@ from limo_hog.atomic import json_text, write_text
 from limo_hog.cv2_api import model_files
 from limo_hog.cv2_api.geometry import Geometry
 from limo_hog.detector import PeopleDetector
-from limo_hog.learn.evaluation.run import EvaluationParameters, Rival, evaluate
+from limo_hog.learn.evaluation.run import DRAWS, Rival, evaluate
 from limo_hog.learn.sources import TrainingData
 from limo_hog.learn.training import Round, TrainingParameters
 from limo_hog.learn.windows import WindowShape
@@ -29,13 +29,8 @@ _STEPS, _SETTLED = 50, 1e-10
 _BINS = 10
 
 
-def card_path(model: Path) -> Path:
-    """Return the name of a model's card: the model's with `.json` after it."""
-    return model.with_name(f"{model.name}.json")
-
-
 def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShape, card: dict[str, Any]) -> None:
-    """Write a detector and its card.
+    """Write a detector and its card, whose name is the detector's with `.json` after it.
 
     Raises
     ------
@@ -43,7 +38,7 @@ def write_model(path: Path, coefficients: NDArray[np.float64], shape: WindowShap
         A file cannot be written; no part of it is left behind.
     """
     model_files.save(path, Geometry(winSize=shape.size), coefficients.astype(np.float32))
-    write_text(card_path(path), json_text(card, indent=2) + "\n")
+    write_text(path.with_name(f"{path.name}.json"), json_text(card, indent=2) + "\n")
 
 
 def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
@@ -55,16 +50,17 @@ def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
     """
     if not data.validation:
         return {}
-    model = Model(Geometry(winSize=data.shape.size), done.coefficients.astype(np.float32), data.shape.object_box)
+    weights = done.solution.coefficients.astype(np.float32)
+    model = Model(Geometry(winSize=data.shape.size), weights, data.shape.object_box)
     detector = PeopleDetector(model=model, min_height=data.min_height, threshold=LEAST_SCORE)
-    how = EvaluationParameters(draws=1000 if final else 1)
-    _, (evaluation,) = evaluate([Rival("trained", detector)], data.validation, how)
+    _, (evaluation,) = evaluate([Rival("trained", detector)], data.validation, DRAWS if final else 1)
     outcomes = evaluation.outcomes
     calibration = calibrate(outcomes.scores, outcomes.right)
     probabilities = calibration.probabilities(outcomes.scores)
     figures = {name: round(value, 4) for name, value in evaluation.figures._asdict().items()}
     return {
-        "threshold": _rounded(evaluation.threshold_01),
+        # None but infinity means no detection at all, which 100 does as well.
+        "threshold": round(evaluation.threshold_01, 4) if np.isfinite(evaluation.threshold_01) else 100.0,
         "calibration": calibration._asdict(),
         "figures": {
             "pictures": len(data.validation),
@@ -75,11 +71,6 @@ def measure(done: Round, data: TrainingData, final: bool) -> dict[str, Any]:
             "calibration_error": round(calibration_error(probabilities, outcomes.right), 4),
         },
     }
-
-
-def _rounded(threshold: float) -> float:
-    """Return a threshold that a card can hold: none but infinity means no detection at all, which 100 does as well."""
-    return round(threshold, 4) if np.isfinite(threshold) else 100.0
 
 
 def calibrate(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Calibration:

@@ -108,14 +108,9 @@ def inside(picture: Picture, size: tuple[int, int]) -> Picture:
     """
     width, height = size
     kept = tuple(b for b in picture.boxes if b.x < width and b.y < height and b.x + b.width > 0 and b.y + b.height > 0)
-    if len(kept) == len(picture.boxes):
-        return picture
-    left_out = len(picture.boxes) - len(kept)
-    warnings.warn(
-        f"{picture.path}: {left_out} boxes outside of its {width} x {height} pixels are left out",
-        LabelWarning,
-        stacklevel=2,
-    )
+    if left_out := len(picture.boxes) - len(kept):
+        said = f"{picture.path}: {left_out} boxes outside of its {width} x {height} pixels are left out"
+        warnings.warn(said, LabelWarning, stacklevel=2)
     return Picture(picture.path, kept)
 
 

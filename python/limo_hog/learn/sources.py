@@ -83,7 +83,10 @@ def gather(wanted: Wanted) -> TrainingData:
         training = labelled
     else:
         training, validation = _held_out(labelled, wanted.held_out, wanted.seed)
-    shape = _shape(training, wanted)
+    if training:
+        shape = shape_for(sizes_of(training), wanted.window)
+    else:
+        shape = WindowShape(wanted.window) if wanted.window else WindowShape()
     regions = (*positive_regions(training, shape), *(Region(path, (0.0, 0.0, 0.0, 0.0)) for path in crops))
     free = [path for folder in wanted.negatives for path in _pictures(folder)]
     if not free and not training:
@@ -144,12 +147,6 @@ def _held_out(pictures: list[Picture], share: float, seed: int) -> tuple[list[Pi
             break
     rest = [picture for i, picture in enumerate(pictures) if i not in held]
     return rest, [pictures[i] for i in sorted(held)]
-
-
-def _shape(training: list[Picture], wanted: Wanted) -> WindowShape:
-    if training:
-        return shape_for(sizes_of(training), wanted.window)
-    return WindowShape(wanted.window) if wanted.window else WindowShape()
 
 
 def _min_height(training: list[Picture], shape: WindowShape) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from limo_hog import _core
 from limo_hog.learn.labels import LabelError
 from limo_hog.learn.mining import Mined, Miner, MiningParameters, describe_objects, hardest
-from limo_hog.learn.solver import solve
+from limo_hog.learn.solver import Solution, solve
 from limo_hog.learn.sources import TrainingData
 from limo_hog.learn.windows import Jitter
 
@@ -45,7 +45,7 @@ class Round:
     """What a round came to; round 0 has random negatives only."""
 
     number: int
-    coefficients: NDArray[np.float64]  #: float64 (D + 1,): weights and bias
+    solution: Solution  #: the detector that it ended with
     #: objects, negatives: how many different objects, and how many negatives, were learnt from
     objects: int
     negatives: int
@@ -53,8 +53,6 @@ class Round:
     new: int
     left_out: int
     descriptor_bytes: int  #: memory of all descriptors [B]
-    objective: float
-    iterations: int
     seconds: float  #: since training began
 
 
@@ -113,14 +111,12 @@ def _rounds(
         last = solution.coefficients
         yield Round(
             number,
-            last,
+            solution,
             count,
             sum(map(len, negatives)),
             new,
             left_out,
             sum(block.nbytes for block in (*positives, *negatives)),
-            solution.objective,
-            solution.iterations,
             time.perf_counter() - start,
         )
 
@@ -145,6 +141,6 @@ def as_json(done: Round) -> dict[str, Any]:
         "negatives": done.negatives,
         "new": done.new,
         "left_out": done.left_out,
-        "objective": round(done.objective, 4),
-        "iterations": done.iterations,
+        "objective": round(done.solution.objective, 4),
+        "iterations": done.solution.iterations,
     }

@@ -80,12 +80,8 @@ class _Page:
         try:
             await asyncio.wait_for(sending, STALL_S)
         except asyncio.TimeoutError as error:
-            self.abort()
+            self.transport.abort()
             raise ConnectionAbortedError("the page takes nothing") from error
-
-    def abort(self) -> None:
-        """Close the connection without waiting for what was not taken."""
-        self.transport.abort()
 
 
 class Live(ABC, Generic[Moment]):
@@ -220,7 +216,7 @@ class Live(ABC, Generic[Moment]):
         if self._pages:
             await asyncio.wait(self._pages.values(), timeout=_CLOSE_S)
         for page in self._pages:
-            page.abort()
+            page.transport.abort()
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
         client = web.WebSocketResponse(heartbeat=20, compress=False, max_msg_size=MAX_BYTES, timeout=_CLOSE_S)

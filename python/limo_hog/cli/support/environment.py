@@ -8,7 +8,6 @@ import platform
 import re
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from typing import NamedTuple
 
 import limo_hog
 from limo_hog import _core
@@ -35,27 +34,20 @@ def environment() -> dict[str, str | int | float | bool | list[str] | None]:
     }
 
 
-class Extra(NamedTuple):
-    """Optional libraries: what of them is installed (a name and version each), and the line that installs the rest."""
-
-    name: str
-    installed: list[str]
-    install: str | None
-
-
-def extras() -> list[Extra]:
-    """List the package's extras, as its metadata has them."""
+def extras() -> dict[str, str]:
+    """Say what is installed of each of the package's extras, and the line that installs the rest."""
     wanted: dict[str, list[str]] = {}
     for line in requires("limo-hog") or []:
         found = re.match(r"([\w.-]+).*\bextra == ['\"]([\w-]+)['\"]", line)
         if found and found[1] != "limo-hog":
             wanted.setdefault(found[2], []).append(found[1])
-    listed = []
+    told = {}
     for name, libraries in sorted(wanted.items()):
-        installed = [each for library in libraries if (each := _version(library))]
-        whole = len(installed) == len(libraries)
-        listed.append(Extra(name, installed, None if whole else f"pip install 'limo-hog[{name}]'"))
-    return listed
+        words = [each for library in libraries if (each := _version(library))]
+        if len(words) < len(libraries):
+            words.append(f"not installed: pip install 'limo-hog[{name}]'")
+        told[name] = "; ".join(words)
+    return told
 
 
 def _version(library: str) -> str | None:

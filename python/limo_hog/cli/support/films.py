@@ -7,7 +7,6 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,28 +17,25 @@ from limo_hog.imaging.writing import video_writer
 from limo_hog.tracking import Tracker
 
 Image = NDArray[np.uint8]
-Item = TypeVar("Item")
-#: Length of the pieces of a live source's copy [s]: what a killed run loses at most.
-PIECE_S = 60.0
+#: Number, image and time [s].
+Frame = tuple[int, Image, float]
 
 
-class Newest(Generic[Item]):
-    """The newest item of a source that does not wait: a thread takes them, and drops the one that nobody took.
+class Newest:
+    """The newest frame of a source that does not wait: a thread takes them, and drops the one that nobody took.
 
-    A context manager, which stops the thread. What the source raises is raised after the item before it.
+    What the source raises is raised after the frame before it.
     """
 
-    def __init__(self, items: Callable[[threading.Event], Iterator[Item]]) -> None:
+    def __init__(self, frames: Callable[[threading.Event], Iterator[Frame]]) -> None:
         self.dropped = 0
-        self._items, self._held = items, queue.Queue[tuple[Item] | BaseException](1)
+        self._frames, self._held = frames, queue.Queue[Frame | BaseException | None](1)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._take, name="limo-hog source", daemon=True)
-
-    def __enter__(self) -> Newest[Item]:
         self._thread.start()
-        return self
 
-    def __exit__(self, *_: object) -> None:
+    def stop(self) -> None:
+        """Stop the thread."""
         self._stopped.set()
         with suppress(queue.Empty):
             self._held.get_nowait()
@@ -47,37 +43,37 @@ class Newest(Generic[Item]):
         self._thread.join(1.0)
 
     def _take(self) -> None:
-        end: BaseException = StopIteration()
+        end = None
         try:
-            for item in self._items(self._stopped):
+            for frame in self._frames(self._stopped):
                 with suppress(queue.Empty):
                     self._held.get_nowait()
                     self.dropped += 1
-                self._held.put((item,))
+                self._held.put(frame)
         except BaseException as error:
             end = error
         if not self._stopped.is_set():
             self._held.put(end)
 
-    def __iter__(self) -> Iterator[Item]:
+    def __iter__(self) -> Iterator[Frame]:
         while True:
             try:
                 # Woken now and then, so that Ctrl-C works on every system.
                 held = self._held.get(timeout=0.5)
             except queue.Empty:
                 continue
-            if isinstance(held, StopIteration):
+            if held is None:
                 return
             if isinstance(held, BaseException):
                 raise held
-            yield held[0]
+            yield held
 
 
-class Identities:
+class Identities(Tracker):
     """Numbers the people of one film, and draws where each came from."""
 
     def __init__(self, name: str, threshold: float, fps: float) -> None:
-        self.tracker = Tracker(name, threshold, fps)
+        super().__init__(name, threshold, fps)
         with needed(by="drawing trails"):
             from supervision import ColorLookup, Position, TraceAnnotator
         self._trails = TraceAnnotator(
@@ -91,14 +87,13 @@ class Identities:
 
 
 @contextmanager
-def pieces(path: Path, fps: float, seconds: float = PIECE_S) -> Iterator[Callable[[Image, float], None]]:
+def pieces(path: Path, fps: float, seconds: float) -> Iterator[Callable[[Image, float], None]]:
     """Give a function that appends a frame taken at a time [s] to a film in whole pieces: PATH, PATH-2 and so on.
 
     A killed run loses the piece that is open, and no other.
     """
     number, begun = 0, 0.0
-    with ExitStack() as outer:
-        piece = outer.enter_context(ExitStack())
+    with ExitStack() as piece:
         append: Callable[..., None]
 
         def write(image: Image, at: float) -> None:

@@ -6,6 +6,7 @@ import argparse
 import math
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -15,12 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
 import limo_hog
 from limo_hog.cli.support.copies import copies_of, real, written
-from limo_hog.cli.support.films import PIECE_S, Identities, Newest, pieces
+from limo_hog.cli.support.films import Frame, Identities, Image, Newest, pieces
 from limo_hog.cli.support.output import UsageError, emit, one_line, printable, refuse_to_overwrite
 from limo_hog.cli.support.results import Result, Results, Row
 from limo_hog.detections import people
@@ -47,43 +46,42 @@ if TYPE_CHECKING:
 
     from limo_hog.cli.support.film_page import FilmPage
 
-Image = NDArray[np.uint8]
-#: Number, image and time [s].
-Frame = tuple[int, Image, float]
+#: Length of the pieces of a live source's copy [s]: what a killed run loses at most.
+PIECE_S = 60.0
 #: Pictures that are tracked are taken for a film of this rate [Hz].
 _PICTURES_HZ = 25.0
 
 
 class Run:
-    """One `detect` run: its options and its results so far; `bar` shows them on a terminal."""
+    """One `detect` run: its options and its results so far; `bar` shows them on a terminal.
+
+    `stack` keeps standard input, where that is an input.
+
+    Raises
+    ------
+    UsageError
+        Copies would overwrite files.
+    """
 
     def __init__(
-        self, args: argparse.Namespace, detector: PeopleDetector, threshold: float, bar: Progress | None
+        self, args: argparse.Namespace, detector: PeopleDetector, bar: Progress | None, stack: ExitStack
     ) -> None:
-        self._args, self._detector, self._threshold, self._bar = args, detector, threshold, bar
-        self._sources: list[Source] = []
+        self._args, self._detector, self._bar = args, detector, bar
         self._copies: dict[Source, Path] = {}
         self._workers = 1
         self._write: Callable[[Result], None]
-        self._done: dict[str, set[int]] | None = None
+        self._earlier: list[Result] | None = None
+        # The frames of each source that an earlier run has done.
+        self._done: dict[str, set[int]] = defaultdict(set)
         #: The result of each picture, kept if a table is written at the end.
         self.results: list[Result] | None = [] if args.csv or args.coco or args.mot else None
         #: The live page, where one is wanted.
         self.page: FilmPage | None = None
         self._identities: Identities | None = None
+        self.set_threshold(detector.least_score)
         self._task = bar.add_task("looking", total=0) if bar else None
         self.pictures = self.peopled = self.people = self.failed = self.known = self.dropped = 0
         self._ms = 0.0
-        self._films = False
-
-    def find(self, stack: ExitStack) -> None:
-        """Expand every input, and name each annotated copy.
-
-        Raises
-        ------
-        UsageError
-            Copies would overwrite files.
-        """
         # A picture that two inputs name is searched once.
         named: dict[object, Source] = {}
         for name in self._args.inputs:
@@ -108,17 +106,23 @@ class Run:
         """Report people from another SVM margin on, from the next picture on."""
         self._threshold = threshold
         if self._identities is not None:
-            self._identities.tracker.set_threshold(threshold)
+            self._identities.set_threshold(threshold)
         fed = FED if self._args.track else 0.0
         self._detector = replace(self._detector, threshold=threshold - fed)
 
     def look(self, results: Results) -> None:
         """Search every input."""
-        self._write = results.write
-        self._done = None if results.earlier is None else results.done()
+        self._write, self._earlier = results
+        for result in self._earlier or []:
+            self._done[result["source"]].add(result["frame"])
         if self.results is not None:
-            self.results += results.earlier or []
-        self._share_cores(self._sources)
+            self.results += self._earlier or []
+        # A core for each of many pictures, and all cores for a single one.
+        threads = self._args.threads or cores()
+        many = len(self._sources) > 1 or any(source.kind is Kind.VIDEO for source in self._sources)
+        self._workers = threads if many else 1
+        limo_hog.set_num_threads(1 if many else threads)
+        cv2.setNumThreads(1 if many else threads)
         self._expect(sum(source.kind is Kind.IMAGE for source in self._sources))
         for images, group in groupby(self._sources, key=lambda source: source.kind is Kind.IMAGE):
             if images:
@@ -133,7 +137,8 @@ class Run:
         found = f"{self.people} detections" if self._films else f"{people(self.people)} in {self.peopled} of them"
         if not self._films and self.pictures == 1:
             found = people(self.people)
-        words = [f"{_of(self.pictures, 'frame' if self._films else 'picture')}, {found}"]
+        what = f"{'frame' if self._films else 'picture'}{'' if self.pictures == 1 else 's'}"
+        words = [f"{self.pictures} {what}, {found}"]
         if self.pictures:
             each = " each" if self.pictures > 1 else ""
             words.append(f"detection {self._ms / self.pictures:.1f} ms{each}")
@@ -159,38 +164,21 @@ class Run:
             found = [source for source in found if out not in real(source.path).parents]
         return found
 
-    def _share_cores(self, sources: list[Source]) -> None:
-        """Use a core for each of many pictures, and all cores for a single one."""
-        threads = self._args.threads or cores()
-        many = len(sources) > 1 or any(source.kind is Kind.VIDEO for source in sources)
-        self._workers = threads if many else 1
-        limo_hog.set_num_threads(1 if many else threads)
-        cv2.setNumThreads(1 if many else threads)
-
     def _look_at_images(self, sources: list[Source]) -> None:
         self._identities = self._identities_at(_PICTURES_HZ)
-
-        def work(place: int, source: Source) -> tuple[Source, Row, Image | None] | str:
-            try:
-                found, picture = self._find(source, 0, read_image(source), place / _PICTURES_HZ)
-            except (ImageError, OSError, MemoryError) as error:
-                return _named(source, error)
-            if picture is not None and source in self._copies and not self._identities:
-                write_image(self._copies[source], picture)
-            return source, found, picture
-
         # Where people are numbered, pictures that are done are searched again.
         new = [source for source in sources if self._identities or not self._is_done(source)]
         self.known += len(sources) - len(new)
-        for result in in_order(lambda job: work(*job), enumerate(new), self._workers):
+        jobs = ((source, (0, None, place / _PICTURES_HZ)) for place, source in enumerate(new))
+        results = in_order(lambda job: self._work(*job), jobs, self._workers)
+        for result, source in zip(results, new, strict=True):
             if isinstance(result, str):
                 self._fail(result)
             else:
-                source, found, picture = result
-                found, picture = self._finished(found, picture, None)
+                found, picture = self._finished(*result, None)
                 if picture is not None and source in self._copies and self._identities:
                     write_image(self._copies[source], picture)
-                if found.frame not in self._done_of(found.source):
+                if found.frame not in self._done[found.source]:
                     self._keep(found)
             self._advance()
 
@@ -203,7 +191,7 @@ class Run:
     def _look_at_frames(self, source: Source) -> None:
         copy = self._copies.get(source)
         if self._args.resume and copy is not None and copy.exists():
-            if self._done is None:
+            if self._earlier is None:
                 self.known += 1
                 return
             # The copy is whole; frames may lack their line.
@@ -214,8 +202,13 @@ class Run:
             except OSError as error:
                 self._fail(_named(source, error))
                 return
-            rate, done = video.fps / self._args.every, self._done_of(source.name)
-            newest = self._newest(video, stack) if video.live else None
+            rate, done = video.fps / self._args.every, self._done[source.name]
+            newest = None
+            if video.live:
+                # The thread that reads it owns it from now on.
+                live = partial(live_frames, video, stack.pop_all(), self._args.every, self._tell)
+                newest = Newest(live)
+                stack.callback(newest.stop)
             write = copy and stack.enter_context(pieces(copy, rate, PIECE_S if newest else math.inf))
             self._identities = self._identities_at(rate)
             work = partial(self._work, source)
@@ -250,35 +243,32 @@ class Run:
         except ReadError as error:
             self._fail(str(error))
 
-    def _newest(self, video: Video, stack: ExitStack) -> Newest[Frame]:
-        """Let a thread read a live source, which is its own from now on."""
-        frames = partial(live_frames, video, stack.pop_all(), self._args.every, self._tell)
-        return stack.enter_context(Newest(frames))
-
     def _identities_at(self, rate: float) -> Identities | None:
         return Identities(self._args.track, self._threshold, rate) if self._args.track else None
 
-    def _work(self, source: Source, frame: Frame) -> tuple[Row, Image | None] | str:
+    def _work(self, source: Source, frame: tuple[int, Image | None, float]) -> tuple[Row, Image | None] | str:
+        """Search a frame, or the picture that is read here; return what is wrong where that fails."""
+        number, image, at = frame
         try:
-            return self._find(source, *frame)
-        except (ImageError, MemoryError) as error:
+            image = read_image(source) if image is None else image
+            start = time.perf_counter()
+            detections = self._detector.detect(image)
+            ms = 1e3 * (time.perf_counter() - start)
+            picture = None
+            if source in self._copies or self.page is not None:
+                # Numbers are known later, so that boxes are drawn later then.
+                picture = image if self._args.track else detections.draw(image)
+        except (ImageError, OSError, MemoryError) as error:
             return _named(source, error)
-
-    def _find(self, source: Source, frame: int, image: Image, at: float) -> tuple[Row, Image | None]:
-        start = time.perf_counter()
-        detections = self._detector.detect(image)
-        ms = 1e3 * (time.perf_counter() - start)
+        if picture is not None and source.kind is Kind.IMAGE and source in self._copies and not self._args.track:
+            write_image(self._copies[source], picture)
         height, width = image.shape[:2]
-        found = Row(source.name, frame, width, height, detections, round(ms, 3), at)
-        if source not in self._copies and self.page is None:
-            return found, None
-        # Numbers are known later, so that boxes are drawn later then.
-        return found, image if self._args.track else detections.draw(image)
+        return Row(source.name, number, width, height, detections, round(ms, 3), at), picture
 
-    def _finished(self, found: Row, picture: Image | None, newest: Newest[Frame] | None) -> tuple[Row, Image | None]:
+    def _finished(self, found: Row, picture: Image | None, newest: Newest | None) -> tuple[Row, Image | None]:
         """Give the people of the next picture their numbers, draw them, and show it on the page."""
         if self._identities is not None:
-            people = self._identities.tracker.update(found.people, found.at if newest else None)
+            people = self._identities.update(found.people, found.at if newest else None)
             found = replace(found, people=people)
             picture = None if picture is None else self._identities.draw(people, picture)
         if self.page and picture is not None:
@@ -288,12 +278,8 @@ class Run:
     def _is_done(self, source: Source) -> bool:
         if not self._args.resume:
             return False
-        written = self._done is None or 0 in self._done_of(source.name)
+        written = self._earlier is None or 0 in self._done[source.name]
         return written and (source not in self._copies or self._copies[source].exists())
-
-    def _done_of(self, name: str) -> set[int]:
-        """Return the frames of a source that an earlier run has done."""
-        return (self._done or {}).get(name, set())
 
     def _expect(self, pictures: int) -> None:
         if self._bar and self._task is not None:
@@ -328,10 +314,6 @@ class Run:
             self._bar.console.print(line, highlight=False, markup=False, soft_wrap=True)
         else:
             print(line, file=sys.stderr)
-
-
-def _of(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _named(source: Source, error: Exception) -> str:

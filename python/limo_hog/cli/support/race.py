@@ -17,26 +17,18 @@ class Timing:
     p50: float
 
 
-@dataclass(frozen=True)
-class Rounds:
-    """How long a race lasts: for so many seconds, but no fewer and no more rounds than these."""
+def race(calls: Sequence[Callable[[], object]], seconds: float, least: int = 5, most: int = 200) -> list[Timing]:
+    """Time each call once a round, in turn, after one call of each that does not count.
 
-    seconds: float
-    least: int = 5
-    most: int = 200
-
-
-def race(calls: Sequence[Callable[[], object]], rounds: Rounds) -> list[Timing]:
-    """Time each call once a round, in turn, after one call of each that does not count."""
+    It lasts for so many seconds, but no fewer than `least` and no more than `most` rounds.
+    """
     times: list[list[float]] = [[] for _ in calls]
     for call in calls:
         call()
     gc.disable()
     start = time.perf_counter()
     try:
-        while len(times[0]) < rounds.least or (
-            len(times[0]) < rounds.most and time.perf_counter() - start < rounds.seconds
-        ):
+        while len(times[0]) < least or (len(times[0]) < most and time.perf_counter() - start < seconds):
             for call, spent in zip(calls, times, strict=True):
                 before = time.perf_counter()
                 call()

@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from limo_hog.atomic import about, json_text, part_of, write_text
 from limo_hog.cli.support.output import STDOUT, emit, refuse_to_overwrite
@@ -56,18 +55,8 @@ class Row:
         }
 
 
-class Results(NamedTuple):
-    """A function that writes a result, and the results of an earlier run (None if no file is kept)."""
-
-    write: Callable[[Result], None]
-    earlier: list[Result] | None
-
-    def done(self) -> dict[str, set[int]]:
-        """Return the frames of each source that an earlier run has done."""
-        frames: dict[str, set[int]] = defaultdict(set)
-        for result in self.earlier or []:
-            frames[result["source"]].add(result["frame"])
-        return frames
+#: A function that writes a result, and the results of an earlier run (None if no file is kept).
+Results = tuple[Callable[[Result], None], list[Result] | None]
 
 
 @contextmanager
@@ -92,7 +81,7 @@ def json_lines(
         # Flushed line by line for a reader at the other end of a pipe.
         say = emit if only else partial(print, flush=True)
         show = (lambda result: say(json_text(result | {"parameters": parameters}))) if target else lambda _: None
-        yield Results(show, None)
+        yield show, None
         return
     path = Path(target)
     part = part_of(path)
@@ -116,7 +105,7 @@ def json_lines(
             whole += len(line)
 
         try:
-            yield Results(write, earlier)
+            yield write, earlier
         finally:
             if kept:
                 # A full disk may have taken half a line.
@@ -139,7 +128,9 @@ def _continue(path: Path, part: Path, parameters: dict[str, Any]) -> list[Result
         if not _is_result(result):
             raise LimoHogError(f"{path}: not the JSON lines of an earlier run: line {number} is another")
         if result["parameters"] != parameters:
-            different = _difference(result["parameters"], parameters)
+            was = result["parameters"]
+            names = [name for name in {**parameters, **was} if was.get(name) != parameters.get(name)]
+            different = ", ".join(f"{name} {was.get(name)}, now {parameters.get(name)}" for name in names)
             raise LimoHogError(f"{path} was made with other parameters: {different}")
     found.replace(part)
     with part.open("rb+") as file:
@@ -169,11 +160,6 @@ def _people(result: Result) -> Iterator[tuple[list[int], list[int], float, float
     """Yield box, window, margin, probability and number of each person; without a tracker the number is None."""
     ids = result.get("ids", [None] * len(result["boxes"]))
     return zip(*(result[name] for name in _EACH), ids, strict=True)
-
-
-def _difference(was: dict[str, Any], now: dict[str, Any]) -> str:
-    names = [name for name in {**now, **was} if was.get(name) != now.get(name)]
-    return ", ".join(f"{name} {was.get(name)}, now {now.get(name)}" for name in names)
 
 
 def write_csv(path: Path, results: Iterable[Result]) -> None:

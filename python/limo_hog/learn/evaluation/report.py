@@ -13,7 +13,7 @@ from limo_hog.atomic import about, json_text, whole_file, write_text
 from limo_hog.extras import needed
 from limo_hog.imaging.writing import write_image
 from limo_hog.learn.evaluation.mistakes import draw_sheet, worst_mistakes
-from limo_hog.learn.evaluation.run import Evaluation, EvaluationParameters, as_json, compare, few
+from limo_hog.learn.evaluation.run import CONFIDENCE, DRAWS, MIN_IOU, Evaluation, as_json, compare, few
 from limo_hog.learn.labels import Picture
 
 with needed(by="--report"):
@@ -32,9 +32,7 @@ td,th{padding:.25rem .8rem;border-bottom:1px solid #d7dde4;text-align:right}
 td:first-child,th:first-child{text-align:left}small{color:#66727f}img{max-width:100%}"""
 
 
-def write_report(
-    folder: Path, pictures: Sequence[Picture], evaluations: Sequence[Evaluation], how: EvaluationParameters
-) -> Path:
+def write_report(folder: Path, pictures: Sequence[Picture], evaluations: Sequence[Evaluation]) -> Path:
     """Write `index.html`, `det.png`, `mistakes.png` (of the first detector) and `figures.json`; return the page.
 
     Raises
@@ -47,13 +45,13 @@ def write_report(
     mistakes = worst_mistakes(evaluations[0], pictures)
     if mistakes:
         write_image(folder / "mistakes.png", draw_sheet(mistakes))
-    figures = as_json(pictures, evaluations, how)
+    figures = as_json(pictures, evaluations)
     figures["mistakes"] = [
         {"kind": m.kind, "picture": str(m.path), "box": list(m.box), "score": m.score} for m in mistakes
     ]
     write_text(folder / "figures.json", json_text(figures, indent=2) + "\n")
     page = folder / "index.html"
-    write_text(page, _page(figures["pictures"], figures["objects"], evaluations, how, bool(mistakes)))
+    write_text(page, _page(figures["pictures"], figures["objects"], evaluations, bool(mistakes)))
     return page
 
 
@@ -76,10 +74,7 @@ def _plot(path: Path, evaluations: Sequence[Evaluation]) -> None:
         figure.savefig(part)
 
 
-def _page(
-    pictures: int, objects: int, evaluations: Sequence[Evaluation], how: EvaluationParameters, mistakes: bool
-) -> str:
-    share = f"{how.confidence:.0%}"
+def _page(pictures: int, objects: int, evaluations: Sequence[Evaluation], mistakes: bool) -> str:
     rows = [_row(one) for one in evaluations]
     heights = [
         (f"{one.name}, {_range(row.low, row.high)}", row.objects, f"{row.recall_01:.2f}", f"{row.recall_1:.2f}")
@@ -89,7 +84,7 @@ def _page(
     differences = [
         (f"{evaluations[0].name} − {d.name}", _FIGURES[d.figure], f"{d.difference:+.3f}", _interval(d.interval, "+.3f"))
         for other in evaluations[1:]
-        for d in compare(evaluations[0], other, how)
+        for d in compare(evaluations[0], other)
     ]
     title = f"{evaluations[0].name} on {pictures} pictures with {objects} objects"
     recalls = ("recall at 0.1 FPPI", "at 1")
@@ -100,17 +95,16 @@ def _page(
         '<img src="det.png" alt="Miss rate over false positives per image">',
         _table(("model", "LAMR", *recalls, "AP", "threshold at 0.1 FPPI", "ms a picture"), rows),
         "<p><small>LAMR: log-average miss rate over 10⁻²…10⁰ false positives per image (FPPI), lower is better. "
-        f"A box is found from an IoU of {how.min_iou:g} on. Intervals: {share} of {how.draws} draws of the pictures."
+        f"A box is found from an IoU of {MIN_IOU:g} on. Intervals: {CONFIDENCE:.0%} of {DRAWS} draws of the pictures."
         "</small></p>",
     ]
     if warning := few(objects):
         parts.insert(2, f"<p><b>{warning}</b></p>")
     if differences:
-        note = "If the interval excludes 0, the difference is unlikely to be chance."
         parts += [
             "<h2>Differences, paired</h2>",
             _table(("models", "figure", "difference", "interval"), differences),
-            f"<p><small>{note}</small></p>",
+            "<p><small>If the interval excludes 0, the difference is unlikely to be chance.</small></p>",
         ]
     parts += ["<h2>By height</h2>", _table(("objects", "how many", *recalls), heights)]
     if mistakes:

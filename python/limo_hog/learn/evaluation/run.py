@@ -26,17 +26,12 @@ from limo_hog.learn.labels import LabelError, Picture, inside, sizes_of
 
 #: With 50 objects the 95 % interval of a miss rate of .3 is ± .13.
 _FEW = 50
-
-
-@dataclass(frozen=True)
-class EvaluationParameters:
-    """How detectors are measured."""
-
-    min_iou: float = 0.5  #: intersection over union from which a box is found (PASCAL VOC, Caltech)
-    draws: int = 1000  #: sets of pictures for an interval; 1000 settle its ends to about .005
-    confidence: float = 0.95  #: share of the sets inside an interval
-    seed: int = 0  #: of the draws
-    height_edges: tuple[float, ...] = (64, 96, 144, 216)  #: heights [px] that part the rows by height
+#: Intersection over union from which a box is found (PASCAL VOC, Caltech).
+MIN_IOU = 0.5
+#: Sets of pictures for an interval, of which 1000 settle its ends to about .005, and the share of them inside it.
+DRAWS, CONFIDENCE = 1000, 0.95
+#: Heights that part the rows by height [px].
+_HEIGHT_EDGES = (64, 96, 144, 216)
 
 
 @dataclass(frozen=True)
@@ -92,13 +87,15 @@ class Difference:
 def evaluate(
     rivals: Sequence[Rival],
     pictures: Sequence[Picture],
-    parameters: EvaluationParameters | None = None,
+    draws: int = DRAWS,
     done: Callable[[], None] = lambda: None,
 ) -> tuple[list[Picture], list[Evaluation]]:
     """Run every detector on every picture and return the pictures as used, and each detector's figures.
 
     Parameters
     ----------
+    draws
+        Sets of pictures for an interval.
     done
         Called after each picture.
 
@@ -109,7 +106,6 @@ def evaluate(
     ReadError, OSError
         A picture cannot be read: figures over the rest would be those of another set.
     """
-    how = parameters or EvaluationParameters()
     used: list[Picture] = []
     found: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in rivals]
     times: list[list[float]] = [[] for _ in rivals]
@@ -127,7 +123,7 @@ def evaluate(
         raise LabelError(f"no labelled box lies inside of its picture, in {len(used)} pictures; at least one is wanted")
     labelled = [picture.arrays() for picture in used]
     return used, [
-        _evaluation(rival.name, hits, labelled, float(np.median(ms)), how)
+        _evaluation(rival.name, hits, labelled, float(np.median(ms)), draws)
         for rival, hits, ms in zip(rivals, found, times, strict=True)
     ]
 
@@ -143,20 +139,19 @@ def _evaluation(
     found: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
     labelled: list[tuple[NDArray[np.float64], NDArray[np.bool_]]],
     ms: float,
-    how: EvaluationParameters,
+    draws: int,
 ) -> Evaluation:
-    outcomes, matches = collect(found, labelled, how.min_iou)
+    outcomes, matches = collect(found, labelled, MIN_IOU)
     points = curve(outcomes)
-    tails = [50 * (1 - how.confidence), 50 * (1 + how.confidence)]
-    ends = np.nanpercentile(bootstrap(outcomes, how.draws, how.seed), tails, axis=0).T.tolist()
+    ends = _intervals(bootstrap(outcomes, draws, seed=0))
     thresholds = threshold_at(points, 0.1), threshold_at(points, 1.0)
     return Evaluation(
         name,
         figures(outcomes),
-        {figure: (low, high) for figure, (low, high) in zip(Figures._fields, ends, strict=True)},
+        dict(zip(Figures._fields, ends, strict=True)),
         *thresholds,
         ms,
-        _by_height(outcomes, thresholds, how.height_edges),
+        _by_height(outcomes, thresholds),
         points,
         outcomes,
         found,
@@ -164,24 +159,29 @@ def _evaluation(
     )
 
 
-def _by_height(outcomes: Outcomes, thresholds: tuple[float, float], edges: tuple[float, ...]) -> tuple[HeightRow, ...]:
+def _intervals(draws: NDArray[np.float64]) -> list[tuple[float, float]]:
+    """Return the lower and upper end of each figure of (draws, figures)."""
+    tails = [50 * (1 - CONFIDENCE), 50 * (1 + CONFIDENCE)]
+    return [(low, high) for low, high in np.nanpercentile(draws, tails, axis=0).T.tolist()]
+
+
+def _by_height(outcomes: Outcomes, thresholds: tuple[float, float]) -> tuple[HeightRow, ...]:
     rows = []
-    for low, high in zip((0.0, *edges), (*edges, float("inf")), strict=True):
+    for low, high in zip((0.0, *_HEIGHT_EDGES), (*_HEIGHT_EDGES, float("inf")), strict=True):
         at = outcomes.found_at[(low <= outcomes.heights) & (outcomes.heights < high)]
         if len(at):
             rows.append(HeightRow(low, high, len(at), *(float((at >= t).mean()) for t in thresholds)))
     return tuple(rows)
 
 
-def compare(first: Evaluation, other: Evaluation, parameters: EvaluationParameters | None = None) -> list[Difference]:
+def compare(first: Evaluation, other: Evaluation) -> list[Difference]:
     """Return how much the first detector's figures are above another's, with paired intervals."""
-    how = parameters or EvaluationParameters()
-    draws = [bootstrap(one.outcomes, how.draws, how.seed) for one in (first, other)]
-    tails = [50 * (1 - how.confidence), 50 * (1 + how.confidence)]
-    ends = np.nanpercentile(draws[0] - draws[1], tails, axis=0).T.tolist()
+    ours, theirs = (bootstrap(one.outcomes, DRAWS, seed=0) for one in (first, other))
     return [
-        Difference(other.name, figure, a - b, (low, high))
-        for figure, a, b, (low, high) in zip(Figures._fields, first.figures, other.figures, ends, strict=True)
+        Difference(other.name, figure, a - b, ends)
+        for figure, a, b, ends in zip(
+            Figures._fields, first.figures, other.figures, _intervals(ours - theirs), strict=True
+        )
     ]
 
 
@@ -192,18 +192,18 @@ def few(objects: int) -> str:
     return f"only {objects} object{'' if objects == 1 else 's'}: below {_FEW} these figures are mostly chance"
 
 
-def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation], how: EvaluationParameters) -> dict[str, Any]:
+def as_json(used: Sequence[Picture], evaluations: Sequence[Evaluation]) -> dict[str, Any]:
     """Return all figures as plain values; null where there is no threshold."""
     return {
         "pictures": len(used),
         "objects": sum(not box.ignored for picture in used for box in picture.boxes),
-        "min_iou": how.min_iou,
-        "confidence": how.confidence,
+        "min_iou": MIN_IOU,
+        "confidence": CONFIDENCE,
         "models": [_model_json(one) for one in evaluations],
         "differences": [
             {"model": d.name, "figure": d.figure, "difference": d.difference, "interval": list(d.interval)}
             for other in evaluations[1:]
-            for d in compare(evaluations[0], other, how)
+            for d in compare(evaluations[0], other)
         ],
     }
 

@@ -35,12 +35,8 @@ class Source:
     """A script's text, as it was before the script ran."""
 
     def __init__(self, script: Path) -> None:
-        self._tree = ast.Module([], [])
         # (A file that Python refuses has no calls; the run says why.)
-        with suppress(SyntaxError, ValueError, RecursionError, MemoryError, OSError):
-            text = script.read_bytes()
-            with _PARSING:
-                self._tree = ast.parse(text)
+        self._tree = _parsed(script) or ast.Module([], [])
 
     def uncalled(self, function: str) -> int | None:
         """Return the line of a function of the module that nothing calls; None where it is called or absent."""
@@ -57,13 +53,18 @@ class Source:
         return min(lines, default=None)
 
 
-def fingerprint(node: Path | str) -> str:
-    """Return what a file or a text has in common with its copies: its code, without comments and names' spelling."""
-    try:
+def _parsed(node: Path | str) -> ast.Module | None:
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError, OSError):
         text = node.read_bytes() if isinstance(node, Path) else node
         with _PARSING:
-            tree = ast.parse(text)
-    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError):
+            return ast.parse(text)
+    return None
+
+
+def fingerprint(node: Path | str) -> str:
+    """Return what a file or a text has in common with its copies: its code, without comments and names' spelling."""
+    tree = _parsed(node)
+    if tree is None:
         return ""
     names: dict[str, str] = {}
     for part in ast.walk(tree):
@@ -114,7 +115,7 @@ def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
         return Finding(False, said, searched_without_svm)
     if any(look.raw is not None for take in takes for look in take.looks) or any(take.unplaced for take in takes):
         return None
-    if any(take.outcome and take.outcome.stage.detector_inputs for take in takes):
+    if any(take.outcome.stage.detector_inputs for take in takes):
         return Finding(None, "not tried: the detector was asked, and gave no answer")
     line = source.first_call("detectMultiScale")
     if line is None:
@@ -124,27 +125,25 @@ def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
 
 def no_command(takes: Sequence[Take]) -> Finding | None:
     """Return why no command reaches the robot; None where one does."""
-    if any(take.outcome and take.outcome.stage.commands for take in takes):
+    if any(take.outcome.stage.commands for take in takes):
         return None
     calls = takes[0].calls
-    other = {topic: line for topic, line in calls.writers.items() if topic not in names.TYPES}
     for said, line in calls.unmatched.items():
         if f"'{names.COMMAND}'" in said:
             return Finding(False, f"the robot gets no command: {said}", line)
     if names.COMMAND in calls.writers:
         return Finding(False, "the publisher is made, but publish is never called", calls.writers[names.COMMAND])
-    if other:
-        topic, line = next(iter(other.items()))
-        return Finding(False, f"publishes on {topic!r}; the robot listens to {names.COMMAND!r}", line)
+    for topic, line in calls.writers.items():
+        if topic not in names.TYPES:
+            return Finding(False, f"publishes on {topic!r}; the robot listens to {names.COMMAND!r}", line)
     return Finding(False, f"nothing is published on {names.COMMAND!r}")
 
 
 def _no_subscription(calls: Calls) -> tuple[str, int | None]:
-    unknown = {topic: line for topic, line in calls.readers.items() if topic not in (*names.TYPES, *calls.writers)}
-    if unknown:
-        topic, line = next(iter(unknown.items()))
-        nearest = nearest_topic(topic, calls.types.get(topic, ""))
-        return f"the topic {topic!r} is not published; did you mean {nearest!r}?", line
+    for topic, line in calls.readers.items():
+        if topic not in (*names.TYPES, *calls.writers):
+            nearest = nearest_topic(topic, calls.types.get(topic, ""))
+            return f"the topic {topic!r} is not published; did you mean {nearest!r}?", line
     if calls.readers:
         topic, line = next(iter(calls.readers.items()))
         return f"subscribes to {topic!r}; the camera's image is {names.IMAGE!r}", line

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -191,15 +191,14 @@ class FaultySearch:
         """Return the boxes (N, 4) [px of the camera's image] that are on nobody, or on people who are not missed."""
         heights = [person.box[3] if person and person.box else 0.0 for person in truth.people]
         missed = [misses.at(period, height) for misses, height in zip(self._misses, heights, strict=True)]
-        on: Sequence[int] = [person_of(box, truth.people) for box in boxes]
+        on = (person_of(box, truth.people) for box in boxes)
         return [index for index, person in enumerate(on) if person == NO_PERSON or not missed[person]]
 
     def _false(self, period: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return false boxes int64 (N, 4) in the camera's image [px] and their scores (N,)."""
         random = np.random.default_rng([self._seed, FALSE_STREAM, period])
         count = random.poisson(self._false_rate)
-        height = FALSE_BOXES.least_height * 2.0 ** random.exponential(FALSE_BOXES.octaves, count)
-        height = np.minimum(height, HEIGHT)
+        height = np.minimum(FALSE_BOXES.least_height * 2.0 ** random.exponential(FALSE_BOXES.octaves, count), HEIGHT)
         width = height / 2
         x, y = random.random(count) * (WIDTH - width), random.random(count) * (HEIGHT - height)
         boxes = np.stack([x, y, width, height], axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +14,7 @@ from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.runner import Limits, Said
 from limo_sim.ros.worker import no_nodes
 from limo_sim.workshop.exercises import Checkpoint, Exercise, exercise
-from limo_sim.workshop.mistakes import Finding, Source, camera_read, no_command, no_detection, no_picture
+from limo_sim.workshop.mistakes import Finding, camera_read, no_command, no_detection, no_picture, parsed
 from limo_sim.workshop.sights import found
 from limo_sim.workshop.stretch import red_on_person
 from limo_sim.workshop.takes import Look, Scene, Take, judge_by_truth, play
@@ -76,7 +77,8 @@ def examine(
         raise StubError(f"{script}: no such file")
     wanted = exercise(name)
     limits = replace(limits or Limits(), began=time.monotonic())
-    source = Source(script)
+    # (As it is before it runs. A file that Python refuses has no calls; the run says why.)
+    source = parsed(script) or ast.Module([], [])
     takes: list[Take] = []
     with _player(script, wanted.scenes, limits, said, workers) as played:
         for scene in wanted.scenes:
@@ -138,7 +140,9 @@ def _where(checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take]) -> l
     return [take for take in takes if take.scene.name in (checkpoint.scenes or first)]
 
 
-def _judged(source: Source, checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take], by_truth: bool) -> Finding:
+def _judged(
+    source: ast.Module, checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take], by_truth: bool
+) -> Finding:
     """Judge one checkpoint, or name the mistake that keeps the node from it."""
     first = wanted.checkpoints[0]
     no_image = no_picture(source, takes)
@@ -182,7 +186,7 @@ def _marked(verdicts: list[Verdict], takes: Sequence[Take]) -> list[Verdict]:
     return [copied, *(replace(verdict, points=0) for verdict in verdicts)]
 
 
-def _fault(source: Source, takes: Sequence[Take]) -> Verdict | None:
+def _fault(source: ast.Module, takes: Sequence[Take]) -> Verdict | None:
     """Name the scenes in which the node raises, hangs or dies."""
     failed = [take for take in takes if take.failed]
     if not failed or (fault := failed[0].outcome.fault) is None:

@@ -31,29 +31,8 @@ class Finding(NamedTuple):
 _PARSING = threading.Lock()
 
 
-class Source:
-    """A script's text, as it was before the script ran."""
-
-    def __init__(self, script: Path) -> None:
-        # (A file that Python refuses has no calls; the run says why.)
-        self._tree = _parsed(script) or ast.Module([], [])
-
-    def uncalled(self, function: str) -> int | None:
-        """Return the line of a function of the module that nothing calls; None where it is called or absent."""
-        defined = [node for node in self._tree.body if isinstance(node, ast.FunctionDef) and node.name == function]
-        return defined[0].lineno if defined and self.first_call(function) is None else None
-
-    def first_call(self, function: str) -> int | None:
-        """Return the first line that calls a function or a method of this name; None where there is none."""
-        lines = [
-            node.lineno
-            for node in ast.walk(self._tree)
-            if isinstance(node, ast.Call) and function in (getattr(node.func, "attr", ""), getattr(node.func, "id", ""))
-        ]
-        return min(lines, default=None)
-
-
-def _parsed(node: Path | str) -> ast.Module | None:
+def parsed(node: Path | str) -> ast.Module | None:
+    """Return the tree of a file or a text; None where Python refuses it."""
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError, OSError):
         text = node.read_bytes() if isinstance(node, Path) else node
         with _PARSING:
@@ -61,9 +40,19 @@ def _parsed(node: Path | str) -> ast.Module | None:
     return None
 
 
+def _first_call(source: ast.Module, function: str) -> int | None:
+    """Return the first line that calls a function or a method of this name; None where there is none."""
+    lines = [
+        node.lineno
+        for node in ast.walk(source)
+        if isinstance(node, ast.Call) and function in (getattr(node.func, "attr", ""), getattr(node.func, "id", ""))
+    ]
+    return min(lines, default=None)
+
+
 def fingerprint(node: Path | str) -> str:
     """Return what a file or a text has in common with its copies: its code, without comments and names' spelling."""
-    tree = _parsed(node)
+    tree = parsed(node)
     if tree is None:
         return ""
     names: dict[str, str] = {}
@@ -82,15 +71,16 @@ def camera_read(calls: Calls) -> bool:
     return any(topic in calls.readers for topic in _IMAGES)
 
 
-def no_picture(source: Source, takes: Sequence[Take]) -> Finding | None:
+def no_picture(source: ast.Module, takes: Sequence[Take]) -> Finding | None:
     """Return why no camera image reaches a callback; None where one does."""
     calls = takes[0].calls
     if calls.given:
         return None
     if not calls.nodes:
-        main = source.uncalled("main")
-        if main is not None:
-            return Finding(False, "main() is never called; end the file with: if __name__ == '__main__': main()", main)
+        mains = [node.lineno for node in source.body if isinstance(node, ast.FunctionDef) and node.name == "main"]
+        if mains and _first_call(source, "main") is None:
+            said = "main() is never called; end the file with: if __name__ == '__main__': main()"
+            return Finding(False, said, mains[0])
         return Finding(False, "the script makes no node: call rclpy.init(), make the node, and rclpy.spin(node)")
     if not camera_read(calls):
         return Finding(False, *_no_subscription(calls))
@@ -106,7 +96,7 @@ def no_picture(source: Source, takes: Sequence[Take]) -> Finding | None:
     return Finding(False, "the callback never ran; is rclpy.spin given the node that has the subscription?", line)
 
 
-def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
+def no_detection(source: ast.Module, takes: Sequence[Take]) -> Finding | None:
     """Return why the detector cannot find anybody; None where it looks at pictures with an SVM."""
     searched_without_svm = takes[0].calls.searched_without_svm
     if searched_without_svm != 0:
@@ -117,7 +107,7 @@ def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
         return None
     if any(take.outcome.stage.detector_inputs for take in takes):
         return Finding(None, "not tried: the detector was asked, and gave no answer")
-    line = source.first_call("detectMultiScale")
+    line = _first_call(source, "detectMultiScale")
     if line is None:
         return Finding(False, "self.hog.detectMultiScale was never called")
     return Finding(False, "detectMultiScale was never called: this line never runs", line)

@@ -22,7 +22,7 @@ from limo_hog.parallel import cores
 from limo_sim.run.provenance import code_version
 from limo_sim.run.score import ScoreCard
 from limo_sim.run.suite import Suite
-from limo_sim.run.sweep import Comparison, Estimate, Run, Summary, compare, play_all, summarise
+from limo_sim.run.sweep import Comparison, Estimate, Run, Summary, compare, in_processes, play, summarise
 from limo_sim.view.sweep_plot import plot
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -69,7 +69,7 @@ def main() -> None:
     args.cards.parent.mkdir(parents=True, exist_ok=True)
     with args.cards.open("a", encoding="utf-8") as file, progress("runs") as bar:
         task = bar.add_task("playing", total=len(missing))
-        for run, card in play_all(missing, args.workers):
+        for run, card in in_processes(play, missing, args.workers):
             known[key(run)] = card
             file.write(json.dumps(card.to_json(), allow_nan=False) + "\n")
             file.flush()

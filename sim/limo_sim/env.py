@@ -54,28 +54,21 @@ Observation = Any  # a float32 array for "state", else a dict of arrays
 
 @dataclass(frozen=True, slots=True)
 class Shaping:
-    """Weights of the reward, see `LimoFollowV1`.
+    """Weights of the reward, see `LimoFollowV1`."""
 
-    Attributes
-    ----------
-    target_m
-        Distance from the camera to the person's surface that earns most [m]: the one that the controllers hold.
-    halving_m
-        Error of the distance at which half is left [m]. Chosen: a person at the far wall, 5 m too far, leaves a sixth.
-    follow, visible
-        What facing the person at the target distance, and seeing the person whole, earns at most. Chosen: together 1.
-    person_contact, wall_contact
-        What a new contact costs. Chosen: ten seconds, and one, of following perfectly.
-    effort, jerk
-        What an action, and a change of the action, costs for each unit. Chosen: less than half a per cent, and 5 %.
-    """
-
+    #: Distance from the camera to the person's surface that earns most [m]: the one that the controllers hold.
     target_m: float = 1.5
+    #: Error of the distance at which half is left [m]. Chosen: a person at the far wall, 5 m too far, leaves a sixth.
     halving_m: float = 1.0
+    #: follow, visible: what facing the person at the target distance, and seeing the person whole, earns at most.
+    #: Chosen: together 1.
     follow: float = 0.7
     visible: float = 0.3
+    #: person_contact, wall_contact: what a new one costs. Chosen: ten seconds, and one, of following perfectly.
     person_contact: float = 100.0
     wall_contact: float = 10.0
+    #: effort, jerk: what an action, and a change of the action, costs for each unit. Chosen: less than half a per cent,
+    #: and 5 %.
     effort: float = 0.005
     jerk: float = 0.05
 
@@ -85,28 +78,15 @@ SHAPING = Shaping()
 
 @dataclass(frozen=True, slots=True)
 class Glimpse:
-    """One person, seen from the robot.
+    """One person, seen from the robot."""
 
-    Attributes
-    ----------
-    bearing, distance
-        From the robot's centre to the person's axis [rad, m].
-    surface
-        From the camera to the front of the person's trunk [m].
-    visible
-        Share of the silhouette that is in the image and not behind a wall or a pillar, about.
-    height_px
-        Of the whole silhouette [px].
-    found
-        Whether HOG would find the person.
-    """
-
+    #: bearing, distance: from the robot's centre to the person's axis [rad, m].
     bearing: float
     distance: float
-    surface: float
-    visible: float
-    height_px: float
-    found: bool
+    surface: float  #: from the camera to the front of the person's trunk [m]
+    visible: float  #: share of the silhouette that is in the image and not behind a wall or a pillar, about
+    height_px: float  #: of the whole silhouette [px]
+    found: bool  #: whether HOG would find the person
 
 
 class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from limo_hog.cli.support.arguments import add_ros_arguments, node_of
 from limo_hog.cli.support.output import UsageError
-from limo_sim.cli.options import add_scenario
-from limo_sim.cli.watching import add_watching, observing
+from limo_sim.cli.watching import add_scenario, add_watching, observing
 
 if TYPE_CHECKING:
     from limo_hog.ros2.dds import Bus

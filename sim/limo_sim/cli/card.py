@@ -10,8 +10,6 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from limo_hog.cli.support.console import console
-
 if TYPE_CHECKING:
     from limo_sim.run.score import ScoreCard
 
@@ -19,11 +17,6 @@ _BAR = 24
 _MODE_STYLES = {"search": "blue", "follow": "green", "hold": "cyan", "blocked": "red", "lost": "yellow"}
 _MODE_STYLES |= {"drive": "green", "stand": "blue"}  # of a node whose detector is its own
 _ZONE_STYLES = {"intimate": "red", "personal": "yellow", "social": "green", "public": "blue"}
-
-
-def show(card: ScoreCard) -> None:
-    """Print a score card on standard output."""
-    console().print(picture(card))
 
 
 def picture(card: ScoreCard) -> Panel:
@@ -80,9 +73,8 @@ def _bars(card: ScoreCard) -> Table:
 
 
 def _bar(name: str, share: float | None, style: str) -> tuple[str, Text, str]:
-    full = round(_BAR * (share or 0.0))
     # A share above 0 has a bar, however small it is.
-    full = max(full, 1) if share else 0
+    full = max(round(_BAR * share), 1) if share else 0
     return f"  {name}", Text("━" * full, style=style) + Text("─" * (_BAR - full), style="dim"), _percent(share)
 
 

@@ -12,8 +12,7 @@ from limo_hog.cli.support.progress import progress
 from limo_hog.follow.control.naming import controller_named
 from limo_hog.follow.decision import made_for
 from limo_hog.follow.sense.detectors import detector_named
-from limo_sim.cli.options import add_scenario
-from limo_sim.cli.watching import add_watching, finish, observing, shown_unasked
+from limo_sim.cli.watching import add_scenario, add_watching, finish, observing, shown_unasked
 
 if TYPE_CHECKING:
     from limo_sim.run.log import Step

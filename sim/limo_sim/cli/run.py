@@ -13,8 +13,7 @@ from limo_hog.cli.support.output import STDOUT, UsageError
 from limo_hog.cli.support.progress import progress
 from limo_hog.exceptions import LimoHogError
 from limo_hog.extras import needed
-from limo_sim.cli.options import add_scenario
-from limo_sim.cli.watching import add_watching, finish, observing
+from limo_sim.cli.watching import add_scenario, add_watching, finish, observing
 
 if TYPE_CHECKING:
     from limo_sim.run.log import Step

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -104,7 +104,7 @@ def _controller(text: str) -> str:
 def run(args: argparse.Namespace) -> int:
     """Play all runs, show the table, and write what was asked for."""
     from limo_sim.run.suite import Suite
-    from limo_sim.run.sweep import WorkerError, compare, play_all, summarise
+    from limo_sim.run.sweep import WorkerError, compare, in_processes, play, summarise
 
     if args.plot:
         # A missing library is named before the work, not after.
@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     with progress("runs") as bar:
         task = bar.add_task("playing", total=len(runs))
         try:
-            for played, card in play_all(runs, args.workers or cores()):
+            for played, card in in_processes(play, runs, args.workers or cores()):
                 card_of[played] = card
                 bar.advance(task)
         except (WorkerError, KeyboardInterrupt) as error:
@@ -196,18 +196,15 @@ def _show(summaries: Sequence[Summary], comparisons: Sequence[Comparison], runs:
     """Print both tables on standard output; `runs` says how many there were of each."""
     screen = console()
     rows = [(one.scenario, one.controller, one.measures) for one in summaries]
-    screen.print(_table(rows, f"mean and, below, half the 95 % interval over {runs}", _cell))
+    screen.print(_table(rows, f"mean and, below, half the 95 % interval over {runs}"))
     if comparisons:
         rows = [(one.scenario, one.controller, one.differences) for one in comparisons]
         words = f"minus {comparisons[0].against}, run by run; bold: the interval leaves out 0"
-        screen.print(_table(rows, words, _difference))
+        screen.print(_table(rows, words, "+"))
 
 
-def _table(
-    rows: Sequence[tuple[str, str, dict[str, Estimate | None]]],
-    caption: str,
-    cell: Callable[[Estimate | None, str, str, str], str],
-) -> Table:
+def _table(rows: Sequence[tuple[str, str, dict[str, Estimate | None]]], caption: str, sign: str = "") -> Table:
+    """Lay figures out; `sign` is "+" for differences."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), caption=caption, caption_justify="left")
     table.add_column("\n", no_wrap=True)
     for _, heading, unit, _ in _COLUMNS:
@@ -217,9 +214,8 @@ def _table(
         if scenario != before:
             table.add_section()
             table.add_row(Text(scenario, style="bold"))
-        table.add_row(
-            Text(f"  {controller}"), *(cell(measures[name], name, unit, style) for name, _, unit, style in _COLUMNS)
-        )
+        cells = (_cell(measures[name], name, unit, sign + style) for name, _, unit, style in _COLUMNS)
+        table.add_row(Text(f"  {controller}"), *cells)
         before = scenario
     return table
 
@@ -228,9 +224,5 @@ def _cell(estimate: Estimate | None, name: str, unit: str, style: str) -> str:
     if estimate is None:
         return "[dim]–[/]"
     mean, interval = estimate.written(name, 100 if unit == "%" else 1, style)
-    return f"{mean}\n[dim]{interval.replace(' ', '')}[/]" if interval else mean
-
-
-def _difference(estimate: Estimate | None, name: str, unit: str, style: str) -> str:
-    text = _cell(estimate, name, unit, f"+{style}")
-    return f"[bold]{text}[/]" if estimate is not None and estimate.is_sure else text
+    text = f"{mean}\n[dim]{interval.replace(' ', '')}[/]" if interval else mean
+    return f"[bold]{text}[/]" if style.startswith("+") and estimate.is_sure else text

@@ -1,4 +1,4 @@
-"""The options of `follow`, `run` and `arena` that show or record a run: --view, --video, --record, --plot."""
+"""The options of `follow`, `run` and `arena`: which scenario, and --view, --video, --record and --plot."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limo_hog.cli.support.arguments import file_ending
+from limo_hog.cli.support.arguments import add_robot, file_ending, seconds, seed
 from limo_hog.cli.support.output import STDOUT, write_json
 from limo_hog.cli.support.page import PORT, add_view, announce, has_display
 from limo_hog.exceptions import LimoHogError
@@ -22,6 +22,18 @@ if TYPE_CHECKING:
     from limo_sim.view.server import View
     from limo_sim.view.tuning import Tunable
     from limo_sim.world.scenario import Scenario
+
+
+def add_scenario(
+    parser: argparse.ArgumentParser, default_seconds: float | None, seconds_help: str, more: str = ""
+) -> None:
+    """Add --scenario, --robot, --seconds and --seed."""
+    parser.add_argument(
+        "--scenario", default="workshop", metavar="NAME|FILE.toml", help=f"the scenario to run{more} (%(default)s)"
+    )
+    add_robot(parser)
+    parser.add_argument("--seconds", type=seconds, default=default_seconds, metavar="S", help=seconds_help)
+    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
 
 
 def add_watching(parser: argparse.ArgumentParser, *, plot: bool = True) -> None:
@@ -54,9 +66,10 @@ def finish(args: argparse.Namespace, card: ScoreCard) -> None:
     if args.json:
         write_json(args.json, card.to_json())
     if args.json != STDOUT:
-        from limo_sim.cli.card import show
+        from limo_hog.cli.support.console import console
+        from limo_sim.cli.card import picture
 
-        show(card)
+        console().print(picture(card))
         if written := [str(one) for one in (args.json, args.video, args.record, args.plot) if one is not None]:
             print(f"written: {', '.join(written)}")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from limo_sim.sensing import imu, lidar
 from limo_sim.sensing.camera import CameraPose, TrueFrame
 from limo_sim.sensing.delivery import Channel, Exposure
 from limo_sim.sensing.renderer import Earlier, Renderer, Seen
+from limo_sim.world import variants
 from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.furniture import KINDS, Disc, Rectangle, placed
 from limo_sim.world.movers import Movers
@@ -30,15 +31,6 @@ from limo_sim.world.person import Pose, earlier, legs_at, trunk_radius
 from limo_sim.world.robot import Drive, integrate, twist_of
 from limo_sim.world.scenario import Camera, Furniture, Lidar, Scenario, Wheels
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
-from limo_sim.world.variants import (
-    CAMERA_STREAM,
-    DROP_STREAM,
-    IMU_STREAM,
-    LIDAR_STREAM,
-    PATTERN_STREAM,
-    SLIP_STREAM,
-    of_run,
-)
 
 STEPS_PER_SECOND = round(1 / STEP_S)
 
@@ -88,12 +80,12 @@ class Arena:
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         scenario.check(f"scenario {scenario.name!r}: ")
-        self.scenario = scenario = of_run(scenario, seed)
+        self.scenario = scenario = variants.of_run(scenario, seed)
         self.seed = seed
         self._crowd, self._movers = Crowd(scenario, seed), Movers(scenario.movers)
         robot, self.robot = scenario.robot, scenario.robot.geometry
         self._drive = Drive(self.robot.wheel_separation, robot.wheel_speed, robot.wheel_acceleration, robot.watchdog_s)
-        self._slip = self._stream(SLIP_STREAM)
+        self._slip = self._stream(variants.SLIP_STREAM)
         self.time = 0.0  #: since the start [s]
         self.contacts = Contacts()  #: how often the robot has touched a person, and a wall or furniture
         self._touched = {"wall": -STEPS_PER_SECOND, "person": -STEPS_PER_SECOND}
@@ -108,13 +100,12 @@ class Arena:
         for other, name in ((_OBSTACLE, "wall"), (_PERSON, "person")):
             self._space.on_collision(_ROBOT, other, pre_solve=self._on_touch, data=name)
         self._state = self._before = _State(0, 0.0, robot.x, robot.y, robot.yaw, people, people, movers)
-        drops = {"drop_probability": scenario.camera.drop_probability, "drops": self._stream(DROP_STREAM)}
+        drops = {"drop_probability": scenario.camera.drop_probability, "drops": self._stream(variants.DROP_STREAM)}
         self._camera = self._channel(scenario.camera, **drops)
         self._lidar, self._wheels = self._channel(scenario.lidar), self._channel(scenario.odometry)
         self._static_scanned = _scanned(scenario.furniture) + [wall.footprint for wall in scenario.walls]
-        self._renderer: Renderer | None = None
         self._frame: TrueFrame | None = None
-        self._scan: tuple[int, Scan] | None = None
+        self._scan: Scan | None = None
 
     @property
     def rejected_commands(self) -> int:
@@ -173,10 +164,10 @@ class Arena:
         state = exposure.state
         if self._frame is None or self._frame.stamp != state.time:
             camera = self._camera_at(state)
-            image, depth, seen = self._render().render(
+            image, depth, seen = self._renderer.render(
                 camera,
                 state.people,
-                self._stream(CAMERA_STREAM, exposure),
+                self._stream(variants.CAMERA_STREAM, exposure),
                 state.movers,
                 time=state.time,
                 past=Earlier(partial(self._earlier, state), state.turn_rate),
@@ -187,8 +178,8 @@ class Arena:
     def scan(self) -> Scan:
         """Return the newest lidar scan that has arrived."""
         exposure = self._lidar.newest
-        if self._scan is None or self._scan[0] != exposure.index:
-            state = exposure.state
+        state = exposure.state
+        if self._scan is None or self._scan.stamp != state.time:
             shapes: list[Disc | Rectangle] = [*self._static_scanned, *_scanned(state.movers)]
             for person, pose in zip(self.scenario.people, state.people, strict=True):
                 if pose is not None:
@@ -198,11 +189,11 @@ class Arena:
             ranges = lidar.measure(
                 lidar.cast(x, y, state.yaw + self.robot.lidar_yaw, shapes, self.scenario.room.half),
                 self.scenario.lidar.noise_m,
-                self._stream(LIDAR_STREAM, exposure),
+                self._stream(variants.LIDAR_STREAM, exposure),
             )
-            scan = Scan(state.time, ranges, -lidar.ANGLE_MAX, lidar.ANGLE_MAX, lidar.RANGE_MIN, lidar.RANGE_MAX)
-            self._scan = exposure.index, scan
-        return self._scan[1]
+            limits = -lidar.ANGLE_MAX, lidar.ANGLE_MAX, lidar.RANGE_MIN, lidar.RANGE_MAX
+            self._scan = Scan(state.time, ranges, *limits)
+        return self._scan
 
     def odometry(self) -> Odometry:
         """Return the newest odometry that has arrived."""
@@ -215,7 +206,7 @@ class Arena:
         gained_x, gained_y = (is_x - was_x) / STEP_S, (is_y - was_y) / STEP_S
         cos, sin = math.cos(now.yaw), math.sin(now.yaw)
         forward, sideways = cos * gained_x + sin * gained_y, cos * gained_y - sin * gained_x
-        noise = np.random.default_rng([self.seed, IMU_STREAM, now.step])
+        noise = np.random.default_rng([self.seed, variants.IMU_STREAM, now.step])
         return imu.samples(now.time, now.turn_rate, forward, sideways, self.scenario.imu, noise)
 
     def passed(self) -> Passed:
@@ -227,22 +218,21 @@ class Arena:
         if self._frame is not None and self._frame.stamp == self.time:
             return self._frame.truth
         state, camera = self._state, self._camera_at(self._state)
-        return self._truth_at(state, camera, self._render().look(camera, state.people, state.movers))
+        return self._truth_at(state, camera, self._renderer.look(camera, state.people, state.movers))
 
     def furniture_in_frame(self) -> list[Seen]:
         """Return the visible share and the box [px] of each piece of furniture in the newest frame; movers last."""
         state = self._camera.newest.state
-        return self._render().look_at_furniture(self._camera_at(state), state.people, state.movers)
+        return self._renderer.look_at_furniture(self._camera_at(state), state.people, state.movers)
 
     def plan(self, *, of_frame: bool = False) -> Plan:
         """Return where everything is now, or was when the newest frame was taken; quick, since nothing is drawn."""
         state = self._camera.newest.state if of_frame else self._state
         return Plan(state.time, (state.x, state.y, state.yaw), state.people)
 
-    def _render(self) -> Renderer:
-        if self._renderer is None:
-            self._renderer = Renderer(self.scenario, self._stream(PATTERN_STREAM))
-        return self._renderer
+    @cached_property
+    def _renderer(self) -> Renderer:
+        return Renderer(self.scenario, self._stream(variants.PATTERN_STREAM))
 
     def _earlier(self, state: _State, age: float) -> tuple[CameraPose, list[Pose | None], tuple[Furniture, ...]]:
         """Return what there was some seconds before a state, within a step or a few of it."""

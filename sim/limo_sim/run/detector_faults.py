@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -22,23 +22,11 @@ from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.truth import Truth
 from limo_sim.world.variants import FALSE_STREAM, MISS_STREAM
 
-
-@dataclass(frozen=True, slots=True)
-class FalseBoxes:
-    """What boxes on nothing look like.
-
-    Measured: the 30 boxes that OpenCV's model finds, threshold 0, grouped, in 14 photographs without people, each at 1,
-    1.5 and 2 times its size, and mirrored. Few, so that a single parameter was fitted to each quantity.
-    """
-
-    least_height: float = 128.0  #: of a window [px]: HOG's own
-    #: Mean of log2(height / least_height); heights are drawn from the exponential distribution of it.
-    octaves: float = 0.44
-    score: float = 0.64  #: mean margin of the SVM, which is drawn from an exponential distribution
-
-
-FALSE_BOXES = FalseBoxes()
-
+# What boxes on nothing look like. Measured: the 30 boxes that OpenCV's model finds, threshold 0, grouped, in 14
+# photographs without people, each at 1, 1.5 and 2 times its size, and mirrored. Few, so that a single parameter was
+# fitted to each quantity: the mean of log2(height / least height), the least one being HOG's own [px], and the mean
+# margin of the SVM. Both are drawn from exponential distributions.
+_FALSE_HEIGHT, _FALSE_OCTAVES, _FALSE_SCORE = 128.0, 0.44, 0.64
 
 #: What benches/fit_detector.py measured on photographs, for each model of people.
 FIT_FILE = Path(__file__).with_name("detector_fit.json")
@@ -191,16 +179,15 @@ class FaultySearch:
         """Return the boxes (N, 4) [px of the camera's image] that are on nobody, or on people who are not missed."""
         heights = [person.box[3] if person and person.box else 0.0 for person in truth.people]
         missed = [misses.at(period, height) for misses, height in zip(self._misses, heights, strict=True)]
-        on: Sequence[int] = [person_of(box, truth.people) for box in boxes]
+        on = (person_of(box, truth.people) for box in boxes)
         return [index for index, person in enumerate(on) if person == NO_PERSON or not missed[person]]
 
     def _false(self, period: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return false boxes int64 (N, 4) in the camera's image [px] and their scores (N,)."""
         random = np.random.default_rng([self._seed, FALSE_STREAM, period])
         count = random.poisson(self._false_rate)
-        height = FALSE_BOXES.least_height * 2.0 ** random.exponential(FALSE_BOXES.octaves, count)
-        height = np.minimum(height, HEIGHT)
+        height = np.minimum(_FALSE_HEIGHT * 2.0 ** random.exponential(_FALSE_OCTAVES, count), HEIGHT)
         width = height / 2
         x, y = random.random(count) * (WIDTH - width), random.random(count) * (HEIGHT - height)
         boxes = np.stack([x, y, width, height], axis=1)
-        return boxes.astype(np.int64), random.exponential(FALSE_BOXES.score, count)
+        return boxes.astype(np.int64), random.exponential(_FALSE_SCORE, count)

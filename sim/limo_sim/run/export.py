@@ -18,6 +18,15 @@ from limo_sim.sensing.camera import TrueFrame
 from limo_sim.world.scenario import Scenario
 from limo_sim.world.variants import WANDERING_STREAM
 
+# How the robot looks around.
+_SPEED = 0.5  # [m/s]; half of what it can, so that pictures differ and little is missed
+_TURN = 0.5  # largest turn rate while it drives [rad/s]; drawn anew for every leg
+_LEG_S = 3.0  # length of a leg [s]
+_TURN_AWAY = 0.9  # turn rate where the way is blocked [rad/s]
+_KEEP = 0.7  # nearest obstacle ahead that it drives towards [m]: it stops within less
+_CLEAR = 1.0  # what must be free ahead before it drives again [m]
+_AHEAD = 0.6  # half of the sector that counts as ahead [rad]
+
 
 @dataclass(frozen=True, slots=True)
 class Thing:
@@ -28,22 +37,6 @@ class Thing:
     #: x, y, w, h [px] around all that lies within the image, as if nothing stood in front of it.
     box: tuple[int, int, int, int]
     visible: float  #: share of the whole silhouette that is seen: 0 (hidden) … 1
-
-
-@dataclass(frozen=True, slots=True)
-class Wandering:
-    """How the robot looks around."""
-
-    speed: float = 0.5  #: [m/s]; half of what it can, so that pictures differ and little is missed
-    turn: float = 0.5  #: largest turn rate while it drives [rad/s]; drawn anew for every leg
-    leg_s: float = 3.0  #: length of a leg [s]
-    turn_away: float = 0.9  #: turn rate where the way is blocked [rad/s]
-    keep: float = 0.7  #: nearest obstacle ahead that it drives towards [m]: it stops within less
-    clear: float = 1.0  #: what must be free ahead before it drives again [m]
-    ahead: float = 0.6  #: half of the sector that counts as ahead [rad]
-
-
-WANDERING = Wandering()
 
 
 def labelled_frames(
@@ -63,11 +56,11 @@ def labelled_frames(
     turn, turning, leg_ends, next_s = 0.0, False, 0.0, 0.0
     while count > 0:
         if arena.time >= leg_ends:
-            turn, leg_ends = float(random.uniform(-WANDERING.turn, WANDERING.turn)), arena.time + WANDERING.leg_s
-        free = _free_ahead(arena.scan(), WANDERING.ahead)
-        turning = free < (WANDERING.clear if turning else WANDERING.keep)
-        away = WANDERING.turn_away if turn >= 0 else -WANDERING.turn_away
-        arena.command(Twist(0.0, away) if turning else Twist(WANDERING.speed, turn))
+            turn, leg_ends = float(random.uniform(-_TURN, _TURN)), arena.time + _LEG_S
+        free = _free_ahead(arena.scan(), _AHEAD)
+        turning = free < (_CLEAR if turning else _KEEP)
+        away = _TURN_AWAY if turn >= 0 else -_TURN_AWAY
+        arena.command(Twist(0.0, away) if turning else Twist(_SPEED, turn))
         for _ in range(steps):
             arena.step()
         if arena.time >= next_s:

@@ -39,15 +39,12 @@ def _told(value: Any) -> Any:
         return [_told(item) for item in value]
     if not dataclasses.is_dataclass(value) or isinstance(value, type):
         return value
-    return {
-        field.name: _told(item)
-        for field in dataclasses.fields(value)
-        if (item := getattr(value, field.name)) != _default(field)
-    }
-
-
-def _default(field: dataclasses.Field[Any]) -> Any:
-    return field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+    told = {}
+    for field in dataclasses.fields(value):
+        item = getattr(value, field.name)
+        if item != (field.default if field.default_factory is dataclasses.MISSING else field.default_factory()):
+            told[field.name] = _told(item)
+    return told
 
 
 @cache

@@ -112,11 +112,6 @@ class WorkerError(LimoHogError):
     """A worker process ended before its run did."""
 
 
-def play_all(runs: Sequence[Run], workers: int) -> Iterator[tuple[Run, ScoreCard]]:
-    """Play runs on `workers` processes; yields each run with its card, as `in_processes` does."""
-    return in_processes(play, runs, workers)
-
-
 def in_processes(task: Callable[[R], C], runs: Sequence[R], workers: int) -> Iterator[tuple[R, C]]:
     """Do a task for each run on `workers` processes; yields each run with the answer, in the order in which they end.
 
@@ -159,7 +154,7 @@ def summarise(cards: Sequence[ScoreCard], groups: Mapping[str, str] | None = Non
     group is taken seed by seed, and the interval is that of the seeds.
     """
     return [
-        Summary(label, controller, len(group), {name: _estimate(_by_seed(_values(group, name))) for name in MEASURES})
+        Summary(label, controller, len(group), {name: _estimate(_values(group, name)) for name in MEASURES})
         for (label, controller), group in _grouped(cards, groups).items()
     ]
 
@@ -175,7 +170,7 @@ def compare(cards: Sequence[ScoreCard], against: str, groups: Mapping[str, str] 
         differences: dict[str, Estimate | None] = {}
         for name in MEASURES:
             mine, theirs = _values(group, name), _values(others, name)
-            differences[name] = _estimate(_by_seed({run: mine[run] - theirs[run] for run in mine if run in theirs}))
+            differences[name] = _estimate({run: mine[run] - theirs[run] for run in mine if run in theirs})
         pairs = len({(card.scenario, card.seed) for card in group} & {(card.scenario, card.seed) for card in others})
         comparisons.append(Comparison(label, controller, against, pairs, differences))
     return comparisons
@@ -195,12 +190,12 @@ def _values(cards: Sequence[ScoreCard], name: str) -> dict[tuple[str, int], floa
     return {(card.scenario, card.seed): float(value) for card in cards if (value := getattr(card, name)) is not None}
 
 
-def _by_seed(values: Mapping[tuple[str, int], float]) -> list[float]:
-    """Return the mean over the scenarios of each seed."""
+def _estimate(values: Mapping[tuple[str, int], float]) -> Estimate | None:
+    """Estimate from the mean over the scenarios of each seed; None without values."""
     seeds: dict[int, list[float]] = {}
     for (_, seed), value in values.items():
         seeds.setdefault(seed, []).append(value)
-    return [fmean(seeds[seed]) for seed in sorted(seeds)]
+    return estimate([fmean(seeds[seed]) for seed in sorted(seeds)]) if seeds else None
 
 
 def estimate(values: Sequence[float]) -> Estimate:
@@ -209,10 +204,6 @@ def estimate(values: Sequence[float]) -> Estimate:
     if count < 2:
         return Estimate(mean, None, mean, mean)
     return Estimate(mean, _student(count - 1) * stdev(values) / math.sqrt(count), min(values), max(values))
-
-
-def _estimate(values: Sequence[float]) -> Estimate | None:
-    return estimate(values) if values else None
 
 
 def _student(freedom: int) -> float:

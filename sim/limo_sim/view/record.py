@@ -7,23 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from limo_hog.ros2 import messages
+from limo_hog.ros2 import messages, names
 from limo_hog.ros2.bag import bag_writer
 from limo_hog.ros2.findings import detections_message
 from limo_hog.ros2.frames import odometry_transform, static_transforms
-from limo_hog.ros2.names import (
-    CAMERA_INFO,
-    CLOCK,
-    COMMAND,
-    DEPTH,
-    DETECTIONS,
-    IMAGE,
-    IMU,
-    ODOMETRY,
-    SCAN,
-    TF,
-    TF_STATIC,
-)
 from limo_sim.run.log import Step, Watch
 from limo_sim.world.scenario import Scenario
 
@@ -40,27 +27,27 @@ def recorded(path: Path, scenario: Scenario) -> Iterator[Watch]:
             log, frame = step.log, step.log.frame
             now, scan = log.time, log.sensors.scan
             for time, odometry, imu in step.passed:
-                write(CLOCK, time, messages.clock(time))
+                write(names.CLOCK, time, messages.clock(time))
                 if not began:
                     began = True
-                    write(TF_STATIC, time, static_transforms(time, scenario.robot.geometry))
+                    write(names.TF_STATIC, time, static_transforms(time, scenario.robot.geometry))
                 for reading in imu:
-                    write(IMU, time, messages.imu(reading.stamp, reading.angular_velocity, reading.acceleration))
+                    write(names.IMU, time, messages.imu(reading.stamp, reading.angular_velocity, reading.acceleration))
                 if odometry.stamp > read:
                     read = odometry.stamp
-                    write(TF, time, odometry_transform(odometry))
-                    write(ODOMETRY, time, messages.odometry(odometry))
+                    write(names.TF, time, odometry_transform(odometry))
+                    write(names.ODOMETRY, time, messages.odometry(odometry))
             if scan is not None and scan.stamp > scanned:
                 scanned = scan.stamp
-                write(SCAN, now, messages.laser_scan(scan))
+                write(names.SCAN, now, messages.laser_scan(scan))
             if frame is not None and frame.depth is not None:
                 height, width = frame.image.shape[:2]
                 bent = scenario.camera.k1, scenario.camera.k2
-                write(CAMERA_INFO, now, messages.camera_info(frame.stamp, width, height, frame.focal_px, bent))
-                write(DEPTH, now, messages.image(frame.stamp, frame.depth))
-                write(IMAGE, now, messages.image(frame.stamp, frame.image))
+                write(names.CAMERA_INFO, now, messages.camera_info(frame.stamp, width, height, frame.focal_px, bent))
+                write(names.DEPTH, now, messages.image(frame.stamp, frame.depth))
+                write(names.IMAGE, now, messages.image(frame.stamp, frame.image))
                 found = detections_message(frame.stamp, log.detections, messages.CAMERA_FRAME)
-                write(DETECTIONS, now, found)
-            write(COMMAND, now, messages.twist(log.decision.twist))
+                write(names.DETECTIONS, now, found)
+            write(names.COMMAND, now, messages.twist(log.decision.twist))
 
         yield watch

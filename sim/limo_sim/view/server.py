@@ -15,17 +15,7 @@ from limo_hog.imaging.writing import jpeg
 from limo_hog.live.pace import Pace
 from limo_hog.live.server import LOOPBACK, Live
 from limo_sim.run.log import Step
-from limo_sim.view.reading import (
-    annotated,
-    believed,
-    depth_colours,
-    depth_picture,
-    figures,
-    followed_person,
-    hits,
-    measured_m,
-    rollouts,
-)
+from limo_sim.view import reading
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.furniture import Disc
 from limo_sim.world.scenario import Scenario
@@ -72,10 +62,10 @@ class View(Live[Step]):
             boxes, tracked = log.detections.boxes, log.decision.belief.people
             self._boxes |= {one.number: (log.time, boxes[one.box].tolist()) for one in tracked if one.box is not None}
         people = [(None, None) if p is None else (p.x, p.y) for p in step.truth.people]
-        self._rows.append([*figures(step).values(), measured_m(log), *robot, *itertools.chain(*people)])
+        self._rows.append([*reading.figures(step).values(), reading.measured_m(log), *robot, *itertools.chain(*people)])
         if log.decision.mode is Mode.SEARCH:
             self._followed = None
-        elif (followed := followed_person(step)) is not None:
+        elif (followed := reading.followed_person(step)) is not None:
             self._followed = followed
         self._poses.append((log.time, *robot))
         self._written += 1
@@ -94,7 +84,7 @@ class View(Live[Step]):
                 for f in self._scenario.footprints
             ],
             "zones": list(ZONE_ENDS.values()),
-            "depth": {"far": self._scenario.depth.far_m, "colours": depth_colours(self._scenario.depth.far_m)},
+            "depth": {"far": self._scenario.depth.far_m, "colours": reading.depth_colours(self._scenario.depth.far_m)},
             "parameters": [
                 {**asdict(one), "whole": one.whole}
                 for one in (self._controller.parameters.values() if self._controller else ())
@@ -104,17 +94,17 @@ class View(Live[Step]):
     def _state(self, step: Step) -> dict[str, Any]:
         log = step.log
         return {
-            **figures(step),
+            **reading.figures(step),
             "mode": log.decision.mode.value,
             "reason": log.decision.reason,
             "robot": step.truth.robot,
             "people": [None if p is None else (p.x, p.y) for p in step.truth.people],
             "followed": self._followed,
-            "believed": believed(step),
-            "rollouts": rollouts(step),
+            "believed": reading.believed(step),
+            "rollouts": reading.rollouts(step),
             "shares": log.decision.belief.shares,
-            "measured_m": measured_m(log),
-            "scan": hits(log.sensors.scan, self._scenario.robot.geometry, list(self._poses)),
+            "measured_m": reading.measured_m(log),
+            "scan": reading.hits(log.sensors.scan, self._scenario.robot.geometry, list(self._poses)),
             "detect_ms": log.detect_ms or None,
             "boxes": len(log.detections),
             "choices": self._choices(log) if self._controller else [],
@@ -138,8 +128,7 @@ class View(Live[Step]):
         frame = step.log.frame
         if frame is None or frame.depth is None:
             return []
-        depth = depth_picture(frame.depth[::2, ::2], self._scenario.depth.far_m)
-        pictures = {b"c": annotated(step.log, caption=False), b"d": depth}
-        encoded = [letter + jpeg(p) for letter, p in pictures.items()]
+        depth = reading.depth_picture(frame.depth[::2, ::2], self._scenario.depth.far_m)
         # A window's name stands between its letter and its picture, ended by a line feed.
-        return encoded + [b"w" + " ".join(name.split()).encode() + b"\n" + jpeg(p) for name, p in step.windows.items()]
+        windows = (b"w" + " ".join(name.split()).encode() + b"\n" + jpeg(p) for name, p in step.windows.items())
+        return [b"c" + jpeg(reading.annotated(step.log, caption=False)), b"d" + jpeg(depth), *windows]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
+from pathlib import Path
 
 _START, _END = "# >>> ", "# <<<"
 _BLANKS = {"1": "picture = image.copy()", "2": "boxes, weights = [], []", "3": "cx = None"}
@@ -32,5 +32,5 @@ def template(node: str) -> str:
 
 
 def _text(node: str) -> list[str]:
-    path = files("limo_sim.workshop").joinpath("nodes").joinpath(f"{node}.solution.txt")
+    path = Path(__file__).with_name("nodes") / f"{node}.solution.txt"
     return path.read_text(encoding="utf-8").splitlines(keepends=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,11 +14,10 @@ from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.runner import Limits, Said
 from limo_sim.ros.worker import no_nodes
 from limo_sim.workshop.exercises import Checkpoint, Exercise, exercise
-from limo_sim.workshop.mistakes import Finding, Source, camera_read, no_command, no_detection, no_picture
-from limo_sim.workshop.scenes import Scene
+from limo_sim.workshop.mistakes import Finding, camera_read, no_command, no_detection, no_picture, parsed
 from limo_sim.workshop.sights import found
 from limo_sim.workshop.stretch import red_on_person
-from limo_sim.workshop.takes import Look, Take, judge_by_truth, play
+from limo_sim.workshop.takes import Look, Scene, Take, judge_by_truth, play
 
 #: What a verdict tells is no longer [characters].
 _LONGEST = 4000
@@ -59,11 +59,6 @@ _BOXES = ("found", "scaled_back", "best")
 _ON_FOUND = ("logged", "scaled_back", "best", "stands")
 
 
-def check(script: Path, name: str = "follower") -> list[Verdict]:
-    """Return the verdicts of `examine`."""
-    return examine(script, name).verdicts
-
-
 def examine(
     script: Path,
     name: str = "follower",
@@ -82,7 +77,8 @@ def examine(
         raise StubError(f"{script}: no such file")
     wanted = exercise(name)
     limits = replace(limits or Limits(), began=time.monotonic())
-    source = Source(script)
+    # (As it is before it runs. A file that Python refuses has no calls; the run says why.)
+    source = parsed(script) or ast.Module([], [])
     takes: list[Take] = []
     with _player(script, wanted.scenes, limits, said, workers) as played:
         for scene in wanted.scenes:
@@ -92,7 +88,8 @@ def examine(
                     break
         by_truth = judge_by_truth(takes)
         fault = _fault(source, takes)
-        late = [point for point in wanted.checkpoints if _is_late(point, wanted)]
+        last = {scene.name for scene in wanted.scenes if scene.last}
+        late = [point for point in wanted.checkpoints if last.intersection(point.scenes)]
         first = [point for point in wanted.checkpoints if point not in late]
         verdicts = [_verdict(point, _judged(source, point, wanted, takes, by_truth)) for point in first]
         ready = fault is None and all(verdict.holds for verdict in verdicts)
@@ -133,13 +130,8 @@ def _player(
 
 def _is_hopeless(take: Take) -> bool:
     """Whether the node would fail in every scene alike, or has used up its time."""
-    fault = take.outcome.fault if take.outcome else None
+    fault = take.outcome.fault
     return not take.calls.given or (fault is not None and fault.how in ("hung", "was stopped"))
-
-
-def _is_late(checkpoint: Checkpoint, wanted: Exercise) -> bool:
-    """Whether it is judged by scenes that are played last."""
-    return any(scene.last and scene.name in checkpoint.scenes for scene in wanted.scenes)
 
 
 def _where(checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take]) -> list[Take]:
@@ -148,7 +140,9 @@ def _where(checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take]) -> l
     return [take for take in takes if take.scene.name in (checkpoint.scenes or first)]
 
 
-def _judged(source: Source, checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take], by_truth: bool) -> Finding:
+def _judged(
+    source: ast.Module, checkpoint: Checkpoint, wanted: Exercise, takes: Sequence[Take], by_truth: bool
+) -> Finding:
     """Judge one checkpoint, or name the mistake that keeps the node from it."""
     first = wanted.checkpoints[0]
     no_image = no_picture(source, takes)
@@ -177,17 +171,9 @@ def _judged(source: Source, checkpoint: Checkpoint, wanted: Exercise, takes: Seq
 
 
 def _verdict(checkpoint: Checkpoint, finding: Finding) -> Verdict:
-    return Verdict(
-        checkpoint.task,
-        checkpoint.name,
-        finding.holds,
-        finding.evidence,
-        checkpoint.points if finding.holds else 0,
-        checkpoint.points,
-        finding.line,
-        checkpoint.hints,
-        finding.look,
-    )
+    (holds, said, line, look), worth = finding, checkpoint.points
+    won = worth if holds else 0
+    return Verdict(checkpoint.task, checkpoint.name, holds, said, won, worth, line, checkpoint.hints, look)
 
 
 def _marked(verdicts: list[Verdict], takes: Sequence[Take]) -> list[Verdict]:
@@ -200,13 +186,13 @@ def _marked(verdicts: list[Verdict], takes: Sequence[Take]) -> list[Verdict]:
     return [copied, *(replace(verdict, points=0) for verdict in verdicts)]
 
 
-def _fault(source: Source, takes: Sequence[Take]) -> Verdict | None:
+def _fault(source: ast.Module, takes: Sequence[Take]) -> Verdict | None:
     """Name the scenes in which the node raises, hangs or dies."""
     failed = [take for take in takes if take.failed]
-    if not failed or (outcome := failed[0].outcome) is None or outcome.fault is None:
+    if not failed or (fault := failed[0].outcome.fault) is None:
         return None
-    line, stage = outcome.fault.line, outcome.stage
-    not_bytes = [asked for asked in stage.detector_inputs if not asked.startswith("uint8")]
+    line, outcome = fault.line, failed[0].outcome
+    not_bytes = [asked for asked in outcome.stage.detector_inputs if not asked.startswith("uint8")]
     if not_bytes:
         said = f"the detector was given {not_bytes[0]}: it reads uint8, as imgmsg_to_cv2(message, 'bgr8') gives it"
         return Verdict(2, "people are found", False, said, line=line)

@@ -39,12 +39,17 @@ def looks_of(takes: Iterable[Take], *, seeing: bool = False) -> Iterator[tuple[T
 
 def _answers(takes: Iterable[Take], *, seeing: bool) -> list[Answer]:
     """Return the commands whose images of the last half second all had a box, or all had none."""
-    found: list[Answer] = []
-    for take in takes:
-        for command, look, recent in take.answers:
-            if recent and all(bool(len(one.found)) == seeing for one in recent):
-                found.append((take, command, look, recent))
-    return found
+    return [
+        (take, command, look, recent)
+        for take in takes
+        for command, look, recent in take.answers
+        if recent and all(bool(len(one.found)) == seeing for one in recent)
+    ]
+
+
+def _wrong(take: Take, command: Command, look: Look, said: str, more: str = "") -> Finding:
+    """Return that a command is a wrong answer: what is `said` comes before the command, what is `more` after it."""
+    return Finding(False, f"{take.at(look)}: {said}the command is {command_of(command)}{more}", command.line, look)
 
 
 def moves(takes: Sequence[Take]) -> bool:
@@ -59,9 +64,7 @@ def stands(takes: Sequence[Take]) -> Finding:
     answers = _answers(takes, seeing=False)
     for take, command, look, _ in answers:
         if command.twist.linear or command.twist.angular:
-            return Finding(
-                False, f"{take.at(look)}: no box, yet the command is {command_of(command)}", command.line, look
-            )
+            return _wrong(take, command, look, "no box, yet ")
     stopped = {id(take) for take, *_ in answers}
     for take in takes:
         empty = [look for look in take.looks if look.searched is not None and not len(look.found)]
@@ -106,10 +109,9 @@ def turns(takes: Sequence[Take]) -> Finding:
     if wrong:
         take, command, look, error = wrong[0]
         side = "left: angular.z > 0" if error > 0 else "right: angular.z < 0"
-        said = f"{take.at(look)}: the person is {abs(error)} px to the {side}; the command is {command_of(command)}"
-        if all(command.twist.angular * error < 0 for _, command, _, error in clear):
-            said += "; the sign is swapped: the error is middle - cx"
-        return Finding(False, said, command.line, look)
+        swapped = all(command.twist.angular * error < 0 for _, command, _, error in clear)
+        more = "; the sign is swapped: the error is middle - cx" if swapped else ""
+        return _wrong(take, command, look, f"the person is {abs(error)} px to the {side}; ", more)
     if len({error > 0 for *_, error in clear}) < 2:
         return Finding(None, "not tried: the person was found on one side only")
     return Finding(True, "left of the middle turns left, right turns right")
@@ -120,17 +122,14 @@ def dead_band(takes: Sequence[Take], pixels: int = DEAD_BAND) -> Finding:
     answers = _answers(takes, seeing=True)
     if not any(command.twist.angular for _, command, _, _ in answers):
         return Finding(None, "not tried: the robot never turns")
-    tried = 0
-    for take, command, look, recent in answers:
-        if max(abs(error_of(one)) for one in recent) >= pixels:
-            continue
-        tried += 1
+    tried = [answer for answer in answers if max(abs(error_of(one)) for one in answer[3]) < pixels]
+    for take, command, look, _ in tried:
         if command.twist.angular != 0.0:
-            said = f"{take.at(look)}: {error_of(look)} px off the middle, within {pixels}: wanted is angular.z 0; the "
-            return Finding(False, f"{said}command is {command_of(command)}", command.line, look)
+            said = f"{error_of(look)} px off the middle, within {pixels}: wanted is angular.z 0; "
+            return _wrong(take, command, look, said)
     if not tried:
         return Finding(None, "not tried: no frame had the person in the middle")
-    return Finding(True, f"{tried} commands within {pixels} px do not turn")
+    return Finding(True, f"{len(tried)} commands within {pixels} px do not turn")
 
 
 def drives(takes: Sequence[Take]) -> Finding:
@@ -140,17 +139,12 @@ def drives(takes: Sequence[Take]) -> Finding:
     ahead = []
     for take, command, look, recent in _answers(takes, seeing=True):
         if command.twist.linear < 0:
-            said = f"{take.at(look)}: a person is in view: wanted is linear.x > 0; the command is {command_of(command)}"
-            return Finding(False, said, command.line, look)
+            return _wrong(take, command, look, "a person is in view: wanted is linear.x > 0; ")
         if max(abs(error_of(one)) for one in recent) <= CLEAR_ERROR:
             ahead.append((take, command, look))
     still = [entry for entry in ahead if entry[1].twist.linear == 0]
     if len(still) > (1 - RIGHT) * len(ahead):
-        take, command, look = still[0]
-        said = (
-            f"{take.at(look)}: a person is in view ahead: wanted is linear.x > 0; the command is {command_of(command)}"
-        )
-        return Finding(False, said, command.line, look)
+        return _wrong(*still[0], "a person is in view ahead: wanted is linear.x > 0; ")
     if not ahead:
         return Finding(None, "not tried: no person was found ahead")
     return Finding(True, "a person ahead is answered with a forward command")
@@ -161,11 +155,11 @@ def speaks(takes: Sequence[Take], seconds: float = SILENCE) -> Finding:
     if not moves(takes):
         return NEVER_MOVES
     for take in takes:
-        stage = take.outcome.stage if take.outcome else None
         seen = [look.time for look in take.looks if len(look.found)]
-        if stage is None or not seen:
+        if not seen:
             continue
-        times = [0.0, *(command.time for command in stage.commands if command.time < seen[-1]), seen[-1]]
+        times = [command.time for command in take.outcome.stage.commands if command.time < seen[-1]]
+        times = [0.0, *times, seen[-1]]
         gap, at = max((b - a, a) for a, b in itertools.pairwise(times))
         if gap > seconds + 1e-6 and not blocked(take):
             said = f"{take.scene.words}: no command for {gap:.1f} s after {at:.1f} s; the watchdog stops the robot"
@@ -183,7 +177,7 @@ def returns(takes: Sequence[Take]) -> Finding:
 
 def blocked(take: Take, seconds: float = SILENCE) -> str:
     """Return which callback took longer than this, "" if none did; the default is the watchdog's time."""
-    call = take.outcome.stage.longest if take.outcome else None
+    call = take.outcome.stage.longest
     if call is None or call.slept <= seconds - 1e-6:
         return ""
     return f"the callback at {call.time:.1f} s slept for {call.slept:.1f} s"
@@ -200,8 +194,7 @@ def keeps(
         tried.add(sign)
         if speed * sign <= 0 and (sign or speed):
             how = {-1: "to drive back", 1: "to drive forward", 0: "to stop, since the depth is unknown"}[sign]
-            said = f"{take.at(look)}: wanted is {how}; the command is {command_of(command)}"
-            return Finding(False, said, command.line, look)
+            return _wrong(take, command, look, f"wanted is {how}; ")
     if len(tried) < len(set(wanted.values())):
         return NOBODY_FOUND
     return Finding(True, "drives forward when the person is too far, back when too near")
@@ -214,8 +207,8 @@ def limits(takes: Sequence[Take], linear: float = 0.3, angular: float = 0.8) -> 
     for take, look in looks_of(takes):
         for command in look.commands:
             if abs(command.twist.linear) > linear + 1e-9 or abs(command.twist.angular) > angular + 1e-9:
-                said = f"{take.at(look)}: the command is {command_of(command)}; "
-                return Finding(False, f"{said}the limits are {linear:g} m/s and {angular:g} rad/s", command.line, look)
+                more = f"; the limits are {linear:g} m/s and {angular:g} rad/s"
+                return _wrong(take, command, look, "", more)
     return Finding(True, f"never faster than {linear:g} m/s and {angular:g} rad/s")
 
 
@@ -223,10 +216,9 @@ def figures(takes: Sequence[Take], **wanted: Sequence[float]) -> Finding:
     """Whether figures of the score card, such as in_view, are between two bounds in each scene."""
     told = []
     for take in takes:
-        if take.outcome is None or take.outcome.failure:
-            why = "" if take.outcome is None else take.outcome.failure
-            line = take.outcome.fault.line if take.outcome is not None and take.outcome.fault else None
-            return Finding(False, f"{take.scene.words}: {why}", line)
+        if take.outcome.failure:
+            line = take.outcome.fault.line if take.outcome.fault else None
+            return Finding(False, f"{take.scene.words}: {take.outcome.failure}", line)
         card = score_of(take.outcome).to_json()
         for name, (least, most) in wanted.items():
             said = "unknown" if card[name] is None else f"{card[name]:.2f}"

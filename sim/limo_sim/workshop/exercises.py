@@ -13,7 +13,7 @@ from typing import Any
 from limo_sim.run.score import ScoreCard
 from limo_sim.workshop import checkpoints, sights, stretch
 from limo_sim.workshop.mistakes import Finding
-from limo_sim.workshop.scenes import Scene
+from limo_sim.workshop.takes import Scene
 from limo_sim.world.scenario import Person, Scenario
 from limo_sim.world.schema import ScenarioError, build
 

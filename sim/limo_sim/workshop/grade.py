@@ -107,22 +107,15 @@ def _files(folder: Path) -> Iterator[os.DirEntry[str]]:
 
 
 def grade(
-    files: Sequence[Path],
-    folder: Path,
-    workers: int,
-    node: str = "follower",
-    limits: Limits | None = None,
-    *,
-    pages: Path | None = None,
+    files: Sequence[Path], folder: Path, workers: int, node: str, limits: Limits, *, pages: Path | None = None
 ) -> Generator[Grade, None, None]:
     """Check each file of `nodes_in(folder)`, `workers` of them at once; yield the grades as they come.
 
     The limits of time are those of all scenes together; in the folder `pages` a page is written for each file. A caller
     who leaves early ends the nodes that run.
     """
-    allowed = limits or Limits(seconds=100.0)
     with ThreadPoolExecutor(workers) as pool:
-        waiting = [pool.submit(_grade, file, folder, node, allowed, pages) for file in files]
+        waiting = [pool.submit(_grade, file, folder, node, limits, pages) for file in files]
         try:
             for done in as_completed(waiting):
                 yield done.result()
@@ -193,29 +186,27 @@ class Table:
 
     def __init__(self, node: str, folder: Path, target: TextIO) -> None:
         wanted = exercise(node)
-        self._tasks = sorted({point.task for point in wanted.checkpoints if point.points})
         self._folder, self._target = folder, target
         self._seen = {fingerprint(solution(wanted.solution)): "the model solution"} if wanted.solution else {}
-        self._writer = csv.writer(target, lineterminator="\n")
-        tasks = (f"task_{task}" for task in self._tasks)
-        self._writer.writerow(["file", "points", "max_points", *tasks, "line", "first_mistake", "copy_of"])
+        tasks = (f"task_{task}" for task in sorted({point.task for point in wanted.checkpoints if point.points}))
+        columns = ["file", "points", "max_points", *tasks, "line", "first_mistake", "copy_of"]
+        self._writer = csv.DictWriter(target, columns, lineterminator="\n")
+        self._writer.writeheader()
 
     def add(self, graded: Grade) -> None:
         """Write a line, to the disk."""
         name = _cell(_name(graded.file, self._folder))
         like = self._seen.setdefault(graded.like, name) if graded.like else ""
-        if graded.result is None:
-            self._writer.writerow([name, 0, "", *("" for _ in self._tasks), "", _cell(graded.reason), ""])
-        else:
-            won = {task["task"]: task["points"] for task in graded.result["tasks"]}
+        row: dict[str, Any] = {"file": name, "points": 0, "first_mistake": _cell(graded.reason)}
+        if graded.result is not None:
+            row |= {key: graded.result[key] for key in ("points", "max_points")}
+            row["copy_of"] = "" if like == name else like
+            row |= {f"task_{task['task']}": task["points"] for task in graded.result["tasks"]}
             missed = next((entry for entry in graded.result["checkpoints"] if not entry["holds"]), None)
-            line, said = "", ""
             if missed is not None:
-                line = "" if missed["line"] is None else missed["line"]
                 said = _cell(f"{missed['checkpoint']}: " + " ".join(missed["evidence"].split()))
-            points, worth = graded.result["points"], graded.result["max_points"]
-            tasks = (won.get(task, "") for task in self._tasks)
-            self._writer.writerow([name, points, worth, *tasks, line, said, "" if like == name else like])
+                row |= {"line": missed["line"], "first_mistake": said}
+        self._writer.writerow(row)
         self._target.flush()
 
 

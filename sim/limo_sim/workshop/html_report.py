@@ -69,7 +69,9 @@ def _line(verdict: Verdict) -> str:
 def _scene(take: Take, cited: Sequence[Look]) -> str:
     """Return the images that verdicts cite, or a telling one, and the way of the robot."""
     words = escape(take.scene.words.capitalize())
-    looks = [look for look in take.looks if any(look is one for one in cited)][:3] or _telling(take)
+    looks = [look for look in take.looks if look in cited][:3]
+    # (Else the image with the most boxes and a window, of equals the last.)
+    looks = looks or sorted(take.looks, key=lambda look: (bool(look.pictures), len(look.found), look.time))[-1:]
     if not looks:
         return f'<figure><div class="none">no frame</div><figcaption>{words}</figcaption></figure>'
     figures = "".join(_figure(take, look, words) for look in looks)
@@ -110,8 +112,3 @@ def _map(take: Take, words: str) -> str:
         f"{words}<span>from above: the robot's way blue, the person's orange; the room is {2 * half:g} m wide</span>"
         "</figcaption></figure>"
     )
-
-
-def _telling(take: Take) -> list[Look]:
-    """Return the image with the most boxes and a window, of equals the last."""
-    return sorted(take.looks, key=lambda look: (bool(look.pictures), len(look.found), look.time))[-1:]

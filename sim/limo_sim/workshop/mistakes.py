@@ -31,39 +31,29 @@ class Finding(NamedTuple):
 _PARSING = threading.Lock()
 
 
-class Source:
-    """A script's text, as it was before the script ran."""
+def parsed(node: Path | str) -> ast.Module | None:
+    """Return the tree of a file or a text; None where Python refuses it."""
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError, OSError):
+        text = node.read_bytes() if isinstance(node, Path) else node
+        with _PARSING:
+            return ast.parse(text)
+    return None
 
-    def __init__(self, script: Path) -> None:
-        self._tree = ast.Module([], [])
-        # (A file that Python refuses has no calls; the run says why.)
-        with suppress(SyntaxError, ValueError, RecursionError, MemoryError, OSError):
-            text = script.read_bytes()
-            with _PARSING:
-                self._tree = ast.parse(text)
 
-    def uncalled(self, function: str) -> int | None:
-        """Return the line of a function of the module that nothing calls; None where it is called or absent."""
-        defined = [node for node in self._tree.body if isinstance(node, ast.FunctionDef) and node.name == function]
-        return defined[0].lineno if defined and self.first_call(function) is None else None
-
-    def first_call(self, function: str) -> int | None:
-        """Return the first line that calls a function or a method of this name; None where there is none."""
-        lines = [
-            node.lineno
-            for node in ast.walk(self._tree)
-            if isinstance(node, ast.Call) and function in (getattr(node.func, "attr", ""), getattr(node.func, "id", ""))
-        ]
-        return min(lines, default=None)
+def _first_call(source: ast.Module, function: str) -> int | None:
+    """Return the first line that calls a function or a method of this name; None where there is none."""
+    lines = [
+        node.lineno
+        for node in ast.walk(source)
+        if isinstance(node, ast.Call) and function in (getattr(node.func, "attr", ""), getattr(node.func, "id", ""))
+    ]
+    return min(lines, default=None)
 
 
 def fingerprint(node: Path | str) -> str:
     """Return what a file or a text has in common with its copies: its code, without comments and names' spelling."""
-    try:
-        text = node.read_bytes() if isinstance(node, Path) else node
-        with _PARSING:
-            tree = ast.parse(text)
-    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError):
+    tree = parsed(node)
+    if tree is None:
         return ""
     names: dict[str, str] = {}
     for part in ast.walk(tree):
@@ -81,15 +71,16 @@ def camera_read(calls: Calls) -> bool:
     return any(topic in calls.readers for topic in _IMAGES)
 
 
-def no_picture(source: Source, takes: Sequence[Take]) -> Finding | None:
+def no_picture(source: ast.Module, takes: Sequence[Take]) -> Finding | None:
     """Return why no camera image reaches a callback; None where one does."""
     calls = takes[0].calls
     if calls.given:
         return None
     if not calls.nodes:
-        main = source.uncalled("main")
-        if main is not None:
-            return Finding(False, "main() is never called; end the file with: if __name__ == '__main__': main()", main)
+        mains = [node.lineno for node in source.body if isinstance(node, ast.FunctionDef) and node.name == "main"]
+        if mains and _first_call(source, "main") is None:
+            said = "main() is never called; end the file with: if __name__ == '__main__': main()"
+            return Finding(False, said, mains[0])
         return Finding(False, "the script makes no node: call rclpy.init(), make the node, and rclpy.spin(node)")
     if not camera_read(calls):
         return Finding(False, *_no_subscription(calls))
@@ -105,7 +96,7 @@ def no_picture(source: Source, takes: Sequence[Take]) -> Finding | None:
     return Finding(False, "the callback never ran; is rclpy.spin given the node that has the subscription?", line)
 
 
-def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
+def no_detection(source: ast.Module, takes: Sequence[Take]) -> Finding | None:
     """Return why the detector cannot find anybody; None where it looks at pictures with an SVM."""
     searched_without_svm = takes[0].calls.searched_without_svm
     if searched_without_svm != 0:
@@ -114,9 +105,9 @@ def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
         return Finding(False, said, searched_without_svm)
     if any(look.raw is not None for take in takes for look in take.looks) or any(take.unplaced for take in takes):
         return None
-    if any(take.outcome and take.outcome.stage.detector_inputs for take in takes):
+    if any(take.outcome.stage.detector_inputs for take in takes):
         return Finding(None, "not tried: the detector was asked, and gave no answer")
-    line = source.first_call("detectMultiScale")
+    line = _first_call(source, "detectMultiScale")
     if line is None:
         return Finding(False, "self.hog.detectMultiScale was never called")
     return Finding(False, "detectMultiScale was never called: this line never runs", line)
@@ -124,27 +115,25 @@ def no_detection(source: Source, takes: Sequence[Take]) -> Finding | None:
 
 def no_command(takes: Sequence[Take]) -> Finding | None:
     """Return why no command reaches the robot; None where one does."""
-    if any(take.outcome and take.outcome.stage.commands for take in takes):
+    if any(take.outcome.stage.commands for take in takes):
         return None
     calls = takes[0].calls
-    other = {topic: line for topic, line in calls.writers.items() if topic not in names.TYPES}
     for said, line in calls.unmatched.items():
         if f"'{names.COMMAND}'" in said:
             return Finding(False, f"the robot gets no command: {said}", line)
     if names.COMMAND in calls.writers:
         return Finding(False, "the publisher is made, but publish is never called", calls.writers[names.COMMAND])
-    if other:
-        topic, line = next(iter(other.items()))
-        return Finding(False, f"publishes on {topic!r}; the robot listens to {names.COMMAND!r}", line)
+    for topic, line in calls.writers.items():
+        if topic not in names.TYPES:
+            return Finding(False, f"publishes on {topic!r}; the robot listens to {names.COMMAND!r}", line)
     return Finding(False, f"nothing is published on {names.COMMAND!r}")
 
 
 def _no_subscription(calls: Calls) -> tuple[str, int | None]:
-    unknown = {topic: line for topic, line in calls.readers.items() if topic not in (*names.TYPES, *calls.writers)}
-    if unknown:
-        topic, line = next(iter(unknown.items()))
-        nearest = nearest_topic(topic, calls.types.get(topic, ""))
-        return f"the topic {topic!r} is not published; did you mean {nearest!r}?", line
+    for topic, line in calls.readers.items():
+        if topic not in (*names.TYPES, *calls.writers):
+            nearest = nearest_topic(topic, calls.types.get(topic, ""))
+            return f"the topic {topic!r} is not published; did you mean {nearest!r}?", line
     if calls.readers:
         topic, line = next(iter(calls.readers.items()))
         return f"subscribes to {topic!r}; the camera's image is {names.IMAGE!r}", line

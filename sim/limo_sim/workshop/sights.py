@@ -48,12 +48,11 @@ def shown(takes: Sequence[Take]) -> Finding:
 
 def _not_shown(take: Take, look: Look) -> Finding:
     before = [entry for entry in take.windows if entry[0] <= look.time + 1e-6]
+    said = f"{take.at(look)}: "
     if not before:
-        return Finding(
-            False, f"{take.at(look)}: no window; show the picture with cv2.imshow and cv2.waitKey(1)", look=look
-        )
+        return Finding(False, f"{said}no window; show the picture with cv2.imshow and cv2.waitKey(1)", look=look)
     at, name, picture, of = before[-1]
-    said = f"{take.at(look)}: the window {name!r} shows "
+    said += f"the window {name!r} shows "
     if at < look.time - SILENCE or of is not None:
         said += f"a picture of {at if of is None else of.time:.1f} s: call cv2.imshow for every image"
     elif picture.ndim == 2:
@@ -63,9 +62,8 @@ def _not_shown(take: Take, look: Look) -> Finding:
     elif is_swapped(picture, look.image):
         said += "red and blue swapped: convert with imgmsg_to_cv2(message, 'bgr8')"
     else:
-        said += (
-            "another picture, or one older than half a second; wanted is the camera's image, and what you draw on it"
-        )
+        said += "another picture, or one older than half a second; "
+        said += "wanted is the camera's image, and what you draw on it"
     return Finding(False, said, take.calls.windows.get(name), look)
 
 
@@ -118,35 +116,32 @@ def scaled_back(takes: Sequence[Take]) -> Finding:
     seeing = list(looks_of(takes, seeing=True))
     if not seeing:
         return NOBODY_FOUND
-    copies = [(t, k, k.raw.detections) for t, k in seeing if k.raw and k.raw.shape[:2] != k.image.shape[:2]]
-    scaled = [entry for entry in copies if len(entry[2]) and entry[1].raw and not _is_part(entry[1])]
+    copies = [(t, k, k.raw) for t, k in seeing if k.raw and k.raw.shape[:2] != k.image.shape[:2]]
+    # (Windows as large as those in the camera's pixels are of a part of the image, at its own size.)
+    scaled = [
+        (take, look, raw)
+        for take, look, raw in copies
+        if len(raw.detections) and not np.array_equal(raw.detections.windows[:, 2:], look.found.windows[:, 2:])
+    ]
     if not scaled:
         return Finding(True, "the detector is given the camera's own pixels")
     turned = False
     for take, look, raw in scaled:
         best = surest(look)
-        here, there = look.found.windows[best], raw.windows[min(best, len(raw) - 1)]
+        here, there = look.found.windows[best], raw.detections.windows[min(best, len(raw.detections) - 1)]
         error, unscaled = error_of(look), look.image.shape[1] // 2 - middle(there)
         turns = [command for command in look.commands if command.twist.angular and abs(error) > CLEAR_ERROR]
         turned |= bool(turns)
         wrong = [c for c in turns if c.twist.angular * error < 0 < c.twist.angular * unscaled]
         drawn = [p for p in look.pictures if _share(p, there, RED) > 0.5 > _share(p, here, RED)]
         if wrong or drawn:
-            width = 0 if look.raw is None else look.raw.shape[1]
-            said = (
-                f"{take.at(look)}: the box at x = {middle(there)} of the {width} px wide copy is at {middle(here)} in "
-            )
-            said += f"the camera's {look.image.shape[1]} px; "
+            said = f"{take.at(look)}: the box at x = {middle(there)} of the {raw.shape[1]} px wide copy is at "
+            said += f"{middle(here)} in the camera's {look.image.shape[1]} px; "
             said += f"the command is {command_of(wrong[0])}" if wrong else "it is drawn without being scaled back"
             return Finding(False, said, wrong[0].line if wrong else None, look)
     if not turned:
         return Finding(None, "not tried: a copy of another size is searched, and the robot does not turn yet")
-    return Finding(True, f"boxes of the copy, {scaled[0][1].raw.shape if scaled[0][1].raw else ''}, are scaled back")
-
-
-def _is_part(look: Look) -> bool:
-    """Whether a part of the image was searched, at its own size."""
-    return look.raw is not None and np.array_equal(look.raw.detections.windows[:, 2:], look.found.windows[:, 2:])
+    return Finding(True, f"boxes of the copy, {scaled[0][2].shape}, are scaled back")
 
 
 def best(takes: Sequence[Take]) -> Finding:

@@ -37,20 +37,15 @@ def reads(takes: Sequence[Take], topic: str) -> Finding:
 
 def red_on_person(takes: Sequence[Take]) -> Finding:
     """Whether every window of a scene with people has its red box on one of them."""
-    tried = right = 0
-    worst = Finding(False, "no picture with a person was seen")
-    for take in takes:
-        for look in take.looks[1:]:
-            if not len(look.people) or not look.pictures:
-                continue
-            tried += 1
-            if any(look.on_person(box) for box in _reds(look)):
-                right += 1
-            elif right == tried - 1:
-                worst = Finding(False, f"{take.at(look)}: no red box, (0, 0, 255), is on a person", None, look)
-    if not tried or right < RIGHT * tried:
-        return worst
-    return Finding(True, f"the red box is on a person in {right} of {tried} frames")
+    tried = [(take, look) for take in takes for look in take.looks[1:] if len(look.people) and look.pictures]
+    if not tried:
+        return Finding(False, "no picture with a person was seen")
+    wrong = [(take, look) for take, look in tried if not any(look.on_person(box) for box in _reds(look))]
+    right = len(tried) - len(wrong)
+    if right < RIGHT * len(tried):
+        take, look = wrong[0]
+        return Finding(False, f"{take.at(look)}: no red box, (0, 0, 255), is on a person", None, look)
+    return Finding(True, f"the red box is on a person in {right} of {len(tried)} frames")
 
 
 def _reds(look: Look) -> Iterator[NDArray[np.int32]]:
@@ -88,7 +83,7 @@ def every_hit(takes: Sequence[Take]) -> Finding:
 
 def no_hog(takes: Sequence[Take]) -> Finding:
     """Whether people are found without OpenCV's HOG detector: a red box is on the person."""
-    if any(take.outcome is not None and take.outcome.stage.detector_inputs for take in takes):
+    if any(take.outcome.stage.detector_inputs for take in takes):
         return Finding(False, "cv2's HOGDescriptor is still asked: detectMultiScale runs")
     return red_on_person(takes)
 
@@ -115,7 +110,7 @@ def stops(takes: Sequence[Take], clearance: float = 0.2) -> Finding:
     """Whether a robot that drives to people stops so far [m] before the furniture."""
     take = next((take for take in takes if take.scene.scenario.furniture), None)
     free = [speed for other in takes if other is not take for speed in speeds(takes, other.scene.name)]
-    if take is None or take.outcome is None or not any(speed > 0 for speed in free):
+    if take is None or not any(speed > 0 for speed in free):
         return Finding(None, "not tried: the robot does not drive to a person in a free room")
     way = max(x for _, x, _, _ in take.path)
     if way < 0.1:

@@ -22,7 +22,7 @@ from limo_sim.ros.runner import Limits, Said, run_node
 from limo_sim.ros.stage import Ended, Stage, Witness
 from limo_sim.run.log import Step
 from limo_sim.sensing.camera import TrueFrame
-from limo_sim.workshop.scenes import Scene
+from limo_sim.world.scenario import Scenario
 from limo_sim.world.truth import Truth
 
 Picture = NDArray[np.uint8]
@@ -41,6 +41,18 @@ _MOST_SHOWN = 100 * 640 * 480 * 3
 #: A window's picture is looked for among images of this age or younger [s].
 _OLDEST = 4.0
 _THUMBNAIL = (160, 120)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A short run in which a node is tried."""
+
+    name: str
+    words: str  #: what happens there
+    scenario: Scenario
+    seconds: float = 1.0  #: how long it is [s]
+    arguments: tuple[str, ...] = ()  #: ROS arguments for the node
+    last: bool = False  #: whether it is played only where every checkpoint of the other scenes holds
 
 
 @dataclass(eq=False)
@@ -75,10 +87,8 @@ class Look:
     def on_person(self, box: NDArray[np.int32], index: int | None = None) -> bool:
         """Whether a box is on a person, or on that of this index."""
         people = self.truth.people if index is None else self.truth.people[index : index + 1]
-        outlines = [p.box for p in people if p is not None and p.box is not None]
-        return bool(outlines) and bool(
-            intersection_over_union(np.asarray(box)[None], np.array(outlines)).max() >= ON_PERSON
-        )
+        outlines = np.array([p.box for p in people if p is not None and p.box is not None]).reshape(-1, 4)
+        return bool((intersection_over_union(box[None], outlines) >= ON_PERSON).any())
 
     def take_boxes(self, found: Found, place: tuple[float, int, int]) -> None:
         """Add what was found in a picture, whose `place` in this image is its scale and its left and upper edge."""
@@ -106,19 +116,19 @@ class Take(Witness):
     answers: list[tuple[Command, Look, list[Look]]] = field(default_factory=list)
     unplaced: set[tuple[int, ...]] = field(default_factory=set)  #: sizes of searched pictures, part of no camera image
     _corners: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
-    outcome: Ended | None = None  #: how the run ended; None before
+    outcome: Ended = field(init=False)  #: how the run ended
     _answered: Look | None = None
     _kept: int = 0  # bytes of all pictures in `windows`
 
     @property
     def calls(self) -> Calls:
         """What the node called."""
-        return self.outcome.stage.calls if self.outcome is not None else Calls()
+        return self.outcome.stage.calls
 
     @property
     def failed(self) -> bool:
         """Whether the node ended before the scene did."""
-        return self.outcome is not None and self.outcome.fault is not None
+        return self.outcome.fault is not None
 
     def at(self, look: Look) -> str:
         """Say which image it is."""

@@ -17,7 +17,7 @@ from limo_hog.follow import TrackingController
 from limo_hog.follow.sense.detectors import HalfSize, Region, detector_named
 from limo_sim.run.detector_faults import FaultySearch, fit_of
 from limo_sim.run.episode import run_episode, score
-from limo_sim.run.sweep import Run, play_all
+from limo_sim.run.sweep import Run, in_processes, play
 from limo_sim.world.scenario import Camera, DetectorFaults, Person, Scenario
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
 
@@ -232,5 +232,5 @@ def test_in_the_closed_loop_the_card_shows_the_recall(unkind: str) -> None:
 
 def test_one_and_two_workers_play_the_same_runs(unkind: str) -> None:
     runs = [Run(unkind, "tracking", "hog", seed, 2.0) for seed in (0, 1)]
-    one, two = dict(play_all(runs, 1)), dict(play_all(runs, 2))
+    one, two = (dict(in_processes(play, runs, workers)) for workers in (1, 2))
     assert all(figures(one[run]) == figures(two[run]) for run in runs)

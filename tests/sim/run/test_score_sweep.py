@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from limo_sim.run.sweep import Run, play_all
+from limo_sim.run.sweep import Run, in_processes, play
 
 
 def test_every_card_belongs_to_its_run_whatever_the_scenario_calls_itself(tmp_path: Path) -> None:
@@ -25,7 +25,7 @@ def test_every_card_belongs_to_its_run_whatever_the_scenario_calls_itself(tmp_pa
         Run("workshop", "approach", "hog", 1, 0.4),
         Run("empty", "proxemic", "hog", 2, 0.1),
     ]
-    cards = dict(play_all(runs, 1))
+    cards = dict(in_processes(play, runs, 1))
     assert set(cards) == set(runs)
     assert [cards[run].scenario for run in runs] == ["another name", "workshop", "empty"]
     assert [cards[run].target_m for run in runs] == [1.8, None, 1.5]

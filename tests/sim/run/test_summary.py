@@ -23,6 +23,7 @@ def test_the_interval_is_students() -> None:
     assert found.interval == pytest.approx(half, rel=0.02)
     assert (found.least, found.most) == (1.0, 7.0)
     assert estimate([3.0]).interval is None
+    assert not estimate([3.0]).is_sure
 
 
 def test_cards_are_summed_up_by_scenario_and_controller() -> None:
@@ -63,10 +64,6 @@ def test_two_controllers_are_compared_run_by_run() -> None:
 @pytest.mark.parametrize("values", [[1.0, 2.0, 1.5], [-3.0, -2.5, -3.5, -2.9], [1.0, -1.0, 0.5], [0.1, 4.0, 0.2, -1.0]])
 def test_a_difference_is_sure_where_students_test_rejects_that_there_is_none(values: list[float]) -> None:
     assert estimate(values).is_sure == (ttest_1samp(values, 0.0).pvalue < 0.05)
-
-
-def test_of_one_run_nothing_is_sure() -> None:
-    assert not estimate([3.0]).is_sure
 
 
 @pytest.mark.parametrize("count", [51, 201, 1001])

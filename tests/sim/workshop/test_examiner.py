@@ -12,7 +12,7 @@ from tests.sim.workshop.strangers import CALLBACK, SEQUEL
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution
-from limo_sim.workshop.check import Verdict, check
+from limo_sim.workshop.check import Verdict, examine
 from limo_sim.workshop.exercises import exercise, scene_named
 from limo_sim.workshop.report import by_task, total
 from limo_sim.workshop.takes import play
@@ -46,7 +46,7 @@ name = "nobody is touched"
 def checked(tmp_path: Path, text: str, name: str = "follower") -> list[Verdict]:
     script = tmp_path / "node.py"
     script.write_text(text, encoding="utf-8")
-    return check(script, name)
+    return examine(script, name).verdicts
 
 
 def changed(text: str, *exchanged: tuple[str, str]) -> str:
@@ -253,7 +253,7 @@ REFUSED = {
 def test_what_python_or_opencv_refuse_is_told(tmp_path: Path, name: str) -> None:
     text, said = REFUSED[name]
     (tmp_path / "node.py").write_bytes(text)
-    verdicts = check(tmp_path / "node.py")
+    verdicts = examine(tmp_path / "node.py").verdicts
     assert said in verdicts[0].evidence
     assert len(verdicts[0].evidence) < 20_000
     assert total(verdicts) == (0, 100)

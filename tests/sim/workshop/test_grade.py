@@ -27,17 +27,17 @@ HOSTILE = {
 REASONS = {"loop": "it took no interrupt", "exit": "status 0", "child": "took no interrupt", "memory": "MemoryError"}
 
 
-def table_of(folder: Path, *options: str) -> dict[str, dict[str, str]]:
+def table_of(folder: Path) -> dict[str, dict[str, str]]:
     """Grade a folder by the command line; return its rows by file."""
     table = folder.parent / f"{folder.name}.csv"
-    assert main(["workshop", "grade", str(folder), "--csv", str(table), *options]) == 0
+    assert main(["workshop", "grade", str(folder), "--csv", str(table)]) == 0
     return {row["file"]: row for row in csv.DictReader(table.read_text(encoding="utf-8").splitlines())}
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_node_ends_within_its_limits_and_gets_no_points(tmp_path: Path, name: str) -> None:
     (tmp_path / "node.py").write_text(HOSTILE[name])
-    (graded,) = grade(nodes_in(tmp_path), tmp_path, 1, limits=Limits(patience=2.0, seconds=60.0))
+    (graded,) = grade(nodes_in(tmp_path), tmp_path, 1, "follower", Limits(patience=2.0, seconds=60.0))
     assert graded.result is not None
     assert graded.result["points"] == 0
     assert REASONS[name] in graded.result["checkpoints"][0]["evidence"]
@@ -124,9 +124,7 @@ def test_a_folder_becomes_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[
     (tmp_path / "amy" / "node.py").write_text(solution("follower"))
     (tmp_path / "bob.py").write_text(template("follower"))
     (tmp_path / "eve.py").write_text(HOSTILE["exit"])
-    table = tmp_path / "points.csv"
-    assert main(["workshop", "grade", str(tmp_path), "--csv", str(table)]) == 0
-    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    rows = list(table_of(tmp_path).values())
     assert [(row["file"], row["points"]) for row in rows] == [("amy/node.py", "100"), ("bob.py", "0"), ("eve.py", "0")]
     assert [rows[0][f"task_{task}"] for task in (1, 2, 3, 4)] == ["10", "25", "25", "40"]
     assert rows[1]["first_mistake"].startswith("the camera image is shown: ")
@@ -164,11 +162,9 @@ def test_thirty_submissions_three_of_them_hostile_are_graded_in_five_minutes(tmp
         (tmp_path / f"s{number:02}.py").write_text((good, wrong, empty)[number % 3])
     for name in ("loop", "memory", "exit"):
         (tmp_path / f"x_{name}.py").write_text(HOSTILE[name])
-    table = tmp_path / "points.csv"
     began = time.monotonic()
-    assert main(["workshop", "grade", str(tmp_path), "--csv", str(table)]) == 0
+    rows = list(table_of(tmp_path).values())
     took = time.monotonic() - began
-    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     assert [row["points"] for row in rows[:27]] == ["100", "80", "0"] * 9
     assert "the sign is swapped" in rows[1]["first_mistake"]
     assert [row["points"] for row in rows[27:]] == ["0", "0", "0"]

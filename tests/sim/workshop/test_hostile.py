@@ -114,6 +114,9 @@ FILES = {
     ),
 }
 THEN = f"self.n = getattr(self, 'n', 0) + 1\nif self.n < 3:\n    {DRIVE}\n    return\n"
+HOSTILE = {name: (HEAD + node(THEN + body), said) for name, (body, said) in IN_A_CALLBACK.items()} | FILES
+#: Of these, those that are tried with every change; the others are marked slow.
+QUICK = ("exit 0", "segfault", "daemon", "own file deleted", "forged messages")
 
 
 def left_running() -> list[str]:
@@ -132,7 +135,11 @@ def left_running() -> list[str]:
     return found
 
 
-def tried(tmp_path: Path, text: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in HOSTILE])
+def test_a_hostile_node_is_reported_and_leaves_nothing(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, said = HOSTILE[name]
     monkeypatch.setattr(runner, "GRACE_S", 1.0)
     folder = tmp_path / "there"
     folder.mkdir()
@@ -146,30 +153,6 @@ def tried(tmp_path: Path, text: str, said: str, monkeypatch: pytest.MonkeyPatch)
     assert total(verdicts) == (0, 100)
     assert time.monotonic() - began < 60
     assert left_running() == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", IN_A_CALLBACK)
-def test_a_hostile_callback_is_reported_and_leaves_nothing(
-    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    body, said = IN_A_CALLBACK[name]
-    tried(tmp_path, HEAD + node(THEN + body), said, monkeypatch)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", FILES)
-def test_a_hostile_file_is_reported_and_leaves_nothing(
-    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    text, said = FILES[name]
-    tried(tmp_path, text, said, monkeypatch)
-
-
-@pytest.mark.parametrize("name", ["exit 0", "segfault", "daemon", "own file deleted", "forged messages"])
-def test_some_hostile_nodes(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    body, said = IN_A_CALLBACK[name]
-    tried(tmp_path, HEAD + node(THEN + body), said, monkeypatch)
 
 
 def test_check_of_a_node_that_exits_writes_a_report_and_returns_1(

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.sim.workshop.strangers import RIGHT, WRONG, source
 
-from limo_sim.workshop.check import check
+from limo_sim.workshop.check import examine
 from limo_sim.workshop.report import total
 
 EXERCISES = {"": "follower", "sequel": "proxemic"}
@@ -27,7 +27,7 @@ def listed(nodes: Iterable[str]) -> list[object]:
 @pytest.mark.parametrize("name", listed(RIGHT))
 def test_a_right_node_gets_all_points(tmp_path: Path, name: str) -> None:
     (tmp_path / "node.py").write_text(source(RIGHT[name]))
-    verdicts = check(tmp_path / "node.py", EXERCISES[RIGHT[name][0]])
+    verdicts = examine(tmp_path / "node.py", EXERCISES[RIGHT[name][0]]).verdicts
     assert [(verdict.checkpoint, verdict.evidence) for verdict in verdicts if verdict.holds is not True] == []
     assert total(verdicts) == (100, 100)
 
@@ -35,7 +35,7 @@ def test_a_right_node_gets_all_points(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", listed(WRONG))
 def test_a_wrong_node_loses_points_of_its_task(tmp_path: Path, name: str) -> None:
     (tmp_path / "node.py").write_text(source(WRONG[name]))
-    verdicts = check(tmp_path / "node.py", EXERCISES[WRONG[name][0]])
+    verdicts = examine(tmp_path / "node.py", EXERCISES[WRONG[name][0]]).verdicts
     lost = {str(verdict.task) for verdict in verdicts if verdict.holds is False}
     assert lost
     assert name[0] in {" ", *lost}

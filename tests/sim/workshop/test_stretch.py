@@ -9,7 +9,7 @@ import pytest
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution, template
-from limo_sim.workshop.check import check
+from limo_sim.workshop.check import Verdict, examine
 
 FOLLOWER = solution("follower")
 
@@ -110,9 +110,13 @@ def written(tmp_path: Path, text: str) -> Path:
     return path
 
 
+def checked(tmp_path: Path, text: str, task: str) -> list[Verdict]:
+    return examine(written(tmp_path, text), f"stretch {task}").verdicts
+
+
 @pytest.mark.parametrize("task", DONE)
 def test_a_node_that_does_the_task_has_all_points(tmp_path: Path, task: str) -> None:
-    verdicts = check(written(tmp_path, DONE[task]), f"stretch {task}")
+    verdicts = checked(tmp_path, DONE[task], task)
     assert [verdict for verdict in verdicts if not verdict.holds] == []
     assert sum(verdict.points for verdict in verdicts) == 100
 
@@ -139,13 +143,13 @@ OTHERWISE = {
 
 @pytest.mark.parametrize("task", OTHERWISE)
 def test_a_stretch_task_done_otherwise_has_all_points(tmp_path: Path, task: str) -> None:
-    verdicts = check(written(tmp_path, OTHERWISE[task]), f"stretch {task}")
+    verdicts = checked(tmp_path, OTHERWISE[task], task)
     assert [verdict for verdict in verdicts if not verdict.holds] == []
 
 
 @pytest.mark.parametrize("task", DONE)
 def test_the_workshops_solution_is_told_what_is_missing(tmp_path: Path, task: str) -> None:
-    verdicts = {verdict.checkpoint: verdict for verdict in check(written(tmp_path, FOLLOWER), f"stretch {task}")}
+    verdicts = {verdict.checkpoint: verdict for verdict in checked(tmp_path, FOLLOWER, task)}
     name, said = MISSED[task]
     assert verdicts[name].holds is False
     assert said in verdicts[name].evidence
@@ -153,7 +157,7 @@ def test_the_workshops_solution_is_told_what_is_missing(tmp_path: Path, task: st
 
 @pytest.mark.parametrize("node", ["in time", "late"])
 def test_the_way_driven_and_the_way_left_add_up_to_the_chair(tmp_path: Path, node: str) -> None:
-    verdicts = check(written(tmp_path, LASER if node == "in time" else LATE), "stretch e")
+    verdicts = checked(tmp_path, LASER if node == "in time" else LATE, "e")
     (stops,) = (verdict for verdict in verdicts if verdict.checkpoint == "the robot stops before the chair")
     driven, left = map(float, re.findall(r"(\d\.\d\d) m", stops.evidence)[:2])
     # The seat's edge is at 1.5 - 0.17 m, the robot's front at 0.145 m when it starts, and the person straight ahead.
@@ -164,7 +168,7 @@ def test_the_way_driven_and_the_way_left_add_up_to_the_chair(tmp_path: Path, nod
 
 @pytest.mark.parametrize("task", DONE)
 def test_the_template_has_no_points(tmp_path: Path, task: str) -> None:
-    verdicts = check(written(tmp_path, template("follower")), f"stretch {task}")
+    verdicts = checked(tmp_path, template("follower"), task)
     assert sum(verdict.points for verdict in verdicts) == 0
 
 

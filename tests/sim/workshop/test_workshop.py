@@ -12,12 +12,13 @@ import pytest
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution, template
-from limo_sim.workshop.check import Verdict, check
+from limo_sim.workshop.check import Verdict, examine
 from limo_sim.workshop.report import by_task, total
 
 #: The workshop's two nodes: the follower of tasks 1 to 4, and the sequel that keeps a distance.
 NODES = ("follower", "proxemic")
 
+SHOW = "cv2.imshow('Camera', picture)"
 DETECT = "boxes, weights = self.hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)"
 HALF = DETECT.replace("(image,", "(cv2.resize(image, (0, 0), fx=0.5, fy=0.5),")
 
@@ -69,7 +70,7 @@ MISTAKES = {
 def checked(tmp_path: Path, text: str, node: str = "follower") -> list[Verdict]:
     script = tmp_path / "node.py"
     script.write_text(text, encoding="utf-8")
-    return check(script, node)
+    return examine(script, node).verdicts
 
 
 @pytest.mark.parametrize("node", NODES)
@@ -88,13 +89,7 @@ def test_a_mistake_fails_for_the_right_reason(tmp_path: Path, name: str) -> None
     ]
     assert failed[0].checkpoint == checkpoint
     assert reason in failed[0].evidence
-
-
-def test_one_mistake_fails_one_checkpoint(tmp_path: Path) -> None:
-    for name in ("sign of the turn", "blocking callback"):
-        right, wrong, *_ = MISTAKES[name]
-        verdicts = checked(tmp_path, solution("follower").replace(right, wrong))
-        assert sum(verdict.holds is False for verdict in verdicts) == 1, name
+    assert len(failed) == 1 or name not in ("sign of the turn", "blocking callback")
 
 
 def test_a_half_size_image_scaled_back_is_right(tmp_path: Path) -> None:
@@ -137,7 +132,7 @@ SHOW_BY_TIMER = (
         "    def show(self, picture):\n",
         "    def show(self, picture):\n        self.kept = picture\n\n    def tick(self):\n",
     )
-    .replace("cv2.imshow('Camera', picture)", "cv2.imshow('Camera', self.kept)")
+    .replace(SHOW, "cv2.imshow('Camera', self.kept)")
     .replace(
         "        self.bridge = CvBridge()\n",
         "        self.bridge = CvBridge()\n        self.kept = np.zeros((480, 640, 3), np.uint8)\n"
@@ -223,28 +218,24 @@ NAMED = {
     "command topic": ("'/cmd_vel'", "'/cmdvel'", "publishes on '/cmdvel'; the robot listens to '/cmd_vel'"),
     "never published": ("self.commands.publish(twist)", "pass", "no command with a speed"),
     "sign": ("middle - cx", "cx - middle", "the sign is swapped"),
-    "shows without boxes": ("cv2.imshow('Camera', picture)", "cv2.imshow('Camera', self.raw)", "nothing drawn on it"),
+    "shows without boxes": (SHOW, "cv2.imshow('Camera', self.raw)", "nothing drawn on it"),
     "shows grey": (
-        "cv2.imshow('Camera', picture)",
+        SHOW,
         "cv2.imshow('Camera', cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))",
         "a grey or depth picture",
     ),
-    "swapped colours": (
-        "cv2.imshow('Camera', picture)",
-        "cv2.imshow('Camera', picture[..., ::-1])",
-        "red and blue swapped",
-    ),
+    "swapped colours": (SHOW, "cv2.imshow('Camera', picture[..., ::-1])", "red and blue swapped"),
     "half the window": (
-        "cv2.imshow('Camera', picture)",
-        "cv2.imshow('Camera', cv2.resize(picture, (320, 240)))",
+        SHOW,
+        SHOW.replace("picture", "cv2.resize(picture, (320, 240))"),
         "wanted is the camera's size",
     ),
     "shown once": (
-        "        cv2.imshow('Camera', picture)",
-        "        if not hasattr(self, 'once'):\n            self.once = 1\n            cv2.imshow('Camera', picture)",
+        f"        {SHOW}",
+        f"        if not hasattr(self, 'once'):\n            self.once = 1\n            {SHOW}",
         "call cv2.imshow for every image",
     ),
-    "no window": ("        cv2.imshow('Camera', picture)\n", "", "no window"),
+    "no window": (f"        {SHOW}\n", "", "no window"),
     "no log": ("        self.get_logger().info(f'Detections: {len(boxes)}')\n", "", "no log line has their number"),
     "constant log": ("{len(boxes)}", "1", "logged: 'Detections: 1'"),
     "red is rgb": ("(0, 0, 255), 3", "(255, 0, 0), 3", "red is (0, 0, 255)"),
@@ -252,11 +243,7 @@ NAMED = {
     "others not green": ("(0, 255, 0), 2", "(0, 255, 255), 2", "not every other box"),
     "never drives": ("twist.linear.x = self.speed", "pass", "wanted is linear.x > 0; the command is linear.x 0.00"),
     "stride too wide": ("winStride=(8, 8)", "hitThreshold=9.0, winStride=(8, 8)", "finds no box in images of"),
-    "never searched": (
-        "boxes, weights = self.hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05)",
-        "boxes, weights = [], []",
-        "detectMultiScale was never called",
-    ),
+    "never searched": (DETECT, "boxes, weights = [], []", "detectMultiScale was never called"),
 }
 
 

@@ -41,11 +41,9 @@ class Scorer:
         self._motion = _Motion(twist_of(-fastest, fastest, robot.wheel_separation).angular)
         # Everybody, until one of them is the target: then that one.
         self._subjects = [Subject(index, criteria) for index in range(max(len(scenario.people), 1))]
-        self._steps = self._frames = self._boxed = self._wrong = self._targets = self._switches = 0
-        self._driven = 0
+        self._steps = self._driven = self._frames = self._boxed = self._wrong = self._targets = self._switches = 0
         self._followed: int | None = None
         self._detect_ms, self._render_ms = array("f"), array("f")
-        self._anybody = False
         self._clearance = math.inf
         self._nearest: Counter[Zone] = Counter()
         self._modes: Counter[str] = Counter()
@@ -54,16 +52,12 @@ class Scorer:
 
     def add(self, step: Step) -> None:
         """Add the next step."""
-        people = step.truth.people
-        hits = (
-            []
-            if step.seen is None
-            else [person_of(box, step.seen.people, self._criteria) for box in step.log.detections.windows]
-        )
+        seen, boxes = step.seen, step.log.detections.windows
+        hits = [] if seen is None else [person_of(box, seen.people, self._criteria) for box in boxes]
         target = None if step.log.decision.target is None else hits[step.log.decision.target]
         for subject in self._subjects:
             subject.add(step, hits, target)
-        if step.seen is not None:
+        if seen is not None:
             self._frames += 1
             self._detect_ms.append(step.log.detect_ms)
             self._render_ms.append(step.render_ms)
@@ -78,8 +72,7 @@ class Scorer:
         self._costs.update(dict(step.log.decision.belief.shares))
         self._motion.add(step, target)
         self._clearance = min(self._clearance, _clearance(self._scenario.robot.geometry, step.truth, self._radii))
-        distances = [person.distance for person in people if person]
-        self._anybody = self._anybody or bool(distances)
+        distances = [person.distance for person in step.truth.people if person]
         if distances:
             self._nearest[zone_of(min(distances))] += 1
 
@@ -166,14 +159,14 @@ class Scorer:
         )
 
     def _success(self, contacts: Contacts, subject: Subject) -> bool | None:
-        if not self._anybody:
+        if not self._nearest:
             return None
         if not subject.last_in_view or contacts.person > 0:
             return False
         return subject.longest_unseen <= self._criteria.unseen_s
 
     def _intrusion(self, zone: Zone) -> float | None:
-        return self._nearest[zone] / self._steps if self._anybody else None
+        return self._nearest[zone] / self._steps if self._nearest else None
 
 
 class _Motion:

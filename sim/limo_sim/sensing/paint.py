@@ -136,8 +136,7 @@ class Paint:
     def _picture(self, number: int) -> list[U8]:
         """Return a side's picture in all its sizes: uint8 (height, width, 4)."""
         if number not in self._pictures:
-            full = self._painted(number)
-            sizes = [full]
+            sizes = [self._painted(number)]
             while min(sizes[-1].shape[:2]) > 8:
                 height, width = sizes[-1].shape[:2]
                 half = cv2.resize(sizes[-1], (width // 2, height // 2), interpolation=cv2.INTER_AREA)

@@ -394,6 +394,4 @@ class Scenario:
 
 @dataclass(frozen=True, slots=True)
 class _Groups:
-    """The groups of people in a file."""
-
     groups: tuple[Group, ...] = ()

@@ -52,8 +52,7 @@ class FloorPlan:
     @cached_property
     def _nodes(self) -> F64:
         """Where ways may turn: float64 (k, 2) [m]."""
-        inside = [node for node in self._corners if max(map(abs, node)) <= self._half - self._margin]
-        kept = _pairs(inside)
+        kept = _pairs([node for node in self._corners if max(map(abs, node)) <= self._half - self._margin])
         # A node within another widened obstacle is none: the way from it to itself crosses that obstacle.
         free: F64 = kept[~self._crossed(kept, kept + 1e-9, self._margin)]
         return free

@@ -61,7 +61,6 @@ def replay(
     waiting: Any = None
     recorded: Detections | None = None
     topics: set[str] = set()
-    frames = 0
     node = NodeNames("limo_hog_follower") if node is None else node
     own = {
         names.resolved(node, topic): topic
@@ -89,7 +88,7 @@ def replay(
         command = _command(message) if name == names.COMMAND else None
         if waiting is not None and (is_image or command is not None):
             yield work(time, command)
-            waiting, recorded, frames = None, None, frames + 1
+            waiting = recorded = None
         elif command is not None and follower is not None:
             follower.tick(time, None, senses.sensors)
         if is_image:
@@ -103,8 +102,7 @@ def replay(
             senses.take(message)
     if waiting is not None:
         yield work(time, None)
-        frames += 1
-    if not frames:
+    if follower is None:
         there = ", ".join(sorted(topics)) or "nothing"
         raise BagError(f"no images on {names.resolved(node, names.IMAGE)}; the recording holds {there}")
 

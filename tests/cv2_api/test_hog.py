@@ -26,9 +26,12 @@ def noise(*shape: int) -> np.ndarray[Any, np.dtype[np.uint8]]:
     return np.random.default_rng(1).integers(0, 256, shape, dtype=np.uint8)
 
 
-@pytest.mark.parametrize(
+in_every_way = pytest.mark.parametrize(
     "again", [copy.copy, copy.deepcopy, lambda hog: pickle.loads(pickle.dumps(hog))], ids=["copy", "deepcopy", "pickle"]
 )
+
+
+@in_every_way
 @pytest.mark.parametrize("hog", [HOGDescriptor(), HOGDescriptor(*GEOMETRY, 1, 3.5, 0, 0.3, True, 7, True), people()])
 def test_a_copy_holds_and_describes_the_same(hog: HOGDescriptor, again: Any) -> None:
     twin = again(hog)
@@ -39,9 +42,7 @@ def test_a_copy_holds_and_describes_the_same(hog: HOGDescriptor, again: Any) -> 
     assert repr(twin) != repr(hog)
 
 
-@pytest.mark.parametrize(
-    "again", [copy.copy, copy.deepcopy, lambda hog: pickle.loads(pickle.dumps(hog))], ids=["copy", "deepcopy", "pickle"]
-)
+@in_every_way
 def test_a_copy_of_a_subclass_keeps_its_attributes_and_its_detector(again: Any) -> None:
     named = _Named("north door")
     named.seen = 7

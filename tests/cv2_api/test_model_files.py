@@ -92,9 +92,7 @@ def test_a_truncated_gzip_file_is_named(tmp_path: Path) -> None:
     refused(path, told=r"model\.xml\.gz")
 
 
-def test_files_that_cannot_be_read_or_written_raise_instead_of_passing_silently(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="missing"):
-        HOGDescriptor(tmp_path / "missing.yml")
+def test_files_that_cannot_be_written_raise_instead_of_passing_silently(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no directory"):
         HOGDescriptor().save(tmp_path / "nowhere" / "model.yml")
     with pytest.raises(limo_hog.ParameterError, match="a b"):

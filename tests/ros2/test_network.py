@@ -43,7 +43,10 @@ def test_the_whole_configuration_may_be_cyclone_dds_own() -> None:
     assert network({RANGE: "SYSTEM_DEFAULT"}).configuration is None
 
 
-@pytest.mark.parametrize("environment", [{RANGE: "subnet"}, {ONLY: "yes"}, {"ROS_DOMAIN_ID": "233"}])
-def test_a_value_that_ros_2_does_not_know_is_refused(environment: dict[str, str]) -> None:
-    with pytest.raises(BusError, match=next(iter(environment))):
-        network(environment)
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [(RANGE, "subnet"), (ONLY, "yes"), *(("ROS_DOMAIN_ID", value) for value in ("233", "x", "-1"))],
+)
+def test_a_value_that_ros_2_does_not_know_is_refused(name: str, value: str) -> None:
+    with pytest.raises(BusError, match=f"{name} is {value!r}"):
+        network({name: value})

@@ -23,7 +23,7 @@ from limo_hog.ros2.findings import stamped_twist
 from limo_hog.ros2.frames import static_transforms
 from limo_hog.ros2.messages import MessageError
 from limo_hog.ros2.replay import replay
-from limo_hog.ros2.senses import Senses, picture_of
+from limo_hog.ros2.senses import Senses
 
 PICTURE = np.zeros((48, 64, 3), np.uint8)
 
@@ -112,11 +112,9 @@ def test_until_the_calibration_comes_the_limos_own_focal_length_is_taken() -> No
     assert senses.frame(0.0, PICTURE).focal_px == 500.0
 
 
-def test_what_is_no_depth_image_and_no_picture_is_named() -> None:
+def test_what_is_no_depth_image_is_named() -> None:
     with pytest.raises(MessageError, match="depth image of 'bgr8' is not read: want 32FC1 or 16UC1"):
         Senses().take(messages.image(0.0, PICTURE))
-    with pytest.raises(MessageError, match="camera image in '32FC1' is not read"):
-        picture_of(messages.image(0.0, depth(1.0)))
 
 
 def frames(count: int) -> Iterator[Record]:

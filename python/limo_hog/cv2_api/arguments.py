@@ -207,13 +207,7 @@ def _index(value: Any) -> int:
 
 
 def _downloaded(value: Any, refusal: type[Exception]) -> Any:
-    """Return the array inside a `cv2.UMat`, or else `value` itself; OpenCV need not be there.
-
-    Raises
-    ------
-    refusal
-        It is a masked array.
-    """
+    """Return the array inside a `cv2.UMat`, or else `value` itself, without OpenCV; a masked array is refused."""
     if isinstance(value, np.ndarray) and hasattr(value, "mask"):
         raise refusal("a masked array came, whose mask would be lost; give its .filled(0)")
     return value.get() if type(value).__name__ == "UMat" else value

@@ -220,12 +220,10 @@ _YAML_ENTRY = re.compile(r"^[ \t]+([\w-]+):[ \t]*(\[[^\]:]*\]|(?:\n[ \t]+-[ \t][
 def _parse_yaml(text: str) -> dict[str, Entries]:
     parts = _YAML_OBJECT.split(text.replace("\r\n", "\n"))
     bodies = zip(parts[1::2], parts[2::2], strict=True)
-    return {name: dict(map(_yaml_entry, _YAML_ENTRY.finditer(body))) for name, body in bodies}
-
-
-def _yaml_entry(found: re.Match[str]) -> tuple[str, list[str]]:
-    words = re.sub(r"[\[\],]|-[ \t]", " ", found[2]).split()
-    return found[1], words
+    return {
+        name: {key: re.sub(r"[\[\],]|-[ \t]", " ", value).split() for key, value in _YAML_ENTRY.findall(body)}
+        for name, body in bodies
+    }
 
 
 def _parse_json(text: str) -> dict[str, Entries]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +25,6 @@ def _renew() -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_renew)
-
-
-class Holder(Protocol):
-    """What holds a state."""
-
-    _state: State
 
 
 class State:
@@ -65,7 +59,7 @@ class State:
         return State, (self.geometry, self.svm)  # what is compiled cannot be pickled
 
 
-def replaced(owner: Holder, before: State, after: State) -> bool:
+def replaced(owner: Any, before: State, after: State) -> bool:
     """Put `after` in the place of the owner's state `before`; false where another thread has replaced that already."""
     with _REPLACING:
         if owner._state is not before:

@@ -82,14 +82,14 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[..., None]]:
         stream.pix_fmt = "yuv420p"
         stream.thread_count = _THREADS
         stream.options = {"preset": "veryfast", "crf": "20"}
-        written, shown_at = 0, -1
+        shown_at = -1  # the last frame's place in the film; -1 before the first
 
         def write(image: NDArray[np.uint8], at: float | None = None) -> None:
-            nonlocal written, shown_at
+            nonlocal shown_at
             height, width = image.shape[:2]
             if height % 2 or width % 2:
                 image = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-            if not written:
+            if shown_at < 0:
                 stream.height, stream.width = image.shape[:2]
             shown_at = max(shown_at + 1, 0 if at is None else round(at * fps))
             with about(path):
@@ -98,10 +98,9 @@ def video_writer(path: Path, fps: float) -> Iterator[Callable[..., None]]:
                 frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
                 frame.pts = shown_at
                 container.mux(stream.encode(frame))
-            written += 1
 
         yield write
-        if not written:
+        if shown_at < 0:
             raise WriteError(f"{path}: no frame to write")
         with about(path):
             container.mux(stream.encode(None))

@@ -130,7 +130,6 @@ def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
 
 
 def _read_parameters(path: Path, into: RosArguments) -> None:
-    """Add the content of a parameter file."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -67,15 +67,8 @@ def to_detections(message: Any) -> Detections:
     """
     if not all(one.results for one in message.detections):
         raise BagError(f"a {DETECTIONS_TYPE} has a box without a hypothesis: its score is missing")
-    boxes = [
-        (
-            one.bbox.center.position.x - one.bbox.size_x / 2,
-            one.bbox.center.position.y - one.bbox.size_y / 2,
-            one.bbox.size_x,
-            one.bbox.size_y,
-        )
-        for one in message.detections
-    ]
+    middles = [(one.bbox.center.position, one.bbox.size_x, one.bbox.size_y) for one in message.detections]
+    boxes = [(middle.x - width / 2, middle.y - height / 2, width, height) for middle, width, height in middles]
     scores = [one.results[0].hypothesis.score for one in message.detections]
     people = np.rint(np.array(boxes).reshape(-1, 4)).astype(np.int32)
     return Detections(people, np.array(scores, np.float64), WHOLE_WINDOW)
@@ -127,21 +120,17 @@ def read_bag(path: Path) -> Iterator[Record]:
     """
     if not path.exists():
         raise BagError(f"{path}: no such recording")
-    messages = _messages(path)
-    while True:
-        try:
-            topic, nanoseconds, message = next(messages)
-        except StopIteration:
-            return
-        # Foreign bytes in other libraries' parsers: whatever they raise, the file is why.
-        except Exception as error:
-            # The system's errors have a number; rosbags raises a FileNotFoundError of its own without.
-            if isinstance(error, OSError) and error.errno is not None:
-                error.filename = error.filename or str(path)
-                raise
-            why = " ".join(str(error).split()) or type(error).__name__
-            raise BagError(f"{path}: no ROS 2 recording that can be read, or cut off: {why[:200]}") from error
-        yield Record(topic, nanoseconds * 1e-9, message)
+    try:
+        for topic, nanoseconds, message in _messages(path):
+            yield Record(topic, nanoseconds * 1e-9, message)
+    # Foreign bytes in other libraries' parsers: whatever they raise, the file is why.
+    except Exception as error:
+        # The system's errors have a number; rosbags raises a FileNotFoundError of its own without.
+        if isinstance(error, OSError) and error.errno is not None:
+            error.filename = error.filename or str(path)
+            raise
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise BagError(f"{path}: no ROS 2 recording that can be read, or cut off: {why[:200]}") from error
 
 
 def _messages(path: Path) -> Iterator[tuple[str, int, Any]]:

@@ -18,8 +18,8 @@ from limo_hog.ros2.network import BusError, network
 
 with needed(by="ROS 2 over the network"):
     from cyclonedds import builtin
+    from cyclonedds.core import DDSStatus, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
     from cyclonedds.core import InstanceState as Instance
-    from cyclonedds.core import Listener, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
     from cyclonedds.domain import Domain, DomainParticipant
     from cyclonedds.idl import make_idl_struct, types
     from cyclonedds.internal import InvalidSample
@@ -126,29 +126,21 @@ class _Graph:
         topic = Topic(participant, "ros_discovery_info", kind)
         self._writer = DataWriter(participant, topic, qos=_qos("", 1, kept=True))
         self._kind, self._node, self._own = kind, node, bytes(participant.guid.bytes)
-        self._readers: list[bytes] = []
-        self._writers: list[bytes] = []
-        self._announce()
+        self.readers: list[bytes] = []
+        self.writers: list[bytes] = []
+        self.announce()
 
-    def add_reader(self, guid: bytes, before: bytes | None = None) -> None:
-        """Tell it of a reader, in the place of the one `before`."""
-        self._readers = [one for one in self._readers if one != before] + [guid]
-        self._announce()
+    def announce(self) -> None:
+        """Tell the readers and writers there are now."""
 
-    def add_writer(self, guid: bytes) -> None:
-        """Tell it of a writer."""
-        self._writers.append(guid)
-        self._announce()
-
-    def _announce(self) -> None:
         def number(guid: bytes) -> Any:
             return self._gid(data=list(guid.ljust(self._size, b"\0")))
 
         info = self._info(
             node_namespace=self._node.namespace,
             node_name=self._node.name,
-            reader_gid_seq=[number(guid) for guid in self._readers],
-            writer_gid_seq=[number(guid) for guid in self._writers],
+            reader_gid_seq=[number(guid) for guid in self.readers],
+            writer_gid_seq=[number(guid) for guid in self.writers],
         )
         self._writer.write(self._kind(gid=number(self._own), node_entities_info_seq=[info]))
 
@@ -160,7 +152,8 @@ class Publisher:
         self._type = dds_type(type_name)
         qos = _qos(type_name, depth, kept=kept)
         self._writer = DataWriter(participant, Topic(participant, _PREFIX + topic, self._type), qos=qos)
-        graph.add_writer(bytes(self._writer.guid.bytes))
+        graph.writers.append(bytes(self._writer.guid.bytes))
+        graph.announce()
         self._is_image = type_name == "sensor_msgs/msg/Image"
         self._readers: set[int] = set()
         self._met = -math.inf  # when the newest reader was met [s]
@@ -192,18 +185,6 @@ class Publisher:
             return True
 
 
-class _Mismatch(Listener):
-    """Notes that a publisher offers less than the reader asks for."""
-
-    def __init__(self) -> None:
-        self.seen = False
-        super().__init__()  # type: ignore[no-untyped-call]
-
-    def on_requested_incompatible_qos(self, reader: Any, status: Any) -> None:  # noqa: ARG002 — Listener's signature
-        """Note it; DDS calls from a thread of its own."""
-        self.seen = True
-
-
 class Subscription:
     """Receives messages of one topic.
 
@@ -217,24 +198,22 @@ class Subscription:
         self._participant, self._wakers, self._type_name, self._depth = participant, wakers, type_name, depth
         self._graph, self._kept = graph, kept
         self._topic = Topic(participant, _PREFIX + topic, dds_type(type_name))
-        self._mismatch = _Mismatch()
         self.dropped = 0  #: how many samples were no message of the topic's type
         self._guid: bytes | None = None
         self._open(reliable=True)
 
     def _open(self, *, reliable: bool) -> None:
         qos = _qos(self._type_name, self._depth, reliable=reliable, kept=self._kept)
-        listener = self._mismatch if reliable else None
-        self._reader = DataReader(self._participant, self._topic, qos=qos, listener=listener)
+        self._reader, self._reliable = DataReader(self._participant, self._topic, qos=qos), reliable
         self._unread = ReadCondition(self._reader, ViewState.Any | SampleState.NotRead | Instance.Any)
         self._wakers.attach(self._unread)
         before, self._guid = self._guid, bytes(self._reader.guid.bytes)
-        self._graph.add_reader(self._guid, before)
+        self._graph.readers = [one for one in self._graph.readers if one != before] + [self._guid]
+        self._graph.announce()
 
     def take(self) -> list[Any]:
         """Return the messages that have come since, oldest first."""
-        if self._mismatch.seen:
-            self._mismatch.seen = False
+        if self._reliable and self._reader.take_status(DDSStatus.RequestedIncompatibleQos):
             self._wakers.detach(self._unread)
             self._open(reliable=False)
         samples = self._reader.take(N=max(self._depth, 1))

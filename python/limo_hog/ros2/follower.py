@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 from limo_hog.detections import Detector
 from limo_hog.follow.decision import Controller
@@ -22,8 +22,6 @@ from limo_hog.ros2.messages import MessageError
 from limo_hog.ros2.network import BusError
 from limo_hog.ros2.outputs import Commands, Findings, frame_named
 from limo_hog.ros2.senses import Senses, picture_of
-
-S = TypeVar("S")
 
 #: The drive ends after so long without a camera image [s]: discovery takes up to 3 s, a driver as long to start.
 SILENT_AFTER = 10.0
@@ -66,20 +64,19 @@ def camera_topic(bus: Bus, *, compressed: bool = False) -> str:
         If no camera is found within 10 s.
     """
     wanted = (names.IMAGE_COMPRESSED,) if compressed else (names.IMAGE, names.IMAGE_COMPRESSED)
-    names_here = {topic: names.resolved(bus.node, topic) for topic in wanted}
-
-    def offered(topic: str, found: dict[str, Endpoints]) -> bool:
-        return names_here[topic] in found and bool(found[names_here[topic]].publishers)
-
-    found = bus.topics(SILENT_AFTER, enough=lambda found: any(offered(topic, found) for topic in wanted))
-    if not any(offered(topic, found) for topic in wanted):
+    here = [names.resolved(bus.node, topic) for topic in wanted]
+    found = bus.topics(SILENT_AFTER, enough=lambda found: any(_offered(name, found) for name in here))
+    if not any(_offered(name, found) for name in here):
         raise BusError(
-            f"no publisher of {' or '.join(names_here.values())} in {bus.network}, within {SILENT_AFTER:g} s; "
-            + _images_in(found)
+            f"no publisher of {' or '.join(here)} in {bus.network}, within {SILENT_AFTER:g} s; {_images_in(found)}"
         )
     # Of a camera that offers both, either topic may be discovered first.
-    found = bus.topics(0.5, enough=lambda found: offered(wanted[0], found))
-    return next(topic for topic in wanted if offered(topic, found))
+    found = bus.topics(0.5, enough=lambda found: _offered(here[0], found))
+    return next(topic for topic, name in zip(wanted, here, strict=True) if _offered(name, found))
+
+
+def _offered(topic: str, found: dict[str, Endpoints]) -> bool:
+    return topic in found and bool(found[topic].publishers)
 
 
 def _images_in(found: dict[str, Endpoints]) -> str:
@@ -146,8 +143,7 @@ def mounted(bus: Bus, inputs: Inputs, camera: str, robot: RobotGeometry) -> tupl
     """
     mounts, framed, file = Mounts(), frozenset[str](), robot
     static = names.resolved(bus.node, names.TF_STATIC)
-    found = bus.topics(0.5, enough=lambda found: static in found and bool(found[static].publishers))
-    if static in found and found[static].publishers:
+    if _offered(static, bus.topics(0.5, enough=lambda found: _offered(static, found))):
         frames = bus.subscription(names.TF_STATIC, names.TYPES[names.TF_STATIC], depth=100, kept=True)
         until, base = time.monotonic() + SETTLED, frame_named(bus.node, "base_frame")
         while not {"camera_x", "lidar_x"} <= framed and time.monotonic() < until:
@@ -176,16 +172,8 @@ class Settings:
     say: Callable[[str], None] = lambda _: None
 
 
-def _ask(follower: Follower[S], whom: str, say: Callable[[str], None]) -> None:
-    """Ask for a person; what names nobody is told."""
-    try:
-        follower.follow(whom)
-    except WhomError as error:
-        say(str(error))
-
-
 def drive(
-    bus: Bus, controller: Controller[S], detector: Detector, settings: Settings, report: Report | None = None
+    bus: Bus, controller: Controller[Any], detector: Detector, settings: Settings, report: Report | None = None
 ) -> Report:
     """Follow the person the camera sees until the time is up; the last command is always to stand.
 
@@ -215,8 +203,11 @@ def drive(
                 said = line
                 settings.say(line)
             # Of several that came at once the last is meant.
-            for message in asked.take()[-1:]:
-                _ask(follower, message.data, settings.say)
+            if came := asked.take():
+                try:
+                    follower.follow(came[-1].data)
+                except WhomError as error:
+                    settings.say(str(error))
             log = follower.tick(now, frame, inputs.senses.sensors)
             if log is None:
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -137,16 +138,10 @@ def _message(transforms: list[Any]) -> Any:
     return message
 
 
-def _transform(
-    stamp: float,
-    parent: str,
-    child: str,
-    translation: tuple[float, float, float],
-    rotation: tuple[float, float, float, float],
-) -> Any:
+def _transform(stamp: float, parent: str, child: str, place: Sequence[float], turn: Sequence[float]) -> Any:
     one = messages.stamped("geometry_msgs/msg/TransformStamped", stamp, parent)
     one.child_frame_id = child
-    place, turn = one.transform.translation, one.transform.rotation
-    place.x, place.y, place.z = translation
-    turn.x, turn.y, turn.z, turn.w = rotation
+    translation, rotation = one.transform.translation, one.transform.rotation
+    translation.x, translation.y, translation.z = place
+    rotation.x, rotation.y, rotation.z, rotation.w = turn
     return one

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 from rosbags.typesys.stores.ros2_humble import builtin_interfaces__msg__Time as Time
 
@@ -24,7 +25,6 @@ from limo_hog.extras import needed
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.observation import Odometry, Scan
 from limo_hog.imaging.headers import picture_size
-from limo_hog.ros2.definitions import add_to
 
 CAMERA_FRAME = "depth_link"
 #: Compressed images of more are not decoded: 8 bytes for each are taken meanwhile. Chosen: twice a camera of 8K.
@@ -61,7 +61,11 @@ class MessageError(LimoHogError):
 def typestore() -> Typestore:
     """Return the message definitions."""
     store = get_typestore(Stores.ROS2_HUMBLE)
-    add_to(store)
+    # What rosbags does not bring along, written as recordings hold it.
+    text = Path(__file__).with_name("definitions.msg").read_text(encoding="utf-8")
+    for definition in text.split(f"{'=' * 80}\nMSG: ")[1:]:
+        name, _, fields = definition.partition("\n")
+        store.register(get_types_from_msg(fields, name.replace("/", "/msg/")))
     return store
 
 
@@ -116,16 +120,12 @@ def fields_of(type_name: str) -> tuple[Field, ...]:
 
 def default_message(type_name: str) -> Any:
     """Return a message with ROS's defaults: zeros, empty strings and sequences, and a quaternion's w of 1."""
-    values = {}
-    for field in fields_of(type_name):
-        plain = field.length is None and not field.is_message
-        values[field.name] = field.zero if plain else _default(field)
-    return typestore().types[type_name](**values)
+    return typestore().types[type_name](**{field.name: _default(field) for field in fields_of(type_name)})
 
 
 def _default(field: Field) -> Any:
     if field.length is None:
-        return default_message(field.item)
+        return default_message(field.item) if field.is_message else field.zero
     if field.is_message:
         return [default_message(field.item) for _ in range(field.length)]
     return [""] * field.length if field.zero == "" else np.zeros(field.length, element_type(field.item))
@@ -209,12 +209,12 @@ def pixels_of(message: Any) -> NDArray[Any]:
     return pixels
 
 
-def compressed_image(stamp: float, pixels: NDArray[np.uint8], quality: int = 90) -> Any:
+def compressed_image(stamp: float, pixels: NDArray[np.uint8]) -> Any:
     """Return a JPEG of uint8 (H, W, 3) BGR, as image_transport's "compressed" topics carry; needs OpenCV."""
     from limo_hog.imaging.writing import jpeg  # imported here: other messages need no OpenCV
 
     message = stamped("sensor_msgs/msg/CompressedImage", stamp, CAMERA_FRAME)
-    message.format, message.data = "bgr8; jpeg compressed bgr8", np.frombuffer(jpeg(pixels, quality), np.uint8)
+    message.format, message.data = "bgr8; jpeg compressed bgr8", np.frombuffer(jpeg(pixels, 90), np.uint8)
     return message
 
 

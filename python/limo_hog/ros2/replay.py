@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, cast
 
 from limo_hog.detections import Detections, Detector
 from limo_hog.follow.decision import Controller
@@ -17,8 +17,6 @@ from limo_hog.ros2.bag import BagError, Record, to_detections
 from limo_hog.ros2.frames import Mounts
 from limo_hog.ros2.outputs import frame_named
 from limo_hog.ros2.senses import DEPTH_ENCODINGS, Senses, picture_of
-
-S = TypeVar("S")
 
 #: Sensors beside the camera's images.
 SENSED = (names.CAMERA_INFO, names.DEPTH, names.DEPTH_LCAS, names.SCAN, names.ODOMETRY)
@@ -37,7 +35,7 @@ class Replayed:
 
 def replay(
     records: Iterable[Record],
-    controller: Controller[S],
+    controller: Controller[Any],
     detector: Detector,
     node: NodeNames | None = None,
     robot: RobotGeometry = LIMO,
@@ -58,12 +56,11 @@ def replay(
     RobotError
         As `Mounts.applied` has it.
     """
-    follower: Follower[S] | None = None
+    follower: Follower[Any] | None = None
     senses, mounts, lidar = Senses(robot), Mounts(), ""
     waiting: Any = None
     recorded: Detections | None = None
     topics: set[str] = set()
-    frames = 0
     node = NodeNames("limo_hog_follower") if node is None else node
     own = {
         names.resolved(node, topic): topic
@@ -78,10 +75,8 @@ def replay(
         if senses.focal_px is None:
             raise BagError("no camera info before the first image: its focal length is needed")
         frame = senses.frame(messages.to_seconds(waiting.header.stamp), picture_of(waiting))
-        log = follower.tick(now, frame, senses.sensors)
-        if log is None:
-            raise RuntimeError("a new frame begins a control period")
-        return Replayed(frame, log, recorded, twist)
+        # A new frame begins a control period, and so has a log.
+        return Replayed(frame, cast(FrameLog, follower.tick(now, frame, senses.sensors)), recorded, twist)
 
     for topic, time, message in records:
         topics.add(topic)
@@ -93,7 +88,7 @@ def replay(
         command = _command(message) if name == names.COMMAND else None
         if waiting is not None and (is_image or command is not None):
             yield work(time, command)
-            waiting, recorded, frames = None, None, frames + 1
+            waiting = recorded = None
         elif command is not None and follower is not None:
             follower.tick(time, None, senses.sensors)
         if is_image:
@@ -107,8 +102,7 @@ def replay(
             senses.take(message)
     if waiting is not None:
         yield work(time, None)
-        frames += 1
-    if not frames:
+    if follower is None:
         there = ", ".join(sorted(topics)) or "nothing"
         raise BagError(f"no images on {names.resolved(node, names.IMAGE)}; the recording holds {there}")
 
@@ -126,11 +120,9 @@ def elsewhere(kinds: Mapping[str, str], node: NodeNames) -> list[str]:
     `kinds` has what `kind_of` says of each topic of the recording.
     """
     told = []
-    for topic in (names.SCAN, names.ODOMETRY, names.DEPTH):
+    for topic, *more in ((names.SCAN,), (names.ODOMETRY,), (names.DEPTH, names.DEPTH_LCAS)):
         wanted = "depth" if topic == names.DEPTH else names.TYPES[topic]
-        known = [
-            names.resolved(node, one) for one in ((names.DEPTH, names.DEPTH_LCAS) if topic == names.DEPTH else (topic,))
-        ]
+        known = [names.resolved(node, one) for one in (topic, *more)]
         others = sorted(other for other, kind in kinds.items() if kind == wanted)
         if others and not set(known) & set(others):
             rule = f"--ros-args -r {topic.lstrip('/')}:={others[0]}"

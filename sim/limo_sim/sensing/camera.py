@@ -34,8 +34,7 @@ class CameraPose:
     @classmethod
     def on_robot(cls, robot: RobotGeometry, x: float, y: float, yaw: float) -> CameraPose:
         """Return the camera of a robot whose base centre is at (x, y, yaw)."""
-        ahead = robot.camera_x
-        place = x + ahead * math.cos(yaw), y + ahead * math.sin(yaw)
+        place = x + robot.camera_x * math.cos(yaw), y + robot.camera_x * math.sin(yaw)
         return cls(*place, yaw, robot.camera_z, robot.focal_px(WIDTH))
 
     @cached_property

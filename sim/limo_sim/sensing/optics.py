@@ -102,7 +102,7 @@ class Shutter:
         Parameters
         ----------
         picture
-            Draws the scene as it was so many seconds before the stamp: uint8 (480, 640, C).
+            Draws the scene as it was so many seconds before the stamp: uint8 (480, 640, 3).
         turn_rate
             Of the camera [rad/s].
         """
@@ -110,12 +110,9 @@ class Shutter:
         shift = time * (abs(turn_rate) * self._focal + _PERSON_TURN * self._focal)
         count = min(max(2, math.ceil(shift / _MOST_SHIFT)), _MOST_PICTURES)
         shares = self._shares(count)
-        frame = np.zeros(())
+        frame = np.zeros((HEIGHT, WIDTH, 3), np.float32)
         for number in range(count):
-            drawn = picture((number + 0.5) / count * time)
-            if number == 0:
-                frame = np.zeros(drawn.shape, np.float32)
-            rows = np.flatnonzero(shares[number])
+            drawn, rows = picture((number + 0.5) / count * time), np.flatnonzero(shares[number])
             part = slice(int(rows[0]), int(rows[-1]) + 1) if len(rows) else slice(0)
             frame[part] += shares[number, part, None, None] * drawn[part]
         return np.rint(frame).astype(np.uint8)

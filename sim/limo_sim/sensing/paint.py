@@ -113,12 +113,11 @@ class Paint:
                 continue
             # Of the picture's sizes the one that has at least as many pixels as the camera where the wall is nearest.
             pictures = self._picture(number)
-            size = math.log2(max(_FINE * float(depth[first:end].min()) / camera.focal_px, 1.0))
-            level = min(int(size), len(pictures) - 1)
+            near = float(depth[first:end].min())
+            level = min(int(math.log2(max(_FINE * near / camera.focal_px, 1.0))), len(pictures) - 1)
             scale = _FINE / 2**level
             to_wall = _to_wall(self._sides[number], camera, first)
             to_picture = np.array([[scale, 0.0, -0.5], [0.0, scale, -0.5], [0.0, 0.0, 1.0]]) @ to_wall
-            near = float(depth[first:end].min())
             top = max(0, math.floor(CENTRE_Y - camera.focal_px * (WALL_HEIGHT - camera.height) / near))
             foot = min(image.shape[0], math.ceil(CENTRE_Y + camera.focal_px * camera.height / near) + 1)
             to_picture = to_picture @ np.array([[1.0, 0.0, 0.0], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
@@ -136,8 +135,7 @@ class Paint:
     def _picture(self, number: int) -> list[U8]:
         """Return a side's picture in all its sizes: uint8 (height, width, 4)."""
         if number not in self._pictures:
-            full = self._painted(number)
-            sizes = [full]
+            sizes = [self._painted(number)]
             while min(sizes[-1].shape[:2]) > 8:
                 height, width = sizes[-1].shape[:2]
                 half = cv2.resize(sizes[-1], (width // 2, height // 2), interpolation=cv2.INTER_AREA)

@@ -152,16 +152,14 @@ class Renderer:
         return [self._seen_of(piece, depth, camera) for piece in (*self._scenario.furniture, *movers)]
 
     def _seen_of(self, piece: Furniture, depth: F32, camera: CameraPose) -> Seen:
-        model = self._model_of(piece)
-        bounds = _bounds(model, camera, piece)
-        if not self._cast(model, bounds, camera, self._sun.seen_from(camera)):
+        within_image = self._cast(self._model_of(piece), piece, camera, self._sun.seen_from(camera))
+        if not within_image:
             return 0.0, None
         inside, visible, within = self._canvas.seen(depth)
         if within is None:
             return 0.0, None
         box = within[0], within[1], within[2] - within[0], within[3] - within[1]
-        share = visible / inside * _share_inside(bounds)
-        return self._through_lens(share, box)
+        return self._through_lens(visible / inside * within_image, box)
 
     def _through_lens(self, share: float, box: tuple[int, int, int, int]) -> Seen:
         """Return a visible share and the image of a box; what the lens moves out of the image is not visible."""
@@ -238,21 +236,24 @@ class Renderer:
     ) -> None:
         """Draw a piece; `hides`: whether there may be people behind it."""
         model = self._model_of(piece)
-        if self._cast(model, _bounds(model, camera, piece), camera, sun):
+        if self._cast(model, piece, camera, sun):
             self._canvas.draw(image, depth, model.palette, self._owner if hides else None, _NO_PERSON)
 
-    def _cast(self, model: _Model, bounds: Bounds | None, camera: CameraPose, sun: Sun) -> bool:
-        """Put a piece on the canvas, by itself; return whether any of it is within the image."""
+    def _cast(self, model: _Model, piece: Furniture, camera: CameraPose, sun: Sun) -> float:
+        """Put a piece on the canvas, by itself; return how much of its upright box is within the image: 0 … 1."""
+        radius, height = model.extent
+        bounds = upright_bounds(camera, camera.ahead_of(piece.x, piece.y), radius, (0.0, height))
         window = _window(bounds)
-        if window is None:
-            return False
+        if bounds is None or window is None:
+            return 0.0
         self._canvas.begin(window)
         for part, solid in enumerate(model.solids):
             if isinstance(solid, Box):
                 cast_box(self._canvas, solid, camera, self._sun, part)
             else:
                 cast_frustum(self._canvas, solid, camera, sun, part)
-        return True
+        (left, top, right, bottom), whole = window, _pixels(bounds)
+        return (right - left) * (bottom - top) / ((whole[2] - whole[0]) * (whole[3] - whole[1]))
 
     def _model_of(self, piece: Furniture) -> _Model:
         # What moves is somewhere else in every frame.
@@ -265,11 +266,6 @@ class _Model(NamedTuple):
     solids: list[Frustum | Box]
     palette: U32
     extent: tuple[float, float]
-
-
-def _bounds(model: _Model, camera: CameraPose, piece: Furniture) -> Bounds | None:
-    radius, height = model.extent
-    return upright_bounds(camera, camera.ahead_of(piece.x, piece.y), radius, (0.0, height))
 
 
 def _model(piece: Furniture) -> _Model:
@@ -304,15 +300,6 @@ def _window(bounds: Bounds | None) -> Window | None:
     left, top, right, bottom = _pixels(bounds)
     left, top, right, bottom = max(0, left), max(0, top), min(WIDTH, right), min(HEIGHT, bottom)
     return (left, top, right, bottom) if left < right and top < bottom else None
-
-
-def _share_inside(bounds: Bounds | None) -> float:
-    """Return how much of a box lies within the image: 0 … 1."""
-    window = _window(bounds)
-    if bounds is None or window is None:
-        return 0.0
-    (left, top, right, bottom), whole = window, _pixels(bounds)
-    return (right - left) * (bottom - top) / ((whole[2] - whole[0]) * (whole[3] - whole[1]))
 
 
 def _area_outside(shape: Outline, window: Window) -> float:

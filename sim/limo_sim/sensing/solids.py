@@ -115,9 +115,8 @@ def outline(body: BodyMesh, camera: CameraPose) -> Outline | None:
 
 def cast_body(canvas: Canvas, shape: Outline, sun: Sun) -> None:
     """Cast a body; `sun` in the camera's frame."""
-    light = sun.light
-    canvas.strips(shape.strips, light)
-    canvas.ellipses(shape.ellipses, light)
+    canvas.strips(shape.strips, sun.light)
+    canvas.ellipses(shape.ellipses, sun.light)
 
 
 def covers(shape: Outline, x: F32, y: F32) -> NDArray[np.bool_]:

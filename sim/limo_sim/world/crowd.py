@@ -245,7 +245,6 @@ class Crowd:
         self.poses = tuple(poses)
 
     def _step(self, robot: RobotPose) -> None:
-        """Let all who yield walk one step."""
         walkers = [walker for index, walker in self._walkers.items() if self.poses[index] is not None]
         if not walkers:
             return

@@ -52,8 +52,7 @@ class FloorPlan:
     @cached_property
     def _nodes(self) -> F64:
         """Where ways may turn: float64 (k, 2) [m]."""
-        inside = [node for node in self._corners if max(map(abs, node)) <= self._half - self._margin]
-        kept = _pairs(inside)
+        kept = _pairs([node for node in self._corners if max(map(abs, node)) <= self._half - self._margin])
         # A node within another widened obstacle is none: the way from it to itself crosses that obstacle.
         free: F64 = kept[~self._crossed(kept, kept + 1e-9, self._margin)]
         return free
@@ -92,7 +91,9 @@ class FloorPlan:
         if not len(self._middle):
             return goal, math.dist(start, goal)
         ends = np.array([start, goal])
-        from_start, from_goal = (self._margin if clear else 0.0 for clear in self._is_clear(ends))
+        away = self.away(ends)
+        clear = (np.hypot(away[..., 0], away[..., 1]) >= self._margin).all(axis=1)
+        from_start, from_goal = np.where(clear, self._margin, 0.0).tolist()
         if not self._crossed(ends[:1], ends[1:], min(from_start, from_goal))[0]:
             return goal, math.dist(start, goal)
         first, last = self._reach(ends[:1], from_start), self._reach(ends[1:], from_goal)
@@ -101,11 +102,6 @@ class FloorPlan:
             return goal, math.inf
         node = self._nodes[int(through.argmin()) // len(self._nodes)]
         return (float(node[0]), float(node[1])), float(through.min())
-
-    def _is_clear(self, places: F64) -> NDArray[np.bool_]:
-        """Whether places are no nearer to any obstacle than the margin."""
-        away = self.away(places)
-        return np.asarray((np.hypot(away[..., 0], away[..., 1]) >= self._margin).all(axis=1))
 
     def _reach(self, place: F64, margin: float) -> F64:
         """Lengths of the straight ways from a place to every node [m]; inf where there is none."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 from limo_sim.world.furniture import Disc, Rectangle, distance_to
 from limo_sim.world.paths import FloorPlan
@@ -131,10 +130,8 @@ class Surroundings:
     robot: tuple[float, float]  #: where the robot starts, x, y [m]
     robot_radius: float  #: of the circle that holds it [m]
     obstacles: Sequence[tuple[str, Disc | Rectangle]]  #: what stands in the room, by the name that a message gives it
-
-    @cached_property
-    def _plans(self) -> dict[float, FloorPlan]:
-        return {}
+    #: the floor plans that were asked for, by their margin [m]
+    _plans: dict[float, FloorPlan] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def plan(self, margin: float) -> FloorPlan:
         """Return the floor plan whose ways keep a distance from obstacles [m]."""

@@ -316,8 +316,7 @@ def colours(person: Person) -> list[Colour]:
         "stool": (150, 108, 72),
     }
     capsules, ellipsoids = _skeleton(Pose(0, 0, 0), sits=person.sits)
-    names = [name for *_, name in capsules] + [name for *_, name in ellipsoids]
-    return [palette[name] for name in names]
+    return [palette[name] for *_, name in capsules] + [palette[name] for *_, name in ellipsoids]
 
 
 def trunk_radius(person: Person, pose: Pose, direction: float) -> float:

@@ -317,9 +317,8 @@ class Scenario:
         if robot is not None:
             geometry = load_robot(robot)
             limits = {"wheel_speed": geometry.max_speed, "wheel_acceleration": geometry.acceleration}
-            scenario = dataclasses.replace(
-                scenario, robot=dataclasses.replace(scenario.robot, geometry=geometry, **limits)
-            )
+            driven = dataclasses.replace(scenario.robot, geometry=geometry, **limits)
+            scenario = dataclasses.replace(scenario, robot=driven)
         scenario.check(where)
         return scenario._with_groups(groups, where) if groups else scenario
 
@@ -394,6 +393,4 @@ class Scenario:
 
 @dataclass(frozen=True, slots=True)
 class _Groups:
-    """The groups of people in a file."""
-
     groups: tuple[Group, ...] = ()

@@ -263,15 +263,6 @@ def test_yaml_is_what_ros_prints_for_numbers_that_are_none_and_long_sequences() 
     assert "z: 1.0e-05\n" in as_yaml(messages.twist(Twist(0.0, 1e-5)))
 
 
-@pytest.mark.parametrize("domain", ["x", "-1", "400"])
-def test_a_domain_that_is_none_is_refused(
-    domain: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    assert main(["topic", "list"]) == 1
-    assert f"ROS_DOMAIN_ID is {domain!r}" in capsys.readouterr().err
-
-
 def test_a_follower_without_a_robot_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

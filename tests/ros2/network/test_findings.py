@@ -126,11 +126,10 @@ def test_a_drive_publishes_where_the_person_is(monkeypatch: pytest.MonkeyPatch) 
             message = messages.default_message(names.ASKED_TYPE)
             message.data = "7" if said[-1:] and said[-1].startswith("got 'leftmost'") else "leftmost"
             asked.publish(message)
-        reasons.update(
-            [log.decision.reason] if log.decision.reason.endswith("asked for person 7, not found yet") else []
-        )
+        if log.decision.reason.endswith("asked for person 7, not found yet"):
+            reasons.append(log.decision.reason)
 
-    reasons: set[str] = set()
+    reasons: list[str] = []
     settings = follower.Settings(7.0, watch=ask, say=said.append)
     report = follower.drive(dds.Bus(), controller_named("tracking", 1.5), detector_named("hog"), settings)
     arena.join()

@@ -70,11 +70,10 @@ def test_the_person_is_found_from_every_side_in_any_phase(distance: float) -> No
     assert rate(SOMEBODY, distance, phases=2, seed=round(100 * distance)) >= 0.95
 
 
-@pytest.mark.parametrize("distance", [2.5])
-def test_a_person_who_stands_is_found_from_every_side(distance: float) -> None:
+def test_a_person_who_stands_is_found_from_every_side() -> None:
     renderer = Renderer(SOMEBODY, np.random.default_rng(0))
     for direction in range(8):
-        pose = Pose(distance, 0.0, direction * math.tau / 8)
+        pose = Pose(2.5, 0.0, direction * math.tau / 8)
         image, _, [(_, box)] = renderer.render(CameraPose(0, 0, 0), [pose], np.random.default_rng(direction))
         assert box is not None
         assert any(holds(candidate, box) for candidate in found(image)), direction

@@ -19,6 +19,7 @@ from limo_sim.world.scenario import Camera, Depth, Furniture, Person, Room, Scen
 HERE = CameraPose(0.0, 0.0, 0.0)
 EYE = np.array([0.0, 0.0, 0.175])
 SOMEBODY = Person(route=((3, 0, 0),))
+ADULT = Person(route=((3, 0, 0),), height=1.85)
 EXACT = Scenario(camera=Camera(noise=0.0), depth=Depth(noise=0.0, invalid=0.0, far_m=20.0))
 
 Picture = tuple[NDArray[np.uint8], NDArray[np.float32], list[Seen]]
@@ -232,15 +233,25 @@ def test_visible_share_falls_as_somebody_leaves_the_image() -> None:
     assert shares[-1] == (0.0, None)
 
 
-@pytest.mark.parametrize(("distance", "y"), [(0.5, 0.0), (0.8, 0.3), (1.1, -0.8), (1.6, 1.1)])
-def test_visible_share_is_that_of_the_silhouette_in_a_wider_image(distance: float, y: float) -> None:
-    """The whole silhouette from single rays: those within the image are the visible ones."""
-    pose = Pose(distance, y, 1.0, 2.0, 1.0)
-    rows, columns = (grid.reshape(-1) for grid in np.mgrid[-400:1300:6, -900:1500:6])
-    covered = np.isfinite(first_hit(body(SOMEBODY, pose), rays(columns, rows)))
-    within = (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
-    [(visible, _)] = picture(pose)[2]
-    assert visible == pytest.approx((covered & within).sum() / covered.sum(), abs=0.03)
+@pytest.mark.parametrize(
+    ("person", "pose", "gap"),
+    [
+        *((SOMEBODY, Pose(x, y, 1.0, 2.0, 1.0), 0.015) for x, y in ((0.5, 0.0), (0.8, 0.3), (1.1, -0.8), (1.6, 1.1))),
+        *((ADULT, Pose(x, 0.2, 2.0, 2.0, 1.0), 0.01) for x in (1.2, 1.6, 2.5)),
+    ],
+)
+def test_of_somebody_nearby_the_image_shows_what_single_rays_show(person: Person, pose: Pose, gap: float) -> None:
+    rows, columns = (grid.reshape(-1) for grid in np.mgrid[-900:1300:6, -900:1500:6])
+    expected = first_hit(body(person, pose), rays(columns, rows))
+    covered = np.isfinite(expected)
+    shown = covered & (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
+    _, depth, [(visible, box)] = picture(pose, person=person)
+    assert visible == pytest.approx(shown.sum() / covered.sum(), abs=0.03)
+    assert box is not None
+    # The rays are six pixels apart, and one is of row 0.
+    assert 0 <= rows[shown].min() - box[1] < 6
+    gaps = np.abs(depth[rows[shown], columns[shown]] - expected[shown])
+    assert np.median(gaps) < gap
 
 
 @pytest.mark.parametrize("height", [1.5, 1.75, 2.0])
@@ -262,22 +273,6 @@ def test_an_adult_is_as_high_in_the_image_as_a_pinhole_camera_makes_them(height:
     assert 0.0 <= box[1] + box[3] - feet < 0.2 * LIMO.focal_px(640) * height / distance * 0.175 / (distance - 0.2) + 3.0
     trunk = depth[round(CENTRE_Y - LIMO.focal_px(640) * (0.65 * height - 0.175) / distance), 320]
     assert trunk == pytest.approx(distance - 0.06 * height, abs=0.03 * height)
-
-
-@pytest.mark.parametrize("distance", [1.2, 1.6, 2.5])
-def test_of_an_adult_nearby_the_image_shows_what_single_rays_show(distance: float) -> None:
-    adult, pose = Person(route=((3, 0, 0),), height=1.85), Pose(distance, 0.2, 2.0, 2.0, 1.0)
-    rows, columns = (grid.reshape(-1) for grid in np.mgrid[-900:1000:6, -300:900:6])
-    expected = first_hit(body(adult, pose), rays(columns, rows))
-    covered = np.isfinite(expected)
-    within = (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
-    _, depth, [(visible, box)] = picture(pose, person=adult)
-    assert visible == pytest.approx((covered & within).sum() / covered.sum(), abs=0.03)
-    assert box is not None
-    assert box[1] == 0
-    shown = covered & within
-    gaps = np.abs(depth[rows[shown], columns[shown]] - expected[shown])
-    assert np.median(gaps) < 0.01
 
 
 def test_somebody_behind_the_camera_is_not_seen() -> None:

@@ -31,6 +31,12 @@ def two(at: tuple[float, float], velocity: tuple[float, float], wanted: tuple[fl
     )
 
 
+def felt(at: tuple[float, float], velocity: tuple[float, float] = (0.0, 0.0), *, hidden: bool = False) -> F64:
+    """Return what the person at `at` feels of the other alone: float64 (2,) [m/s²]."""
+    push: F64 = acceleration(two(at, velocity), FREE, np.array([[False, hidden]]), MODEL)[0]
+    return push
+
+
 def potential(at: F64, velocity: F64) -> float:
     """Return V of equation (3), b of equation (4) [m²/s²]."""
     step = velocity * 2.0
@@ -48,18 +54,15 @@ def test_people_are_pushed_down_the_slope_of_the_papers_potential(
         -(potential(place + tiny * axis, pace) - potential(place - tiny * axis, pace)) / (2 * tiny)
         for axis in np.eye(2)
     ]
-    felt = acceleration(two(at, velocity), FREE, np.zeros((1, 2), bool), MODEL)[0]
     in_sight = -downhill[0] >= math.cos(math.radians(100.0)) * math.hypot(*downhill)
-    np.testing.assert_allclose(felt, np.array(downhill) * (1.0 if in_sight else 0.5), rtol=1e-5)
+    np.testing.assert_allclose(felt(at, velocity), np.array(downhill) * (1.0 if in_sight else 0.5), rtol=1e-5)
 
 
 def test_what_is_behind_counts_half_and_what_a_wall_hides_not_at_all() -> None:
-    before = acceleration(two((-0.8, 0.0), (0.0, 0.0)), FREE, np.zeros((1, 2), bool), MODEL)[0]
-    behind = acceleration(two((0.8, 0.0), (0.0, 0.0)), FREE, np.zeros((1, 2), bool), MODEL)[0]
-    hidden = acceleration(two((-0.8, 0.0), (0.0, 0.0)), FREE, np.array([[False, True]]), MODEL)[0]
-    assert before[0] == pytest.approx(-7.0 * math.exp(-0.8 / 0.3))
-    assert behind[0] == pytest.approx(-0.5 * before[0])
-    assert hidden.tolist() == [0.0, 0.0]
+    before = felt((-0.8, 0.0))[0]
+    assert before == pytest.approx(-7.0 * math.exp(-0.8 / 0.3))
+    assert felt((0.8, 0.0))[0] == pytest.approx(-0.5 * before)
+    assert felt((-0.8, 0.0), hidden=True).tolist() == [0.0, 0.0]
 
 
 def test_a_wall_pushes_with_the_papers_strength_and_a_child_feels_it_in_proportion() -> None:
@@ -67,15 +70,12 @@ def test_a_wall_pushes_with_the_papers_strength_and_a_child_feels_it_in_proporti
         scale = height / ADULT
         rest = np.zeros((1, 2))
         alone = People(rest, rest, np.array([0.13 * height]), np.array([height]), rest, np.array([[1.0, 0.0]]))
-        felt = acceleration(alone, np.array([[[0.0, 0.4 * scale]]]), np.zeros((1, 1), bool), MODEL)[0]
-        np.testing.assert_allclose(felt, [0.0, scale * 50.0 * math.exp(-2.0)])
+        pushed = acceleration(alone, np.array([[[0.0, 0.4 * scale]]]), np.zeros((1, 1), bool), MODEL)[0]
+        np.testing.assert_allclose(pushed, [0.0, scale * 50.0 * math.exp(-2.0)])
 
 
 def test_bodies_that_touch_are_pushed_apart() -> None:
-    near, touching = (
-        acceleration(two((-gap, 0.0), (0.0, 0.0)), FREE, np.zeros((1, 2), bool), MODEL)[0][0]
-        for gap in (0.26 * ADULT + 0.01, 0.26 * ADULT - 0.01)
-    )
+    near, touching = (felt((-gap, 0.0))[0] for gap in (0.26 * ADULT + 0.01, 0.26 * ADULT - 0.01))
     assert touching - near == pytest.approx(-15.0, abs=1.0)
 
 

@@ -79,7 +79,7 @@ def in_front(world: World) -> Iterator[None]:
     sys.meta_path.append(refuser)
     context.enter(context.Context(world))
     try:
-        with in_turns(world.turns, lambda: world.time):
+        with in_turns(world.turns):
             yield
     finally:
         context.enter(None)

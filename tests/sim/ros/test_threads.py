@@ -104,7 +104,7 @@ def test_a_python_without_a_private_of_cpythons_takes_turns_all_the_same(
     else:
         monkeypatch.delattr(missing)
     sleep = time.sleep
-    with in_turns(Turns(lambda _: None, lambda: 0.0, lambda: False, print), lambda: 0.0):
+    with in_turns(Turns(lambda _: None, lambda: 0.0, lambda: False, print)):
         assert time.sleep is not sleep
         assert bare.wait is sleep  # type: ignore[attr-defined]
     assert time.sleep is sleep

@@ -26,22 +26,25 @@ _BEGAN = float(2**17)
 
 
 @contextmanager
-def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
+def in_turns(turns: Turns) -> Iterator[None]:
     """Replace what starts, joins, stops and times threads; other threads than the script's notice nothing.
 
-    `time.time` and `time.monotonic` go on with simulated time, `now()` [s]; `time.perf_counter` stays the wall's.
+    `time.time` and `time.monotonic` go on with simulated time; `time.perf_counter` stays the wall's.
     """
     real_sleep, real_start, real_join = time.sleep, threading.Thread.start, threading.Thread.join
     real_wait = threading.Condition.wait
 
     def sleep(seconds: float) -> None:
         if turns.inside:
-            turns.wait(lambda: False, now() + seconds, lambda: math.inf)
+            turns.sleep(seconds)
         else:
             real_sleep(seconds)
 
     def clock(real: Callable[[], float], began: float) -> Callable[[], float]:
-        return lambda: began + now() if turns.inside else real()
+        return lambda: began + turns.now() if turns.inside else real()
+
+    def until(timeout: float | None) -> float:
+        return math.inf if timeout is None else turns.now() + max(timeout, 0.0)
 
     def start(thread: threading.Thread) -> None:
         # The workers of a pool wait in C, where no turn can be given away: they are no threads of the script.
@@ -54,7 +57,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
     def join(thread: threading.Thread, timeout: float | None = None) -> None:
         seat = getattr(thread, "limo_seat", None)
         if turns.inside and seat is not None:
-            if turns.wait(lambda: not turns.alive(seat), _until(now, timeout)):
+            if turns.wait(lambda: not turns.alive(seat), until(timeout)):
                 real_join(thread)
         else:
             real_join(thread, timeout)
@@ -69,7 +72,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         condition._waiters.append(waiter)
         saved = condition._release_save()
         try:
-            notified = turns.wait(lambda: not waiter.locked(), _until(now, timeout))
+            notified = turns.wait(lambda: not waiter.locked(), until(timeout))
         finally:
             condition._acquire_restore(saved)
             if waiter.locked():
@@ -94,7 +97,3 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
                 stack.callback(setattr, owner, name, getattr(owner, name))
                 setattr(owner, name, value)
         yield
-
-
-def _until(now: Callable[[], float], timeout: float | None) -> float:
-    return math.inf if timeout is None else now() + max(timeout, 0.0)

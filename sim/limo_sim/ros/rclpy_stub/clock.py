@@ -131,13 +131,13 @@ class Clock(PartialApi, missing=("create_jump_callback", "ros_time_is_active", "
 
     def sleep_for(self, rel_time: Duration, context: Any = None) -> bool:  # noqa: ARG002 — rclpy's signature
         """Let time pass."""
-        self._context.world.sleep(rel_time.nanoseconds * 1e-9)
+        self._context.world.turns.sleep(rel_time.nanoseconds * 1e-9)
         return True
 
     def sleep_until(self, until: Time, context: Any = None) -> bool:  # noqa: ARG002 — rclpy's signature
         """Let time pass until a point in time."""
         world = self._context.world
-        world.sleep(until.nanoseconds * 1e-9 - world.time)
+        world.turns.sleep(until.nanoseconds * 1e-9 - world.time)
         return True
 
 

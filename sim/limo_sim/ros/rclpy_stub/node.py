@@ -302,7 +302,7 @@ class Node(PartialApi, missing=_MISSING):
     def count_subscribers(self, topic_name: str) -> int:
         """Return how many listen to a topic, the robot being one."""
         readers = self._context.world.readers
-        return sum(reader.topic == topic_name for reader in readers) + (topic_name == names.COMMAND)
+        return [reader.topic for reader in readers].count(topic_name) + (topic_name == names.COMMAND)
 
     def declare_parameter(
         self, name: str, value: Any = None, descriptor: Any = None, ignore_override: bool = False

@@ -70,7 +70,7 @@ class Publisher(
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions; the robot is one to /cmd_vel."""
         world = self._context.world
-        return sum(reader.topic == self.topic for reader in world.readers) + (self.topic == names.COMMAND)
+        return [reader.topic for reader in world.readers].count(self.topic) + (self.topic == names.COMMAND)
 
     def destroy(self) -> None:
         """End the publisher."""
@@ -107,6 +107,7 @@ class Subscription(
         self._queue: deque[Message] = deque(maxlen=None if keep_all else max(qos.depth, 1))
         # As in ROS, a transient-local subscription gets no message from a volatile publisher.
         volatile = topic in names.TYPES and topic != names.TF_STATIC
+        #: Whether it is given what was published before it, and whether it asks for reliable delivery.
         self.keeps = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
         self.reliable = qos.reliability not in (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.BEST_AVAILABLE)
         self._deaf = self.keeps and volatile
@@ -114,7 +115,7 @@ class Subscription(
             self._context.world.called("unmatched", incompatible(topic, "DURABILITY", reads=True))
 
     def offer(self, message: Message) -> None:
-        """Queue a message; the oldest gives way."""
+        """Queue a message, which is the subscription's own; the oldest gives way."""
         if not self._deaf:
             self._queue.append(message)
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.abc
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
@@ -46,15 +44,10 @@ _ROS_TOPS = tuple(
 )
 
 
-class _Refuser(importlib.abc.MetaPathFinder):
+class _Refuser:
     """The last finder of modules: for one of ROS 2's, the error names what is offered."""
 
-    def find_spec(
-        self,
-        fullname: str,
-        path: Sequence[str] | None,  # noqa: ARG002 — the protocol's
-        target: ModuleType | None = None,  # noqa: ARG002
-    ) -> ModuleSpec | None:
+    def find_spec(self, fullname: str, *_: Any) -> None:
         top = fullname.partition(".")[0]
         if top in _ROS_TOPS or top.endswith(("_msgs", "_srvs", "_interfaces")):
             raise NotOfferedError(
@@ -62,18 +55,18 @@ class _Refuser(importlib.abc.MetaPathFinder):
                 "https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
                 name=fullname,
             )
-        return None
 
 
 @contextmanager
 def in_front(world: World) -> Iterator[None]:
     """Let `import rclpy` and its companions find what belongs to `world`, and Python's waits take the arena's time."""
-    modules = _modules()
-    tops = {name.partition(".")[0] for name in modules}
+    modules: dict[str, ModuleType] = {name: _Module(name, content) for name, content in offered().items()}
+    for name, module in modules.items():
+        parent, _, child = name.rpartition(".")
+        if parent:
+            setattr(modules[parent], child, module)
     # A real rclpy that was imported before is put aside for the run.
-    hidden = {name: module for name, module in sys.modules.items() if name.partition(".")[0] in tops}
-    for name in hidden:
-        del sys.modules[name]
+    hidden = _put_aside(modules)
     sys.modules.update(modules)
     refuser = _Refuser()
     sys.meta_path.append(refuser)
@@ -84,15 +77,11 @@ def in_front(world: World) -> Iterator[None]:
     finally:
         context.enter(None)
         sys.meta_path.remove(refuser)
-        for name in [name for name in sys.modules if name.partition(".")[0] in tops]:
-            del sys.modules[name]
+        _put_aside(modules)
         sys.modules.update(hidden)
 
 
-def _modules() -> dict[str, ModuleType]:
-    made: dict[str, ModuleType] = {name: _Module(name, content) for name, content in offered().items()}
-    for name, module in made.items():
-        parent, _, child = name.rpartition(".")
-        if parent:
-            setattr(made[parent], child, module)
-    return made
+def _put_aside(modules: Iterable[str]) -> dict[str, ModuleType]:
+    """Remove the packages of these modules from `sys.modules`; return what was removed."""
+    tops = {name.partition(".")[0] for name in modules}
+    return {name: sys.modules.pop(name) for name in tuple(sys.modules) if name.partition(".")[0] in tops}

@@ -230,11 +230,8 @@ class Stage:
             self._render_ms = 1e3 * (time.perf_counter() - drawing)
             self._frame, self.found = frame, []
             self._witness.frame(self.arena.time, frame)
-        news = []
-        for topic, make in self._outlet.new(passed):
-            if topic in wanted or topic == names.TF_STATIC:
-                news.append(_news(topic, make()))
-        return news
+        wanted = {*wanted, names.TF_STATIC}
+        return [_news(topic, make()) for topic, make in self._outlet.new(passed) if topic in wanted]
 
     def _log(self) -> None:
         """Log the control period that ends now."""

@@ -75,15 +75,6 @@ def test_a_nodes_windows_are_on_the_live_page_under_their_names(run: Run) -> Non
     assert picture.shape == (480, 640, 3)
 
 
-def test_the_same_node_gives_the_same_run(run: Run) -> None:
-    def log() -> list[tuple[object, ...]]:
-        steps: list[Step] = []
-        run(node(FOLLOW), STANDING, 1.0, watch=kept_in(steps))
-        return [(s.log.time, s.truth.robot, s.log.decision.twist, s.log.detections.windows.tolist()) for s in steps]
-
-    assert log() == log()
-
-
 def test_a_half_size_image_is_scored_in_the_cameras_pixels(run: Run) -> None:
     half = FOLLOW.replace("detectMultiScale(image,", "detectMultiScale(cv2.resize(image, (0, 0), fx=0.5, fy=0.5),")
     near = dataclasses.replace(STANDING, people=(Person(route=((1.9, 0.0, 3600.0),)),))

@@ -1,15 +1,12 @@
-"""Puts ROS 2's Python API into `sys.modules` for one run; a name that is not offered raises an error."""
+"""Puts ROS 2's Python API into `sys.modules` of a node's process; a name that is not offered raises an error."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
 from limo_sim.ros.lockstep.records import StubError
-from limo_sim.ros.lockstep.threads import in_turns
 from limo_sim.ros.lockstep.world import World
 from limo_sim.ros.offer import offered
 from limo_sim.ros.rclpy_stub import context
@@ -57,31 +54,13 @@ class _Refuser:
             )
 
 
-@contextmanager
-def in_front(world: World) -> Iterator[None]:
-    """Let `import rclpy` and its companions find what belongs to `world`, and Python's waits take the arena's time."""
+def put_in_front(world: World) -> None:
+    """Let `import rclpy` and its companions find what belongs to `world`, until this process ends."""
     modules: dict[str, ModuleType] = {name: _Module(name, content) for name, content in offered().items()}
     for name, module in modules.items():
         parent, _, child = name.rpartition(".")
         if parent:
             setattr(modules[parent], child, module)
-    # A real rclpy that was imported before is put aside for the run.
-    hidden = _put_aside(modules)
     sys.modules.update(modules)
-    refuser = _Refuser()
-    sys.meta_path.append(refuser)
+    sys.meta_path.append(_Refuser())
     context.enter(context.Context(world))
-    try:
-        with in_turns(world.turns):
-            yield
-    finally:
-        context.enter(None)
-        sys.meta_path.remove(refuser)
-        _put_aside(modules)
-        sys.modules.update(hidden)
-
-
-def _put_aside(modules: Iterable[str]) -> dict[str, ModuleType]:
-    """Remove the packages of these modules from `sys.modules`; return what was removed."""
-    tops = {name.partition(".")[0] for name in modules}
-    return {name: sys.modules.pop(name) for name in tuple(sys.modules) if name.partition(".")[0] in tops}

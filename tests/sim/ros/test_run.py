@@ -49,7 +49,7 @@ def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("script", "said"),
+    ("text", "said"),
     [
         (node("raise ValueError('boom')"), "failed with ValueError"),
         (node("pass"), "never published on /cmd_vel"),
@@ -57,8 +57,8 @@ def test_the_workshops_node_turns_to_the_person_and_is_scored(run: Run) -> None:
     ],
     ids=["crashes", "only spins", "as the template stands"],
 )
-def test_a_node_that_fails_has_no_success(script: str, said: str, run: Run) -> None:
-    card = score_of(run(script, STANDING, 1.0))
+def test_a_node_that_fails_has_no_success(text: str, said: str, run: Run) -> None:
+    card = score_of(run(text, STANDING, 1.0))
     assert card.success is False
     assert said in str(card.to_json()["failure"])
 

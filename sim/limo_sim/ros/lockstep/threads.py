@@ -1,4 +1,4 @@
-"""Python's own waits, for one run: in a thread of the script they give the turn away and take simulated time.
+"""Python's own waits, in a node's process: in a thread of the script they give the turn away and take simulated time.
 
 CPython's privates are touched here alone. A run goes on without one of them, less exact:
 
@@ -15,8 +15,7 @@ import queue
 import threading
 import time
 from _thread import allocate_lock
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from limo_sim.ros.lockstep.turns import Turns
@@ -25,8 +24,7 @@ from limo_sim.ros.lockstep.turns import Turns
 _BEGAN = float(2**17)
 
 
-@contextmanager
-def in_turns(turns: Turns) -> Iterator[None]:
+def take_turns(turns: Turns) -> None:
     """Replace what starts, joins, stops and times threads; other threads than the script's notice nothing.
 
     `time.time` and `time.monotonic` go on with simulated time; `time.perf_counter` stays the wall's.
@@ -91,9 +89,6 @@ def in_turns(turns: Turns) -> Iterator[None]:
     ]
     if all(hasattr(threading.Condition(), name) for name in ("_waiters", "_release_save", "_acquire_restore")):
         replaced.append((threading.Condition, "wait", wait))
-    with ExitStack() as stack:
-        for owner, name, value in replaced:
-            if hasattr(owner, name):
-                stack.callback(setattr, owner, name, getattr(owner, name))
-                setattr(owner, name, value)
-        yield
+    for owner, name, value in replaced:
+        if hasattr(owner, name):
+            setattr(owner, name, value)

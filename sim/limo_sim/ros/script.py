@@ -20,7 +20,7 @@ from limo_sim.ros.lockstep.world import World
 _HERE = Path(__file__).parent
 
 
-def run_script(world: World, arguments: Sequence[str] = ()) -> Fault | None:
+def run_script(world: World, arguments: Sequence[str]) -> Fault | None:
     """Run the world's script as `python SCRIPT ARGUMENTS` would; return why it ended before its time, None if not."""
     sys.argv = [str(world.script), *arguments]
     here = world.script.resolve().parent

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
-import sys
 import time
 from collections import Counter
 from pathlib import Path
@@ -276,16 +274,6 @@ def test_polling_and_spinning_with_a_timeout_let_time_pass(run: Run) -> None:
         pub.publish(Twist())
     """
     assert len(run(text).stage.commands) == 101
-
-
-def test_a_run_leaves_python_as_it_was(run: Run) -> None:
-    def python() -> tuple[object, ...]:
-        return time.sleep, cv2.imshow, getattr(cv2, "HOGDescriptor", None), list(sys.path), list(sys.argv)
-
-    before = python()
-    run(node(FOLLOW), seconds=0.2)
-    assert python() == before
-    assert importlib.util.find_spec("message_filters") is None
 
 
 def test_a_callback_may_draw_on_its_picture_without_touching_anybody_elses(run: Run) -> None:

@@ -44,8 +44,6 @@ class TimeoutException(TransformException):
 
 #: Newest transforms of one child frame, by time [ns]; a frame that does not move has its one at None.
 _Track = list[tuple[int, Rigid]]
-
-
 #: Names of ROS 2's `Buffer` that are not offered.
 _MISSING = tuple(
     "lookup_transform_full lookup_transform_full_async lookup_transform_async transform_full "

@@ -18,8 +18,6 @@ from limo_sim.ros.rclpy_stub.partial import PartialApi
 #: Threads of a MultiThreadedExecutor without a number. In ROS as many as the computer has processors; here always the
 #: same, since a run must not depend on the computer. Chosen: a workshop's laptop has four.
 _THREADS = 4
-
-
 #: Names of rclpy's `Executor` that are not offered.
 _MISSING = tuple(
     "wait_for_ready_callbacks spin_once_until_future_complete can_execute create_timer add_to_context "

@@ -26,11 +26,7 @@ class NotInitializedException(Exception):  # noqa: N818 — rclpy's name
 
 
 #: Options of rclpy's Node that change nothing here.
-_WITHOUT_EFFECT = tuple(
-    "context enable_rosout rosout_qos_profile start_parameter_services enable_logger_service".split()
-)
-
-
+_WITHOUT_EFFECT = "context enable_rosout rosout_qos_profile start_parameter_services enable_logger_service".split()
 #: Names of rclpy's `Node` that are not offered.
 _MISSING = tuple(
     "create_guard_condition destroy_guard_condition guards handle context wait_for_node waitables add_waitable "

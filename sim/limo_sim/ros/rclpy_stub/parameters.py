@@ -24,9 +24,6 @@ class ParameterNotDeclaredException(ParameterException):
 class ParameterAlreadyDeclaredException(ParameterException):
     """A parameter was declared twice."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(f"parameter {name!r} is declared already")
-
 
 class InvalidParameterTypeException(ParameterException):
     """A parameter was given a value of another type."""
@@ -59,9 +56,7 @@ class ParameterType(IntEnum):
         if isinstance(value, list | tuple):
             arrays = {bool: cls.BOOL_ARRAY, int: cls.INTEGER_ARRAY, float: cls.DOUBLE_ARRAY, str: cls.STRING_ARRAY}
             arrays[bytes] = cls.BYTE_ARRAY
-            kinds = {type(item) for item in value}
-            if not kinds:
-                return cls.BYTE_ARRAY
+            kinds = {type(item) for item in value} or {bytes}
             if len(kinds) == 1 and (kind := kinds.pop()) in arrays:
                 return arrays[kind]
         raise TypeError(f"a parameter cannot hold {type(value).__name__} {value!r}")
@@ -141,7 +136,7 @@ class Parameters:
         A type may be given in place of a value, as in rclpy: the command line must then give the value.
         """
         if name in self.values:
-            raise ParameterAlreadyDeclaredException(name)
+            raise ParameterAlreadyDeclaredException(f"parameter {name!r} is declared already")
         typed = isinstance(default, ParameterType)
         wanted, value = (default, None) if typed else (ParameterType.from_parameter_value(default), default)
         if not ignore_override and name in self._overrides:

@@ -46,7 +46,7 @@ def test_the_same_node_scenario_and_seed_give_the_same_run(script: Callable[[str
     assert log(first) == log(second)
     assert len(first) > 10
     assert figures(ended) == figures(again)
-    assert (ended.failure, ended.used_hog, ended.episode.target_distance) == ("", True, 1.8)
+    assert (ended.failure, ended.episode.detector, ended.episode.target_distance) == ("", "hog", 1.8)
 
 
 @pytest.mark.parametrize(

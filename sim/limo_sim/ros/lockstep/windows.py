@@ -31,16 +31,11 @@ def watch_cv2(world: World) -> None:
     """Put the replacements into `cv2`, until this process ends."""
     # OpenCV 5 has no HOG: ours takes its place.
     install_into_cv2()
-    replacements: list[tuple[Any, str, Any]] = [(cv2, name, value) for name, value in _windows(world).items()]
-    replacements.append((cv2, "HOGDescriptor", _watched(cv2.HOGDescriptor, world)))
+    vars(cv2).update(_windows(world), HOGDescriptor=_watched(cv2.HOGDescriptor, world))
     if world.checked:
-        replacements += [
-            (limo_hog, "HOGDescriptor", _watched(limo_hog.HOGDescriptor, world)),
-            (limo_hog.PeopleDetector, "detect", _watched_detect(limo_hog.PeopleDetector.detect, world)),
-            *((cv2, name, _tracker(getattr(cv2, name), world)) for name in vars(cv2) if _TRACKER.fullmatch(name)),
-        ]
-    for owner, name, value in replacements:
-        setattr(owner, name, value)
+        vars(limo_hog)["HOGDescriptor"] = _watched(limo_hog.HOGDescriptor, world)
+        limo_hog.PeopleDetector.detect = _watched_detect(limo_hog.PeopleDetector.detect, world)  # type: ignore[method-assign]
+        vars(cv2).update({name: _tracker(make, world) for name, make in vars(cv2).items() if _TRACKER.fullmatch(name)})
 
 
 def _windows(world: World) -> dict[str, Callable[..., Any]]:

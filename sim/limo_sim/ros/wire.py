@@ -1,4 +1,4 @@
-"""The messages between a node's process and the arena's: plain data."""
+"""The messages between a node's process and the arena's, plain data, and the node's end of the link."""
 
 from __future__ import annotations
 

@@ -18,12 +18,11 @@ import select
 import signal
 import socket
 import sys
-from collections.abc import Sequence
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
-from limo_sim.ros.wire import FORKS, HEAD, News, packed, prctl
+from limo_sim.ros.wire import FORKS, SocketLink, prctl
 
 _SET_PDEATHSIG, _SET_CHILD_SUBREAPER = 1, 36
 # While this process imports, nothing can be told to it: it ends with its parent, and by SIGTERM.
@@ -42,45 +41,6 @@ with needed(by="limo-hog run"):
 
 #: How long a node that is stopped may take to say where it was [s].
 _LAST_WORDS_S = 0.5
-
-
-class SocketLink:
-    """The node's end of the link. A node that hangs is not interrupted while a message is half sent."""
-
-    def __init__(self, connection: socket.socket) -> None:
-        self._connection = connection
-        self._reading = connection.makefile("rb")
-
-    def tell(self, told: str, *content: Any, data: Any = b"") -> None:
-        """Send a message."""
-        bare = memoryview(data)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGALRM,)) if os.name != "nt" else ()
-        try:
-            self._connection.sendall(packed([told, *content], bare.nbytes))
-            if bare.nbytes:
-                self._connection.sendall(bare)
-        finally:
-            if os.name != "nt":
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-    def advance(self, wanted: Sequence[str], target: float | None, until: float) -> tuple[float, list[News]]:
-        """Let time pass."""
-        self.tell("advance", wanted, target, until)
-        said, _ = HEAD.unpack(self._reading.read(HEAD.size))
-        time, sizes = json.loads(self._reading.read(said))
-        news: list[News] = []
-        for topic, length, size in sizes:
-            data, pixels = self._reading.read(length), None
-            if size:
-                # (An image is received into what the node is given, and copied nowhere else.)
-                pixels = array.array("B", [0]) * size
-                self._reading.readinto(pixels)
-            news.append((topic, data, pixels))
-        return time, news
-
-    def leave(self) -> None:
-        """Close the link in a process that the node has forked."""
-        socket.close(self._connection.detach())
 
 
 def _run(job: dict[str, Any], out: socket.socket, err: socket.socket, link: socket.socket) -> None:

@@ -1,17 +1,12 @@
-"""Puts ROS 2's Python API into `sys.modules` for one run; a name that is not offered raises an error."""
+"""Puts ROS 2's Python API into `sys.modules` of a node's process; a name that is not offered raises an error."""
 
 from __future__ import annotations
 
-import importlib.abc
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
 from limo_sim.ros.lockstep.records import StubError
-from limo_sim.ros.lockstep.threads import in_turns
 from limo_sim.ros.lockstep.world import World
 from limo_sim.ros.offer import offered
 from limo_sim.ros.rclpy_stub import context
@@ -46,15 +41,10 @@ _ROS_TOPS = tuple(
 )
 
 
-class _Refuser(importlib.abc.MetaPathFinder):
+class _Refuser:
     """The last finder of modules: for one of ROS 2's, the error names what is offered."""
 
-    def find_spec(
-        self,
-        fullname: str,
-        path: Sequence[str] | None,  # noqa: ARG002 — the protocol's
-        target: ModuleType | None = None,  # noqa: ARG002
-    ) -> ModuleSpec | None:
+    def find_spec(self, fullname: str, *_: Any) -> None:
         top = fullname.partition(".")[0]
         if top in _ROS_TOPS or top.endswith(("_msgs", "_srvs", "_interfaces")):
             raise NotOfferedError(
@@ -62,37 +52,15 @@ class _Refuser(importlib.abc.MetaPathFinder):
                 "https://github.com/limo-hog/limo-hog/blob/main/docs/ros2.md",
                 name=fullname,
             )
-        return None
 
 
-@contextmanager
-def in_front(world: World) -> Iterator[None]:
-    """Let `import rclpy` and its companions find what belongs to `world`, and Python's waits take the arena's time."""
-    modules = _modules()
-    tops = {name.partition(".")[0] for name in modules}
-    # A real rclpy that was imported before is put aside for the run.
-    hidden = {name: module for name, module in sys.modules.items() if name.partition(".")[0] in tops}
-    for name in hidden:
-        del sys.modules[name]
-    sys.modules.update(modules)
-    refuser = _Refuser()
-    sys.meta_path.append(refuser)
-    context.enter(context.Context(world))
-    try:
-        with in_turns(world.turns, lambda: world.time):
-            yield
-    finally:
-        context.enter(None)
-        sys.meta_path.remove(refuser)
-        for name in [name for name in sys.modules if name.partition(".")[0] in tops]:
-            del sys.modules[name]
-        sys.modules.update(hidden)
-
-
-def _modules() -> dict[str, ModuleType]:
-    made: dict[str, ModuleType] = {name: _Module(name, content) for name, content in offered().items()}
-    for name, module in made.items():
+def put_in_front(world: World) -> None:
+    """Let `import rclpy` and its companions find what belongs to `world`, until this process ends."""
+    modules: dict[str, ModuleType] = {name: _Module(name, content) for name, content in offered().items()}
+    for name, module in modules.items():
         parent, _, child = name.rpartition(".")
         if parent:
-            setattr(made[parent], child, module)
-    return made
+            setattr(modules[parent], child, module)
+    sys.modules.update(modules)
+    sys.meta_path.append(_Refuser())
+    context.enter(context.Context(world))

@@ -161,7 +161,8 @@ class Message:
 @cache
 def message_class(type_name: str) -> type[Message]:
     """Return the class of a type such as "geometry_msgs/msg/Twist"."""
-    fields = [field for field in fields_of(type_name) if field.name != _EMPTY]
+    # rosbags gives messages without fields a member.
+    fields = [field for field in fields_of(type_name) if field.name != "structure_needs_at_least_one_member"]
     package, _, name = type_name.split("/")
     body: dict[str, Any] = {constant: value for constant, _, value in typestore().fielddefs[type_name][0]}
     body |= {
@@ -172,10 +173,6 @@ def message_class(type_name: str) -> type[Message]:
         "_type_name": type_name,
     }
     return type(name, (Message,), body)
-
-
-#: The member rosbags gives to messages without fields.
-_EMPTY = "structure_needs_at_least_one_member"
 
 
 def from_wire(message: Any) -> Message:

@@ -61,9 +61,8 @@ def run_live(scenario: Scenario, seed: int, seconds: float, bus: Bus | None, wat
             twist = to_twist(message.twist if message.__msgtype__ == _STAMPED else message)
             arena.command(twist)
         for topic, make in outlet.new(now) if outlet is not None else ():
-            writer = writers.get(topic)
-            if writer is not None and (writer.has_readers or topic == names.TF_STATIC):
-                writer.publish(make())
+            if writers[topic].has_readers or topic == names.TF_STATIC:
+                writers[topic].publish(make())
         if watch is not None and arena.frame().stamp > shown:
             shown = arena.frame().stamp
             watch(_step(arena, twist, tuple(passed)))

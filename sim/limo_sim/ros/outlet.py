@@ -22,7 +22,6 @@ class Outlet:
     def __init__(self, arena: Arena) -> None:
         self._arena = arena
         self._camera = self._lidar = self._wheels = -math.inf
-        self._began = False
 
     def new(self, passed: Passed) -> list[Outgoing]:
         """Return the new messages: the clock first, depth before colour, so that a colour image finds its depth.
@@ -31,8 +30,7 @@ class Outlet:
         """
         arena, odometry = self._arena, passed.odometry
         out: list[Outgoing] = [(names.CLOCK, lambda: messages.clock(arena.time))]
-        if not self._began:
-            self._began = True
+        if self._wheels == -math.inf:  # the first call
             out.append((names.TF_STATIC, lambda: frames.static_transforms(arena.time, arena.robot)))
         for reading in passed.imu:
             make = partial(messages.imu, reading.stamp, reading.angular_velocity, reading.acceleration)

@@ -77,10 +77,10 @@ def run_node(
     """
     if not stage.script.is_file():
         raise StubError(f"{stage.script}: no such file")
-    run = _Run(stage, limits or Limits(), said)
     with ready() as worker:
+        run = _Run(stage, limits or Limits(), said, worker)
         try:
-            run.begin(worker, arguments, checked)
+            run.begin(arguments, checked)
             fault = run.serve()
         finally:
             worker.end()
@@ -95,25 +95,25 @@ class _StoppedError(LimoHogError):
 class _Run:
     """One run of a node: what it sends, and its limits."""
 
-    def __init__(self, stage: Stage, limits: Limits, said: Said) -> None:
-        self._stage, self._limits, self._said = stage, limits, said
+    def __init__(self, stage: Stage, limits: Limits, said: Said, worker: Worker) -> None:
+        self._stage, self._limits, self._said, self._worker = stage, limits, said, worker
         self._printed = 0
         self._tail = ""
-        self._texts: dict[socket.socket, tuple[str, codecs.IncrementalDecoder]] = {}
+        self._pairs = [socket.socketpair() for _ in range(3)]
         #: Ours of the connections: what is printed, and the link, last; and those that are not closed yet.
-        self._ends: list[socket.socket] = []
-        self._open: list[socket.socket] = []
+        self._ends = [ours for ours, _ in self._pairs]
+        self._open = self._ends.copy()
+        decoder = codecs.getincrementaldecoder("utf-8")
+        out, err, _ = self._ends
+        self._texts = {out: ("stdout", decoder("replace")), err: ("stderr", decoder("replace"))}
         self._exits: int | None = None
         self._exited = False
         self._fault: Fault | None = None
         self._received = bytearray()
 
-    def begin(self, worker: Worker, arguments: Sequence[str], checked: bool) -> None:
+    def begin(self, arguments: Sequence[str], checked: bool) -> None:
         """Start the node."""
-        self._worker = worker
-        pairs = [socket.socketpair() for _ in range(3)]
-        self._ends = [ours for ours, _ in pairs]
-        self._open = self._ends.copy()
+        theirs = [their for _, their in self._pairs]
         job = {
             "script": str(self._stage.script),
             "folder": str(self._limits.folder or Path.cwd()),
@@ -124,9 +124,9 @@ class _Run:
             "memory_mb": self._limits.memory_mb,
             "checked": checked,
         }
-        worker.begin(job, [theirs for _, theirs in pairs])
-        for _, theirs in pairs:
-            theirs.close()
+        self._worker.begin(job, theirs)
+        for end in theirs:
+            end.close()
         began = self._limits.began
         self._over_at = (time.monotonic() if began is None else began) + self._limits.seconds
         self._wait_until = time.monotonic() + _START_S
@@ -138,10 +138,8 @@ class _Run:
 
     def serve(self) -> Fault | None:
         """Answer the node until it has ended; return why that was before its time, None if it was not."""
-        out, err, link = self._ends
+        link = self._ends[-1]
         link.settimeout(self._limits.patience + GRACE_S)
-        decoder = codecs.getincrementaldecoder("utf-8")
-        self._texts = {out: ("stdout", decoder("replace")), err: ("stderr", decoder("replace"))}
         try:
             while link in self._open:
                 ready = self._take(_LOOK_S)
@@ -257,7 +255,8 @@ class _Run:
                 if told != "advance":
                     self._stage.tell(told, *content, data=data)
                     continue
-                asked = _asked(*content)
+                wanted, target, until = content
+                asked = frozenset(wanted), None if target is None else float(target), float(until)
             except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError) as error:
                 raise _StoppedError(f"it sent what is no message of a node: {error}") from error
             if self._stage.over:
@@ -279,10 +278,6 @@ class _Run:
     def _wait(self) -> None:
         """Give the node its time until the next step."""
         self._wait_until = time.monotonic() + self._limits.patience + GRACE_S
-
-
-def _asked(wanted: list[str], target: float | None, until: float) -> tuple[Collection[str], float | None, float]:
-    return frozenset(wanted), None if target is None else float(target), float(until)
 
 
 def _fault(how: str, message: str, traceback: str, line: int | None) -> Fault:

@@ -1,4 +1,4 @@
-"""Runs a script against the arena behind a link, and says what became of it."""
+"""Runs a script against the arena behind a link, and says what became of it; the process is the script's alone."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
-from limo_sim.ros.front import in_front
+from limo_sim.ros.front import put_in_front
 from limo_sim.ros.lockstep.patience import HungError
 from limo_sim.ros.lockstep.records import Fault, StubError
+from limo_sim.ros.lockstep.threads import take_turns
 from limo_sim.ros.lockstep.turns import ExternalShutdownException, RunOver
-from limo_sim.ros.lockstep.windows import watched_cv2
+from limo_sim.ros.lockstep.windows import watch_cv2
 from limo_sim.ros.lockstep.world import World
 
 _HERE = Path(__file__).parent
 
 
-def run_script(world: World, arguments: Sequence[str] = ()) -> Fault | None:
+def run_script(world: World, arguments: Sequence[str]) -> Fault | None:
     """Run the world's script as `python SCRIPT ARGUMENTS` would; return why it ended before its time, None if not."""
-    argv, path = sys.argv, list(sys.path)
     sys.argv = [str(world.script), *arguments]
     here = world.script.resolve().parent
     # As where it is installed, an ament package finds its own modules: beside package.xml, or in the folder above.
     packages = [folder for folder in (here, *here.parents[:3]) if (folder / "package.xml").is_file()]
     sys.path[:0] = [str(folder) for folder in (here, *packages, *(folder.parent for folder in packages))]
-    with in_front(world), watched_cv2(world):
-        try:
-            with world.patience.watching(), world.turns.main():
-                _check_encoding(world.script)
-                runpy.run_path(str(world.script), run_name="__main__")
-        except (RunOver, ExternalShutdownException):
-            pass
-        except SystemExit as exit_:
-            if exit_.code not in (None, 0):
-                world.fault = world.fault or StubError(f"sys.exit({exit_.code!r})")
-        except BaseException as error:
-            world.fault = world.fault or error
-        finally:
-            sys.argv, sys.path[:] = argv, path
+    put_in_front(world)
+    take_turns(world.turns)
+    watch_cv2(world)
+    try:
+        with world.patience.watching(), world.turns.main():
+            _check_encoding(world.script)
+            runpy.run_path(str(world.script), run_name="__main__")
+    except (RunOver, ExternalShutdownException):
+        pass
+    except SystemExit as exit_:
+        if exit_.code not in (None, 0):
+            world.fault = world.fault or StubError(f"sys.exit({exit_.code!r})")
+    except BaseException as error:
+        world.fault = world.fault or error
     return None if world.fault is None else _told(world.fault, str(world.script))
 
 

@@ -230,11 +230,8 @@ class Stage:
             self._render_ms = 1e3 * (time.perf_counter() - drawing)
             self._frame, self.found = frame, []
             self._witness.frame(self.arena.time, frame)
-        news = []
-        for topic, make in self._outlet.new(passed):
-            if topic in wanted or topic == names.TF_STATIC:
-                news.append(_news(topic, make()))
-        return news
+        wanted = {*wanted, names.TF_STATIC}
+        return [_news(topic, make()) for topic, make in self._outlet.new(passed) if topic in wanted]
 
     def _log(self) -> None:
         """Log the control period that ends now."""
@@ -355,11 +352,6 @@ class Ended:
         """The script's part of the traceback; "" without an exception."""
         return "" if self.fault is None else self.fault.traceback
 
-    @property
-    def used_hog(self) -> bool:
-        """Whether the script used cv2's HOG detector."""
-        return bool(self.stage.detector_inputs)
-
 
 def score_of(outcome: Ended) -> ScoreCard:
     """Measure a run; where the script does not use cv2's HOG detector, figures of detections are None.
@@ -369,7 +361,7 @@ def score_of(outcome: Ended) -> ScoreCard:
     card, driving = score(outcome.episode), outcome.episode.scorer.driving
     if failure := outcome.failure or ("" if driving or not card.success else "the node never moved the robot"):
         card = replace(card, success=False, failure=failure)
-    if outcome.used_hog:
+    if outcome.stage.detector_inputs:
         return card
     unknown: dict[str, Any] = dict.fromkeys(_OF_DETECTIONS)
     return replace(card, modes={"drive": driving, "stand": 1.0 - driving}, lost=0, **unknown)

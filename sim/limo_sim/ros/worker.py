@@ -30,15 +30,15 @@ class Worker:
     """A process that has imported what nodes need."""
 
     def __init__(self) -> None:
-        command = [sys.executable, "-m", "limo_sim.ros.child"]
-        # (In the root folder no file has a module's name.)
-        options: dict[str, Any] = {"cwd": Path(os.sep).resolve(), "stdout": subprocess.DEVNULL}
         self.status: int | None = None
         self._leaves = False
         self._control, theirs = socket.socketpair()
-        options["stdin"] = subprocess.PIPE if os.name == "nt" else theirs
-        self._process: subprocess.Popen[bytes] = subprocess.Popen(  # noqa: S603 — this program
-            command, start_new_session=True, **options
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "limo_sim.ros.child"],
+            cwd=Path(os.sep).resolve(),  # in the root folder no file has a module's name
+            stdin=subprocess.PIPE if os.name == "nt" else theirs.fileno(),
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,
         )
         theirs.close()
 

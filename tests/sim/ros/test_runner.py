@@ -6,7 +6,6 @@ import gc
 import json
 import subprocess
 import sys
-import textwrap
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -14,27 +13,15 @@ from pathlib import Path
 
 import pytest
 from tests.sim.logs import kept_in
-from tests.sim.ros.scripts import DRIVE, FOLLOW, HEAD, STANDING, node, run_script
+from tests.sim.ros.scripts import DRIVE, FOLLOW, STANDING, node, run_script
 
 from limo_hog.cli.main import main
 from limo_sim.ros import runner
-from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.stage import Ended, score_of
 from limo_sim.run.log import Step
-from limo_sim.world.scenario import Scenario
 
 #: Drives for ten images, then does something else.
 THEN = f"self.n = getattr(self, 'n', 0) + 1\nif self.n < 10:\n    {DRIVE}\n    return\n"
-
-
-@pytest.fixture
-def script(tmp_path: Path) -> Callable[[str], Path]:
-    def write(text: str) -> Path:
-        path = tmp_path / "node.py"
-        path.write_text(HEAD + textwrap.dedent(text), encoding="utf-8")
-        return path
-
-    return write
 
 
 def log(steps: list[Step]) -> list[tuple[object, ...]]:
@@ -59,7 +46,7 @@ def test_the_same_node_scenario_and_seed_give_the_same_run(script: Callable[[str
     assert log(first) == log(second)
     assert len(first) > 10
     assert figures(ended) == figures(again)
-    assert (ended.failure, ended.used_hog, ended.episode.target_distance) == ("", True, 1.8)
+    assert (ended.failure, ended.episode.detector, ended.episode.target_distance) == ("", "hog", 1.8)
 
 
 @pytest.mark.parametrize(
@@ -165,11 +152,6 @@ def test_a_watcher_that_fails_ends_the_node(script: Callable[[str], Path]) -> No
 
     with pytest.raises(OSError, match="no space left"):
         run_script(script(node(DRIVE)), STANDING, 2.0, watch=full)
-
-
-def test_a_script_that_is_not_there_and_a_scenario_that_cannot_be_are_named(tmp_path: Path) -> None:
-    with pytest.raises(StubError, match="no such file"):
-        run_script(tmp_path / "none.py", Scenario(name="nobody"), 1.0)
 
 
 def test_the_command_line_writes_a_card_and_ends_with_one_line(

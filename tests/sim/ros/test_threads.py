@@ -6,14 +6,10 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import pytest
 from tests.sim.ros.scripts import Run, said
-
-from limo_sim.ros.lockstep.threads import in_turns
-from limo_sim.ros.lockstep.turns import Turns
 
 NODE = "import threading, time\nrclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\n"
 SERVICE = "from std_srvs.srv import Trigger\n"
@@ -94,21 +90,26 @@ def test_an_endless_loop_in_a_thread_is_stopped(run: Run) -> None:
     assert "hung" in run(text, patience=0.5).failure
 
 
-@pytest.mark.parametrize("missing", ["threading._time", "queue.time", "threading.Condition._waiters"])
-def test_a_python_without_a_private_of_cpythons_takes_turns_all_the_same(
-    monkeypatch: pytest.MonkeyPatch, missing: str
-) -> None:
-    bare = type("Condition", (), {"wait": time.sleep})
-    if missing.endswith("_waiters"):
-        monkeypatch.setattr(threading, "Condition", bare)
-    else:
-        monkeypatch.delattr(missing)
-    sleep = time.sleep
-    with in_turns(Turns(lambda _: None, lambda: 0.0, lambda: False, print), lambda: 0.0):
-        assert time.sleep is not sleep
-        assert bare.wait is sleep  # type: ignore[attr-defined]
-    assert time.sleep is sleep
-    assert not missing.endswith("time") or not hasattr(sys.modules[missing.split(".")[0]], missing.split(".")[1])
+@pytest.mark.parametrize(
+    ("without", "then"),
+    [
+        ("del threading._time", "not hasattr(threading, '_time')"),
+        ("del queue.time", "not hasattr(queue, 'time')"),
+        ("threading.Condition = type('Condition', (), {'wait': time.sleep})", "threading.Condition.wait is sleep"),
+    ],
+)
+def test_a_python_without_a_private_of_cpythons_takes_turns_all_the_same(without: str, then: str) -> None:
+    text = f"""
+import queue, threading, time
+from limo_sim.ros.lockstep.threads import take_turns
+from limo_sim.ros.lockstep.turns import Turns
+{without}
+sleep = time.sleep
+take_turns(Turns(lambda _: None, lambda: 0.0, lambda: False, print))
+assert time.sleep is not sleep
+assert {then}
+"""
+    subprocess.run([sys.executable, "-c", text], check=True)
 
 
 #: Waits for ever beside other threads, as a script beside OpenCV's.

@@ -66,15 +66,13 @@ class ApproximateTimeSynchronizer(SimpleFilter):
         queue[nanoseconds] = message
         while len(queue) > self._queue_size:
             del queue[min(queue)]
+        if not all(self._queues):
+            return
         # The nearest stamp of each other input makes the tightest set with this message.
-        chosen = []
-        for other, candidates in enumerate(self._queues):
-            if other == index:
-                chosen.append(nanoseconds)
-            elif candidates:
-                chosen.append(min(candidates, key=lambda at: (abs(at - nanoseconds), at)))
-            else:
-                return
+        chosen = [
+            nanoseconds if candidates is queue else min(candidates, key=lambda at: (abs(at - nanoseconds), at))
+            for candidates in self._queues
+        ]
         if max(abs(a - b) for a, b in itertools.product(chosen, chosen)) > self._slop_ns:
             return
         self.signalMessage(*(queue.pop(at) for queue, at in zip(self._queues, chosen, strict=True)))

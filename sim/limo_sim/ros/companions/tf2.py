@@ -44,8 +44,6 @@ class TimeoutException(TransformException):
 
 #: Newest transforms of one child frame, by time [ns]; a frame that does not move has its one at None.
 _Track = list[tuple[int, Rigid]]
-
-
 #: Names of ROS 2's `Buffer` that are not offered.
 _MISSING = tuple(
     "lookup_transform_full lookup_transform_full_async lookup_transform_async transform_full "
@@ -182,17 +180,15 @@ class Buffer(PartialApi, missing=_MISSING):
 
     def _to_root(self, frame: str) -> list[str]:
         frame = frame.lstrip("/")
-        if frame not in self._parents and frame not in self._parents.values():
-            raise LookupException(f"frame {frame!r} does not exist; known are {', '.join(sorted(self._frames()))}")
+        known = {*self._parents, *self._parents.values()}
+        if frame not in known:
+            raise LookupException(f"frame {frame!r} does not exist; known are {', '.join(sorted(known))}")
         way = [frame]
         while way[-1] in self._parents:
             way.append(self._parents[way[-1]])
             if way[-1] in way[:-1]:
                 raise ConnectivityException(f"the frames {', '.join(way)} are each other's parents")
         return way
-
-    def _frames(self) -> set[str]:
-        return {*self._parents, *self._parents.values()}
 
     def _at(self, child: str, at: int) -> Rigid:
         if child in self._fixed:

@@ -36,21 +36,10 @@ class Calls:
     solution_read: int | None = None
 
 
-def nearest_topic(topic: str, type_name: str = "") -> str:
+def nearest_topic(topic: str, type_name: str) -> str:
     """Return the topic of this type whose name is most like `topic`, of any type where none has this one."""
     # A depth image has the colour image's type; who means it says so.
     of_type = [
         name for name, kind in names.TYPES.items() if kind == type_name and ("depth" in name) == ("depth" in topic)
     ]
     return difflib.get_close_matches(topic, of_type or PUBLISHED, n=1, cutoff=0.0)[0]
-
-
-def incompatible(topic: str, policy: str, *, reads: bool) -> str:
-    """Return ROS 2's warning of a publisher and a subscription that do not match, `policy` being the reason."""
-    other, does, never = (
-        ("publisher", "offering", "received from") if reads else ("subscription", "requesting", "sent to")
-    )
-    return (
-        f"New {other} discovered on topic '{topic}', {does} incompatible QoS. No messages will be {never} it. "
-        f"Last incompatible policy: {policy}"
-    )

@@ -34,13 +34,13 @@ class Patience:
             yield
             return
         handler = signal.signal(signal.SIGALRM, self._alarm)
-        left = self._start()
         self._running = True
+        self._start()
         try:
             yield
         finally:
             self._running = False
-            signal.setitimer(signal.ITIMER_REAL, left)
+            signal.setitimer(signal.ITIMER_REAL, 0)
             signal.signal(signal.SIGALRM, handler)
 
     @contextmanager
@@ -52,9 +52,8 @@ class Patience:
         if self._running:
             self._start()
 
-    def _start(self) -> float:
-        """Start the timer; return what was left of the one before [s]."""
-        return signal.setitimer(signal.ITIMER_REAL, self.seconds, _AGAIN_S)[0]
+    def _start(self) -> None:
+        signal.setitimer(signal.ITIMER_REAL, self.seconds, _AGAIN_S)
 
     def _alarm(self, _signal: int, _frame: FrameType | None) -> None:
         signal.setitimer(signal.ITIMER_REAL, 0)

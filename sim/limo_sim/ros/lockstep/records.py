@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from limo_hog.detections import Detections
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.robot import Twist
-from limo_sim.ros.interfaces import Message
 
 #: Takes what a script logs: time [s], level, logger, message.
 Log = Callable[[float, str, str, str], None]
@@ -20,19 +18,6 @@ Log = Callable[[float, str, str, str], None]
 
 class StubError(LimoHogError):
     """A script uses something that `limo-hog run` does not offer, or sends a command that is not finite."""
-
-
-class Reader(Protocol):
-    """A subscription; one that `keeps` is given what was published before it; `reliable`: what it asks for."""
-
-    topic: str
-    msg_type: type[Message]
-    keeps: bool
-    reliable: bool
-
-    def offer(self, message: Message) -> None:
-        """Queue a message, which is the reader's own."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Python's own waits, for one run: in a thread of the script they give the turn away and take simulated time.
+"""Python's own waits, in a node's process: in a thread of the script they give the turn away and take simulated time.
 
 CPython's privates are touched here alone. A run goes on without one of them, less exact:
 
@@ -15,8 +15,7 @@ import queue
 import threading
 import time
 from _thread import allocate_lock
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from limo_sim.ros.lockstep.turns import Turns
@@ -25,23 +24,25 @@ from limo_sim.ros.lockstep.turns import Turns
 _BEGAN = float(2**17)
 
 
-@contextmanager
-def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
+def take_turns(turns: Turns) -> None:
     """Replace what starts, joins, stops and times threads; other threads than the script's notice nothing.
 
-    `time.time` and `time.monotonic` go on with simulated time, `now()` [s]; `time.perf_counter` stays the wall's.
+    `time.time` and `time.monotonic` go on with simulated time; `time.perf_counter` stays the wall's.
     """
     real_sleep, real_start, real_join = time.sleep, threading.Thread.start, threading.Thread.join
     real_wait = threading.Condition.wait
 
     def sleep(seconds: float) -> None:
         if turns.inside:
-            turns.wait(lambda: False, now() + seconds, lambda: math.inf)
+            turns.sleep(seconds)
         else:
             real_sleep(seconds)
 
     def clock(real: Callable[[], float], began: float) -> Callable[[], float]:
-        return lambda: began + now() if turns.inside else real()
+        return lambda: began + turns.now() if turns.inside else real()
+
+    def until(timeout: float | None) -> float:
+        return math.inf if timeout is None else turns.now() + max(timeout, 0.0)
 
     def start(thread: threading.Thread) -> None:
         # The workers of a pool wait in C, where no turn can be given away: they are no threads of the script.
@@ -54,7 +55,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
     def join(thread: threading.Thread, timeout: float | None = None) -> None:
         seat = getattr(thread, "limo_seat", None)
         if turns.inside and seat is not None:
-            if turns.wait(lambda: not turns.alive(seat), _until(now, timeout)):
+            if turns.wait(lambda: not turns.alive(seat), until(timeout)):
                 real_join(thread)
         else:
             real_join(thread, timeout)
@@ -69,7 +70,7 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
         condition._waiters.append(waiter)
         saved = condition._release_save()
         try:
-            notified = turns.wait(lambda: not waiter.locked(), _until(now, timeout))
+            notified = turns.wait(lambda: not waiter.locked(), until(timeout))
         finally:
             condition._acquire_restore(saved)
             if waiter.locked():
@@ -88,13 +89,6 @@ def in_turns(turns: Turns, now: Callable[[], float]) -> Iterator[None]:
     ]
     if all(hasattr(threading.Condition(), name) for name in ("_waiters", "_release_save", "_acquire_restore")):
         replaced.append((threading.Condition, "wait", wait))
-    with ExitStack() as stack:
-        for owner, name, value in replaced:
-            if hasattr(owner, name):
-                stack.callback(setattr, owner, name, getattr(owner, name))
-                setattr(owner, name, value)
-        yield
-
-
-def _until(now: Callable[[], float], timeout: float | None) -> float:
-    return math.inf if timeout is None else now() + max(timeout, 0.0)
+    for owner, name, value in replaced:
+        if hasattr(owner, name):
+            setattr(owner, name, value)

@@ -62,7 +62,7 @@ class Turns:
         over: Callable[[], bool],
         failed: Callable[[BaseException], None],
     ) -> None:
-        self._advance, self._now, self._over, self._failed = advance, now, over, failed
+        self._advance, self.now, self._over, self._failed = advance, now, over, failed
         self._order: list[Seat] = []
         self._seats: dict[int, Seat] = {}
         self._current: Seat | None = None
@@ -86,10 +86,8 @@ class Turns:
     @contextmanager
     def main(self) -> Iterator[None]:
         """Make the calling thread the script's first; at the end the others are waited for, daemons are ended."""
-        seat = Seat(daemon=False)
+        self._current = self._seats[threading.get_ident()] = seat = Seat(daemon=False)
         self._order.append(seat)
-        self._current = seat
-        self._seats[threading.get_ident()] = seat
         try:
             yield
             self.wait(lambda: all(other.daemon for other in self._order if other is not seat))
@@ -120,9 +118,13 @@ class Turns:
             raise ThreadEnded
         if ready():
             return True
-        if self._now() >= until - 1e-9:
+        if self.now() >= until - 1e-9:
             return False
         raise RunOver
+
+    def sleep(self, seconds: float) -> None:
+        """Let simulated time pass, as a script's `time.sleep` does: messages are queued, callbacks wait."""
+        self.wait(lambda: False, self.now() + seconds, lambda: math.inf)
 
     def start(self, thread: threading.Thread, start: Callable[[threading.Thread], None]) -> None:
         """Start a thread of the script; it runs when its turn comes."""
@@ -158,10 +160,7 @@ class Turns:
     @contextmanager
     def outside(self) -> Iterator[None]:
         """Let the run's own code work in a thread of the script: what it waits for is real."""
-        seat = self.seat()
-        if seat is None:
-            yield
-            return
+        seat = self._seats[threading.get_ident()]
         seat.outside += 1
         try:
             yield
@@ -180,7 +179,7 @@ class Turns:
             self._broken = True
 
     def _due(self, seat: Seat) -> bool:
-        return seat.ended or self._broken or self._over() or seat.ready() or self._now() >= seat.until - 1e-9
+        return seat.ended or self._broken or self._over() or seat.ready() or self.now() >= seat.until - 1e-9
 
     def _next(self, at: int) -> Seat | None:
         """Return the first thread from position `at` on, round to before it, that can go on; None where all wait."""

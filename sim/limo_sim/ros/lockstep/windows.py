@@ -1,11 +1,10 @@
-"""Replacements in `cv2` for one run: windows without a display, and a HOG detector whose results are logged."""
+"""Replacements in `cv2` of a node's process: windows without a display, and a HOG detector whose results are logged."""
 
 from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ with needed(by="limo-hog run"):
 
 #: No screen is larger, nor a JPEG [px].
 _LARGEST = 16_384
-_MISSING = object()
 _WITHOUT_EFFECT = (
     "namedWindow moveWindow resizeWindow setWindowTitle setWindowProperty setMouseCallback startWindowThread "
     "createTrackbar"
@@ -29,27 +27,15 @@ _WITHOUT_EFFECT = (
 _TRACKER = re.compile(r"Tracker\w+_create")
 
 
-@contextmanager
-def watched_cv2(world: World) -> Iterator[None]:
-    """Put the replacements into `cv2`, for one run."""
-    # OpenCV 5 has no HOG: for this run, ours takes its place.
-    installed = install_into_cv2()
-    replacements: list[tuple[Any, str, Any]] = [(cv2, name, value) for name, value in _windows(world).items()]
-    replacements.append((cv2, "HOGDescriptor", _watched(cv2.HOGDescriptor, world)))
+def watch_cv2(world: World) -> None:
+    """Put the replacements into `cv2`, until this process ends."""
+    # OpenCV 5 has no HOG: ours takes its place.
+    install_into_cv2()
+    vars(cv2).update(_windows(world), HOGDescriptor=_watched(cv2.HOGDescriptor, world))
     if world.checked:
-        replacements += [
-            (limo_hog, "HOGDescriptor", _watched(limo_hog.HOGDescriptor, world)),
-            (limo_hog.PeopleDetector, "detect", _watched_detect(limo_hog.PeopleDetector.detect, world)),
-            *((cv2, name, _tracker(getattr(cv2, name), world)) for name in vars(cv2) if _TRACKER.fullmatch(name)),
-        ]
-    with ExitStack() as stack:
-        for name in installed:
-            stack.callback(delattr, cv2, name)
-        for owner, name, value in replacements:
-            before = getattr(owner, name, _MISSING)
-            setattr(owner, name, value)
-            stack.callback(delattr, owner, name) if before is _MISSING else stack.callback(setattr, owner, name, before)
-        yield
+        vars(limo_hog)["HOGDescriptor"] = _watched(limo_hog.HOGDescriptor, world)
+        limo_hog.PeopleDetector.detect = _watched_detect(limo_hog.PeopleDetector.detect, world)  # type: ignore[method-assign]
+        vars(cv2).update({name: _tracker(make, world) for name, make in vars(cv2).items() if _TRACKER.fullmatch(name)})
 
 
 def _windows(world: World) -> dict[str, Callable[..., Any]]:

@@ -9,38 +9,25 @@ from __future__ import annotations
 import copy
 import inspect
 import math
+import operator
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from limo_hog.ros2 import names
 from limo_hog.ros2.messages import deserialize, to_twist
 from limo_sim.ros.interfaces import Message, from_wire
 from limo_sim.ros.lockstep.patience import Patience
-from limo_sim.ros.lockstep.records import Reader, StubError
+from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.lockstep.turns import RunOver, ThreadEnded, Turns
-from limo_sim.ros.wire import News
-
-
-class Link(Protocol):
-    """The way to the arena; plain data alone."""
-
-    def tell(self, told: str, *content: Any, data: Any = b"") -> None:
-        """Tell what the script does: numbers, texts, None and lists of them, and a picture, an array in C order."""
-        ...
-
-    def advance(self, wanted: Sequence[str], target: float | None, until: float) -> tuple[float, list[News]]:
-        """Let time pass, to `until` [s] or to the next message; returns the time [s], and the topics' messages."""
-        ...
+from limo_sim.ros.wire import SocketLink
 
 
 class World:
     """One run, as the script's process knows it."""
 
-    def __init__(
-        self, link: Link, seconds: float, *, script: Path, patience: float = 20.0, checked: bool = False
-    ) -> None:
+    def __init__(self, link: SocketLink, seconds: float, *, script: Path, patience: float, checked: bool) -> None:
         self.link = link
         self.checked = checked  #: whether the arena wants to see the pictures that detectors are given
         self.seconds = seconds
@@ -48,7 +35,7 @@ class World:
         self.patience = Patience(patience)
         self.time = 0.0  #: since the start of the run [s]
         self.over = seconds <= 0.0  #: whether the run's time is up
-        self.readers: list[Reader] = []
+        self.readers: list[Any] = []  #: the subscriptions of the script's nodes
         self.published: dict[str, str] = {}  #: types of the topics on which the script has published
         self.writers: list[str] = []  #: the topic of each of the script's publishers
         self.services: dict[str, Any] = {}  #: what the script's nodes offer, by name
@@ -100,10 +87,6 @@ class World:
         value = self.parameters.get("target_distance")
         return value if isinstance(value, float) and math.isfinite(value) and value > 0 else None
 
-    def sleep(self, seconds: float) -> None:
-        """Let simulated time pass, as a script's `time.sleep` does: messages are queued, callbacks wait."""
-        self.turns.wait(lambda: False, self.time + seconds, lambda: math.inf)
-
     def call(self, function: Callable[[], Any]) -> Any:
         """Call back into the script, return what comes back; an exception is kept in `fault`."""
         since = self.time
@@ -112,7 +95,7 @@ class World:
         except (RunOver, ThreadEnded, SystemExit):
             raise
         except BaseException as error:
-            self.fault = self.fault or error
+            self._fail(error)
             raise
         finally:
             if self.time > since:
@@ -128,7 +111,7 @@ class World:
             self._told.add(told)
             self.link.tell(*told)
 
-    def subscribe(self, reader: Reader) -> None:
+    def subscribe(self, reader: Any) -> None:
         """Add a subscription."""
         self.readers.append(reader)
         self.called("readers", reader.topic, reader.msg_type._type_name)
@@ -156,12 +139,8 @@ class World:
                 reader.offer(copy.deepcopy(message))
 
     def _drive(self, message: Any) -> None:
-        parts = {
-            f"{vector}.{axis}": getattr(getattr(message, vector), axis)
-            for vector in ("linear", "angular")
-            for axis in "xyz"
-        }
-        for name, value in parts.items():
+        for name in ("linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z"):
+            value = operator.attrgetter(name)(message)
             if not math.isfinite(value):
                 raise StubError(f"the command's {name} is {value}: a robot can be given finite numbers alone")
         twist = to_twist(message)

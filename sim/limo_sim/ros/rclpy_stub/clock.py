@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import total_ordering
 from typing import Any
@@ -24,9 +25,11 @@ class ClockType(IntEnum):
     STEADY_TIME = 3
 
 
-@total_ordering
+@dataclass(init=False, order=True, unsafe_hash=True)
 class Duration(PartialApi, missing=("get_c_duration",)):
     """A difference of times; `nanoseconds` holds it exactly."""
+
+    nanoseconds: int
 
     def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None:
         self.nanoseconds = int(seconds * 1e9) + int(nanoseconds)
@@ -40,18 +43,6 @@ class Duration(PartialApi, missing=("get_c_duration",)):
     def from_msg(cls, msg: Any) -> Duration:
         """Read a builtin_interfaces/Duration."""
         return cls(seconds=0, nanoseconds=msg.sec * 10**9 + msg.nanosec)
-
-    def __eq__(self, other: object) -> bool:
-        return self.nanoseconds == other.nanoseconds if isinstance(other, Duration) else NotImplemented
-
-    def __lt__(self, other: Duration) -> bool:
-        return self.nanoseconds < other.nanoseconds if isinstance(other, Duration) else NotImplemented
-
-    def __hash__(self) -> int:
-        return hash(self.nanoseconds)
-
-    def __repr__(self) -> str:
-        return f"Duration(nanoseconds={self.nanoseconds})"
 
     def __str__(self) -> str:
         return f"{self.nanoseconds} nanoseconds"
@@ -95,21 +86,16 @@ class Time:
         self._comparable(other)
         return Duration(nanoseconds=difference)
 
-    def _comparable(self, other: Time) -> None:
+    def _comparable(self, other: Time) -> int:
         if self.clock_type != other.clock_type:
             raise TypeError("times of different clocks cannot be compared or subtracted")
+        return other.nanoseconds
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Time):
-            return NotImplemented
-        self._comparable(other)
-        return self.nanoseconds == other.nanoseconds
+        return self.nanoseconds == self._comparable(other) if isinstance(other, Time) else NotImplemented
 
     def __lt__(self, other: Time) -> bool:
-        if not isinstance(other, Time):
-            return NotImplemented
-        self._comparable(other)
-        return self.nanoseconds < other.nanoseconds
+        return self.nanoseconds < self._comparable(other) if isinstance(other, Time) else NotImplemented
 
     def __hash__(self) -> int:
         return hash(self.nanoseconds)
@@ -131,13 +117,13 @@ class Clock(PartialApi, missing=("create_jump_callback", "ros_time_is_active", "
 
     def sleep_for(self, rel_time: Duration, context: Any = None) -> bool:  # noqa: ARG002 — rclpy's signature
         """Let time pass."""
-        self._context.world.sleep(rel_time.nanoseconds * 1e-9)
+        self._context.world.turns.sleep(rel_time.nanoseconds * 1e-9)
         return True
 
     def sleep_until(self, until: Time, context: Any = None) -> bool:  # noqa: ARG002 — rclpy's signature
         """Let time pass until a point in time."""
         world = self._context.world
-        world.sleep(until.nanoseconds * 1e-9 - world.time)
+        world.turns.sleep(until.nanoseconds * 1e-9 - world.time)
         return True
 
 
@@ -157,15 +143,10 @@ class Timer(PartialApi, missing=("handle",)):
         self.callback, self.callback_group, self.clock = callback, callback_group, clock
         self.timer_period_ns = timer_period_ns
         self._period = max(timer_period_ns * 1e-9, 0.0)
-        self._cancelled = not autostart
         self._world = (context or default_context()).world
         self._called = self._world.time
-        self._due = self._world.time + self._period
-
-    @property
-    def due(self) -> float:
-        """When the next call is due [s]; infinite where it is cancelled."""
-        return math.inf if self._cancelled else self._due
+        #: When the next call is due [s]; infinite where it is cancelled.
+        self.due = self._world.time + self._period if autostart else math.inf
 
     def is_ready(self) -> bool:
         """Whether the call is due."""
@@ -174,27 +155,26 @@ class Timer(PartialApi, missing=("handle",)):
     def take(self) -> Callable[[], Any]:
         """Set the next call and return this one."""
         now = self._called = self._world.time
-        self._due += self._period
+        self.due += self._period
         if self._period > 0:
-            while self._due <= now - 1e-9:
-                self._due += self._period
+            while self.due <= now - 1e-9:
+                self.due += self._period
         else:
             # A period of nothing calls at every step.
-            self._due = now + 1e-6
+            self.due = now + 1e-6
         return self.callback
 
     def cancel(self) -> None:
         """Call no more."""
-        self._cancelled = True
+        self.due = math.inf
 
     def reset(self) -> None:
         """Begin the period again, also after `cancel`."""
-        self._cancelled = False
-        self._due = self._world.time + self._period
+        self.due = self._world.time + self._period
 
     def is_canceled(self) -> bool:
         """Whether it was cancelled."""
-        return self._cancelled
+        return math.isinf(self.due)
 
     def time_since_last_call(self) -> int:
         """Return the time since the last call, or since the start [ns]."""
@@ -202,7 +182,7 @@ class Timer(PartialApi, missing=("handle",)):
 
     def time_until_next_call(self) -> int | None:
         """Return the time until the next call [ns]; None where it is cancelled."""
-        return None if self._cancelled else round((self._due - self._world.time) * 1e9)
+        return None if self.is_canceled() else round((self.due - self._world.time) * 1e9)
 
     def destroy(self) -> None:
         """Call no more."""

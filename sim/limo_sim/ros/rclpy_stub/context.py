@@ -64,8 +64,8 @@ class Context:
 _default: Context | None = None
 
 
-def enter(context: Context | None) -> None:
-    """Set the default context when a run begins; None when it is over."""
+def enter(context: Context) -> None:
+    """Set the default context when a run begins."""
     global _default
     _default = context
 

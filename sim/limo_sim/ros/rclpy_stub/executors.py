@@ -18,8 +18,6 @@ from limo_sim.ros.rclpy_stub.partial import PartialApi
 #: Threads of a MultiThreadedExecutor without a number. In ROS as many as the computer has processors; here always the
 #: same, since a run must not depend on the computer. Chosen: a workshop's laptop has four.
 _THREADS = 4
-
-
 #: Names of rclpy's `Executor` that are not offered.
 _MISSING = tuple(
     "wait_for_ready_callbacks spin_once_until_future_complete can_execute create_timer add_to_context "
@@ -27,24 +25,19 @@ _MISSING = tuple(
 )
 
 
-#: A callback's group, and what has it: a timer, subscription, client, service or task.
-_Due = tuple[CallbackGroup | None, Any]
-
-
-def _may_run(group: CallbackGroup | None, entity: Any) -> bool:
-    return entity.is_ready() and (group is None or group.can_execute(entity))
+def _may_run(entity: Any) -> bool:
+    return bool(entity.is_ready() and entity.callback_group.can_execute(entity))
 
 
 def _ended(future: Future) -> bool:
     return future.done() or future.cancelled()
 
 
-async def _holding(group: CallbackGroup | None, coroutine: Any) -> None:
+async def _holding(group: CallbackGroup, coroutine: Any) -> None:
     try:
         await coroutine
     finally:
-        if group is not None:
-            group.running -= 1
+        group.running -= 1
 
 
 class Executor(PartialApi, missing=_MISSING):
@@ -55,7 +48,8 @@ class Executor(PartialApi, missing=_MISSING):
         self._nodes: list[Node] = []
         self._tasks: list[Task] = []
         self._is_shutdown = self._spins = False
-        self._round: list[_Due] = []
+        #: What is due: timers, subscriptions, clients, services and tasks.
+        self._round: list[Any] = []
         #: What a callback in a thread has raised.
         self._failure: BaseException | None = None
 
@@ -116,7 +110,7 @@ class Executor(PartialApi, missing=_MISSING):
 
     def _once(self, timeout: float, enough: Callable[[], bool] = lambda: False) -> None:
         """Wait for something that is due, and run it."""
-        world = self.context.world
+        context, world = self.context, self.context.world
         world.once("spun")
         if self._spins:
             raise RuntimeError(
@@ -125,8 +119,6 @@ class Executor(PartialApi, missing=_MISSING):
             )
         self._spins = True
         try:
-            context = self.context
-
             polls, before = False, world.advances
 
             def wanted() -> bool:
@@ -140,47 +132,42 @@ class Executor(PartialApi, missing=_MISSING):
                 raise self._failure
             due = None if world.over else self._next()
             if due is not None:
-                self._run(due[0], due[1].take())
+                self._run(due.callback_group, due.take())
         finally:
             self._spins = False
 
-    def _run(self, group: CallbackGroup | None, work: Callable[[], Any]) -> None:
+    def _run(self, group: CallbackGroup, work: Callable[[], Any]) -> None:
         """Run a callback; one written as a coroutine becomes a task, which holds its group to the end, as in ROS."""
         made, world = None, self.context.world
-        if group is not None:
-            group.running += 1
+        group.running += 1
         try:
             made = world.call(work)
         finally:
-            if group is not None and not hasattr(made, "send"):
+            if not hasattr(made, "send"):
                 group.running -= 1
         if hasattr(made, "send"):
             world.call(self.create_task(_holding(group, made)).take())
 
-    def _ready(self) -> list[_Due]:
-        """Return what may run now, with its group: tasks first, the newest of them before the others."""
-        due: list[_Due] = []
+    def _ready(self) -> list[Any]:
+        """Return what may run now: tasks first, the newest of them before the others."""
+        due: list[Any] = []
         if self._tasks:
             self._tasks = [task for task in self._tasks if not _ended(task)]
-            due += [(None, task) for task in reversed(self._tasks) if task.is_ready()]
-        for node in self._nodes:
-            for entity in node.entities:
-                if _may_run(entity.callback_group, entity):
-                    due.append((entity.callback_group, entity))
-        return due
+            due += [task for task in reversed(self._tasks) if task.is_ready()]
+        return due + [entity for node in self._nodes for entity in node.entities if _may_run(entity)]
 
     def _wakes(self) -> float:
         """Return when the next timer is due [s]."""
         return min((timer.due for node in self._nodes for timer in node.timers), default=math.inf)
 
-    def _next(self) -> _Due | None:
+    def _next(self) -> Any:
         """Return what runs next: as in ROS, what is due together runs once each before any of it runs again."""
         for _ in range(2):
             while self._round:
-                group, entity = self._round.pop(0)
-                if _may_run(group, entity):
+                entity = self._round.pop(0)
+                if _may_run(entity):
                     entity.executor = self
-                    return group, entity
+                    return entity
             self._round = self._ready()
         return None
 
@@ -197,18 +184,16 @@ class MultiThreadedExecutor(Executor):
         self._threads = num_threads or _THREADS
         self._running = 0
 
-    def _ready(self) -> list[_Due]:
+    def _ready(self) -> list[Any]:
         return super()._ready() if self._running < self._threads else []
 
-    def _run(self, group: CallbackGroup | None, work: Callable[[], Any]) -> None:
+    def _run(self, group: CallbackGroup, work: Callable[[], Any]) -> None:
         self._running += 1
-        if group is not None:
-            group.running += 1  # before the thread has its first turn
+        group.running += 1  # before the thread has its first turn
 
         def run() -> None:
             try:
-                if group is not None:
-                    group.running -= 1
+                group.running -= 1
                 super(MultiThreadedExecutor, self)._run(group, work)
             except Exception as error:
                 self._failure = error

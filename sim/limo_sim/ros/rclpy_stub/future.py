@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 from limo_sim.ros.lockstep.records import StubError
+from limo_sim.ros.rclpy_stub.groups import ReentrantCallbackGroup
 
 
 class Future:
@@ -90,6 +91,7 @@ class Task(Future):
         self._handler, self._args, self._kwargs = handler, args, kwargs or {}
         self._coroutine = handler if hasattr(handler, "send") else None
         self._awaits: Future | None = None
+        self.callback_group = ReentrantCallbackGroup()
 
     def executing(self) -> bool:
         """Whether it is being worked on; a coroutine that awaits is not."""

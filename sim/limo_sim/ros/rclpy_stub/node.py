@@ -9,17 +9,11 @@ from limo_hog.ros2 import names
 from limo_hog.ros2.arguments import RosArguments
 from limo_sim.ros.interfaces import Message
 from limo_sim.ros.lockstep.records import StubError
+from limo_sim.ros.rclpy_stub import naming
 from limo_sim.ros.rclpy_stub.clock import Clock, ClockType, Rate, Timer
 from limo_sim.ros.rclpy_stub.context import default_context
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from limo_sim.ros.rclpy_stub.logger import Logger
-from limo_sim.ros.rclpy_stub.naming import (
-    InvalidNamespaceException,
-    InvalidNodeNameException,
-    InvalidServiceNameException,
-    InvalidTopicNameException,
-    checked,
-)
 from limo_sim.ros.rclpy_stub.parameters import Parameter, Parameters, SetParametersResult
 from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import QoSProfile, qos_profile_services_default, to_profile
@@ -32,11 +26,7 @@ class NotInitializedException(Exception):  # noqa: N818 — rclpy's name
 
 
 #: Options of rclpy's Node that change nothing here.
-_WITHOUT_EFFECT = tuple(
-    "context enable_rosout rosout_qos_profile start_parameter_services enable_logger_service".split()
-)
-
-
+_WITHOUT_EFFECT = "context enable_rosout rosout_qos_profile start_parameter_services enable_logger_service".split()
 #: Names of rclpy's `Node` that are not offered.
 _MISSING = tuple(
     "create_guard_condition destroy_guard_condition guards handle context wait_for_node waitables add_waitable "
@@ -77,10 +67,9 @@ class Node(PartialApi, missing=_MISSING):
             raise StubError("limo-hog run does not offer Node(cli_args=...): give the arguments after --ros-args")
         arguments = context.arguments
         self._names = (arguments if use_global_arguments else RosArguments()).named(node_name, namespace or "")
-        checked(self._names.name, InvalidNodeNameException)
-        checked(self._names.namespace, InvalidNamespaceException)
-        overrides = self._names.parameters
-        overrides = {p.name: p.value for p in parameter_overrides or ()} | overrides
+        naming.checked(self._names.name, naming.InvalidNodeNameException)
+        naming.checked(self._names.namespace, naming.InvalidNamespaceException)
+        overrides = {p.name: p.value for p in parameter_overrides or ()} | self._names.parameters
         context.world.called("nodes", self._names.name)
         self._parameters = Parameters(
             overrides,
@@ -88,7 +77,7 @@ class Node(PartialApi, missing=_MISSING):
             declares_overrides=automatically_declare_parameters_from_overrides,
             allows_undeclared=allow_undeclared_parameters,
         )
-        if not self._parameters.has("use_sim_time"):
+        if not self.has_parameter("use_sim_time"):
             self._parameters.declare("use_sim_time", False)
         self._logger = Logger(self.get_fully_qualified_name().strip("/").replace("/", "."), context)
         self._clock = Clock(clock_type=ClockType.ROS_TIME)
@@ -121,30 +110,11 @@ class Node(PartialApi, missing=_MISSING):
         """Return the node's clock."""
         return self._clock
 
-    @property
-    def publishers(self) -> Iterable[Publisher]:
-        """The node's publishers."""
-        return iter(self._publishers)
-
-    @property
-    def subscriptions(self) -> Iterable[Subscription]:
-        """The node's subscriptions."""
-        return iter(self._subscriptions)
-
-    @property
-    def timers(self) -> Iterable[Timer]:
-        """The node's timers."""
-        return iter(self._timers)
-
-    @property
-    def services(self) -> Iterable[Service]:
-        """The services the node offers."""
-        return iter(self._services)
-
-    @property
-    def clients(self) -> Iterable[Client]:
-        """The node's clients."""
-        return iter(self._clients)
+    publishers = property(lambda self: iter(self._publishers), doc="The node's publishers.")
+    subscriptions = property(lambda self: iter(self._subscriptions), doc="The node's subscriptions.")
+    timers = property(lambda self: iter(self._timers), doc="The node's timers.")
+    services = property(lambda self: iter(self._services), doc="The services the node offers.")
+    clients = property(lambda self: iter(self._clients), doc="The node's clients.")
 
     @property
     def entities(self) -> tuple[Any, ...]:
@@ -153,12 +123,13 @@ class Node(PartialApi, missing=_MISSING):
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         """Return a topic's full name, after the command line's remaps unless `only_expand`."""
-        checked(topic, InvalidTopicNameException)
+        naming.checked(topic, naming.InvalidTopicNameException)
         return self._names.expand(topic) if only_expand else self._names.resolve(topic)
 
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
         """Return a service's full name, after the command line's remaps unless `only_expand`."""
-        return self.resolve_topic_name(checked(service, InvalidServiceNameException), only_expand=only_expand)
+        name = naming.checked(service, naming.InvalidServiceNameException)
+        return self.resolve_topic_name(name, only_expand=only_expand)
 
     def create_publisher(
         self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int, **_: Any
@@ -185,7 +156,7 @@ class Node(PartialApi, missing=_MISSING):
         check_type(msg_type)
         if raw:
             raise StubError("limo-hog run does not offer create_subscription(raw=True): callbacks get messages")
-        group = self._group(callback_group)
+        group = callback_group or self.default_callback_group
         name, qos = self.resolve_topic_name(topic), to_profile(qos_profile)
         subscription = Subscription(msg_type, name, callback, qos, group, self._context)
         check_topic(subscription.topic, msg_type)
@@ -204,8 +175,7 @@ class Node(PartialApi, missing=_MISSING):
     ) -> Timer:
         """Call back every so many seconds."""
         nanoseconds = int(float(timer_period_sec) * 1e9)
-        group = self._group(callback_group)
-        clock = clock or self._clock
+        group, clock = callback_group or self.default_callback_group, clock or self._clock
         timer = Timer(callback, group, nanoseconds, clock, context=self._context, autostart=autostart)
         group.add_entity(timer)
         self._timers.append(timer)
@@ -229,7 +199,7 @@ class Node(PartialApi, missing=_MISSING):
     ) -> Service:
         """Answer requests by `callback(request, response)`, which returns the response."""
         _check_service(srv_type)
-        name, group = self.resolve_service_name(srv_name), self._group(callback_group)
+        name, group = self.resolve_service_name(srv_name), callback_group or self.default_callback_group
         service = Service(srv_type, (srv_name, name), callback, group, qos_profile, self._context)
         group.add_entity(service)
         self._services.append(service)
@@ -247,15 +217,12 @@ class Node(PartialApi, missing=_MISSING):
     ) -> Client:
         """Return what sends requests to a service."""
         _check_service(srv_type)
-        name, group = self.resolve_service_name(srv_name), self._group(callback_group)
+        name, group = self.resolve_service_name(srv_name), callback_group or self.default_callback_group
         client = Client(srv_type, (srv_name, name), qos_profile, group, self._context)
         group.add_entity(client)
         self._clients.append(client)
         self._context.world.called("clients", name)
         return client
-
-    def _group(self, given: CallbackGroup | None) -> CallbackGroup:
-        return self.default_callback_group if given is None else given
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """End a publisher."""
@@ -302,7 +269,7 @@ class Node(PartialApi, missing=_MISSING):
     def count_subscribers(self, topic_name: str) -> int:
         """Return how many listen to a topic, the robot being one."""
         readers = self._context.world.readers
-        return sum(reader.topic == topic_name for reader in readers) + (topic_name == names.COMMAND)
+        return [reader.topic for reader in readers].count(topic_name) + (topic_name == names.COMMAND)
 
     def declare_parameter(
         self, name: str, value: Any = None, descriptor: Any = None, ignore_override: bool = False
@@ -323,7 +290,7 @@ class Node(PartialApi, missing=_MISSING):
 
     def has_parameter(self, name: str) -> bool:
         """Whether a parameter is declared."""
-        return self._parameters.has(name)
+        return name in self._parameters.values
 
     def get_parameter(self, name: str) -> Parameter:
         """Return a declared parameter."""
@@ -336,8 +303,8 @@ class Node(PartialApi, missing=_MISSING):
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
         """Return the parameters `prefix.name`, by name without the prefix."""
         start = f"{prefix}." if prefix else ""
-        found = [name for name in self._parameters.names() if name.startswith(start)]
-        return {name.removeprefix(start): self._parameters.get(name) for name in found}
+        known = self._parameters.values.items()
+        return {name.removeprefix(start): parameter for name, parameter in known if name.startswith(start)}
 
     def undeclare_parameter(self, name: str) -> None:
         """Forget a declared parameter."""
@@ -345,9 +312,7 @@ class Node(PartialApi, missing=_MISSING):
 
     def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
         """Return a parameter, or something else where it is not declared."""
-        if self._parameters.has(name):
-            return self._parameters.get(name)
-        return alternative_value or Parameter(name)
+        return self._parameters.values.get(name) or alternative_value or Parameter(name)
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
         """Change declared parameters."""

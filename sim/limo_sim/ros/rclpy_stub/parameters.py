@@ -24,9 +24,6 @@ class ParameterNotDeclaredException(ParameterException):
 class ParameterAlreadyDeclaredException(ParameterException):
     """A parameter was declared twice."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(f"parameter {name!r} is declared already")
-
 
 class InvalidParameterTypeException(ParameterException):
     """A parameter was given a value of another type."""
@@ -59,9 +56,7 @@ class ParameterType(IntEnum):
         if isinstance(value, list | tuple):
             arrays = {bool: cls.BOOL_ARRAY, int: cls.INTEGER_ARRAY, float: cls.DOUBLE_ARRAY, str: cls.STRING_ARRAY}
             arrays[bytes] = cls.BYTE_ARRAY
-            kinds = {type(item) for item in value}
-            if not kinds:
-                return cls.BYTE_ARRAY
+            kinds = {type(item) for item in value} or {bytes}
             if len(kinds) == 1 and (kind := kinds.pop()) in arrays:
                 return arrays[kind]
         raise TypeError(f"a parameter cannot hold {type(value).__name__} {value!r}")
@@ -123,17 +118,12 @@ class Parameters:
     """
 
     def __init__(
-        self,
-        overrides: dict[str, Any],
-        noted: dict[str, Any],
-        *,
-        declares_overrides: bool = False,
-        allows_undeclared: bool = False,
+        self, overrides: dict[str, Any], noted: dict[str, Any], *, declares_overrides: bool, allows_undeclared: bool
     ) -> None:
         self._allows_undeclared = allows_undeclared
         self._overrides = overrides
         self._noted = noted
-        self._values: dict[str, Parameter] = {}
+        self.values: dict[str, Parameter] = {}  #: all that are declared
         self._described: dict[str, Any] = {}
         self.callbacks: list[Callable[[list[Parameter]], Any]] = []
         if declares_overrides:
@@ -145,12 +135,10 @@ class Parameters:
 
         A type may be given in place of a value, as in rclpy: the command line must then give the value.
         """
-        if name in self._values:
-            raise ParameterAlreadyDeclaredException(name)
-        value = default
-        wanted = default if isinstance(default, ParameterType) else ParameterType.from_parameter_value(default)
-        if isinstance(default, ParameterType):
-            value = None
+        if name in self.values:
+            raise ParameterAlreadyDeclaredException(f"parameter {name!r} is declared already")
+        typed = isinstance(default, ParameterType)
+        wanted, value = (default, None) if typed else (ParameterType.from_parameter_value(default), default)
         if not ignore_override and name in self._overrides:
             value = self._overrides[name]
             dynamic = wanted == ParameterType.NOT_SET or getattr(descriptor, "dynamic_typing", False)
@@ -163,32 +151,21 @@ class Parameters:
         refusal = self._refusal(Parameter(name, value=value))
         if refusal is not None:
             raise InvalidParameterValueException(f"parameter {name!r}: a callback refused {value!r}: {refusal.reason}")
-        self._values[name] = Parameter(name, value=value)
+        self.values[name] = Parameter(name, value=value)
         self._described[name] = descriptor or ParameterDescriptor()
         self._noted[name] = value
-        return self._values[name]
-
-    def has(self, name: str) -> bool:
-        """Whether a parameter is declared."""
-        return name in self._values
+        return self.values[name]
 
     def get(self, name: str) -> Parameter:
         """Return a declared parameter."""
-        if name not in self._values:
-            if self._allows_undeclared:
-                return Parameter(name)
+        if name not in self.values and not self._allows_undeclared:
             raise ParameterNotDeclaredException(name)
-        return self._values[name]
+        return self.values.get(name) or Parameter(name)
 
     def forget(self, name: str) -> None:
         """Remove a declared parameter."""
-        if name not in self._values:
+        if self.values.pop(name, None) is None:
             raise ParameterNotDeclaredException(name)
-        del self._values[name]
-
-    def names(self) -> list[str]:
-        """Return the names of all declared parameters."""
-        return list(self._values)
 
     def set(self, changes: Iterable[Parameter]) -> list[SetParametersResult]:
         """Change parameters one by one, each if every callback agrees and its type stays."""
@@ -203,7 +180,7 @@ class Parameters:
             refused = self._refusal(change)
             results.append(SetParametersResult() if refused is None else refused)
             if refused is None:
-                self._values[change.name] = change
+                self.values[change.name] = change
                 self._noted[change.name] = change.value
         return results
 

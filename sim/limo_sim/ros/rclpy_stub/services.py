@@ -35,19 +35,15 @@ class Service(PartialApi, missing=("send_response", "configure_introspection", "
         self._context = context
         self.srv_type, (self.srv_name, self.service_name) = srv_type, names
         self.callback, self.callback_group, self.qos_profile = callback, callback_group, qos_profile
-        self._requests: deque[tuple[Any, Client, Future]] = deque()
-
-    def request(self, request: Any, client: Client, future: Future) -> None:
-        """Queue a request."""
-        self._requests.append((request, client, future))
+        self.requests: deque[tuple[Any, Client, Future]] = deque()
 
     def is_ready(self) -> bool:
         """Whether a request waits."""
-        return bool(self._requests)
+        return bool(self.requests)
 
     def take(self) -> Callable[[], Any]:
         """Return the work of answering the oldest request."""
-        request, client, future = self._requests.popleft()
+        request, client, future = self.requests.popleft()
 
         def answer() -> Any:
             response = self.callback(request, self.srv_type.Response())
@@ -67,7 +63,7 @@ class Service(PartialApi, missing=("send_response", "configure_introspection", "
                 f"the callback of the service {self.srv_name!r} must return its response, a "
                 f"{self.srv_type.__name__}.Response; came {type(response).__name__}: end it with `return response`"
             )
-        client.respond(copy.deepcopy(response), future)
+        client.responses.append((copy.deepcopy(response), future))
 
     def destroy(self) -> None:
         """End the service."""
@@ -85,7 +81,7 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
         #: The executor that last served it: it runs the done callbacks of its futures.
         self.executor: Any = None
         self.qos_profile, self.callback_group = qos, group
-        self._responses: deque[tuple[Any, Future]] = deque()
+        self.responses: deque[tuple[Any, Future]] = deque()
 
     def service_is_ready(self) -> bool:
         """Whether a node offers the service."""
@@ -106,7 +102,7 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
         future = Future()
         server = self._context.world.services.get(self.service_name)
         if server is not None:
-            server.request(copy.deepcopy(request), self, future)
+            server.requests.append((copy.deepcopy(request), self, future))
         return future
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
@@ -134,20 +130,16 @@ class Client(PartialApi, missing=("configure_introspection", "handle", "logger_n
         """Want no answer any more."""
         future.cancel()
 
-    def respond(self, response: Any, future: Future) -> None:
-        """Queue an answer."""
-        self._responses.append((response, future))
-
     def is_ready(self) -> bool:
         """Whether an answer waits."""
-        return bool(self._responses)
+        return bool(self.responses)
 
     def take(self) -> Callable[[], Any]:
         """Return the work of giving the oldest answer to its future."""
-        response, future = self._responses.popleft()
+        response, future = self.responses.popleft()
         future.executor = self.executor
         return lambda: None if future.cancelled() else future.set_result(response)
 
     def destroy(self) -> None:
         """End the client."""
-        self._responses.clear()
+        self.responses.clear()

@@ -10,12 +10,17 @@ from typing import Any
 
 from limo_hog.ros2 import names
 from limo_sim.ros.interfaces import Message
-from limo_sim.ros.lockstep.calls import PUBLISHED, incompatible
+from limo_sim.ros.lockstep.calls import PUBLISHED
 from limo_sim.ros.lockstep.records import StubError
 from limo_sim.ros.rclpy_stub.context import Context
 from limo_sim.ros.rclpy_stub.groups import CallbackGroup
 from limo_sim.ros.rclpy_stub.partial import PartialApi
 from limo_sim.ros.rclpy_stub.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+#: ROS 2's warning of a publisher and a subscription that do not match.
+_UNMATCHED = (
+    "New {} discovered on topic '{}', {} incompatible QoS. No messages will be {} it. Last incompatible policy: {}"
+)
 
 
 class InvalidHandle(Exception):  # noqa: N818 — rclpy's name
@@ -34,14 +39,14 @@ class Publisher(
         self.qos_profile = qos
         self._kept: deque[Message] | None = None
         self._destroyed = False
-        world = self._context.world
+        world = context.world
         if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL:
             self._kept = deque(maxlen=max(qos.depth, 1))
             world.kept.append((topic, self._kept))
         world.called("writers", topic)
         self._reliable = qos.reliability != ReliabilityPolicy.BEST_EFFORT
         if topic == names.COMMAND and not self._reliable:
-            world.called("unmatched", incompatible(topic, "RELIABILITY", reads=False))
+            world.called("unmatched", _UNMATCHED.format("subscription", topic, "requesting", "sent to", "RELIABILITY"))
         world.writers.append(topic)
 
     def publish(self, msg: Message) -> None:
@@ -70,7 +75,7 @@ class Publisher(
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions; the robot is one to /cmd_vel."""
         world = self._context.world
-        return sum(reader.topic == self.topic for reader in world.readers) + (self.topic == names.COMMAND)
+        return [reader.topic for reader in world.readers].count(self.topic) + (self.topic == names.COMMAND)
 
     def destroy(self) -> None:
         """End the publisher."""
@@ -107,14 +112,16 @@ class Subscription(
         self._queue: deque[Message] = deque(maxlen=None if keep_all else max(qos.depth, 1))
         # As in ROS, a transient-local subscription gets no message from a volatile publisher.
         volatile = topic in names.TYPES and topic != names.TF_STATIC
+        #: Whether it is given what was published before it, and whether it asks for reliable delivery.
         self.keeps = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
         self.reliable = qos.reliability not in (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.BEST_AVAILABLE)
         self._deaf = self.keeps and volatile
         if self._deaf and topic in PUBLISHED:
-            self._context.world.called("unmatched", incompatible(topic, "DURABILITY", reads=True))
+            warning = _UNMATCHED.format("publisher", topic, "offering", "received from", "DURABILITY")
+            context.world.called("unmatched", warning)
 
     def offer(self, message: Message) -> None:
-        """Queue a message; the oldest gives way."""
+        """Queue a message, which is the subscription's own; the oldest gives way."""
         if not self._deaf:
             self._queue.append(message)
 

@@ -123,6 +123,20 @@ busy: list[Worker] = []
 _closed = threading.Event()
 
 
+def _waiting() -> Worker | None:
+    """Take a process that waits; a list's `pop` gives each of several threads another."""
+    while idle:
+        try:
+            worker = idle.pop()
+        except IndexError:
+            break
+        if worker.waits:
+            return worker
+        # A node can signal every process of its user: one that waited may be gone.
+        worker.kill()
+    return None
+
+
 @contextmanager
 def ready() -> Iterator[Worker]:
     """Give a process that has imported what nodes need; it is kept for the next node unless it has ended.
@@ -132,10 +146,7 @@ def ready() -> Iterator[Worker]:
     StubError
         Inside of `no_nodes`.
     """
-    # A node can signal every process of its user: one that waited may be gone.
-    while idle and not idle[-1].waits:
-        idle.pop().kill()
-    worker = idle.pop() if idle else Worker()
+    worker = _waiting() or Worker()
     busy.append(worker)
     try:
         if _closed.is_set():

@@ -35,5 +35,8 @@ class Movers:
 
     def at(self, time: float) -> tuple[Furniture, ...]:
         """Return the pieces where they are at a time [s]."""
-        poses = ((kind, walk.pose(time)) for kind, walk in self._walks)
-        return tuple(Furniture(kind, pose.x, pose.y, pose.yaw) for kind, pose in poses if pose)
+        pieces = []
+        for kind, walk in self._walks:
+            if pose := walk.pose(time):
+                pieces.append(Furniture(kind, pose.x, pose.y, pose.yaw))
+        return tuple(pieces)

@@ -100,14 +100,13 @@ class Planner:
         best = int(np.argmin(totals))
         gains = np.maximum(costs[:, 0] - costs[:, best], 0.0)
         gained = dict(zip(names, gains.tolist(), strict=True))
-        why = next((name for name in REASONS if 4 * gained.get(name, 0.0) > gains.sum()), "")
+        reason = next((words for name, words in REASONS.items() if 4 * gained.get(name, 0.0) > gains.sum()), "")
         off, speed = float(rollouts.offs[best]), float(rollouts.wanted[best])
         heading, rate = goal.heading + off, goal.rate if off == 0 else 0.0
         limit = min(stoppable_turn(heading, situation.acceleration, situation.robot) + abs(rate), self.max_turn)
         angular = min(max(self.turn_gain * heading + rate, -limit), limit)
         # Driving sideways to the person would lose sight of them: turn first, then drive.
         twist = Twist(speed * max(math.cos(heading), 0.0) ** 2, angular)
-        reason = REASONS.get(why, "")
         manoeuvre = Manoeuvre(
             None if off == 0 else situation.pose.yaw + heading, None if speed == rollouts.wanted[0] else speed
         )
@@ -118,5 +117,4 @@ class Planner:
             if abs(speed) > self.nowhere:
                 twist, reason = replace(twist, linear=0.0), NO_WAY
         shares = tuple(zip(names, costs[:, best].tolist(), strict=True))
-        ways = rollouts.poses[..., :2]
-        return Move(twist, manoeuvre, reason, shares, ways[best], ways)
+        return Move(twist, manoeuvre, reason, shares, rollouts.poses[best, :, :2], rollouts.poses[..., :2])

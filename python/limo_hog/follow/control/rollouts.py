@@ -51,11 +51,6 @@ class Rollouts:
         """Which of them goes on with the manoeuvre begun."""
         return 0 if self.kept.is_direct else len(self.offs) - 1
 
-    @property
-    def nothing(self) -> Array:
-        """No cost for any of them, float64 (K,)."""
-        return np.zeros(len(self.offs))
-
     def gaps(self, places: Array, robot: RobotGeometry) -> Array:
         """Return the distance from the outline to places (T, N, 2), float64 (K, T, N) [m]; negative inside it."""
         poses = self.poses[:, :, None]
@@ -81,9 +76,7 @@ class Sampling:
     where `Guard` would stop it: a closed formula, so all rollouts together are a few operations on arrays.
     """
 
-    offsets: tuple[float, ...] = param(
-        (0.08, 0.18, 0.3, 0.44, 0.6, 0.8, 1.1, 1.6), "rad", "Compared, to either side of the goal."
-    )
+    offsets: tuple[float, ...] = param((0.08, 0.18, 0.3, 0.44, 0.6, 0.8, 1.1, 1.6), "rad", "Either side of the goal.")
     speeds: tuple[float, ...] = param((-0.6, 0.0, 0.3, 0.8), "m/s", "Speeds compared with the goal's own.")
     steps: int = param(15, "1", "Steps of a rollout.")
     step_s: float = param(0.2, "s", "How long a step is.")
@@ -104,8 +97,7 @@ class Sampling:
         own = goal.speed_later + (goal.speed - goal.speed_later) * np.exp(-self.gain * self.times)
         target = np.where(np.isnan(wanted)[:, None], own, wanted[:, None])
         known, _ = situation.is_known_behind(np.zeros(3))
-        least = -math.inf if known else -self.blind_speed
-        least = least if situation.robot.may_back else 0.0
+        least = (-math.inf if known else -self.blind_speed) if situation.robot.may_back else 0.0
         target = np.maximum(target, least) * np.maximum(np.cos(left), 0.0) ** 2
         reach = situation.acceleration * self.times
         speed = np.clip(target, situation.driven.linear - reach, situation.driven.linear + reach)

@@ -65,9 +65,8 @@ class Situation:
 
     def is_behind(self, place: tuple[float, float]) -> bool:
         """Whether something that lasts is between the robot and a place in the odometry frame [m]."""
-        here = np.array([[self.pose.x, self.pose.y]])
-        ground = self.ground
-        return ground is not None and not self.grid.sees(ground, here, np.array([place]), lasting=True)[0, 0]
+        here, there = np.array([[self.pose.x, self.pose.y]]), np.array([place])
+        return self.ground is not None and not self.grid.sees(self.ground, here, there, lasting=True)[0, 0]
 
     def bearing_of(self, x: float, y: float) -> float:
         """Return the direction of a place in the odometry frame [rad]."""

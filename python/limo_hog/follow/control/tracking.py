@@ -36,16 +36,14 @@ class TrackingController:
     # Chosen: another person is noticed within 1.5 s.
     whole_image_every: int = param(15, "frames", "One in this many frames is searched whole, else a region.", 1, 1000)
     slowest: float = param(0.3, "m/s", "People slower than this stand: the lidar shows them where they are.", 0, 2)
-    #: Where to be while the person is known to be somewhere, and where to look for one who is lost.
     near_behind: float = param(1.2, "m", "Behind the robot, what the map shows this near counts as well.", 0, 5)
-    following: Following = field(default_factory=Following)
-    lookout: Lookout = field(default_factory=Lookout)
-    planner: Planner = field(default_factory=Planner)  #: Which command to send, and what the wheels can do.
-    wheels: Wheels = field(default_factory=Wheels)
-    #: Whom to follow; where all people are; who is out of sight.
-    selection: Selection = field(default_factory=Selection)
-    tracker: Tracker = field(default_factory=Tracker)
-    hiding: Hiding = field(default_factory=Hiding)
+    following: Following = field(default_factory=Following)  #: Where to be while the person is known to be somewhere.
+    lookout: Lookout = field(default_factory=Lookout)  #: Where to look for one who is lost.
+    planner: Planner = field(default_factory=Planner)  #: Which command to send.
+    wheels: Wheels = field(default_factory=Wheels)  #: What the wheels can do.
+    selection: Selection = field(default_factory=Selection)  #: Whom to follow.
+    tracker: Tracker = field(default_factory=Tracker)  #: Where all people are.
+    hiding: Hiding = field(default_factory=Hiding)  #: Who is out of sight.
     region: RegionSize = field(default_factory=RegionSize)  #: How much of the image to search.
     grid: Grid = field(default_factory=Grid)  #: How the ground is mapped, and which depth pixels are looked at for it.
     depth_grid: DepthGrid = field(default_factory=lambda: DepthGrid(step=16))

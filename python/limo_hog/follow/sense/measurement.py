@@ -101,17 +101,11 @@ def median(values: NDArray[np.float32]) -> float:
     return float((values[:half].max() + values[half]) / 2)
 
 
-@dataclass(frozen=True, slots=True)
-class Strips:
-    """Where a detection window shows a person's chest, and what is beside it."""
-
-    top: float = param(0.27, "window heights", "First of the rows looked at, of the chest.")
-    bottom: float = param(0.5, "window heights", "Last of these rows.")
-    chest: float = param(0.06, "window widths", "Half the width of the strip in the middle.")
-    inner: float = param(0.36, "window widths", "Inner edge of the two strips beside it, from the middle.")
-    outer: float = param(0.46, "window widths", "Their outer edge.")
-    beyond: float = param(20.0, "m", "Depth taken where the camera sees none.")
-    known: float = param(0.2, "1", "Share of pixels that must be valid for a depth to be known.")
+#: Where a detection window shows a person's chest: first and last row looked at [window heights]; half the width of the
+#: strip in the middle, and inner and outer edge of the two beside it, from the middle [window widths].
+_TOP, _BOTTOM, _CHEST, _INNER, _OUTER = 0.27, 0.5, 0.06, 0.36, 0.46
+#: Depth taken where the camera sees none [m], and share of pixels that must be valid for a depth to be known.
+_BEYOND_M, _KNOWN = 20.0, 0.2
 
 
 def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32]) -> float | None:
@@ -121,14 +115,14 @@ def stands_out(depth: NDArray[np.float32], box: NDArray[np.int32]) -> float | No
     has, in the middle between them, the mean of their inverse depths. A picture on a wall is in that plane, seen from
     whatever side: 0. `depth` is float32 (H, W) [m], `box` int32 (4,): x, y, w, h [px].
     """
-    (x, y, w, h), strips = box.tolist(), Strips()
-    band = depth[max(round(y + strips.top * h), 0) : max(round(y + strips.bottom * h), 0)]
+    x, y, w, h = box.tolist()
+    band = depth[max(round(y + _TOP * h), 0) : max(round(y + _BOTTOM * h), 0)]
     centre = x + w / 2
     depths = []
-    for left, right in (-strips.chest, strips.chest), (-strips.outer, -strips.inner), (strips.inner, strips.outer):
+    for left, right in (-_CHEST, _CHEST), (-_OUTER, -_INNER), (_INNER, _OUTER):
         strip = band[:, max(round(centre + left * w), 0) : max(round(centre + right * w), 0)]
         valid = strip[(strip > 0) & (strip < np.inf)]
-        known = median(valid) if valid.size > strips.known * strip.size else strips.beyond
+        known = median(valid) if valid.size > _KNOWN * strip.size else _BEYOND_M
         depths.append(known if strip.size else None)
     middle, *sides = depths
     inverse = [1.0 / side for side in sides if side is not None]

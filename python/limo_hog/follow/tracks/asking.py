@@ -39,9 +39,9 @@ def checked(whom: Whom) -> Whom:
 
 def ask_of(controller: Any) -> Callable[[Whom, Any], Any]:
     """Return the method that asks a controller for a person; raises `WhomError` for one that has none."""
-    if not hasattr(controller, "ask"):
+    ask: Callable[[Whom, Any], Any] | None = getattr(controller, "ask", None)
+    if ask is None:
         raise WhomError(f"{type(controller).__name__} follows nobody in particular: use TrackingController")
-    ask: Callable[[Whom, Any], Any] = controller.ask
     return ask
 
 

@@ -49,21 +49,21 @@ class Hiding:
         left = [one for one in known if all(math.dist(place, (one.x, one.y)) > self.same for place in own)]
         kept: list[Other] = []
         for person in seen:
-            same = [number for number, one in enumerate(left) if self._may_be(one, person, now)]
+            same = [
+                (now - one.at, apart, which)
+                for which, one in enumerate(left)
+                if (apart := math.dist(one[:2], person[:2])) <= self._reach(one, now)
+                and self.appearance.cost(one.clothes, person.clothes) <= self.appearance.other
+            ]
             if same:
                 # Somebody who was just measured, rather than one who was not for long and can be anywhere.
-                before = left.pop(min(same, key=lambda which: (now - left[which].at, _apart(left[which], person))))
+                before = left.pop(min(same)[2])
                 person = person if person.clothes is not None else person._replace(clothes=before.clothes)
             kept.append(person)
         for one in left:
             gap, x, y = min(((math.dist((x, y), (one.x, one.y)), x, y) for x, y in legs), default=(math.inf, 0.0, 0.0))
             kept.append(one._replace(x=x, y=y, at=now) if gap < self.same else one)
         return tuple(kept)
-
-    def _may_be(self, one: Other, seen: Other, now: float) -> bool:
-        """Whether a person out of sight can have walked to where one is seen, in these clothes."""
-        alike = self.appearance.cost(one.clothes, seen.clothes) <= self.appearance.other
-        return alike and _apart(one, seen) <= self._reach(one, now)
 
     def circles(self, others: tuple[Other, ...], now: float) -> Points:
         """Return where people out of sight can be, float64 (H, 3): x, y and radius [m], odometry frame."""
@@ -72,7 +72,3 @@ class Hiding:
 
     def _reach(self, one: Other, now: float) -> float:
         return self.same + self.walk * (now - one.at)
-
-
-def _apart(one: Other, other: Other) -> float:
-    return math.dist(one[:2], other[:2])

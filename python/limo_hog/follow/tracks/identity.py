@@ -147,10 +147,9 @@ class Identity:
     def _is_gone(self, person: Person, tracks: Tracks, walking: AbstractSet[int]) -> bool:
         """Whether a track is not measured, or only by legs that may be those of somebody beside it."""
         stamp = tracks.stamp or 0.0
-        if stamp - person.measured > self.unseen_s:
-            return True
-        if stamp - person.seen <= self.unseen_s or person.number in walking:
-            return False
+        lost, unseen = (stamp - at > self.unseen_s for at in (person.measured, person.seen))
+        if lost or not unseen or person.number in walking:
+            return lost
         beside = [one.track.place for one in tracks.movers if one.number != person.number]
         near = any(math.dist(place, person.track.place) < self.meets for place in beside)
         return near or not self._is_alone(person, tracks)

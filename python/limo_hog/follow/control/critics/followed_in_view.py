@@ -25,7 +25,7 @@ class FollowedInView:
         """Return the cost of each rollout before its weight, float64 (K,) [rad]."""
         goal, times = rollouts.goal, rollouts.times
         if not goal.faces:
-            return rollouts.nothing
+            return np.zeros(len(rollouts.offs))
         if situation.followed is None:
             off = np.abs(rollouts.poses[:, :, 2] - goal.heading - goal.rate * times)
         else:

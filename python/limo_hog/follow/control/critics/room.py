@@ -30,7 +30,7 @@ class Room:
     def short(self, rollouts: Rollouts, people: list[int], situation: Situation) -> Array:
         """Return the cost of each rollout by the people in these rows, float64 (K,) [m]."""
         if not people:
-            return rollouts.nothing
+            return np.zeros(len(rollouts.offs))
         gaps = rollouts.gaps(rollouts.places[:, people], situation.robot).min(axis=2)
         fade, scale = np.exp(-rollouts.times / self.fades_s), self.error + self.spread * rollouts.times
         chance = (1 - np.tanh((gaps - self.touches) / scale / 2)) / 2

@@ -23,7 +23,7 @@ class UnseenGround:
 
     def cost(self, rollouts: Rollouts, situation: Situation) -> Array:
         """Return the cost of each rollout before its weight, float64 (K,) [1]."""
-        cost, backs = rollouts.nothing, np.flatnonzero(rollouts.speeds.min(axis=1) < -self.stands)
+        cost, backs = np.zeros(len(rollouts.offs)), np.flatnonzero(rollouts.speeds.min(axis=1) < -self.stands)
         if len(backs):
             known, risky = situation.is_known_behind(rollouts.poses[backs, ::2])
             onto = np.where(risky, 1.0, self.unknown * ~known) * (rollouts.speeds[backs, ::2] < -self.stands)

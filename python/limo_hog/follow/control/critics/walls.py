@@ -28,7 +28,7 @@ class Walls:
         points, reach = situation.points, np.sqrt((at**2).sum(axis=1).max()) + self.clear
         points = points[(points**2).sum(axis=1) < reach**2]
         if len(points) == 0:
-            return rollouts.nothing
+            return np.zeros(len(rollouts.offs))
         squares = np.maximum(((points**2).sum(axis=1) - 2 * at @ points.T).min(axis=1) + (at**2).sum(axis=1), 0.0)
         gap = np.sqrt(squares).reshape(len(rollouts.offs), -1)
         return np.asarray((np.maximum(self.clear - gap, 0.0) + self.contact * (gap < self.touches)).mean(axis=1))

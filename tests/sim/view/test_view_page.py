@@ -98,13 +98,21 @@ def _read_the_words_on_the_map(page: Page) -> None:
 
 
 def _read_why_it_does_that(page: Page) -> None:
-    """A bar for each critic, as wide as what it adds, and nothing of the rollouts but lines from the robot."""
-    page.evaluate("now.shares = [['walls', 0.5], ['goal_distance', 1.0], ['effort', 0.001]]; shares()")
-    bars = page.evaluate("[...document.querySelectorAll('#shares span')].map((bar) => [bar.title, bar.offsetWidth])")
+    """A bar for each critic, as wide as what it adds, and none where the controller has no critics."""
+    # In one go: the run goes on, and sends its own.
+    bars, hidden = page.evaluate(
+        """(() => {
+            now.shares = [["walls", 0.5], ["goal_distance", 1.0], ["effort", 0.001]];
+            shares();
+            const bars = [...document.querySelectorAll("#shares span")].map((bar) => [bar.title, bar.offsetWidth]);
+            now.shares = [];
+            shares();
+            return [bars, document.getElementById("shares").hidden];
+        })()"""
+    )
     assert [title for title, _ in bars] == ["walls: 0.50", "goal distance: 1.00"]
     assert bars[1][1] == pytest.approx(2 * bars[0][1], rel=0.1)
-    page.evaluate("now.shares = []; shares()")
-    assert page.evaluate("document.getElementById('shares').hidden")
+    assert hidden
 
 
 def _see_it_move(page: Page) -> None:

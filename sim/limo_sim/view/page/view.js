@@ -247,7 +247,7 @@ function parameters(all) {
   let group = "";
   for (const { name, value, low, high, unit, tooltip, whole } of all) {
     const [own, part = ""] = name.split(".").reverse();
-    if (part !== group) $("fields").append(element("h3", { textContent: part }));
+    if (part !== group) $("fields").append(element("h3", { textContent: part.replaceAll("_", " ") }));
     group = part;
     const words = (unit && own.endsWith(`_${unit}`) ? own.slice(0, -unit.length - 1) : own).replaceAll("_", " ");
     const input = element("input", { type: "number", step: whole ? 1 : "any", min: low, max: high, name, value });

@@ -20,7 +20,7 @@ class Timing:
 def race(calls: Sequence[Callable[[], object]], seconds: float, least: int = 5, most: int = 200) -> list[Timing]:
     """Time each call once a round, in turn, after one call of each that does not count.
 
-    It lasts for so many seconds, but no fewer than `least` and no more than `most` rounds.
+    The race lasts for `seconds`, with at least `least` and at most `most` rounds.
     """
     times: list[list[float]] = [[] for _ in calls]
     for call in calls:

@@ -85,15 +85,15 @@ class Planner:
 
     def critics(self) -> Iterator[tuple[str, Critic]]:
         """Name and hand out the critics."""
-        for one in dataclasses.fields(self):
-            if hasattr(getattr(self, one.name), "cost"):
-                yield one.name, getattr(self, one.name)
+        for part in dataclasses.fields(self):
+            if hasattr(critic := getattr(self, part.name), "cost"):
+                yield part.name, critic
 
     def plan(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> Move:
         """Return the command that costs least; `kept` is the manoeuvre begun."""
         names, critics = zip(*self.critics(), strict=True)
         rollouts = self.sampling.roll_out(situation, goal, kept)
-        costs = np.array([one.weight * one.cost(rollouts, situation) for one in critics])
+        costs = np.array([critic.weight * critic.cost(rollouts, situation) for critic in critics])
         totals = costs.sum(axis=0)
         if not kept.is_direct:
             totals[rollouts.begun] /= 1 + self.stay

@@ -180,10 +180,10 @@ class TrackingState:
 def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:
     """Return everyone tracked, in the base frame, as of the newest stamp `now` [s]."""
     boxes, likeness, people = dict(state.tracks.boxes), state.choice.likeness, state.tracks.people
-    means = np.array([predict(one.track, now, noise).mean for one in people]).reshape(-1, 4)
+    means = np.array([predict(person.track, now, noise).mean for person in people]).reshape(-1, 4)
     moved = carried(means, pose_at(state.tracks.poses, now)).tolist()
-    same = [None if likeness is None else likeness.of(one.number) for one in people]
+    same = [None if likeness is None else likeness.of(person.number) for person in people]
     return tuple(
-        Believed(x, y, one.existence, one.number, vx, vy, boxes.get(one.number), chance)
-        for one, chance, (x, y, vx, vy) in zip(people, same, moved, strict=True)
+        Believed(x, y, person.existence, person.number, vx, vy, boxes.get(person.number), chance)
+        for person, chance, (x, y, vx, vy) in zip(people, same, moved, strict=True)
     )

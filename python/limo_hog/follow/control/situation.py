@@ -15,9 +15,9 @@ from limo_hog.follow.space.grid import Grid, Ground
 
 #: Ground behind the robot is looked at so far behind its outline [m]: from .6 m/s it stops within .33 m.
 DEPTHS = (0.1, 0.2, 0.3)
-#: Ground seen to be free counts as known for so long [s]: a second less than `Guard.memory_s`.
+#: How long ground that was seen free counts as known [s]: a second less than `Guard.memory_s`.
 KNOWN_S = 59.0
-#: And where a person out of sight can be, for so long [s]: a person at .75 m/s comes from 3.5 m away.
+#: The same where a person out of sight can be [s]: a person at .75 m/s comes from 3.5 m away.
 LATELY_S = 5.0
 
 

@@ -38,7 +38,7 @@ class TrackingController:
     slowest: float = param(0.3, "m/s", "People slower than this stand: the lidar shows them where they are.", 0, 2)
     near_behind: float = param(1.2, "m", "Behind the robot, what the map shows this near counts as well.", 0, 5)
     following: Following = field(default_factory=Following)  #: Where to be while the person is known to be somewhere.
-    lookout: Lookout = field(default_factory=Lookout)  #: Where to look for one who is lost.
+    lookout: Lookout = field(default_factory=Lookout)  #: Where to look for a lost person.
     planner: Planner = field(default_factory=Planner)  #: Which command to send.
     wheels: Wheels = field(default_factory=Wheels)  #: What the wheels can do.
     selection: Selection = field(default_factory=Selection)  #: Whom to follow.

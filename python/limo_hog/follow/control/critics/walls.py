@@ -25,10 +25,10 @@ class Walls:
         """Return the cost of each rollout before its weight, float64 (K,) [m]."""
         # Every third step will do: in .6 s the robot drives little more than its length.
         at = rollouts.poses[:, 1::3, :2].reshape(-1, 2)
-        points, reach = situation.points, np.sqrt((at**2).sum(axis=1).max()) + self.clear
-        points = points[(points**2).sum(axis=1) < reach**2]
+        driven, away = (at**2).sum(axis=1), (situation.points**2).sum(axis=1)
+        near = away < (np.sqrt(driven.max()) + self.clear) ** 2
+        points, away = situation.points[near], away[near]
         if len(points) == 0:
             return np.zeros(len(rollouts.offs))
-        squares = np.maximum(((points**2).sum(axis=1) - 2 * at @ points.T).min(axis=1) + (at**2).sum(axis=1), 0.0)
-        gap = np.sqrt(squares).reshape(len(rollouts.offs), -1)
+        gap = np.sqrt(np.maximum((away - 2 * at @ points.T).min(axis=1) + driven, 0.0)).reshape(len(rollouts.offs), -1)
         return np.asarray((np.maximum(self.clear - gap, 0.0) + self.contact * (gap < self.touches)).mean(axis=1))

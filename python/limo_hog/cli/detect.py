@@ -33,7 +33,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "http://…) or standard input (-). What cannot be read is named, the rest is done, and the exit code is 1 then.",
     )
     parser.add_argument("inputs", nargs="+", metavar="INPUT")
-    # What is written and shown.
+    _add_outputs(parser)
+    _add_search(parser)
+    again = parser.add_mutually_exclusive_group()
+    again.add_argument("--resume", action="store_true", help="go on where an earlier run with --json or --out stopped")
+    again.add_argument("--overwrite", action="store_true", help="replace the files of an earlier run")
+
+
+def _add_outputs(parser: argparse.ArgumentParser) -> None:
+    """Add the options of what is written and shown."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="write annotated copies of pictures and videos (MP4)")
     parser.add_argument(
         "--format", choices=["jpg", "png"], help="of annotated pictures (JPEG where the picture is, else PNG)"
@@ -56,7 +64,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         f"show pictures, boxes and the rate on a live page ({PORT}), with a pause and the threshold; films are no "
         "faster than real time then",
     )
-    # The search.
+
+
+def _add_search(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the search."""
     parser.add_argument("--model", default=PeopleDetector.model, metavar="NAME|FILE", help=f"{MODEL} (%(default)s)")
     add_search(parser)
     parser.add_argument("--threshold", type=arguments.score, metavar="T", help="least score of a hit (the model's own)")
@@ -90,9 +101,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--threads", type=arguments.threads, default=0, metavar="N", help="how many cores to keep busy; 0: all (0)"
     )
     parser.add_argument("--every", type=arguments.count, default=1, metavar="N", help="every Nth frame of a video (1)")
-    again = parser.add_mutually_exclusive_group()
-    again.add_argument("--resume", action="store_true", help="go on where an earlier run with --json or --out stopped")
-    again.add_argument("--overwrite", action="store_true", help="replace the files of an earlier run")
 
 
 def _tables(args: argparse.Namespace) -> Mapping[Path, Callable[[Path, Iterable[Result]], None]]:

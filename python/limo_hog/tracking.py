@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
 from limo_hog.exceptions import ParameterError
@@ -53,6 +54,11 @@ class Tracker:
             raise ParameterError(f"tracker is {name!r}; one of {', '.join(TRACKERS)} is wanted")
         with needed(by="tracking people"):
             import trackers
+        from supervision import ColorLookup, Position, TraceAnnotator
+
+        self._trails = TraceAnnotator(
+            position=Position.BOTTOM_CENTER, trace_length=round(2 * fps), color_lookup=ColorLookup.TRACK
+        )
         self._tracker = getattr(trackers, TRACKERS[name])(frame_rate=fps, **_SETTINGS)
         self.set_threshold(load_model("limo").threshold if threshold is None else threshold)
 
@@ -89,3 +95,11 @@ class Tracker:
             ids[told.data["place"]] = told.tracker_id
         known = ids >= 0
         return dataclasses.replace(found[known], ids=ids[known] + 1)
+
+    def draw(self, people: Detections, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Draw people that `update` returned into a copy of their picture: boxes, numbers, and trails of 2 s.
+
+        `image` is uint8 (H, W, 3) BGR; pictures are drawn in the film's order.
+        """
+        drawn: NDArray[np.uint8] = self._trails.annotate(people.draw(image), people.to_supervision())
+        return drawn

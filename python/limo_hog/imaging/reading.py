@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import glob
 import os
+import queue
 import shutil
 import stat
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Container, Generator, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
@@ -253,39 +254,79 @@ def open_video(source: Source) -> Iterator[Video]:
         yield Video(source, capture.get(cv2.CAP_PROP_FPS) or 25.0, frames, capture)
 
 
-def live_frames(
-    video: Video, opened: ExitStack, every: int, tell: Callable[[str], None], stopped: threading.Event
-) -> Iterator[tuple[int, NDArray[np.uint8], float]]:
-    """Yield (number, uint8 (height, width, 3) BGR, time [s]) of a camera or a stream, until `stopped`.
+def newest_frames(
+    video: Video, opened: ExitStack, every: int, tell: Callable[[str], None], drop: Callable[[], None]
+) -> Generator[tuple[int, NDArray[np.uint8], float], None, None]:
+    """Yield (number, uint8 (height, width, 3) BGR, time [s]) of the newest frame of a camera or a stream.
 
-    Where it breaks off it is opened again, after growing pauses; numbers go on. `opened` closes the open video.
+    A thread reads it and calls `drop` for each frame that nobody took in time. It opens a source that broke off again,
+    after growing pauses, and numbers go on. `opened` closes the open video, which the thread owns from now on.
 
     Raises
     ------
     ReadError
-        It never sent a frame, or did not come back.
+        The source never sent a frame, or did not come back.
     """
-    source, first, waits = video.source, 0, iter(RETRY_AFTER_S)
+    held: queue.Queue[tuple[int, NDArray[np.uint8], float] | BaseException | None] = queue.Queue(1)
+    stopped = threading.Event()
+
+    def read() -> None:
+        end = None
+        try:
+            for frame in _live_frames(video, opened, every, tell, stopped):
+                with suppress(queue.Empty):
+                    held.get_nowait()
+                    drop()
+                held.put(frame)
+        except BaseException as error:
+            end = error
+        if not stopped.is_set():
+            held.put(end)
+
+    thread = threading.Thread(target=read, name="limo-hog source", daemon=True)
+    thread.start()
+    try:
+        while True:
+            try:
+                # Woken now and then, so that Ctrl-C works on every system.
+                frame = held.get(timeout=0.5)
+            except queue.Empty:
+                continue
+            if isinstance(frame, BaseException):
+                raise frame
+            if frame is None:
+                return
+            yield frame
+    finally:
+        stopped.set()
+        with suppress(queue.Empty):
+            held.get_nowait()
+        # A camera that sends nothing is left to the end of the process.
+        thread.join(1.0)
+
+
+def _live_frames(
+    video: Video, opened: ExitStack, every: int, tell: Callable[[str], None], stopped: threading.Event
+) -> Iterator[tuple[int, NDArray[np.uint8], float]]:
+    source, first, pauses = video.source, 0, iter(RETRY_AFTER_S)
     while True:
         number = -1
         try:
             with opened:
+                if first:
+                    video = opened.enter_context(open_video(source))
                 for number, image in video.frames(every):
                     if stopped.is_set():
                         return
                     yield first + number, image, time.monotonic()
-        except ReadError:
+        except (ReadError, OSError):
             if not first:
                 raise
         if number >= 0:
-            first, waits = first + number + 1, iter(RETRY_AFTER_S)
+            first, pauses = first + number + 1, iter(RETRY_AFTER_S)
             tell(f"{source.name}: broke off after {first} frames; trying again for {sum(RETRY_AFTER_S)} s")
-        for wait in waits:
-            if stopped.wait(wait):
-                return
-            with suppress(ReadError, OSError):
-                opened = ExitStack()
-                video = opened.enter_context(open_video(source))
-                break
-        else:
+        pause = next(pauses, None)
+        if pause is None:
             raise ReadError(f"{source.name}: broke off after {first} frames, and did not come back")
+        if stopped.wait(pause):
+            return

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import glob
 import os
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 from limo_hog.imaging.reading import STDIN, Kind, Source
@@ -39,11 +37,3 @@ def copies_of(sources: list[Source], folder: Path, wanted: str | None) -> dict[S
         source: path if taken[path] == 1 else path.with_name(source.path.name + path.suffix)
         for source, path in names.items()
     }
-
-
-def written(copies: dict[Source, Path]) -> Iterator[Path]:
-    """Yield the copies that may be there already, with all pieces of live sources'."""
-    for source, copy in copies.items():
-        yield copy
-        if source.kind in (Kind.CAMERA, Kind.STREAM):
-            yield from copy.parent.glob(f"{glob.escape(copy.stem)}-[0-9]*{copy.suffix}")

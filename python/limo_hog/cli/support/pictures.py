@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import partial
 from itertools import groupby
@@ -16,10 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
+import numpy as np
+from numpy.typing import NDArray
 
 import limo_hog
-from limo_hog.cli.support.copies import copies_of, real, written
-from limo_hog.cli.support.films import Frame, Identities, Image, Newest, pieces
+from limo_hog.cli.support.copies import copies_of, real
 from limo_hog.cli.support.output import UsageError, emit, one_line, printable, refuse_to_overwrite
 from limo_hog.cli.support.results import Result, Results, Row
 from limo_hog.detections import people
@@ -32,22 +32,21 @@ from limo_hog.imaging.reading import (
     Source,
     Video,
     find_sources,
-    live_frames,
+    newest_frames,
     open_video,
     read_image,
     standard_input,
 )
-from limo_hog.imaging.writing import WriteError, write_image
+from limo_hog.imaging.writing import video_writer, write_image
 from limo_hog.parallel import cores, in_order
-from limo_hog.tracking import FED
+from limo_hog.tracking import FED, Tracker
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
     from limo_hog.cli.support.film_page import FilmPage
 
-#: Length of the pieces of a live source's copy [s]: what a killed run loses at most.
-PIECE_S = 60.0
+Image = NDArray[np.uint8]
 #: Pictures that are tracked are taken for a film of this rate [Hz].
 _PICTURES_HZ = 25.0
 
@@ -77,7 +76,7 @@ class Run:
         self.results: list[Result] | None = [] if args.csv or args.coco or args.mot else None
         #: The live page, where one is wanted.
         self.page: FilmPage | None = None
-        self._identities: Identities | None = None
+        self._tracker: Tracker | None = None
         self.set_threshold(detector.least_score)
         self._task = bar.add_task("looking", total=0) if bar else None
         self.pictures = self.peopled = self.people = self.failed = self.known = self.dropped = 0
@@ -100,13 +99,13 @@ class Run:
                 if real(copy) in own:
                     raise UsageError(f"{copy} is itself an input: choose another folder for --out")
             if not self._args.resume and not self._args.overwrite:
-                refuse_to_overwrite(written(self._copies), ", --resume makes only what is missing")
+                refuse_to_overwrite(self._copies.values(), ", --resume makes only what is missing")
 
     def set_threshold(self, threshold: float) -> None:
         """Report people from another SVM margin on, from the next picture on."""
         self._threshold = threshold
-        if self._identities is not None:
-            self._identities.set_threshold(threshold)
+        if self._tracker is not None:
+            self._tracker.set_threshold(threshold)
         fed = FED if self._args.track else 0.0
         self._detector = replace(self._detector, threshold=threshold - fed)
 
@@ -165,9 +164,9 @@ class Run:
         return found
 
     def _look_at_images(self, sources: list[Source]) -> None:
-        self._identities = self._identities_at(_PICTURES_HZ)
+        self._tracker = self._tracker_at(_PICTURES_HZ)
         # Where people are numbered, pictures that are done are searched again.
-        new = [source for source in sources if self._identities or not self._is_done(source)]
+        new = [source for source in sources if self._tracker or not self._is_done(source)]
         self.known += len(sources) - len(new)
         jobs = ((source, (0, None, place / _PICTURES_HZ)) for place, source in enumerate(new))
         results = in_order(lambda job: self._work(*job), jobs, self._workers)
@@ -175,20 +174,14 @@ class Run:
             if isinstance(result, str):
                 self._fail(result)
             else:
-                found, picture = self._finished(*result, None)
-                if picture is not None and source in self._copies and self._identities:
+                found, picture = self._finished(*result)
+                if picture is not None and source in self._copies and self._tracker:
                     write_image(self._copies[source], picture)
                 if found.frame not in self._done[found.source]:
                     self._keep(found)
             self._advance()
 
     def _look_at_video(self, source: Source) -> None:
-        try:
-            self._look_at_frames(source)
-        except (ReadError, WriteError) as error:
-            self._fail(_named(source, error))
-
-    def _look_at_frames(self, source: Source) -> None:
         copy = self._copies.get(source)
         if self._args.resume and copy is not None and copy.exists():
             if self._earlier is None:
@@ -199,42 +192,45 @@ class Run:
         with ExitStack() as stack:
             try:
                 video = stack.enter_context(open_video(source))
-            except OSError as error:
+            except (ReadError, OSError) as error:
                 self._fail(_named(source, error))
                 return
-            rate, done = video.fps / self._args.every, self._done[source.name]
-            newest = None
+            rate, done, write = video.fps / self._args.every, self._done[source.name], None
+            self._tracker = self._tracker_at(rate)
+            # An annotated copy, and people's numbers, always start at the first frame.
+            skip = set() if copy or self._tracker else done
+            self.known += len(skip)
+            work = partial(self._work, source)
+            results: Iterator[tuple[Row, Image | None] | str]
             if video.live:
                 # The thread that reads it owns it from now on.
-                live = partial(live_frames, video, stack.pop_all(), self._args.every, self._tell)
-                newest = Newest(live)
-                stack.callback(newest.stop)
-            write = copy and stack.enter_context(pieces(copy, rate, PIECE_S if newest else math.inf))
-            self._identities = self._identities_at(rate)
-            work = partial(self._work, source)
-            # An annotated copy, and people's numbers, always start at the first frame.
-            skip = set() if write or self._identities else done
-            self.known += len(skip)
-            frames = self._frames(video, skip)
+                newest = newest_frames(video, stack.pop_all(), self._args.every, self._tell, self._drop)
+                results = map(work, stack.enter_context(closing(newest)))
+            else:
+                results = in_order(work, self._frames(video, skip), self._workers)
             try:
-                for result in map(work, newest) if newest else in_order(work, frames, self._workers):
+                for result in results:
                     if isinstance(result, str):
                         self._fail(result)
                         break  # the other frames are as large
-                    found, picture = self._finished(*result, newest)
-                    if write and picture is not None:
+                    found, picture = self._finished(*result, live=video.live)
+                    if copy and picture is not None:
+                        write = write or stack.enter_context(video_writer(copy, rate, grows=video.live))
                         write(picture, found.at)
                     if found.frame not in done:
                         self._keep(found, film=True)
                     self._advance()
+            except ReadError as error:
+                self._fail(_named(source, error))
             except KeyboardInterrupt:
                 # Ctrl-C is how a camera's or a stream's run ends: its copy is complete.
                 if source.kind not in (Kind.CAMERA, Kind.STREAM):
                     raise
-            finally:
-                self.dropped += newest.dropped if newest else 0
 
-    def _frames(self, video: Video, skip: set[int]) -> Iterator[Frame]:
+    def _drop(self) -> None:
+        self.dropped += 1
+
+    def _frames(self, video: Video, skip: set[int]) -> Iterator[tuple[int, Image, float]]:
         """Yield number, image and time [s] of a film's frames."""
         self._expect(max(0, -(-video.frame_count // self._args.every) - len(skip)))
         try:
@@ -243,8 +239,8 @@ class Run:
         except ReadError as error:
             self._fail(str(error))
 
-    def _identities_at(self, rate: float) -> Identities | None:
-        return Identities(self._args.track, self._threshold, rate) if self._args.track else None
+    def _tracker_at(self, rate: float) -> Tracker | None:
+        return Tracker(self._args.track, self._threshold, rate) if self._args.track else None
 
     def _work(self, source: Source, frame: tuple[int, Image | None, float]) -> tuple[Row, Image | None] | str:
         """Search a frame, or the picture that is read here; return what is wrong where that fails."""
@@ -265,14 +261,13 @@ class Run:
         height, width = image.shape[:2]
         return Row(source.name, number, width, height, detections, round(ms, 3), at), picture
 
-    def _finished(self, found: Row, picture: Image | None, newest: Newest | None) -> tuple[Row, Image | None]:
+    def _finished(self, found: Row, picture: Image | None, live: bool = False) -> tuple[Row, Image | None]:
         """Give the people of the next picture their numbers, draw them, and show it on the page."""
-        if self._identities is not None:
-            people = self._identities.update(found.people, found.at if newest else None)
-            found = replace(found, people=people)
-            picture = None if picture is None else self._identities.draw(people, picture)
+        if self._tracker is not None:
+            found = replace(found, people=self._tracker.update(found.people, found.at if live else None))
+            picture = None if picture is None else self._tracker.draw(found.people, picture)
         if self.page and picture is not None:
-            self.page.watch((found, picture, newest.dropped if newest else 0), None if newest else found.at)
+            self.page.watch((found, picture, self.dropped), None if live else found.at)
         return found, picture
 
     def _is_done(self, source: Source) -> bool:

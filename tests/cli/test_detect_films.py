@@ -180,6 +180,7 @@ def test_the_page_shows_a_film_in_real_time_pauses_and_sets_the_threshold(film: 
         page.goto(run.stderr.readline().split()[-1])
         expect(page.locator("#source")).to_have_text(str(film))
         expect(page.locator("#people")).not_to_have_text(re.compile("^[0–]$"))
+        expect(page.locator("#margin")).to_have_text(f"{PeopleDetector().least_score:.2f}")
         page.locator("#threshold").fill("2.5")
         expect(page.locator("#margin")).to_have_text("2.50")
         expect(page.locator("#people")).to_have_text("0")  # none is as sure

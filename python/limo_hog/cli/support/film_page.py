@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -15,12 +15,6 @@ from limo_hog.cv2_api.arguments import shown
 from limo_hog.imaging.writing import jpeg
 from limo_hog.live.controls import Parameter, ParameterError
 from limo_hog.live.server import Live
-
-#: Bounds of the threshold that the page sets [SVM margin].
-_LOWEST, _HIGHEST = -1.0, 3.0
-#: Pictures over which their rate is taken.
-_RATE_OVER = 25
-
 
 #: A picture that was searched, boxes and numbers drawn into it; and how many of a live source nobody took so far.
 Shown = tuple[Row, NDArray[np.uint8], int]
@@ -34,13 +28,15 @@ class FilmPage(Live[Shown]):
 
     def __init__(self, threshold: float, set_threshold: Callable[[float], None], host: str, port: int) -> None:
         super().__init__("limo_hog.live", self, host, port)
-        about = ("SVM margin", "Least margin of a box that is shown.")
-        self.threshold, self._use = Parameter("threshold", threshold, _LOWEST, _HIGHEST, *about), set_threshold
-        self._times: list[float] = []
+        about = "Least margin of a box that is shown."
+        self._range = Parameter("threshold", threshold, low=-1.0, high=3.0, unit="SVM margin", tooltip=about)
+        self.threshold, self._use = threshold, set_threshold
+        # When the last pictures came, over which their rate is taken.
+        self._times = deque[float](maxlen=25)
 
     def watch(self, moment: Shown, at: float | None) -> None:
         """Show a picture, and return when the next is wanted: a film is no faster than real time, `at` [s] in it."""
-        self._times = [*self._times[1 - _RATE_OVER :], time.monotonic()]
+        self._times.append(time.monotonic())
         self._pictured, self._newest = (self._written, moment), moment
         self._written += 1
         self.pace.wait(time.monotonic() if at is None else at)
@@ -49,25 +45,26 @@ class FilmPage(Live[Shown]):
         """Set the threshold; raises `ParameterError`."""
         if name != "threshold":
             raise ParameterError(f"no parameter {shown(name)}; threshold is the only one")
-        self.threshold = dataclasses.replace(self.threshold, value=self.threshold.checked(value))
-        self._use(self.threshold.value)
+        self.threshold = self._range.checked(value)
+        self._use(self.threshold)
 
     def _welcome(self) -> dict[str, Any]:
-        return {"threshold": dataclasses.asdict(self.threshold)}
+        return {"threshold": {"min": self._range.low, "max": self._range.high, "value": self.threshold}}
 
     def _state(self, moment: Shown) -> dict[str, Any]:
-        row, _, dropped = moment
-        seconds = self._times[-1] - self._times[0]
+        """Return what the page's elements say, by their ids."""
+        (row, _, dropped), times = moment, list(self._times)
+        ids = () if row.people.ids is None else row.people.ids.tolist()
         return {
             "source": row.source,
             "frame": row.frame,
             "people": len(row.people),
-            "ids": [] if row.people.ids is None else row.people.ids.tolist(),
-            "detect_ms": row.ms,
-            "rate": (len(self._times) - 1) / seconds if seconds else None,
+            "ids": f"in view: {', '.join(map(str, ids))}" if ids else "",
+            "detect": f"{row.ms:.1f} ms",
+            "rate": f"{(len(times) - 1) / (times[-1] - times[0]):.1f}/s" if len(times) > 1 else "–",
             "dropped": dropped,
-            "threshold": self.threshold.value,
-            "paused": self.pace.paused,
+            "margin": f"{self.threshold:.2f}",
+            "pause": "Go on" if self.pace.paused else "Pause",
         }
 
     def _pictures(self, moment: Shown) -> list[bytes]:

@@ -3,12 +3,10 @@
 
 const $ = (id) => document.getElementById(id);
 let socket = null;
-let paused = false;
 let ended = false;
 
 function connect() {
   socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
-  socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => (typeof data === "string" ? read(JSON.parse(data)) : picture(data));
   socket.onclose = () => {
     if (ended) return;
@@ -19,10 +17,10 @@ function connect() {
 
 function read(message) {
   if (message.threshold) {
-    Object.assign($("threshold"), { min: message.threshold.low, max: message.threshold.high, value: message.threshold.value });
+    Object.assign($("threshold"), message.threshold);
     notice("");
   }
-  if (message.state) state(message.state);
+  for (const [id, text] of Object.entries(message.state ?? {})) $(id).textContent = text;
   if (message.complaint) $("complaint").textContent = message.complaint;
   if (message.ended) {
     ended = true;
@@ -30,23 +28,9 @@ function read(message) {
   }
 }
 
-function state(now) {
-  paused = now.paused;
-  $("source").textContent = now.source;
-  $("frame").textContent = now.frame;
-  $("ids").textContent = now.ids.length ? `in view: ${now.ids.join(", ")}` : "";
-  $("pause").textContent = paused ? "Go on" : "Pause";
-  $("margin").textContent = now.threshold.toFixed(2);
-  $("people").textContent = now.people;
-  $("rate").textContent = now.rate === null ? "–" : `${now.rate.toFixed(1)}/s`;
-  $("detect").textContent = `${now.detect_ms.toFixed(1)} ms`;
-  $("dropped").textContent = now.dropped;
-}
-
-function picture(data) {
-  const last = $("camera").src;
-  $("camera").src = URL.createObjectURL(new Blob([data], { type: "image/jpeg" }));
-  if (last) URL.revokeObjectURL(last);
+function picture(jpeg) {
+  URL.revokeObjectURL($("camera").src);
+  $("camera").src = URL.createObjectURL(jpeg);
 }
 
 function notice(text) {
@@ -59,7 +43,7 @@ function send(message) {
   if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
 }
 
-$("pause").onclick = () => send({ do: paused ? "resume" : "pause" });
+$("pause").onclick = () => send({ do: $("pause").textContent === "Pause" ? "pause" : "resume" });
 $("threshold").oninput = () => send({ set: "threshold", value: Number($("threshold").value) });
 document.onkeydown = (event) => {
   if (event.key !== " " || event.target !== document.body) return;

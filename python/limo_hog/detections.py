@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, overload
 
@@ -169,11 +169,7 @@ class Detections:
         """Return them as `supervision.Detections`: boxes, `tracker_id`, class 0, probabilities as `confidence`.
 
         Without calibration the margins are the `confidence`. Windows and margins are in `data`.
-
-        Raises
-        ------
-        MissingExtraError
-            supervision is not installed.
+        Raises `MissingExtraError` where supervision is not installed.
         """
         with needed(by="to_supervision"):
             from supervision import Detections as Supervisions
@@ -191,25 +187,19 @@ class Detections:
         """Return `supervision.Detections`, best first: what `to_supervision` made, or another detector's.
 
         Another detector's boxes are their own windows, its `confidence` the scores.
-
-        Raises
-        ------
-        HogError
-            They have no confidence.
+        Raises `HogError` where they have no confidence.
         """
-        if found.confidence is None and "score" not in found.data:
+        if {"window", "score"} <= {*found.data} and found.metadata:
+            return cls._best_first(found.data["window"], found.data["score"], found.tracker_id, found.metadata)
+        if found.confidence is None:
             raise HogError("these supervision.Detections have no confidence; give each box one")
         boxes = np.hstack([found.xyxy[:, :2], found.xyxy[:, 2:] - found.xyxy[:, :2]])
-        windows, scores = found.data.get("window"), found.data.get("score", found.confidence)
-        return cls._best_first(boxes, windows, scores, found.tracker_id, found.metadata)
+        return cls._best_first(boxes, found.confidence, found.tracker_id, {})
 
     def to_pandas(self) -> Any:
         """Return a `pandas.DataFrame`, a line a person, with the columns of `detect --csv`.
 
-        Raises
-        ------
-        MissingExtraError
-            pandas is not installed.
+        Raises `MissingExtraError` where pandas is not installed.
         """
         with needed(by="to_pandas"):
             from pandas import DataFrame
@@ -224,27 +214,22 @@ class Detections:
         """Return the people of a `pandas.DataFrame`, best first; it needs the columns x, y, w, h and score.
 
         A table that `to_pandas` did not make tells nothing of a model: its boxes are their own windows.
-
-        Raises
-        ------
-        HogError
-            A column is missing.
+        Raises `HogError` where a column is missing.
         """
         if missing := [name for name in (*BOX_COLUMNS, "score") if name not in table]:
             raise HogError(f"the table has no column {', '.join(missing)}; x, y, w, h and score are wanted")
-        windows = table[[*WINDOW_COLUMNS]].to_numpy() if {*WINDOW_COLUMNS} <= {*table} and table.attrs else None
-        ids = table["id"].to_numpy() if "id" in table else None
-        return cls._best_first(table[[*BOX_COLUMNS]].to_numpy(), windows, table["score"].to_numpy(), ids, table.attrs)
+        ours = {*WINDOW_COLUMNS} <= {*table} and table.attrs
+        windows = table[[*(WINDOW_COLUMNS if ours else BOX_COLUMNS)]]
+        return cls._best_first(windows, table["score"], table.get("id"), table.attrs if ours else {})
 
     @classmethod
-    def _best_first(cls, boxes: Any, windows: Any, scores: Any, ids: Any, model: Any) -> Detections:
-        """Return them in the order of their scores; without windows the boxes are whole windows, of no model."""
-        order = np.argsort(-np.asarray(scores, np.float64), kind="stable")
+    def _best_first(cls, windows: Any, scores: Any, ids: Any, model: Mapping[str, Any]) -> Detections:
+        """Return them in the order of their scores; of no model the windows are boxes."""
+        scores = np.asarray(scores, np.float64)
+        order = np.argsort(-scores, kind="stable")
+        windows = np.rint(np.asarray(windows)).astype(np.int32)[order]
         ids = None if ids is None else np.asarray(ids, np.int64)[order]
-        known = windows is not None
-        person_box, calibration = (model["person_box"], model["calibration"]) if known else (WHOLE_WINDOW, None)
-        windows = np.rint(windows if known else boxes).astype(np.int32)[order]
-        return cls(windows, np.asarray(scores, np.float64)[order], person_box, calibration, ids=ids)
+        return cls(windows, scores[order], model.get("person_box", WHOLE_WINDOW), model.get("calibration"), ids=ids)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the picture that was searched, with the people's boxes; the path's ending says its format.

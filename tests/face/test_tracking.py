@@ -14,23 +14,22 @@ pytest.importorskip("trackers", reason="needs limo-hog[track]")
 
 
 def walk(score: float = 1.0, frames: int = 20) -> list[Detections]:
-    """Two people who walk towards and past each other, one in front; the left one scores `score`."""
-    people = []
-    for i in range(frames):
-        windows = np.array([[20 + 10 * i, 40, 40, 100], [220 - 10 * i, 60, 50, 130]], np.int32)
-        scores = np.array([score if i > 2 else 1.0, 2.0])
-        order = np.argsort(-scores)
-        people.append(Detections(windows[order], scores[order], WHOLE_WINDOW))
-    return people
+    """Two people who walk towards and past each other; the second scores `score` from the fourth picture on."""
+    steps = [np.array([[220 - 10 * i, 60, 50, 130], [20 + 10 * i, 40, 40, 100]], np.int32) for i in range(frames)]
+    scores = [np.array([2.0, score if i > 2 else 1.0]) for i in range(frames)]
+    return [Detections(*found, WHOLE_WINDOW) for found in zip(steps, scores, strict=True)]
 
 
 @pytest.mark.parametrize("name", TRACKERS)
-def test_two_people_who_pass_each_other_keep_their_numbers(name: str) -> None:
-    tracker = Tracker(name, fps=10)
+def test_two_people_who_pass_each_other_keep_their_numbers_and_leave_trails(name: str) -> None:
+    tracker, image = Tracker(name, fps=10), np.zeros((200, 300, 3), np.uint8)
     seen = [tracker.update(found) for found in walk()][2:]
-    assert all(people.ids is not None and sorted(people.ids.tolist()) == [1, 2] for people in seen)
-    by_height = [dict(zip(people.boxes[:, 3].tolist(), people.ids.tolist(), strict=True)) for people in seen]  # type: ignore[union-attr]
-    assert all(numbers == by_height[0] for numbers in by_height)
+    drawn = [tracker.draw(people, image) for people in seen]
+    numbers = [dict(zip(people.boxes[:, 3].tolist(), people.to_dict()["ids"], strict=True)) for people in seen]
+    assert numbers == [numbers[0]] * 18
+    assert {*numbers[0].values()} == {1, 2}
+    assert (drawn[-1] != seen[-1].draw(image))[140, 90:180].any()  # where the shorter one's feet were
+    assert tracker.update(Detections.none()).to_dict()["ids"] == []
 
 
 @pytest.mark.parametrize("score", [0.01, -FED + 0.01])
@@ -45,12 +44,6 @@ def test_a_box_below_the_threshold_is_no_new_person_until_the_threshold_is_lower
     tracker.set_threshold(1.5)
     assert [len(tracker.update(found)) for found in faint[6:9]] == [0, 2, 2]
     assert tracker.lowest == 1.5 - FED
-
-
-def test_a_picture_without_people_has_no_numbers() -> None:
-    people = Tracker().update(Detections.none())
-    assert len(people) == 0
-    assert people.ids is not None
 
 
 def test_an_unknown_tracker_is_named() -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,9 +70,8 @@ class Tracker:
         """Take new people from another SVM margin on, from the next picture on."""
         self._threshold = threshold
         # SORT has the first, OC-SORT the second, ByteTrack both.
-        for name in ("track_activation_threshold", "high_conf_det_threshold"):
-            if hasattr(self._tracker, name):
-                setattr(self._tracker, name, threshold)
+        for name in {"track_activation_threshold", "high_conf_det_threshold"} & {*vars(self._tracker)}:
+            setattr(self._tracker, name, threshold)
 
     def update(self, found: Detections, time: float | None = None) -> Detections:
         """Return the people among `found` who were seen before, with their `ids`, best first.
@@ -85,16 +83,11 @@ class Tracker:
         time
             When the picture was taken [s], for a film without a steady rate.
         """
-        from supervision import Detections as Supervisions
-
-        places: Any = {"place": np.arange(len(found))}
-        given = Supervisions(found.xyxy.astype(np.float64), confidence=found.scores, data=places)
+        given = found.to_supervision()
+        given.confidence = found.scores
         told = self._tracker.update(given, timestamp=time)
-        ids = np.full(len(found), -1, np.int64)
-        if len(told):
-            ids[told.data["place"]] = told.tracker_id
-        known = ids >= 0
-        return dataclasses.replace(found[known], ids=ids[known] + 1)
+        told.tracker_id = told.tracker_id + 1
+        return dataclasses.replace(Detections.from_supervision(told[told.tracker_id > 0]), _searched=found._searched)
 
     def draw(self, people: Detections, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Draw people that `update` returned into a copy of their picture: boxes, numbers, and trails of 2 s.

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 import pytest
 from playwright.sync_api import expect
+from pytest import CaptureFixture, MonkeyPatch
 from tests.cli.material import LIMO_HOG, PICTURE, film_of, frames_of, lines_of
 from tests.sim.view.browser import CHROMIUM, chromium
 
@@ -57,15 +58,7 @@ def test_people_of_a_film_are_numbered_in_every_format(film: Path, tmp_path: Pat
     assert [result["ids"] for result in lines_of(half.read_text())] == [result["ids"] for result in results]
 
 
-def test_a_film_without_the_tracker_names_the_line_that_installs_it(
-    film: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "trackers", None)
-    assert main(["detect", str(film), "--track"]) == 1
-    assert "tracking people needs trackers: pip install 'limo-hog[track]'" in capsys.readouterr().err
-
-
-def test_copies_of_a_film_are_of_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_copies_of_a_film_are_of_the_same_bytes(tmp_path: Path, monkeypatch: MonkeyPatch) -> None:
     monkeypatch.setattr("tests.cli.material.PICTURE", cv2.resize(PICTURE, (100, 68)))
     film_of(tmp_path / "walk.mp4", frames=40)
     for junk in ("1", "200"):
@@ -94,7 +87,7 @@ class Capture:
         return True, np.full((96, 96, 3), self.number % 256, np.uint8)
 
 
-def play(monkeypatch: pytest.MonkeyPatch, *captures: Capture) -> None:
+def play(monkeypatch: MonkeyPatch, *captures: Capture) -> None:
     """Let a live source be opened as these, one after another; then its user stops it."""
     monkeypatch.setattr(cv2, "VideoCapture", Mock(side_effect=[*captures, KeyboardInterrupt]))
     monkeypatch.setattr(reading, "RETRY_AFTER_S", (0.01, 0.02, 0.04))
@@ -105,7 +98,7 @@ SLOW = pytest.param(7500, marks=[pytest.mark.slow, pytest.mark.timeout(600)])
 
 @pytest.mark.parametrize("frames", [75, SLOW])
 def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
-    frames: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    frames: int, monkeypatch: MonkeyPatch, capsys: CaptureFixture[str]
 ) -> None:
     camera, behind = Capture(frames, period_s=0.04), []
 
@@ -130,12 +123,7 @@ def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
     ],
 )
 def test_a_stream_that_breaks_off_is_one_line_and_comes_back_or_fails(
-    then: tuple[int, ...],
-    code: int,
-    said: str,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    then: tuple[int, ...], code: int, said: str, monkeypatch: MonkeyPatch, tmp_path: Path, capsys: CaptureFixture[str]
 ) -> None:
     play(monkeypatch, *map(Capture, (3, *then)))
     assert main(["detect", "rtsp://camera/live", "--out", str(tmp_path), "--json", "-"]) == code
@@ -144,9 +132,9 @@ def test_a_stream_that_breaks_off_is_one_line_and_comes_back_or_fails(
     assert numbers == sorted(set(numbers))
     assert numbers[-1] == 2 + sum(then)
     assert frames_of(tmp_path / "live.mp4") == len(numbers)
-    lines = [line for line in shown.err.splitlines() if "broke off" in line]
     first = "broke off after 3 frames; trying again for 0.07 s"
-    assert lines == [f"limo-hog: rtsp://camera/live: {line}" for line in (first, said)]
+    told = [line for line in shown.err.splitlines() if "broke off" in line]
+    assert told == [f"limo-hog: rtsp://camera/live: {line}" for line in (first, said)]
 
 
 #: `detect` of a camera of 50/s.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
 from limo_hog.detections import Detections
 from limo_hog.exceptions import ParameterError
+from limo_hog.extras import MissingExtraError
 from limo_hog.models import WHOLE_WINDOW
 from limo_hog.tracking import FED, TRACKERS, Tracker
 
@@ -49,3 +52,9 @@ def test_a_box_below_the_threshold_is_no_new_person_until_the_threshold_is_lower
 def test_an_unknown_tracker_is_named() -> None:
     with pytest.raises(ParameterError, match=r"'deepsort'; one of bytetrack, ocsort, sort is wanted"):
         Tracker("deepsort")
+
+
+def test_without_trackers_the_line_that_installs_them_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "trackers", None)
+    with pytest.raises(MissingExtraError, match=r"tracking people needs trackers: pip install 'limo-hog\[track\]'"):
+        Tracker()

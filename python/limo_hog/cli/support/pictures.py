@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import replace
@@ -19,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import limo_hog
-from limo_hog.cli.support.copies import copies_of, real
 from limo_hog.cli.support.output import UsageError, emit, one_line, printable, refuse_to_overwrite
 from limo_hog.cli.support.results import Result, Results, Row
 from limo_hog.detections import people
@@ -93,10 +93,10 @@ class Run:
                 f"--mot is for one film, or for pictures that are one; these are {len(self._sources)} inputs"
             )
         if self._args.out is not None:
-            self._copies = copies_of(self._sources, self._args.out, self._args.format)
-            own = {real(source.path) for source in self._sources}
+            self._copies = _copies(self._sources, self._args.out, self._args.format)
+            own = {_real(source.path) for source in self._sources}
             for copy in self._copies.values():
-                if real(copy) in own:
+                if _real(copy) in own:
                     raise UsageError(f"{copy} is itself an input: choose another folder for --out")
             if not self._args.resume and not self._args.overwrite:
                 refuse_to_overwrite(self._copies.values(), ", --resume makes only what is missing")
@@ -157,10 +157,10 @@ class Run:
         except (ReadError, OSError) as error:
             self._fail(one_line(error))
             return []
-        out = self._args.out and real(self._args.out)
-        if out and real(Path(name)) in out.parents:
+        out = self._args.out and _real(self._args.out)
+        if out and _real(Path(name)) in out.parents:
             # Copies of an earlier run, in a folder below the pictures', are no inputs.
-            found = [source for source in found if out not in real(source.path).parents]
+            found = [source for source in found if out not in _real(source.path).parents]
         return found
 
     def _look_at_images(self, sources: list[Source]) -> None:
@@ -311,6 +311,11 @@ class Run:
             print(line, file=sys.stderr)
 
 
+def _real(path: Path) -> Path:
+    """Return a path without links; one that leads to itself stays, where `Path.resolve` raises."""
+    return Path(os.path.realpath(path))
+
+
 def _named(source: Source, error: Exception) -> str:
     """Return an error in one line that names its picture."""
     line = one_line(error)
@@ -320,5 +325,30 @@ def _named(source: Source, error: Exception) -> str:
 def _identity(source: Source) -> object:
     """Return what two spellings of one picture or video file have in common; a link to it is one of its own."""
     if source.kind in (Kind.IMAGE, Kind.VIDEO):
-        return real(source.path.parent) / source.path.name, source.kind
+        return _real(source.path.parent) / source.path.name, source.kind
     return source
+
+
+def _copies(sources: list[Source], folder: Path, wanted: str | None) -> dict[Source, Path]:
+    """Name each source's annotated copy: its place below what all sources have in common, in `folder`.
+
+    Images are of the `wanted` format, or else JPEG where the source is, and PNG where not.
+    """
+    # Without `..`, which would lead out of `folder`.
+    folders = {
+        source: Path(os.path.normpath(source.path.absolute().parent)) for source in sources if source.name != STDIN
+    }
+    root = os.path.commonpath(folders.values()) if folders else ""
+    names: dict[Source, Path] = {}
+    for source in sources:
+        like_source = "jpg" if source.path.suffix.lower() in (".jpg", ".jpeg") else "png"
+        suffix = f".{wanted or like_source}" if source.kind is Kind.IMAGE else ".mp4"
+        place = folder / folders[source].relative_to(root) if source in folders else folder
+        stem = "stdin" if source.name == STDIN else source.path.stem
+        names[source] = place / f"{stem}{suffix}"
+    # Two pictures of one stem, such as a.jpg and a.png, keep their whole names.
+    taken = Counter(names.values())
+    return {
+        source: path if taken[path] == 1 else path.with_name(source.path.name + path.suffix)
+        for source, path in names.items()
+    }

@@ -41,6 +41,10 @@ STREAM_TIMEOUT_S = 10
 RETRY_AFTER_S = (1, 2, 4, 8, 16, 32)
 
 
+#: Number, uint8 (height, width, 3) BGR and time [s] of a frame.
+LiveFrame = tuple[int, NDArray[np.uint8], float]
+
+
 class ReadError(ImageError):
     """An input is not a picture, a video or a camera that can be read."""
 
@@ -256,18 +260,17 @@ def open_video(source: Source) -> Iterator[Video]:
 
 def newest_frames(
     video: Video, opened: ExitStack, every: int, tell: Callable[[str], None], drop: Callable[[], None]
-) -> Generator[tuple[int, NDArray[np.uint8], float], None, None]:
-    """Yield (number, uint8 (height, width, 3) BGR, time [s]) of the newest frame of a camera or a stream.
+) -> Generator[LiveFrame, None, None]:
+    """Yield the newest frame of a camera or a stream; `drop` is called for each that nobody took in time.
 
-    A thread reads it and calls `drop` for each frame that nobody took in time. It opens a source that broke off again,
-    after growing pauses, and numbers go on. `opened` closes the open video, which the thread owns from now on.
+    A thread reads it, which owns the open video from now on; `opened` closes that.
 
     Raises
     ------
     ReadError
         The source never sent a frame, or did not come back.
     """
-    held: queue.Queue[tuple[int, NDArray[np.uint8], float] | BaseException | None] = queue.Queue(1)
+    held: queue.Queue[LiveFrame | BaseException | None] = queue.Queue(1)
     stopped = threading.Event()
 
     def read() -> None:
@@ -287,34 +290,30 @@ def newest_frames(
     thread.start()
     try:
         while True:
-            try:
-                # Woken now and then, so that Ctrl-C works on every system.
+            # Woken now and then, so that Ctrl-C works on every system.
+            with suppress(queue.Empty):
                 frame = held.get(timeout=0.5)
-            except queue.Empty:
-                continue
-            if isinstance(frame, BaseException):
-                raise frame
-            if frame is None:
-                return
-            yield frame
+                if not isinstance(frame, tuple):
+                    break
+                yield frame
+        if frame is not None:
+            raise frame
     finally:
         stopped.set()
-        with suppress(queue.Empty):
-            held.get_nowait()
         # A camera that sends nothing is left to the end of the process.
         thread.join(1.0)
 
 
 def _live_frames(
     video: Video, opened: ExitStack, every: int, tell: Callable[[str], None], stopped: threading.Event
-) -> Iterator[tuple[int, NDArray[np.uint8], float]]:
+) -> Iterator[LiveFrame]:
+    """Yield frames until `stopped`; what breaks off is opened again, after growing pauses, and numbers go on."""
     source, first, pauses = video.source, 0, iter(RETRY_AFTER_S)
     while True:
         number = -1
         try:
             with opened:
-                if first:
-                    video = opened.enter_context(open_video(source))
+                video = opened.enter_context(open_video(source)) if first else video
                 for number, image in video.frames(every):
                     if stopped.is_set():
                         return

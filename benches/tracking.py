@@ -17,7 +17,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from trackers.eval import evaluate_mot_sequences
 
 from limo_hog import PeopleDetector
@@ -34,18 +33,17 @@ PICTURES, ARENA_HZ = 200, 10
 FAMILIES = ["CLEAR", "HOTA", "Identity"]
 #: A person's number, box x, y, w, h [px], and class.
 Person = tuple[int, Any, int]
-Frame = tuple[NDArray[np.uint8], list[Person]]
 
 
-def tud(pictures: Path, truth: Path) -> Iterator[Frame]:
+def tud(pictures: Path, truth: Path) -> Iterator[tuple[Any, list[Person]]]:
     """Yield the frames of TUD-Stadtmitte; MOTChallenge counts pixels from 1."""
     rows = np.loadtxt(truth, delimiter=",")
     for number in range(1, 42):
         people = [(int(row[1]), row[2:6] - [1, 1, 0, 0], PERSON) for row in rows[rows[:, 0] == number]]
-        yield np.asarray(cv2.imread(str(pictures / f"{number:06d}.jpg")), np.uint8), people
+        yield cv2.imread(str(pictures / f"{number:06d}.jpg")), people
 
 
-def arena(name: str) -> Iterator[Frame]:
+def arena(name: str) -> Iterator[tuple[Any, list[Person]]]:
     """Yield what a robot that stands sees of a scenario."""
     arena = Arena(Scenario.load(name), seed=0)
     for _ in range(PICTURES):
@@ -67,8 +65,8 @@ def numbered(found: list[Detections], how: str, fps: float) -> Iterator[Iterator
 def write(path: Path, frames: Iterable[Iterable[Person]]) -> None:
     """Write MOTChallenge's lines."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = ((n, who, *box, 1, kind) for n, people in enumerate(frames, 1) for who, box, kind in people)
-    path.write_text("".join(",".join(map(str, line)) + "\n" for line in lines))
+    rows = [(number, who, *box, 1, kind) for number, people in enumerate(frames, 1) for who, box, kind in people]
+    np.savetxt(path, rows, "%g", ",")
 
 
 def main() -> None:
@@ -79,8 +77,8 @@ def main() -> None:
     args = parser.parse_args()
     truth = args.data / "real" / "annotations" / "TUD-Stadtmitte_gt.txt"
     # The smallest person of TUD is as docs/models.md has it.
-    sets = {"TUD 1–41": (96.0, 25.0, {"TUD 1–41": tud(args.frames, truth)})}
-    sets["arena, all five"] = (64.0, float(ARENA_HZ), {name: arena(name) for name in SCENARIOS})
+    sets = {"TUD 1–41": (96, 25, {"TUD 1–41": tud(args.frames, truth)})}
+    sets["arena, all five"] = (64, ARENA_HZ, {name: arena(name) for name in SCENARIOS})
     print("|  | tracker | HOTA | IDF1 | MOTA | recall | precision | switches |\n|---|---|---|---|---|---|---|---|")
     for group, (min_height, fps, sequences) in sets.items():
         with tempfile.TemporaryDirectory() as folder:

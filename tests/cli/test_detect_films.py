@@ -27,14 +27,9 @@ from limo_hog.cli.main import main
 from limo_hog.imaging import reading
 
 
-@pytest.fixture
-def film(tmp_path: Path) -> Path:
-    film_of(tmp_path / "walk.mp4")
-    return tmp_path / "walk.mp4"
-
-
-def test_people_of_a_film_are_numbered_in_every_format(film: Path, tmp_path: Path) -> None:
+def test_people_of_a_film_are_numbered_in_every_format(tmp_path: Path) -> None:
     pytest.importorskip("trackers", reason="needs limo-hog[track]")
+    film_of(film := tmp_path / "walk.mp4")
     names = {name: tmp_path / f"people.{name}" for name in ("json", "csv", "mot", "coco")}
     options = [word for name, file in names.items() for word in (f"--{name}", str(file))]
     assert main(["detect", str(film), "--track", "--out", str(tmp_path / "out"), *options]) == 0
@@ -68,26 +63,23 @@ def test_copies_of_a_film_are_of_the_same_bytes(tmp_path: Path, monkeypatch: Mon
     assert (tmp_path / "1" / "walk.mp4").read_bytes() == (tmp_path / "200" / "walk.mp4").read_bytes()
 
 
-class Capture:
-    """An open `cv2.VideoCapture` that breaks off after some frames, whose grey is their number; of 0, a closed one."""
+def capture(frames: int, period_s: float = 0.01) -> Mock:
+    """Stand for a `cv2.VideoCapture` that breaks off after some frames, whose grey is their number; 0: a closed one."""
+    camera = Mock(number=0)
 
-    def __init__(self, frames: int, period_s: float = 0.01) -> None:
-        self.frames, self.period_s, self.number = frames, period_s, 0
-        self.get, self.release = Mock(return_value=0.0), Mock()
+    def grab() -> bool:
+        time.sleep(period_s)
+        camera.number += 1
+        return bool(camera.number <= frames)
 
-    def isOpened(self) -> bool:
-        return self.frames > 0
+    def retrieve() -> tuple[bool, Any]:
+        return True, np.full((96, 96, 3), camera.number % 256, np.uint8)
 
-    def grab(self) -> bool:
-        time.sleep(self.period_s)
-        self.number += 1
-        return self.number <= self.frames
-
-    def retrieve(self) -> tuple[bool, np.ndarray[Any, Any]]:
-        return True, np.full((96, 96, 3), self.number % 256, np.uint8)
+    camera.configure_mock(isOpened=lambda: frames > 0, get=lambda _: 0.0, grab=grab, retrieve=retrieve)
+    return camera
 
 
-def play(monkeypatch: MonkeyPatch, *captures: Capture) -> None:
+def play(monkeypatch: MonkeyPatch, *captures: Mock) -> None:
     """Let a live source be opened as these, one after another; then its user stops it."""
     monkeypatch.setattr(cv2, "VideoCapture", Mock(side_effect=[*captures, KeyboardInterrupt]))
     monkeypatch.setattr(reading, "RETRY_AFTER_S", (0.01, 0.02, 0.04))
@@ -100,7 +92,7 @@ SLOW = pytest.param(7500, marks=[pytest.mark.slow, pytest.mark.timeout(600)])
 def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
     frames: int, monkeypatch: MonkeyPatch, capsys: CaptureFixture[str]
 ) -> None:
-    camera, behind = Capture(frames, period_s=0.04), []
+    camera, behind = capture(frames, period_s=0.04), []
 
     def slow(_: PeopleDetector, image: np.ndarray[Any, Any]) -> Detections:
         behind.append((camera.number - int(image[0, 0, 0])) % 256)
@@ -125,7 +117,7 @@ def test_a_detector_slower_than_a_camera_gets_its_newest_frame(
 def test_a_stream_that_breaks_off_is_one_line_and_comes_back_or_fails(
     then: tuple[int, ...], code: int, said: str, monkeypatch: MonkeyPatch, tmp_path: Path, capsys: CaptureFixture[str]
 ) -> None:
-    play(monkeypatch, *map(Capture, (3, *then)))
+    play(monkeypatch, *map(capture, (3, *then)))
     assert main(["detect", "rtsp://camera/live", "--out", str(tmp_path), "--json", "-"]) == code
     shown = capsys.readouterr()
     numbers = [result["frame"] for result in lines_of(shown.out)]
@@ -137,30 +129,30 @@ def test_a_stream_that_breaks_off_is_one_line_and_comes_back_or_fails(
     assert told == [f"limo-hog: rtsp://camera/live: {line}" for line in (first, said)]
 
 
-#: `detect` of a camera of 50/s.
-_LIVE = """
-import cv2, sys
-from tests.cli.test_detect_films import Capture
+#: `detect` of a camera of 50/s, which ends in a kill.
+_KILLED = """
+import cv2, os, sys
+from tests.cli.test_detect_films import capture
 from limo_hog.cli.main import main
-cv2.VideoCapture = lambda *_: Capture(10_000, period_s=0.02)
+cv2.VideoCapture = lambda *_: camera
+camera = capture(200, period_s=0.02)
+camera.release = lambda: os.kill(os.getpid(), 9)
 main(["detect", "0", "--out", sys.argv[1], "--json", "-"])
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
 def test_a_killed_run_loses_the_last_second_of_a_live_copy_alone(tmp_path: Path) -> None:
-    root = Path(__file__).parents[2]
-    with subprocess.Popen([sys.executable, "-c", _LIVE, str(tmp_path)], cwd=root, stdout=subprocess.PIPE) as run:
-        assert run.stdout is not None
-        searched = len([run.stdout.readline() for _ in range(150)])
-        run.kill()
-        searched += len(run.stdout.readlines())
-    assert 0 < searched - frames_of(tmp_path / "0.mp4") <= 25 + 20  # of 25/s, and what the encoder holds
+    command = [sys.executable, "-c", _KILLED, str(tmp_path)]
+    done = subprocess.run(command, cwd=Path(__file__).parents[2], stdout=subprocess.PIPE, check=False)
+    assert done.returncode == -9
+    lost = len(done.stdout.splitlines()) - frames_of(tmp_path / "0.mp4")
+    assert 0 < lost <= 25 + 20  # of 25/s, and what the encoder holds
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
-def test_the_page_shows_a_film_in_real_time_pauses_and_sets_the_threshold(film: Path) -> None:
-    film_of(film, frames=600)
+def test_the_page_shows_a_film_in_real_time_pauses_and_sets_the_threshold(tmp_path: Path) -> None:
+    film_of(film := tmp_path / "walk.mp4", frames=600)
     command = [str(LIMO_HOG), "detect", str(film), "--view", "0"]
     with chromium() as browser, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
         assert run.stderr is not None

@@ -149,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
             # Imported here: the server is an extra.
             from limo_hog.cli.support.film_page import FilmPage
 
-            run.page = stack.enter_context(FilmPage(detector.least_score, run.set_threshold, *args.view))
+            run.page = stack.enter_context(FilmPage(run, *args.view))
             announce(run.page.url)
         only = args.out is None and not tables
         results = stack.enter_context(json_lines(args.json, parameters, args.resume, args.overwrite, only))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +15,20 @@ from limo_hog.imaging.writing import jpeg
 from limo_hog.live.controls import Parameter, ParameterError
 from limo_hog.live.server import Live
 
-#: A picture that was searched, boxes and numbers drawn into it; and how many of a live source nobody took so far.
-Shown = tuple[Row, NDArray[np.uint8], int]
+if TYPE_CHECKING:
+    from limo_hog.cli.support.pictures import Run
+
+#: A picture that was searched, and the same with boxes and numbers drawn into it.
+Shown = tuple[Row, NDArray[np.uint8]]
 
 
 class FilmPage(Live[Shown]):
-    """The live page of `detect`: pictures with boxes, their rate, a pause, and the threshold.
+    """The live page of a `detect` run: pictures with boxes, their rate, a pause, and the threshold, which it sets."""
 
-    `set_threshold` is called, from the server's thread, with the SVM margin that the page asks for.
-    """
-
-    def __init__(self, threshold: float, set_threshold: Callable[[float], None], host: str, port: int) -> None:
+    def __init__(self, run: Run, host: str, port: int) -> None:
         super().__init__("limo_hog.live", self, host, port)
-        about = "Least margin of a box that is shown."
-        self._range = Parameter("threshold", threshold, low=-1.0, high=3.0, unit="SVM margin", tooltip=about)
-        self.threshold, self._use = threshold, set_threshold
+        about = ("SVM margin", "Least margin of a box that is shown.")
+        self._run, self._threshold = run, Parameter("threshold", run.threshold, -1.0, 3.0, *about)
         # When the last pictures came, over which their rate is taken.
         self._times = deque[float](maxlen=25)
 
@@ -45,16 +43,15 @@ class FilmPage(Live[Shown]):
         """Set the threshold; raises `ParameterError`."""
         if name != "threshold":
             raise ParameterError(f"no parameter {shown(name)}; threshold is the only one")
-        self.threshold = self._range.checked(value)
-        self._use(self.threshold)
+        self._run.set_threshold(self._threshold.checked(value))
 
     def _welcome(self) -> dict[str, Any]:
-        return {"threshold": {"min": self._range.low, "max": self._range.high, "value": self.threshold}}
+        return {"threshold": {"min": self._threshold.low, "max": self._threshold.high, "value": self._run.threshold}}
 
     def _state(self, moment: Shown) -> dict[str, Any]:
         """Return what the page's elements say, by their ids."""
-        (row, _, dropped), times = moment, list(self._times)
-        ids = () if row.people.ids is None else row.people.ids.tolist()
+        row, times = moment[0], list(self._times)
+        ids = row.people.to_dict().get("ids")
         return {
             "source": row.source,
             "frame": row.frame,
@@ -62,8 +59,8 @@ class FilmPage(Live[Shown]):
             "ids": f"in view: {', '.join(map(str, ids))}" if ids else "",
             "detect": f"{row.ms:.1f} ms",
             "rate": f"{(len(times) - 1) / (times[-1] - times[0]):.1f}/s" if len(times) > 1 else "–",
-            "dropped": dropped,
-            "margin": f"{self.threshold:.2f}",
+            "dropped": self._run.dropped,
+            "margin": f"{self._run.threshold:.2f}",
             "pause": "Go on" if self.pace.paused else "Pause",
         }
 

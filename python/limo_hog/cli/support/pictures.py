@@ -103,11 +103,10 @@ class Run:
 
     def set_threshold(self, threshold: float) -> None:
         """Report people from another SVM margin on, from the next picture on."""
-        self._threshold = threshold
+        self.threshold = threshold
         if self._tracker is not None:
             self._tracker.set_threshold(threshold)
-        fed = FED if self._args.track else 0.0
-        self._detector = replace(self._detector, threshold=threshold - fed)
+        self._detector = replace(self._detector, threshold=threshold - FED * bool(self._args.track))
 
     def look(self, results: Results) -> None:
         """Search every input."""
@@ -240,7 +239,7 @@ class Run:
             self._fail(str(error))
 
     def _tracker_at(self, rate: float) -> Tracker | None:
-        return Tracker(self._args.track, self._threshold, rate) if self._args.track else None
+        return Tracker(self._args.track, self.threshold, rate) if self._args.track else None
 
     def _work(self, source: Source, frame: tuple[int, Image | None, float]) -> tuple[Row, Image | None] | str:
         """Search a frame, or the picture that is read here; return what is wrong where that fails."""
@@ -267,7 +266,7 @@ class Run:
             found = replace(found, people=self._tracker.update(found.people, found.at if live else None))
             picture = None if picture is None else self._tracker.draw(found.people, picture)
         if self.page and picture is not None:
-            self.page.watch((found, picture, self.dropped), None if live else found.at)
+            self.page.watch((found, picture), None if live else found.at)
         return found, picture
 
     def _is_done(self, source: Source) -> bool:

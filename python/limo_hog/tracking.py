@@ -76,12 +76,8 @@ class Tracker:
     def update(self, found: Detections, time: float | None = None) -> Detections:
         """Return the people among `found` who were seen before, with their `ids`, best first.
 
-        Parameters
-        ----------
-        found
-            All that the detector finds from `lowest` on in the next picture.
-        time
-            When the picture was taken [s], for a film without a steady rate.
+        `found` is all that the detector finds from `lowest` on in the next picture. `time` [s] is when that was taken,
+        for a film without a steady rate.
         """
         given = found.to_supervision()
         given.confidence = found.scores

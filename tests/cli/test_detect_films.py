@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -35,17 +36,15 @@ def test_people_of_a_film_are_numbered_in_every_format(tmp_path: Path) -> None:
     assert main(["detect", str(film), "--track", "--out", str(tmp_path / "out"), *options]) == 0
     assert frames_of(tmp_path / "out" / "walk.mp4") == 12
     results = lines_of(names["json"].read_text())
-    assert all(len(result["ids"]) == len(result["boxes"]) for result in results)
-    known = [(result["frame"], who) for result in results for who in result["ids"]]
-    counts = [sum(who == one for _, who in known) for one in {who for _, who in known}]
-    assert max(counts) >= 8  # the street moves by 4 px a frame
-    rows = list(csv.DictReader(names["csv"].read_text().splitlines()))
-    assert [(int(row["frame"]), int(row["id"])) for row in rows] == known
-    mot = np.loadtxt(names["mot"], delimiter=",", ndmin=2)
-    assert [(int(frame) - 1, int(who)) for frame, who in mot[:, :2]] == known
-    assert mot[0, 2:6].tolist() == [int(rows[0]["x"]) + 1, int(rows[0]["y"]) + 1, int(rows[0]["w"]), int(rows[0]["h"])]
+    each = [(result["frame"], *one) for result in results for one in zip(result["ids"], result["boxes"], strict=True)]
+    known = [(frame, who, *box) for frame, who, box in each]
+    assert max(Counter(who for _, who, *_ in known).values()) >= 8  # the street moves by 4 px a frame
+    rows = csv.DictReader(names["csv"].read_text().splitlines())
+    assert [tuple(int(row[name]) for name in ("frame", "id", *"xywh")) for row in rows] == known
+    mot = np.loadtxt(names["mot"], delimiter=",", ndmin=2)[:, :6]
+    assert [tuple(line) for line in mot - [1, 0, 1, 1, 0, 0]] == known  # it counts from 1
     coco = json.loads(names["coco"].read_text())["annotations"]
-    assert [one["track_id"] for one in coco] == [who for _, who in known]
+    assert [(one["image_id"] - 1, one["track_id"], *one["bbox"]) for one in coco] == known
     # Gone on with, numbers are those of one run.
     half = tmp_path / "half.json"
     half.write_text("".join(names["json"].read_text().splitlines(keepends=True)[:5]))

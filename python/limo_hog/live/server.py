@@ -17,6 +17,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -178,7 +179,7 @@ class Live(ABC, Generic[Moment]):
         own = [file for file in files(self._package).joinpath("page").iterdir() if file.name != "view.css"]
         for file in (files("limo_hog.live").joinpath("page").joinpath("view.css"), *own):
             where = "/" if file.name == "index.html" else f"/{file.name}"
-            app.router.add_get(where, _page(file.read_bytes(), _KINDS[file.name.rpartition(".")[2]]))
+            app.router.add_get(where, partial(_file, file.read_bytes(), _KINDS[file.name.rpartition(".")[2]]))
         app.router.add_get("/live", self._live)
         logger: Any = QuietLogger(logging.getLogger("limo_hog.live"), {})
         # Connections that ask nothing, or never finish asking, do not hold up the end.
@@ -287,13 +288,8 @@ async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
     response.headers.update(HEADERS)
 
 
-def _page(body: bytes, kind: str) -> Any:
-    async def answer(_: web.Request) -> web.Response:
-        return web.Response(
-            body=body, content_type=f"text/{kind}", charset="utf-8", headers={"Cache-Control": "no-cache"}
-        )
-
-    return answer
+async def _file(body: bytes, kind: str, _: web.Request) -> web.Response:
+    return web.Response(body=body, content_type=f"text/{kind}", charset="utf-8", headers={"Cache-Control": "no-cache"})
 
 
 def _finite(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
     from limo_hog.cli.support.pictures import Run
 
     with ExitStack() as stack:
-        bar = None
+        bar = page = None
         if sys.stderr.isatty():
             # Imported only where it is shown: rich takes a sixth of a call for one picture.
             from limo_hog.cli.support.progress import progress
@@ -149,8 +149,9 @@ def run(args: argparse.Namespace) -> int:
             # Imported here: the server is an extra.
             from limo_hog.cli.support.film_page import FilmPage
 
-            run.page = stack.enter_context(FilmPage(run, *args.view))
-            announce(run.page.url)
+            page = stack.enter_context(FilmPage(run, *args.view))
+            run.show = page.watch
+            announce(page.url)
         only = args.out is None and not tables
         results = stack.enter_context(json_lines(args.json, parameters, args.resume, args.overwrite, only))
         start = time.perf_counter()
@@ -161,7 +162,7 @@ def run(args: argparse.Namespace) -> int:
             for path, write in tables.items():
                 write(path, run.results or [])
             summary = run.summary(time.perf_counter() - start)
-            if run.page:
-                run.page.end({"summary": summary})
+            if page:
+                page.end({"summary": summary})
             print(summary, file=sys.stderr)
     return 1 if run.failed else 0

@@ -44,8 +44,6 @@ from limo_hog.tracking import FED, Tracker
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from limo_hog.cli.support.film_page import FilmPage
-
 Image = NDArray[np.uint8]
 #: Pictures that are tracked are taken for a film of this rate [Hz].
 _PICTURES_HZ = 25.0
@@ -74,8 +72,8 @@ class Run:
         self._done: dict[str, set[int]] = defaultdict(set)
         #: The result of each picture, kept if a table is written at the end.
         self.results: list[Result] | None = [] if args.csv or args.coco or args.mot else None
-        #: The live page, where one is wanted.
-        self.page: FilmPage | None = None
+        #: Shows a picture, drawn into, at its time in a film [s] on the live page, where one is wanted.
+        self.show: Callable[[tuple[Row, Image], float | None], None] | None = None
         self._tracker: Tracker | None = None
         self.set_threshold(detector.least_score)
         self._task = bar.add_task("looking", total=0) if bar else None
@@ -250,7 +248,7 @@ class Run:
             detections = self._detector.detect(image)
             ms = 1e3 * (time.perf_counter() - start)
             picture = None
-            if source in self._copies or self.page is not None:
+            if source in self._copies or self.show is not None:
                 # Numbers are known later, so that boxes are drawn later then.
                 picture = image if self._args.track else detections.draw(image)
         except (ImageError, OSError, MemoryError) as error:
@@ -265,8 +263,8 @@ class Run:
         if self._tracker is not None:
             found = replace(found, people=self._tracker.update(found.people, found.at if live else None))
             picture = None if picture is None else self._tracker.draw(found.people, picture)
-        if self.page and picture is not None:
-            self.page.watch((found, picture), None if live else found.at)
+        if self.show and picture is not None:
+            self.show((found, picture), None if live else found.at)
         return found, picture
 
     def _is_done(self, source: Source) -> bool:

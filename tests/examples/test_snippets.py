@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,6 @@ from tests.examples.pages import ROOT, Page
 import limo_hog
 from limo_hog.cli.support.scene import street
 from limo_hog.imaging.writing import video_writer, write_image
-from limo_sim.run.arena import STEPS_PER_SECOND, Arena
-from limo_sim.world.scenario import Scenario
 
 cv2: Any = typed_cv2  # its types do not know `ml`
 
@@ -122,15 +121,14 @@ def test_coming_from_other_libraries(folder: Path) -> None:
 
 def test_people_in_a_film_of_the_arena_are_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("trackers", reason="needs limo-hog[track]")
-    arena = Arena(Scenario.load("sharp_turns"), 0)
+    from benches.tracking import arena
+
     with video_writer(folder / "walk.mp4", fps=10) as write:
-        for _ in range(150):
-            for _ in range(STEPS_PER_SECOND // 10):
-                arena.step()
-            frame = arena.frame()
-            write(frame.image)
-    (person,) = frame.truth.people
-    assert person is not None and person.box is not None and person.box[0] + person.box[2] < 320
+        for image, people in islice(arena("sharp_turns"), 150):
+            write(image)
+            seen = people
+    ((_, (left, _, width, _), _),) = seen
+    assert left + width < 320
     (block,) = [block for block in Page(ROOT / "docs" / "detect.md").python if "LineZone" in block]
     assert len(block.replace("\n\n", "\n").splitlines()) <= 15
     exec(compile(block, "docs/detect.md", "exec"), {})

@@ -1,16 +1,17 @@
 # /// script
 # requires-python = ">=3.11"
-# dependencies = ["jax>=0.7", "limo-hog", "numpy", "opencv-python-headless>=4.8,<5", "optax>=0.2"]
+# dependencies = ["jax>=0.7", "limo-hog[train]", "numpy", "opencv-python-headless>=4.8,<5", "optax>=0.2"]
 # [tool.uv.sources]
 # limo-hog = { path = ".." }
 # ///
 """Trains the network of the detector's second look, and measures it; docs/models.md says where the data is.
 
     uv run --script benches/second_look.py --people inria/positive mit/Positive --crops inria/negative \
-        --photographs photographs/images --data ../shared/data --frames TUD --out second_look.f16
+        --photographs photographs/images --streets motion-pairs --data ../shared/data --frames TUD --out second_look.f16
 
 writes the weights (float16, little-endian) and beside them a card. All that is drawn comes from `--seed`.
-The windows that `limo` takes for people on the photographs are mined first and kept in `--mined`, if that is named.
+The windows that `limo` takes for people on the photographs are mined first, and what it finds on parts of the people of
+the streets.
 Weights that are there are not trained again: only their card is made.
 """
 
@@ -22,10 +23,11 @@ import json
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import cv2
 import jax
@@ -38,8 +40,8 @@ from limo_hog import PeopleDetector, __version__
 from limo_hog.learn.card import calibrate, calibration_error
 from limo_hog.learn.evaluation.run import Evaluation, Rival, evaluate
 from limo_hog.learn.sources import hash_of
-from limo_hog.models import Calibration, SecondLook, load_model
-from limo_hog.suppression import nms
+from limo_hog.models import PERSON_BOX, Calibration, SecondLook, load_model
+from limo_hog.suppression import intersection_over_union, nms, share_inside
 from rivals import tud, usc
 
 #: The first look: the large window, which alone serves people from 64 px on.
@@ -53,16 +55,31 @@ SOURCE = WIDTH + 2 * MARGIN, HEIGHT + 2 * MARGIN * 2
 #: The network's input, and its layers: channels of three convolutions of stride 2, and units of the dense layer.
 INPUT = 32, 64
 CHANNELS, KERNELS = (16, 32, 64), (5, 3, 3)
-HIDDEN = 16
+HIDDEN = 32
 #: Mined: least margin, most windows of a photograph, most overlap (IoU) of two.
 LEAST_MARGIN, MOST, MOST_IOU = -1.3, 25, 0.7
-#: An epoch: people, negatives for each, share of these that are parts of people, and from epoch HARD_FROM on of the
-#: others the share of the hardest.
-PEOPLE, NEGATIVES, PARTS, HARDEST, HARD_FROM = 8192, 3, 1 / 6, 0.5, 2
-BATCH, RATE, DECAY, DROPOUT, SURE = 256, 2e-3, 0.02, 0.4, 0.99
+#: The streets: size of the pictures that belong to them [px], least height of a person [px], and bounds of a person's
+#: width [heights]; a window on a labelled person (share inside) that is not the person's (IoU) shows a part.
+STREET, TALL, SLIM, INSIDE, NOT_THE_PERSON = (720, 576), 70, (0.2, 0.62), 0.7, 0.3
+#: Height of a person in a window of INRIA's and MIT's [px], and of the streets', and how far below its upper edge.
+PERSON, STREET_PERSON, ABOVE = 96, 0.76, 0.12
+#: An epoch: people, negatives for each, shares of these that are cut out of people, and that are parts found on the
+#: streets, from epoch HARD_FROM on of the others the share of the hardest; and people for their places alone.
+PEOPLE, NEGATIVES, PARTS, FOUND_PARTS, HARDEST, HARD_FROM, PLACES = 8192, 3, 1 / 6, 1 / 12, 0.5, 2, 4096
+BATCH, RATE, DECAY, DROPOUT, SURE, LARGEST_STEP = 256, 2e-3, 0.02, 0.4, 0.99, 1.0
+#: How much the places' loss counts, and where it passes from squares to lines.
+PLACE_SHARE, PLACE_SQUARE = 0.05, 0.1
 
 Images = NDArray[np.uint8]
 Params = dict[str, jax.Array]
+
+
+@dataclass(frozen=True)
+class People:
+    """Crops (N, 160, 80), and each person (N, 4): right and down of the middle, width (NaN: unknown), height [px]."""
+
+    crops: Images
+    places: NDArray[np.float32]
 
 
 def main() -> None:
@@ -71,7 +88,7 @@ def main() -> None:
     parser.add_argument("--people", type=Path, nargs="+", required=True, help="folders of 64 x 128 crops of people")
     parser.add_argument("--crops", type=Path, required=True, help="a folder of such crops without people")
     parser.add_argument("--photographs", type=Path, required=True, help="a folder of photographs without people")
-    parser.add_argument("--mined", type=Path, help="file in which the mined windows are kept (.npy)")
+    parser.add_argument("--streets", type=Path, required=True, help="with JPEGImages, and people in Annotations (VOC)")
     parser.add_argument("--data", type=Path, required=True, help="with eval/usc-c and real/annotations")
     parser.add_argument("--frames", type=Path, required=True, help="frames 1 to 41 of TUD-Stadtmitte")
     parser.add_argument("--out", type=Path, required=True)
@@ -87,6 +104,7 @@ def main() -> None:
         "sha256": hashlib.sha256(weights).hexdigest(),
         **measured(weights, args.data, args.frames),
         "data": [source(folder) for folder in (*args.people, args.crops, args.photographs)],
+        "streets": [source(args.streets / folder) for folder in ("JPEGImages", "Annotations")],
         "seed": args.seed,
         "epochs": args.epochs,
     }
@@ -96,19 +114,56 @@ def main() -> None:
 
 def learnt(args: argparse.Namespace) -> bytes:
     """Mine and train."""
-    people = np.unique(np.concatenate([crops(folder) for folder in args.people]), axis=0)
-    if args.mined is not None and args.mined.exists():
-        mined = np.load(args.mined)
-    else:
-        mined = np.stack(list(mine(args.photographs)))
-        if args.mined is not None:
-            np.save(args.mined, mined)
-    negatives = np.concatenate([crops(args.crops), mined])
-    print(f"{len(people)} people, {len(negatives)} negatives, {len(mined)} of them mined", flush=True)
-    params = train(people, negatives, args.epochs, args.seed)
+    plain = np.unique(np.concatenate([crops(folder) for folder in args.people]), axis=0)
+    walking, parts = streets(args.streets)
+    people = People(
+        np.concatenate([plain, walking.crops]),
+        np.concatenate([np.tile(np.float32([0, 0, np.nan, PERSON]), (len(plain), 1)), walking.places]),
+    )
+    negatives = np.concatenate([crops(args.crops), np.stack(list(mine(args.photographs))), parts])
+    print(f"{len(people.crops)} people, {len(negatives)} negatives, {len(parts)} of them parts of people", flush=True)
+    params = train(people, negatives, len(parts), args.epochs, args.seed)
     # (jax sorts a dictionary's keys, which puts a bias before its weights.)
     ordered = [np.asarray(params[f"{layer}{kind}"]).ravel() for layer in range(5) for kind in "wb"]
     return np.concatenate(ordered).astype("<f2").tobytes()
+
+
+def streets(folder: Path) -> tuple[People, Images]:
+    """Return the people of the streets, seen whole, and windows that `limo` finds on parts of them."""
+    detector = PeopleDetector(model=LIMO, threshold=LEAST_MARGIN, nms="group", group_threshold=0)
+    whole, places, parts = [], [], []
+    for path in sorted((folder / "Annotations").glob("*.xml")):
+        picture = folder / "JPEGImages" / f"{path.stem}.jpg"
+        image = gray(picture) if picture.exists() else None
+        boxes = list(labelled(path))
+        if image is None or image.shape[::-1] != STREET or not boxes:
+            continue
+        for x, y, w, h in boxes:
+            is_inside = x > 2 and y > 2 and x + w < STREET[0] - 3 and y + h < STREET[1] - 3
+            if h < TALL or not SLIM[0] <= w / h <= SLIM[1] or not is_inside:
+                continue
+            height = h / STREET_PERSON
+            window = np.rint([x + w / 2 - height / 4, y - ABOVE * height, height / 2, height]).astype(np.int32)
+            whole.append(cut(image, window))
+            right, down = x + w / 2 - window[0], y + h / 2 - window[1]
+            across, along = WIDTH / window[2], HEIGHT / window[3]
+            places.append((right * across - WIDTH / 2, down * along - HEIGHT / 2, w * across, h * along))
+        found = detector.detect(image)
+        windows = found.windows[nms(found.windows, found.scores, MOST_IOU)[:60]]
+        people, there = PERSON_BOX.inside(windows), np.array(boxes)
+        is_part = intersection_over_union(people, there).max(axis=1, initial=0) < NOT_THE_PERSON
+        is_part &= share_inside(people, there).max(axis=1, initial=0) > INSIDE
+        parts += [cut(image, window) for window in windows[is_part]]
+    return People(np.stack(whole), np.array(places, np.float32)), np.stack(parts)
+
+
+def labelled(path: Path) -> Iterator[tuple[float, float, float, float]]:
+    """Yield the people's boxes x, y, w, h [px] of a file of PASCAL VOC's format, which counts pixels from 1."""
+    for thing in ElementTree.parse(path).iter("object"):
+        if thing.findtext("name") == "person":
+            sides = ("xmin", "ymin", "xmax", "ymax")
+            x, y, right, below = (float(thing.findtext(f"bndbox/{side}", "0")) for side in sides)
+            yield x - 1, y - 1, right - x + 1, below - y + 1
 
 
 def source(folder: Path) -> dict[str, Any]:
@@ -121,9 +176,7 @@ def measured(weights: bytes, data: Path, frames: Path) -> dict[str, Any]:
     """Return share, threshold (.1 false positives an image of USC-C), calibration (Platt, on both sets) and figures."""
 
     def figures(name: str, pictures: list[Any], min_height: int, look: SecondLook) -> Evaluation:
-        detector = PeopleDetector(
-            model=replace(LIMO, second_look=look), min_height=min_height, threshold=LEAST_SCORE, second_look=True
-        )
+        detector = PeopleDetector(model=replace(LIMO, second_look=look), min_height=min_height, threshold=LEAST_SCORE)
         return evaluate([Rival(name, detector)], pictures)[1][0]
 
     look = SecondLook(CHANNELS, HIDDEN, weights, SHARE, LEAST_SCORE, Calibration(1.0, 0.0))
@@ -189,11 +242,24 @@ def cut(image: Images, box: NDArray[np.int32]) -> Images:
     return cv2.resize(region, SOURCE, interpolation=way)
 
 
-def drawn(sources: Images, at: NDArray[np.intp], parts: bool, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Return these sources, varied as the search, light and cameras vary them: (N, 64, 32), normalised."""
+def drawn(
+    sources: Images,
+    at: NDArray[np.intp],
+    rng: np.random.Generator,
+    kind: str = "as found",
+    places: NDArray[np.float32] | None = None,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return these sources, varied as the search, light and cameras vary them, and where the people stand.
+
+    `kind`: "as found" by the search; "parts" of people, or people off the middle; "off": by as much as windows are that
+    still find the person. Inputs are (N, 64, 32), normalised; places (N, 4) as the network answers, NaN: unknown.
+    """
     size = np.exp(rng.uniform(math.log(0.94), math.log(1.06), len(at)))
     shift = rng.uniform(-5, 5, (len(at), 2))
-    if parts:
+    if kind == "off":
+        size = np.exp(rng.uniform(math.log(0.78), math.log(1.28), len(at)))
+        shift = rng.uniform(-1, 1, (len(at), 2)) * (9, 15)
+    if kind == "parts":
         near = rng.random(len(at)) < 0.6
         side = np.where(near, rng.uniform(0.4, 0.7, len(at)), rng.uniform(0.8, 1.3, len(at)))
         size = 1 / side
@@ -228,7 +294,14 @@ def drawn(sources: Images, at: NDArray[np.intp], parts: bool, rng: np.random.Gen
     one = (len(at), 1, 1)
     out = out * rng.uniform(0.6, 1.5, one).astype(np.float32) + rng.uniform(-25, 25, one).astype(np.float32)
     out += 2 * rng.standard_normal(out.shape, np.float32)
-    return normalised(np.clip(out, 0, 255))
+    where = np.full((len(at), 4), np.nan, np.float32)
+    if places is not None:
+        right, down, width, height = places[at].T
+        where[:, 0] = (right - shift[:, 0]) * size * flip / WIDTH + (0.5 - PERSON_BOX.x - PERSON_BOX.width / 2)
+        where[:, 1] = (down - shift[:, 1]) * size / HEIGHT + (0.5 - PERSON_BOX.y - PERSON_BOX.height / 2)
+        where[:, 2] = np.log(width * size / (PERSON_BOX.width * WIDTH))
+        where[:, 3] = np.log(height * size / (PERSON_BOX.height * HEIGHT))
+    return normalised(np.clip(out, 0, 255)), where
 
 
 def normalised(inputs: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -247,12 +320,12 @@ def begin(rng: np.random.Generator) -> Params:
         before = channels
     cells = (INPUT[0] // 8) * (INPUT[1] // 8) * before
     params["3w"], params["3b"] = rng.standard_normal((cells, HIDDEN)) * math.sqrt(2 / cells), np.zeros(HIDDEN)
-    params["4w"], params["4b"] = rng.standard_normal((HIDDEN, 1)) * math.sqrt(1 / HIDDEN), np.zeros(1)
+    params["4w"], params["4b"] = rng.standard_normal((HIDDEN, 5)) * math.sqrt(1 / HIDDEN), np.zeros(5)
     return {name: jnp.asarray(value, jnp.float32) for name, value in params.items()}
 
 
-def logits(params: Params, inputs: jax.Array, key: jax.Array | None = None) -> jax.Array:
-    """Return the network's answers (N,) to inputs (N, 64, 32); with a key, as in training."""
+def answers(params: Params, inputs: jax.Array, key: jax.Array | None = None) -> jax.Array:
+    """Return the network's answers (N, 5) to inputs (N, 64, 32); with a key, as in training."""
     x = inputs[..., None]
     for i, kernel in enumerate(KERNELS):
         count, rows, columns, _ = x.shape
@@ -267,53 +340,65 @@ def logits(params: Params, inputs: jax.Array, key: jax.Array | None = None) -> j
     if key is not None:
         x = jnp.where(jax.random.bernoulli(key, 1 - DROPOUT, x.shape), x / (1 - DROPOUT), 0)
     x = jax.nn.relu(x @ params["3w"] + params["3b"])
-    return (x @ params["4w"] + params["4b"])[:, 0]
+    return x @ params["4w"] + params["4b"]
 
 
-def train(people: Images, negatives: Images, epochs: int, seed: int) -> Params:
-    """Return a trained network."""
+def train(people: People, negatives: Images, parts: int, epochs: int, seed: int) -> Params:
+    """Return a trained network; the last `parts` of the negatives are parts of people."""
     rng = np.random.default_rng(seed)
     params = begin(rng)
-    steps = epochs * PEOPLE * (1 + NEGATIVES) // BATCH
-    optimiser = optax.adamw(optax.cosine_decay_schedule(RATE, steps), weight_decay=DECAY)
+    count = PEOPLE * NEGATIVES
+    steps = epochs * ((PEOPLE + count + PLACES) // BATCH)
+    schedule = optax.cosine_decay_schedule(RATE, steps)
+    optimiser = optax.chain(optax.clip_by_global_norm(LARGEST_STEP), optax.adamw(schedule, weight_decay=DECAY))
 
     @jax.jit
-    def step(params: Params, state: Any, inputs: jax.Array, wanted: jax.Array, key: jax.Array) -> Any:
-        def loss(params: Params) -> tuple[jax.Array, jax.Array]:
-            answers = logits(params, inputs, key)
-            return optax.sigmoid_binary_cross_entropy(answers, wanted).mean(), answers
+    def step(params: Params, state: Any, inputs: jax.Array, wanted: jax.Array, where: jax.Array, key: jax.Array) -> Any:
+        def loss(params: Params) -> tuple[jax.Array, tuple[jax.Array, ...]]:
+            found = answers(params, inputs, key)
+            is_told, is_known = jnp.isfinite(wanted), jnp.isfinite(where)
+            of_logits = optax.sigmoid_binary_cross_entropy(found[:, 0], jnp.where(is_told, wanted, 0))
+            opinion = jnp.where(is_told, of_logits, 0).sum() / is_told.sum()
+            off = jnp.where(is_known, found[:, 1:] - jnp.where(is_known, where, 0), 0)
+            place = optax.losses.huber_loss(off / PLACE_SQUARE).sum(axis=1).mean()
+            return opinion + PLACE_SHARE * place, (opinion, place, found[:, 0])
 
-        (value, answers), slope = jax.value_and_grad(loss, has_aux=True)(params)
+        (_, told), slope = jax.value_and_grad(loss, has_aux=True)(params)
         change, state = optimiser.update(slope, state, params)
-        return optax.apply_updates(params, change), state, value, answers
+        return optax.apply_updates(params, change), state, told
 
     state, began = optimiser.init(params), time.monotonic()
-    count = PEOPLE * NEGATIVES
     # The newest answer to each negative: the hardest are those that are taken for people.
     newest = np.full(len(negatives), -np.inf, np.float32)
+    cut_out, found_parts = round(PARTS * count), round(FOUND_PARTS * count)
+    wanted = np.repeat(np.float32([SURE, 1 - SURE, np.nan]), [PEOPLE, count, PLACES])
     for epoch in range(epochs):
-        few = round(PARTS * count)
-        at = rng.integers(len(negatives), size=count - few)
+        at = rng.integers(len(negatives), size=count - cut_out)
+        at[-found_parts:] = len(negatives) - parts + rng.integers(parts, size=found_parts)
         if epoch >= HARD_FROM:
             hard = round(HARDEST * len(at))
             at[:hard] = np.argsort(-newest, kind="stable")[:hard]
-        order = np.concatenate([rng.permutation(len(people)) for _ in range(-(-PEOPLE // len(people)))])[:PEOPLE]
-        inputs = np.concatenate(
-            [
-                drawn(people, order, False, rng),
-                drawn(negatives, at, False, rng),
-                drawn(people, rng.integers(len(people), size=few), True, rng),
-            ]
+        every = len(people.crops)
+        order = np.concatenate([rng.permutation(every) for _ in range(-(-PEOPLE // every))])[:PEOPLE]
+        inputs, where = (
+            np.concatenate(drawings)
+            for drawings in zip(
+                drawn(people.crops, order, rng, places=people.places),
+                drawn(negatives, at, rng),
+                drawn(people.crops, rng.integers(every, size=cut_out), rng, "parts"),
+                drawn(people.crops, rng.integers(every, size=PLACES), rng, "off", people.places),
+                strict=True,
+            )
         )
-        wanted = np.where(np.arange(len(inputs)) < PEOPLE, SURE, 1 - SURE).astype(np.float32)
         losses = []
         for batch in rng.permutation(len(inputs)).reshape(-1, BATCH):
             key = jax.random.key(int(rng.integers(2**31)))
-            params, state, value, answers = step(params, state, inputs[batch], wanted[batch], key)
-            losses.append(value)
+            params, state, told = step(params, state, inputs[batch], wanted[batch], where[batch], key)
+            losses.append(told[:2])
             own = (batch >= PEOPLE) & (batch < PEOPLE + len(at))
-            newest[at[batch[own] - PEOPLE]] = np.asarray(answers)[own]
-        print(f"epoch {epoch + 1}: loss {np.mean(losses):.4f}, {time.monotonic() - began:.0f} s", flush=True)
+            newest[at[batch[own] - PEOPLE]] = np.asarray(told[2])[own]
+        opinion, place = np.mean(losses, axis=0)
+        print(f"epoch {epoch + 1}: losses {opinion:.4f}, {place:.4f}, {time.monotonic() - began:.0f} s", flush=True)
     return params
 
 

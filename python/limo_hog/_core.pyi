@@ -262,10 +262,14 @@ class SecondLook:
             These are no weights of such a network.
         """
 
-    def logits(
+    def answers(
         self, image: NDArray[np.uint8], windows: NDArray[np.float64], *, threads: int | None = None
     ) -> NDArray[np.float32]:
-        """Answer to each window: float32 (N,), above 0 where it rather shows a person.
+        """Answer to each window: float32 (N, 5).
+
+        First a logit, above 0 where the window rather shows a person. Then how the person's box differs from that which
+        every window of the model has: right and down by these shares of the window's sides, and the logarithms by how
+        much it is wider and higher.
 
         A window is averaged to 32 × 64 grey pixels (a colour is its channels' mean), less their mean, over their
         deviation and 8. Its answer does not depend on the others, nor on the number of threads.

@@ -19,7 +19,7 @@ from limo_hog.detections import Detections, remembered
 from limo_hog.exceptions import ImageError, ParameterError, ParameterTypeError
 from limo_hog.models import Model, SecondLook, is_named, load_model
 from limo_hog.parallel import cores, in_order
-from limo_hog.suppression import intersection_over_smaller, nms
+from limo_hog.suppression import intersection_over_smaller, nms, voted
 
 if TYPE_CHECKING:
     from PIL.Image import Image as PilImage
@@ -32,8 +32,13 @@ _OVERLAP = 0.65
 #: image being enlarged for it. On USC-C, LAMR .27 against .32 with both at 64 px; at 48 px both are better, .29 to .31.
 _LARGE_WINDOW_FROM_PX = 64.0
 #: What a second look is given: windows of at least this margin, of those whose people share more than this (IoU) the
-#: best, and of these the best few. On USC-C and TUD 1-41 lower margins find nobody more; from -1.0 LAMR is .005 higher.
-_LOOKED_AT_FROM, _LOOKED_AT_IOU, _LOOKED_AT_MOST = -1.2, 0.7, 50
+#: best, and of these the best few. On USC-C, TUD 1-41 and Penn-Fudan lower margins and more windows find nobody more.
+_LOOKED_AT_FROM, _LOOKED_AT_IOU, _LOOKED_AT_MOST = -1.0, 0.7, 32
+#: Of its boxes, those vote on where a person stands that overlap by this (IoU), and a vote is 1/e where the score is
+#: lower by that much; .5 to .7 and .3 to 1 hardly differ on these sets.
+_VOTES_FROM_IOU, _VOTE_SOFTNESS = 0.5, 0.3
+#: How much a level is smaller than the one before: OpenCV's default, and that of a search which a second look follows.
+_SCALE, _SCALE_LOOKED_AT = 1.05, 1.1
 #: Hits that OpenCV's sample asks a group to have more than.
 _GROUP_THRESHOLD = 2
 
@@ -89,15 +94,16 @@ class PeopleDetector:
     padding
         Mirrored border around each level (x, y) [px], at most the window's size.
     scale
-        How much each level is smaller than the one before, 1.005 or more.
+        How much each level is smaller than the one before, 1.005 or more. None: 1.1 with a second look, 1.05 without.
     search
         "exact": all levels, every window. "guided": every eighth level, and those between only around what was found
         on the levels around them: about twice as fast, and a raw hit in two hundred is missed (docs/simd.md).
         Geometries without kernels are searched whole.
     second_look
-        A small network looks again at the best 50 windows, the most that are then found in an image; a score is SVM
-        margin + a share of the network's logit, and `threshold` applies to it. For "limo", `nms="overlap"` and
-        `search="exact"`: a guide that follows every candidate takes longer. False: every step is HOG's.
+        A small network looks again at the best 32 windows, the most that are then found in an image; a score is SVM
+        margin + a share of the network's logit, and `threshold` applies to it; boxes, and windows with them, are moved
+        and stretched to where the network sees the person. For "limo", `nms="overlap"` and `search="exact"` (a guide
+        that follows every candidate takes longer). None: where it can be had. False: every step is HOG's.
 
     Raises
     ------
@@ -116,15 +122,16 @@ class PeopleDetector:
     group_threshold: int | None = None
     win_stride: tuple[int, int] = (8, 8)
     padding: tuple[int, int] = (4, 4)
-    scale: float = 1.05
+    scale: float | None = None
     search: Literal["exact", "guided"] = "exact"
-    second_look: bool = False
+    second_look: bool | None = None
     _model: Model = field(init=False, repr=False, compare=False)
     _hogs: tuple[_core.Hog, ...] = field(init=False, repr=False, compare=False)
     #: The network and its words, where there is a second look.
     _look: tuple[_core.SecondLook, SecondLook] | None = field(init=False, repr=False, compare=False)
-    #: How much images are enlarged.
+    #: How much images are enlarged, and each level is smaller than the one before.
     _zoom: float = field(init=False, repr=False, compare=False)
+    _step: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         model = load_model(self.model)
@@ -136,7 +143,7 @@ class PeopleDetector:
         self._set(
             _model=model,
             threshold=None if self.threshold is None else number("threshold", self.threshold),
-            scale=number("scale", self.scale, _FINEST_SCALE),
+            scale=None if self.scale is None else number("scale", self.scale, _FINEST_SCALE),
             win_stride=_pair("win_stride", self.win_stride, 1, None),
             padding=_pair("padding", self.padding, 0, model.geometry.winSize),
         )
@@ -150,7 +157,10 @@ class PeopleDetector:
         if self.min_height is not None and smaller is not None:
             zoom = max(zoom, model.person_height / _LARGE_WINDOW_FROM_PX)
         self._check_max_height(least if self.min_height is None else self.min_height)
-        self._set(_zoom=zoom, _hogs=tuple(self._compiled(smaller)), _look=self._compiled_look())
+        look = self._compiled_look()
+        step = self.scale or (_SCALE if look is None else _SCALE_LOOKED_AT)
+        self._set(_zoom=zoom, _step=step, _look=look)
+        self._set(_hogs=tuple(self._compiled(smaller)))
 
     @property
     def least_score(self) -> float:
@@ -161,14 +171,15 @@ class PeopleDetector:
 
     def _compiled_look(self) -> tuple[_core.SecondLook, SecondLook] | None:
         """Return the network, where there is to be a second look."""
-        if not isinstance(self.second_look, (bool, np.bool_)):
-            raise ParameterTypeError(f"second_look is {shown(self.second_look)}; True or False is wanted")
-        if not self.second_look:
-            return None
-        look = self._model.second_look
-        if look is None or self.nms == "group" or self.search != "exact":
+        if not isinstance(self.second_look, (bool, np.bool_, type(None))):
+            raise ParameterTypeError(f"second_look is {shown(self.second_look)}; True, False or None is wanted")
+        look = None if self.nms == "group" or self.search != "exact" else self._model.second_look
+        if look is None and self.second_look:
             needs = 'a model that has one ("limo"), nms="overlap" and search="exact"'
             raise ParameterError(f"second_look is True; it needs {needs}")
+        wanted = self.second_look is None or bool(self.second_look)
+        if look is None or not wanted:
+            return None
         return look.compiled(), look
 
     def _compiled(self, smaller: Model | None) -> Iterator[_core.Hog]:
@@ -176,7 +187,7 @@ class PeopleDetector:
         model = self._model
         yield model.geometry._replace(nlevels=_LEVELS).compiled(model.coefficients)
         if smaller is not None:
-            levels = math.ceil(math.log(model.person_height / smaller.person_height) / math.log(self.scale))
+            levels = math.ceil(math.log(model.person_height / smaller.person_height) / math.log(self._step))
             yield smaller.geometry._replace(nlevels=levels).compiled(smaller.coefficients)
 
     def _check_max_height(self, least: float) -> None:
@@ -258,7 +269,7 @@ class PeopleDetector:
                 hit_threshold=self.least_score if self._look is None else _LOOKED_AT_FROM,
                 win_stride=self.win_stride,
                 padding=self.padding,
-                scale=self.scale,
+                scale=self._step,
                 similar=members,
                 first_level=size,
                 guide=_GUIDES[self.search],
@@ -268,14 +279,11 @@ class PeopleDetector:
         ]
         boxes, scores = (np.concatenate(parts) for parts in zip(*hits, strict=True))
         zoom = np.tile(np.array(size) / image.shape[1::-1], 2)
-        boxes, scores = self._looked_at_again(image, boxes, scores, zoom, threads)
-        if self.nms == "group":
-            kept = np.argsort(-scores, kind="stable")
+        if self._look is not None:
+            found, scores = self._looked_at_again(self._look, image, boxes / zoom, scores, threads)
         else:
-            # People are compared, not windows: those of two people side by side share most of their margins.
-            people = self._model.person_box.inside(boxes)
-            kept = nms(people, scores, _OVERLAP if self.overlap is None else self.overlap, intersection_over_smaller)
-        found, scores = boxes[kept] / zoom, scores[kept]
+            kept = np.argsort(-scores, kind="stable") if self.nms == "group" else self._best(boxes, scores)
+            found, scores = boxes[kept] / zoom, scores[kept]
         if self.max_height is not None:
             # A level's window is rounded to whole pixels.
             low = self._model.person_box.height * found[:, 3] <= self.max_height + 0.5
@@ -283,26 +291,30 @@ class PeopleDetector:
         boxes = np.rint(found).astype(np.int32)
         return Detections(boxes, scores, self._model.person_box, reading.calibration, searched)
 
+    def _best(self, windows: NDArray[Any], scores: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Return which windows hold the people, one each, best first."""
+        # People are compared, not windows: those of two people side by side share most of their margins.
+        people = self._model.person_box.inside(windows)
+        return nms(people, scores, _OVERLAP if self.overlap is None else self.overlap, intersection_over_smaller)
+
     def _looked_at_again(
         self,
+        look: tuple[_core.SecondLook, SecondLook],
         image: NDArray[np.uint8],
-        boxes: NDArray[np.int32],
+        windows: NDArray[np.float64],
         margins: NDArray[np.float64],
-        zoom: NDArray[np.float64],
         threads: int | None,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-        """Return the best windows whose score, with the network's opinion, is enough, and their scores.
-
-        Without a second look these are all windows and their margins.
-        """
-        if self._look is None:
-            return boxes, margins
-        network, look = self._look
-        best = nms(self._model.person_box.inside(boxes), margins, _LOOKED_AT_IOU, most=_LOOKED_AT_MOST)
-        boxes = boxes[best]
-        scores = margins[best] + look.share * network.logits(image, boxes / zoom, threads=threads)
-        enough = scores >= self.least_score
-        return boxes[enough], scores[enough]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the people's windows (K, 4) [px], corrected by the network, and their scores, best first."""
+        person_box = self._model.person_box
+        best = nms(person_box.inside(windows), margins, _LOOKED_AT_IOU, most=_LOOKED_AT_MOST)
+        windows = windows[best]
+        answers = look[0].answers(image, windows, threads=threads)
+        scores = margins[best] + look[1].share * answers[:, 0]
+        people = look[1].moved(person_box.inside(windows), windows, answers)
+        kept = self._best(person_box.around(people), scores)
+        kept = kept[scores[kept] >= self.least_score]
+        return person_box.around(voted(people, scores, kept, _VOTES_FROM_IOU, _VOTE_SOFTNESS)), scores[kept]
 
     def _searched_size(self, image: NDArray[np.uint8]) -> tuple[int, int]:
         """Return the size (x, y) [px] at which the smallest person in the image fills the model's window."""

@@ -31,6 +31,12 @@ class PersonBox(NamedTuple):
         x, y, w, h = windows.T.astype(np.float64)
         return np.stack([x + self.x * w, y + self.y * h, self.width * w, self.height * h], axis=1)
 
+    def around(self, people: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the windows of these boxes, both float64 (N, 4) x, y, w, h [px]: the inverse of `inside`."""
+        x, y, w, h = people.T
+        width, height = w / self.width, h / self.height
+        return np.stack([x - self.x * width, y - self.y * height, width, height], axis=1)
+
 
 class Calibration(NamedTuple):
     """How a score becomes a probability: 1 / (1 + exp(-(slope · score + offset))) (Platt, 1999)."""
@@ -46,7 +52,8 @@ class Calibration(NamedTuple):
 class SecondLook(NamedTuple):
     """A small convolutional network's opinion of a model's best windows, and how scores with it are to be read.
 
-    Made by `benches/second_look.py`. A window's score is its SVM margin + `share` · the network's logit.
+    Made by `benches/second_look.py`. A window's score is its SVM margin + `share` · the network's logit. The network
+    also says where in the window the person stands.
     """
 
     channels: tuple[int, int, int]  #: of the convolutions
@@ -55,6 +62,15 @@ class SecondLook(NamedTuple):
     share: float
     threshold: float  #: default of the least score of a person's window
     calibration: Calibration  #: from scores to probabilities
+
+    @staticmethod
+    def moved(people: NDArray[np.float64], windows: NDArray[np.float64], answers: NDArray[np.float32]) -> NDArray[Any]:
+        """Return the boxes of `people` in `windows`, all (N, 4) x, y, w, h [px], corrected by the answers (N, 5)."""
+        right, down, wider, higher = answers[:, 1:].T.astype(np.float64)
+        width, height = people[:, 2] * np.exp(wider), people[:, 3] * np.exp(higher)
+        x = people[:, 0] + people[:, 2] / 2 + right * windows[:, 2] - width / 2
+        y = people[:, 1] + people[:, 3] / 2 + down * windows[:, 3] - height / 2
+        return np.stack([x, y, width, height], axis=1)
 
     def compiled(self) -> _core.SecondLook:
         """Return the network; a `ModelFormatError` says what is wrong with its weights."""

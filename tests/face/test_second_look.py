@@ -1,4 +1,4 @@
-"""The detector's second look: a small network's opinion, against the same in plain numpy."""
+"""The detector's second look: a small network's answers, against the same in plain numpy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import limo_hog
 from limo_hog import PeopleDetector, _core, models
 from limo_hog.cli.support.scene import street
-from limo_hog.models import SecondLook, load_model
+from limo_hog.models import PERSON_BOX, SecondLook, load_model
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data"
 WEIGHTS = Path(models.__file__).parent / "weights" / "second_look.f16"
@@ -44,7 +44,7 @@ def plain_crop(image: NDArray[np.uint8], x: int, y: int, w: int, h: int) -> Numb
     return np.asarray((crop - crop.mean()) / (crop.std() + 8))
 
 
-def plain_logit(look: SecondLook, crop: Numbers) -> float:
+def plain_answer(look: SecondLook, crop: Numbers) -> Numbers:
     weights = np.frombuffer(look.weights, "<f2").astype(np.float64)
 
     def take(*shape: int) -> Numbers:
@@ -64,42 +64,64 @@ def plain_logit(look: SecondLook, crop: Numbers) -> float:
         ]
         x, before = np.maximum(sum(shifted, bias), 0), channels
     hidden = np.maximum(x.ravel() @ take(x.size, look.hidden) + take(look.hidden), 0)
-    (logit,) = hidden @ take(look.hidden, 1) + take(1)
+    answer = hidden @ take(look.hidden, 5) + take(5)
     assert not len(weights)
-    return float(logit)
+    return np.asarray(answer)
+
+
+def always(logit: float, right: float, down: float, wider: float, higher: float) -> SecondLook:
+    """A network with this answer to every window."""
+    weights = np.zeros(len(network().weights) // 2, "<f2")
+    weights[-5:] = logit, right, down, np.log(wider), np.log(higher)
+    return network()._replace(weights=weights.tobytes())
 
 
 def test_the_network_answers_what_plain_numpy_answers() -> None:
     windows = [(0, 0, 64, 128), (300, 200, 96, 192), (-20, 350, 96, 192), (600, -30, 64, 128), (101, 99, 32, 64)]
-    found = network().compiled().logits(picture(), np.array(windows, float))
-    expected = [plain_logit(network(), plain_crop(picture(), *window)) for window in windows]
+    found = network().compiled().answers(picture(), np.array(windows, float))
+    expected = [plain_answer(network(), plain_crop(picture(), *window)) for window in windows]
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
 def test_a_score_is_the_margin_and_a_share_of_the_networks_logit() -> None:
-    look, twice = network(), PeopleDetector(threshold=-9, overlap=1, second_look=True)
-    every = replace(twice, threshold=-1.2, second_look=False).detect(picture())
-    margins = {tuple(window): score for window, score in zip(every.windows.tolist(), every.scores, strict=True)}
-    found = twice.detect(picture())
-    assert 10 < len(found) <= 50
-    logits = look.compiled().logits(picture(), found.windows.astype(float))
-    for window, score, logit in zip(found.windows.tolist(), found.scores, logits, strict=True):
-        # (Windows are rounded to pixels of the picture, the network saw them as they were.)
-        assert score == pytest.approx(margins[tuple(window)] + look.share * logit, abs=0.25)
-    assert found.calibration == look.calibration
+    alone = PeopleDetector(threshold=-1, scale=1.1, second_look=False).detect(picture())
+    model = replace(load_model("limo"), second_look=always(2, 0, 0, 1, 1))
+    found = PeopleDetector(model=model, threshold=-9).detect(picture())
+    np.testing.assert_allclose(found.scores, (alone.scores + 2 * network().share)[:32], atol=1e-6)
+    assert len(found) > 5 and found.calibration == network().calibration
+
+
+def test_the_network_moves_and_stretches_the_boxes() -> None:
+    def best(*answer: float) -> Numbers:
+        model = replace(load_model("limo"), second_look=always(9, *answer))
+        return PeopleDetector(model=model).detect(picture()).windows[0].astype(float)
+
+    x, y, w, h = best(0, 0, 1, 1)
+    moved = PERSON_BOX.inside(best(0.1, -0.05, 1.2, 0.9)[None])[0]
+    (px, py, pw, ph), (to_x, to_y, to_w, to_h) = PERSON_BOX.inside(np.array([[x, y, w, h]]))[0], moved
+    np.testing.assert_allclose([to_w, to_h], [1.2 * pw, 0.9 * ph], atol=1)
+    np.testing.assert_allclose(to_x + to_w / 2, px + pw / 2 + 0.1 * w, atol=1.5)
+    np.testing.assert_allclose(to_y + to_h / 2, py + ph / 2 - 0.05 * h, atol=1.5)
 
 
 def test_the_order_of_the_colours_does_not_matter() -> None:
     windows, look = np.array([[10.0, 20.0, 64.0, 128.0]]), network().compiled()
-    there, back = (look.logits(image, windows) for image in (picture(), picture()[:, :, ::-1]))
+    there, back = (look.answers(image, windows) for image in (picture(), picture()[:, :, ::-1]))
     np.testing.assert_allclose(there, back, atol=1e-5)
 
 
 def test_switched_off_every_score_is_an_svm_margin() -> None:
     alone = PeopleDetector(model=WEIGHTS.with_name("limo_64x128.yml")).detect(picture())
-    assert PeopleDetector().detect(picture()) == alone and len(alone) > 0
-    assert PeopleDetector().least_score == load_model("limo").threshold
-    assert PeopleDetector(second_look=True).least_score == network().threshold
+    assert PeopleDetector(second_look=False).detect(picture()) == alone and len(alone) > 0
+    assert PeopleDetector(second_look=False).least_score == load_model("limo").threshold
+
+
+def test_by_default_limo_looks_twice_and_what_cannot_does_not() -> None:
+    assert PeopleDetector().detect(picture()) == PeopleDetector(second_look=True, scale=1.1).detect(picture())
+    assert PeopleDetector().least_score == network().threshold
+    for once in ({"model": "opencv"}, {"nms": "group"}, {"search": "guided"}):
+        plain = PeopleDetector(**once, second_look=False, scale=1.05)  # type: ignore[arg-type]
+        assert PeopleDetector(**once).detect(picture()) == plain.detect(picture())  # type: ignore[arg-type]
 
 
 def test_pictures_as_they_are_may_be_looked_at_twice() -> None:
@@ -111,7 +133,7 @@ def test_what_has_no_second_look_refuses_it() -> None:
     for wrong in ({"model": "opencv"}, {"nms": "group"}, {"search": "guided"}):
         with pytest.raises(limo_hog.ParameterError, match=r'one \("limo"\), nms="overlap" and search="exact"'):
             PeopleDetector(second_look=True, **wrong)  # type: ignore[arg-type]
-    with pytest.raises(limo_hog.ParameterTypeError, match="second_look is 'yes'; True or False is wanted"):
+    with pytest.raises(limo_hog.ParameterTypeError, match="second_look is 'yes'; True, False or None is wanted"):
         PeopleDetector(second_look="yes")  # type: ignore[arg-type]
 
 
@@ -166,6 +188,7 @@ def test_the_card_says_where_the_weights_come_from() -> None:
     card = json.loads(WEIGHTS.with_name(f"{WEIGHTS.name}.json").read_text())
     assert {"made_by", "data", "seed", "epochs", "figures"} <= card.keys()
     assert [source["files"] for source in card["data"]] == [2416, 924, 4146, 3019]
+    assert [source["files"] for source in card["streets"]] == [1569, 1569]
     assert WEIGHTS.stat().st_size < 400_000
 
 

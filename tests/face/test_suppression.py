@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from limo_hog.suppression import intersection_over_smaller, intersection_over_union, nms
+from limo_hog.models import PERSON_BOX
+from limo_hog.suppression import intersection_over_smaller, intersection_over_union, nms, voted
 
 Boxes = NDArray[np.int_]
 
@@ -73,3 +74,17 @@ def test_thousands_of_hits_are_suppressed_at_once() -> None:
     nms(boxes, scores, 0.65, intersection_over_smaller)
     # 5 ms on a quiet machine; box by box it is seconds.
     assert time.process_time() - start < 0.2
+
+
+def test_boxes_that_overlap_vote_on_where_a_person_stands_the_more_the_better_they_are() -> None:
+    boxes = np.array([[0, 0, 40, 80], [8, 4, 40, 80], [200, 0, 40, 80]], float)
+    equal = voted(boxes, np.array([1.0, 1.0, 3.0]), np.array([2, 0]), 0.5, 0.3)
+    np.testing.assert_allclose(equal, [[200, 0, 40, 80], [4, 2, 40, 80]])
+    (lower,) = voted(boxes, np.array([1.0, 0.7, 3.0]), np.array([0]), 0.5, 0.3)
+    np.testing.assert_allclose(lower[:2], np.array([8, 4]) * np.exp(-1) / (1 + np.exp(-1)))
+    assert voted(boxes, np.zeros(3), np.empty(0, np.intp), 0.5, 0.3).shape == (0, 4)
+
+
+def test_a_window_around_a_persons_box_is_the_one_that_the_box_is_inside_of() -> None:
+    windows = np.array([[10.0, -20.0, 64.0, 128.0], [3.5, 7.25, 100.0, 90.0]])
+    np.testing.assert_allclose(PERSON_BOX.around(PERSON_BOX.inside(windows)), windows)

@@ -18,7 +18,7 @@ network = limo_hog.models.load_model("limo").second_look.compiled()
 windows = np.array([[x, 3, 32, 64] for x in range(40)], float)
 
 def answers():
-    looked = network.logits(image, windows)
+    looked = network.answers(image, windows)
     return *hog.detectMultiScale(image, -0.5, scale=1.2), limo_hog.describe(crops), looked
 
 wanted = answers()

@@ -44,7 +44,7 @@ SHARED = [
     "small.detectMultiScale(people(4000, 3000), 1e9, (2, 2))",
     "small.detect(people(4000, 3000), 1e9, (1, 1))",
     "hog.detectMultiScale(people(8000, 6000, 1), 1e9, scale=1.001)",
-    "limo_hog.models.load_model('limo').second_look.compiled().logits(people(64, 64), np.full((40, 4), 2.0**20))",
+    "limo_hog.models.load_model('limo').second_look.compiled().answers(people(64, 64), np.full((40, 4), 2.0**20))",
 ]
 ALONE = [
     "hog.compute(people(1200, 1000), (3, 3))",

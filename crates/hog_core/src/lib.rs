@@ -50,4 +50,4 @@ pub use interrupt::Interrupt;
 pub use options::{Grouping, Search, SearchOptions};
 pub use params::{HogParams, HogSpec};
 pub use rescore::Hit;
-pub use second::{SecondLook, Window};
+pub use second::{Answer, SecondLook, Window};

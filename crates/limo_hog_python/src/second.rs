@@ -3,7 +3,7 @@
 use numpy::{PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
-use crate::arrays::{Array1, Pixels, collect, empty};
+use crate::arrays::{Array2, Pixels, collect, empty};
 use crate::calls::{self, at_work, detached};
 use crate::errors::raised;
 
@@ -28,21 +28,22 @@ impl SecondLook {
     }
 
     #[pyo3(signature = (image, windows, *, threads = None))]
-    fn logits<'py>(
+    fn answers<'py>(
         &self,
         image: PyReadonlyArrayDyn<'py, u8>,
         windows: PyReadonlyArray2<'py, f64>,
         threads: Option<usize>,
-    ) -> PyResult<Array1<'py, f32>> {
+    ) -> PyResult<Array2<'py, f32>> {
         let py = image.py();
         let pixels = Pixels::new(py, &image)?;
         let windows =
             collect(windows.as_array().rows().into_iter().map(|row| std::array::from_fn(|i| row[i])));
         let windows: Vec<hog_core::Window> = windows.map_err(|error| raised(py, &error))?;
-        let logits = empty(py, [windows.len()])?;
-        let mut out = logits.readwrite();
-        let (out, threads) = (out.as_slice_mut()?, at_work(threads.unwrap_or_else(calls::threads)));
-        detached(py, |interrupt| self.inner.logits(pixels.view()?, &windows, threads, interrupt, out))?;
-        Ok(logits)
+        let answers = empty(py, [windows.len(), 5])?;
+        let mut out = answers.readwrite();
+        let (out, threads) =
+            (out.as_slice_mut()?.as_chunks_mut().0, at_work(threads.unwrap_or_else(calls::threads)));
+        detached(py, |interrupt| self.inner.answers(pixels.view()?, &windows, threads, interrupt, out))?;
+        Ok(answers)
     }
 }

@@ -72,9 +72,11 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
     add_search(parser)
     parser.add_argument("--threshold", type=arguments.score, metavar="T", help="least score of a hit (the model's own)")
     parser.add_argument(
-        "--second-look",
-        action="store_true",
-        help="let a small network look again at limo's best 50 windows: fewer misses, half as long again",
+        "--no-second-look",
+        dest="second_look",
+        action="store_const",
+        const=False,
+        help="do not let a small network look again at limo's best 32 windows: HOG alone, with more misses",
     )
     parser.add_argument(
         "--min-height",

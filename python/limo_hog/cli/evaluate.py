@@ -38,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--least-score", type=score, default=-1.2, metavar="T", help="lowest score counted (-1.2)")
     parser.add_argument(
-        "--second-look", action="store_true", help="also measure with the second look; --report does so by itself"
+        "--first-look", action="store_true", help="also measure without the second look; --report does so by itself"
     )
     parser.add_argument("--report", type=Path, metavar="DIR", help="write a page with the curve and the worst mistakes")
     add_json(parser, "the figures as JSON")
@@ -92,8 +92,8 @@ def _rivals(args: argparse.Namespace) -> list[Rival]:
                 detector = replace(detector, min_height=height)
                 name = f"{model} {'as is' if height is None else f'{height:g} px'}"
             stages = {name: detector}
-            if (args.second_look or args.report) and load_model(model).second_look is not None:
-                stages[f"{name}, second look"] = replace(detector, second_look=True)
+            if (args.first_look or args.report) and load_model(model).second_look is not None:
+                stages[f"{name}, first look"] = replace(detector, second_look=False)
             rivals += [Rival(name, replace(one, threshold=args.least_score), one) for name, one in stages.items()]
     return rivals
 

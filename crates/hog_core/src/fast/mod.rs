@@ -27,7 +27,7 @@ mod votes;
 pub use backend::Backend;
 pub(crate) use describe::{Crops, describe};
 pub(crate) use dispatch::{fill_planes, geometry, plan, resize_planes, row_kernel, serves};
-pub(crate) use network::{INPUT, Network};
+pub(crate) use network::{ANSWER, INPUT, Network};
 pub(crate) use plan::{Geometry, Plan};
 pub(crate) use rows::Planes;
 pub(crate) use score::Thresholds;

@@ -1,11 +1,12 @@
-//! A second look: a small convolutional network's opinion of windows that the detector found.
+//! A second look: a small convolutional network's opinion of windows that the detector found, and of where in them the
+//! person stands.
 //!
 //! `crop` cuts a window out of the image at the network's size; `fast::network` has the kernels.
 
 mod crop;
 
 use crate::error::{ParameterError, Result};
-use crate::fast::{Backend, INPUT, Network};
+use crate::fast::{ANSWER, Backend, INPUT, Network};
 use crate::image::ImageView;
 use crate::interrupt::Interrupt;
 use crate::memory::{self, Pool, Workspace};
@@ -21,6 +22,11 @@ const PLACE_MAX: f64 = (1 << 30) as f64;
 
 /// A window of the image: x, y, width, height \[px\], in fractions where it likes.
 pub type Window = [f64; 4];
+
+/// The network's answer to a window: a logit, above 0 where it is rather a person; then how its person's box differs from
+/// the box that every window of the model has: right and down by these shares of the window's sides, and the logarithms
+/// by how much it is wider and higher.
+pub type Answer = [f32; ANSWER];
 
 /// Scratch memory, one per thread at work.
 static SCRATCH: Pool<Scratch> = Pool::new();
@@ -41,12 +47,12 @@ impl Workspace for Scratch {
 ///
 /// ```
 /// use hog_core::{ImageView, Interrupt, SecondLook};
-/// let weights = [0.0; 26 * 4 + 37 * 4 + 37 * 4 + 129 * 4 + 5];
+/// let weights = [0.0; 26 * 4 + 37 * 4 + 37 * 4 + 129 * 4 + 5 * 5];
 /// let look = SecondLook::new([4, 4, 4], 4, &weights)?;
 /// let image = ImageView::new(&[128; 64 * 128], 64, 128, 1, 64)?;
-/// let mut logits = [1.0];
-/// look.logits(image, &[[0.0, 0.0, 64.0, 128.0]], 1, &Interrupt::NEVER, &mut logits)?;
-/// assert_eq!(logits, [0.0]);
+/// let mut answers = [[1.0; 5]];
+/// look.answers(image, &[[0.0, 0.0, 64.0, 128.0]], 1, &Interrupt::NEVER, &mut answers)?;
+/// assert_eq!(answers, [[0.0; 5]]);
 /// # Ok::<(), hog_core::HogError>(())
 /// ```
 #[derive(Debug)]
@@ -73,16 +79,16 @@ impl SecondLook {
         Ok(Self { network: Network::new(channels, hidden, weights)?, backend: backend.checked()? })
     }
 
-    /// The network's answer to each window, into `out`, which has a place for each: above 0, rather a person.
+    /// The network's answer to each window, into `out`, which has a place for each.
     ///
     /// What lies beyond the image is mirrored. The same bits whatever the number of threads.
-    pub fn logits(
+    pub fn answers(
         &self,
         image: ImageView,
         windows: &[Window],
         threads: usize,
         interrupt: &Interrupt,
-        out: &mut [f32],
+        out: &mut [Answer],
     ) -> Result<()> {
         if let Some(window) = windows.iter().find(|window| !is_fair(window)) {
             let [x, y, width, height] = window.map(|side| side as i64);

@@ -19,13 +19,15 @@ use kernel::{Make, OUTPUTS};
 pub(crate) const INPUT: (usize, usize) = (32, 64);
 /// Sides of the kernels of the convolutions, all of stride 2.
 const KERNELS: [usize; 3] = [5, 3, 3];
+/// Numbers of an answer.
+pub(crate) const ANSWER: usize = 5;
 /// More channels or units than any layer may have.
 const CHANNELS_MAX: usize = 1024;
 
 /// Scratch memory, one per thread at work.
 static SCRATCH: Pool<Scratch> = Pool::new();
 
-/// Three convolutions, then two dense layers, the last of one unit.
+/// Three convolutions, then two dense layers, the last of [`ANSWER`] units.
 #[derive(Debug)]
 pub(crate) struct Network {
     layers: Vec<Layer>,
@@ -96,7 +98,7 @@ impl Network {
             (KERNELS[1], KERNELS[1] * first, second),
             (KERNELS[2], KERNELS[2] * second, third),
             (1, cells * third, hidden),
-            (1, hidden, 1),
+            (1, hidden, ANSWER),
         ]
     }
 
@@ -106,7 +108,7 @@ impl Network {
         backend: Backend,
         inputs: &[f32],
         interrupt: &Interrupt,
-        out: &mut [f32],
+        out: &mut [[f32; ANSWER]],
     ) -> Result<()> {
         on_lane(backend, Answers { network: self, inputs, interrupt, out })
     }
@@ -148,7 +150,7 @@ struct Answers<'a> {
     network: &'a Network,
     inputs: &'a [f32],
     interrupt: &'a Interrupt<'a>,
-    out: &'a mut [f32],
+    out: &'a mut [[f32; ANSWER]],
 }
 
 impl OnLane for Answers<'_> {
@@ -164,7 +166,10 @@ impl OnLane for Answers<'_> {
                     interrupt.check()?;
                     scratch.make(l, layer, index)?;
                 }
-                out.copy_from_slice(&scratch.numbers[network.layers.len() % 2].numbers()[..out.len()]);
+                let made = scratch.numbers[network.layers.len() % 2].numbers();
+                for (lane, answer) in out.iter_mut().enumerate() {
+                    *answer = std::array::from_fn(|number| made[number * L::LANES + lane]);
+                }
             }
             Ok(())
         });

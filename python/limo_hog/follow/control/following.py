@@ -17,17 +17,19 @@ from limo_hog.follow.sense.clearance import NO_POINTS, Margin, from_odometry, ro
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
 from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.routes import Router, along
-from limo_hog.follow.tracks.kalman import Track, bearing_range, rates
+from limo_hog.follow.tracks.kalman import Track, rates
 from limo_hog.follow.tracks.person import Person
 
 
 class Followed(NamedTuple):
-    """The person followed, at the newest stamp; the distance to hold [m]; whether nearing them shows if it is one."""
+    """The person followed."""
 
     person: Person
-    track: Track
-    keeps: float
-    worth_nearing: bool
+    track: Track  #: At the newest stamp; from there bearing and distance from the robot [rad, m].
+    bearing: float
+    distance: float
+    keeps: float  #: The distance to hold [m].
+    worth_nearing: bool  #: Whether nearing them shows if it is a person.
 
 
 class Aimed(NamedTuple):
@@ -95,9 +97,8 @@ class Following:
 
     def aim(self, followed: Followed, situation: Situation, state: TrackingState, sampling: Sampling) -> Aimed:
         """Return the goal that holds the distance to a person."""
-        person, track, keeps, worth_nearing = followed
+        person, track, bearing, distance, keeps, worth_nearing = followed
         now, stamp = situation.now, state.tracks.stamp or 0.0
-        bearing, distance = bearing_range(track, situation.pose)
         bearing_rate, range_rate = rates(track, situation.pose)
         error = distance - situation.robot.camera_x - keeps
         speed = min(max(sampling.gain * error + range_rate, -self.max_speed), self.max_speed)

@@ -182,8 +182,9 @@ def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, 
     boxes, likeness, people = dict(state.tracks.boxes), state.choice.likeness, state.tracks.people
     means = np.array([predict(person.track, now, noise).mean for person in people]).reshape(-1, 4)
     moved = carried(means, pose_at(state.tracks.poses, now)).tolist()
-    same = [None if likeness is None else likeness.of(person.number) for person in people]
-    return tuple(
-        Believed(x, y, person.existence, person.number, vx, vy, boxes.get(person.number), chance)
-        for person, chance, (x, y, vx, vy) in zip(people, same, moved, strict=True)
-    )
+    same = {} if likeness is None else dict(likeness.chances)
+    everybody = []
+    for person, (x, y, vx, vy) in zip(people, moved, strict=True):
+        box, chance = boxes.get(person.number), None if likeness is None else same.get(person.number, 0.0)
+        everybody.append(Believed(x, y, person.existence, person.number, vx, vy, box, chance))
+    return tuple(everybody)

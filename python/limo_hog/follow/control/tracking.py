@@ -141,7 +141,7 @@ class TrackingController:
             others = tuple(one for one, stands in zip(others, lasts.tolist(), strict=True) if not stands)
         people = np.array([track.mean for track in around]).reshape(-1, 4)
         pace = np.hypot(people[:, 2], people[:, 3])
-        followed = next((row for row, track in enumerate(around) if track is own), None)
+        followed = None if own is None else around.index(own)
         walks = pace > self.slowest
         if followed is not None:
             if walks[followed] and pace[followed] < state.brisk:
@@ -196,7 +196,8 @@ class TrackingController:
         keeps = following.keeps(self.target_distance, least, brisk if person.confirmed else 0.0, soon, situation)
         too_small = person.window <= distance * self.tracker.visibility.smallest_window
         worth_nearing = too_small and person.existence >= self.selection.min_existence
-        aimed = following.aim(Followed(person, track, keeps, worth_nearing), situation, state, self.planner.sampling)
+        followed = Followed(person, track, bearing, distance, keeps, worth_nearing)
+        aimed = following.aim(followed, situation, state, self.planner.sampling)
         if keeps > self.target_distance + following.distance_tolerance and aimed.mode in (Mode.HOLD, Mode.FOLLOW):
             reason = f"{aimed.reason}, further off than asked: nearer the camera would not show all of them"
             aimed = aimed._replace(reason=reason)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from operator import itemgetter
+
+_CAME = itemgetter(1)
 
 CAMERA, DEPTH, SCAN, ODOMETRY = "camera frame", "depth image", "scan", "odometry"
 
@@ -18,9 +21,11 @@ class Arrivals:
 
     def after(self, now: float, stamps: Mapping[str, float]) -> Arrivals:
         """Add the readings at hand at `now` [s]: a new one has another stamp than the last, NaN is none."""
-        known = {name: stamp for name, (stamp, _) in self.newest.items()}
-        new = {name: (at, now) for name, at in stamps.items() if math.isfinite(at) and known.get(name) != at}
-        return Arrivals({**self.newest, **new}) if new else self
+        newest = dict(self.newest)
+        for name, at in stamps.items():
+            if math.isfinite(at) and (name not in newest or newest[name][0] != at):
+                newest[name] = at, now
+        return Arrivals(newest)
 
     def missing(self, now: float, needed: tuple[str, ...], max_age: float) -> str:
         """Return which senses never came, though needed, or came longer than `max_age` [s] ago; "" if none.
@@ -36,12 +41,12 @@ class Arrivals:
 
     def oldest(self, now: float) -> float:
         """Return how long ago the sense that is silent for longest was heard [s]; 0 without any."""
-        return max((now - came for _, came in self.newest.values()), default=0.0)
+        return now - min(map(_CAME, self.newest.values()), default=now)
 
     def disagreement(self, max_age: float, max_late: float) -> str:
         """Return which sense's stamps do not fit the others': readings may be `max_age`, images `max_late` [s] late."""
         # A depth image has its camera frame's stamp. What the others' clocks showed when the last reading came:
-        now = max((came for _, came in self.newest.values()), default=0.0)
+        now = max(map(_CAME, self.newest.values()), default=0.0)
         clocks = {name: stamp + now - came for name, (stamp, came) in self.newest.items() if name != DEPTH}
         ahead = max(clocks, key=clocks.__getitem__, default="")
         late = {name: clocks[ahead] - clock for name, clock in clocks.items() if name != ahead}

@@ -124,7 +124,7 @@ class Grid:
 
     def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether an occupied cell is within half a cell of each point, bool (N,); at the edge none is."""
-        lowest, _ = self.index(ground, points - self.cell / 2)
+        lowest: Cells = np.floor((points - self.cell / 2) / self.cell).astype(np.int64) - ground.corner
         within = lowest.view(np.uint64) < self.cells - 1
         inside = within[:, 0] & within[:, 1]
         flat = np.where(inside, lowest[:, 0] * self.cells + lowest[:, 1], 0)
@@ -133,7 +133,7 @@ class Grid:
 
     def lasting_near(self, ground: Ground, pose: Odometry, reach: float) -> Points:
         """Return the middles of cells within `reach` [m] in which something lasts, float64 (N, 2), odometry frame."""
-        x, y = self.index(ground, np.array([[pose.x, pose.y]]))[0][0].tolist()
+        x, y = math.floor(pose.x / self.cell) - ground.corner[0], math.floor(pose.y / self.cell) - ground.corner[1]
         side = int(reach / self.cell)
         rows, columns = slice(max(x - side, 0), x + side + 1), slice(max(y - side, 0), y + side + 1)
         lasts = (ground.occupied[rows, columns] > 0) & (ground.freed[rows, columns] < ground.stamp - self.lasts_s)

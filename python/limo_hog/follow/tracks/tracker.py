@@ -39,7 +39,10 @@ class Tracks:
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
-        return next((one for one in self.people if one.number == number), None)
+        for one in self.people:
+            if one.number == number:
+                return one
+        return None
 
     @property
     def in_view(self) -> list[Person]:
@@ -230,6 +233,8 @@ class Tracker:
         Only where they can be one person's alone, and that person has no others to choose from.
         """
         lost = [one for one in people if one.confirmed and self.scan_period_s < stamp - one.measured < self.legs_only_s]
+        if not lost:
+            return movers
         walking = [one for one in self.movers.moving(movers) if one.number is None and one.felt == stamp]
         pairs = [(one, mover) for one in lost for mover in walking if mover.since > one.measured]
         pairs = [(one, mover) for one, mover in pairs if self._is_near(one, mover.track)]
@@ -261,13 +266,14 @@ class Tracker:
         places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)
-            gap = min((math.dist(track.place, place) for place in places), default=math.inf)
+            here = track.place
+            gap = min([math.dist(here, place) for place in places], default=math.inf)
             if mover.number in people or gap <= self.association.same_place:
                 continue
             nameless.append(track)
             may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))
             if now - mover.felt <= lately_s and not may_be_own:
-                others.append(Other(*track.place, now))
+                others.append(Other(*here, now))
         return [*people.values(), *nameless], others, own
 
     def _is_near(self, person: Person, track: Track) -> bool:

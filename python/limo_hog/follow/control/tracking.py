@@ -90,7 +90,7 @@ class TrackingController:
         state = replace(state, kept=plan.manoeuvre, sent=twist, since_full=since_full)
         if (asked := choice.asked) is not None:
             reason = f"{reason}; asked for {named(asked)}, not found yet"
-        people, leads = believed(state, observation.now, self.tracker.noise), tuple(map(tuple, plan.rollout.tolist()))
+        people, leads = believed(state, situation.pose, self.tracker.noise), tuple(map(tuple, plan.rollout.tolist()))
         belief = replace(belief, people=people, rollout=leads, rollouts=plan.rollouts, shares=plan.shares)
         return Decision(twist, state, mode, reason, target, region, belief)
 

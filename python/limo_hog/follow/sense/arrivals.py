@@ -32,11 +32,13 @@ class Arrivals:
 
         A reading from the future came before the robot's clock was set back: nobody knows how old it is.
         """
-        reasons = [f"no {name} has come" for name in needed if name not in self.newest]
-        ages = {name: now - came for name, (_, came) in self.newest.items()}
-        if abs(ages.get(CAMERA, 0.0)) > max_age:
+        ages = {name: abs(now - came) for name, (_, came) in self.newest.items()}
+        if ages.keys() >= set(needed) and max(ages.values()) <= max_age:
+            return ""
+        reasons = [f"no {name} has come" for name in needed if name not in ages]
+        if ages.get(CAMERA, 0.0) > max_age:
             ages.pop(DEPTH, None)  # it comes with its frame
-        reasons += [f"no {name} for {abs(age):.1f} s" for name, age in ages.items() if abs(age) > max_age]
+        reasons += [f"no {name} for {age:.1f} s" for name, age in ages.items() if age > max_age]
         return "; ".join(reasons)
 
     def oldest(self, now: float) -> float:
@@ -51,6 +53,8 @@ class Arrivals:
         ahead = max(clocks, key=clocks.__getitem__, default="")
         late = {name: clocks[ahead] - clock for name, clock in clocks.items() if name != ahead}
         old = [name for name in late if late[name] > (max_late if name == CAMERA else max_age)]
-        if old and len(old) == len(late):
+        if not old:
+            return ""
+        if len(old) == len(late):
             return f"the {ahead}'s clock is {min(late.values()):.1f} s ahead of the {' and the '.join(late)}'s"
         return "; ".join(f"the {name} is {late[name]:.1f} s old" for name in old)

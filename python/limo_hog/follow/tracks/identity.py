@@ -177,8 +177,9 @@ class Identity:
         others = [traits for traits in known.others if traits.number == person.number]
         others = others or [traits for traits in known.others if traits.number != known.traits.number]
         same, strange = self._fit(person, known.traits, first=first), self._fit(person, None, first=first)
-        evidence = same - max([strange, *[self._fit(person, traits, first=first) for traits in others]])
-        return min(max(evidence, -self.most), self.most)
+        for traits in others:
+            strange = max(strange, self._fit(person, traits, first=first))
+        return min(max(same - strange, -self.most), self.most)
 
     def _fit(self, person: Person, traits: Traits | None, *, first: bool) -> float:
         """Return how likely a person's last box is on one who looks like this, or on anybody [log]."""

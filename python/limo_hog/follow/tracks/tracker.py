@@ -164,9 +164,9 @@ class Tracker:
             track = kalman.loosened(track, self.association.same_place, self.turn_speed)
             fit = innovation(track, seen.bearing, seen.range, pose, noise)
         clothes, track = self._clothes(person, worn), kalman.update(track, fit)
-        person = replace(self.existence.update(person, evidence, found=True), seen=track.stamp, track=track)
-        person = replace(person, window=window, centre=centre, clothes=clothes)
-        return replace(person, worn=worn, tall=tall, strained=strained or not in_place)
+        person = self.existence.update(person, evidence, found=True)
+        person = replace(person, seen=track.stamp, track=track, window=window, centre=centre)
+        return replace(person, clothes=clothes, worn=worn, tall=tall, strained=strained or not in_place)
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
         """Bring a person up to the newest scan, if their legs are in it; returns on the known `ground` are none.
@@ -219,8 +219,8 @@ class Tracker:
             movers = self.movers.update(movers, returns, views, self.noise, grid, ground)
             movers = self.movers.assign(movers, seen, returns.stamp)
             movers = self._come_back(movers, people, returns.stamp)
-            walking = {one.number for one in self.movers.moving(movers)}
             unseen = [one for one in people if one.confirmed and one.seen != tracks.stamp]
+            walking = {one.number for one in self.movers.moving(movers)} if unseen else set()
             for one in unseen:
                 if (tracks.stamp or 0.0) - one.seen < self.legs_only_s or one.number in walking:
                     now = self.movers.continued(one, movers, returns, self.noise)
@@ -252,17 +252,14 @@ class Tracker:
         None for none of them.
         """
         people: dict[int, Track] = {}
+        others: list[Other] = []
         for one in tracks.people:
             one = followed if followed is not None and one.number == followed.number else one
             if one.confirmed and now - one.measured <= self.walks_on_s:
-                people[one.number] = kalman.predict(one.track, now, self.noise)
+                people[one.number] = track = kalman.predict(one.track, now, self.noise)
+                if one is not followed and now - one.measured <= lately_s:
+                    others.append(Other(*track.place, now, one.clothes))
         own = None if followed is None else people.get(followed.number)
-        lately = {one.number: one.clothes for one in tracks.people if now - one.measured <= lately_s}
-        others = [
-            Other(*track.place, now, lately[number])
-            for number, track in people.items()
-            if track is not own and number in lately
-        ]
         places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
             track = kalman.predict(mover.track, now, self.noise)

@@ -24,8 +24,8 @@ from limo_hog.follow.sense.clearance import (
     Margin,
     Points,
     from_odometry,
-    room_ahead,
     room_seen_behind,
+    rooms_ahead,
     scan_points,
     speed_within,
     to_odometry,
@@ -82,18 +82,14 @@ class Guard(Generic[S]):
     depth_grid: DepthGrid = field(default_factory=DepthGrid)  #: Which depth pixels are looked at.
     robot: RobotGeometry = LIMO  #: The robot's outline, mounts and limits.
 
-    @property
-    def braking(self) -> float:
-        """Deceleration counted on [m/s²]: half of what the wheels can do."""
-        return self.robot.acceleration / 2
-
     def start(self) -> GuardState[S]:
         """Return the state before the first observation."""
         return GuardState(self.controller.start())
 
     def step(self, observation: Observation, state: GuardState[S]) -> Decision[GuardState[S]]:
         """Ask the controller and let through what is safe; a faulty observation stops the robot."""
-        sensors, now = Sensors(observation.scan, observation.odometry), observation.at
+        sensors = Sensors(observation.scan, observation.odometry)
+        now = observation.now if observation.clock is None else observation.clock
         if fault := find_fault(observation, state.stamp):
             # When the clock was set back, what is remembered has stamps of the old clock.
             set_back = state.stamp is not None and observation.stamp < state.stamp
@@ -163,10 +159,13 @@ class Guard(Generic[S]):
         if fault := self._missing(now, state):
             return decision(Twist(), Mode.BLOCKED, fault)
         around = from_odometry(state.scan_points, pose)
-        room = room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot)
-        braking = self.braking
+        obstacles, straight = np.concatenate([around, state.depth_points]), np.zeros(1)
+        room = float(rooms_ahead(obstacles, straight, self.margin, self.robot)[0])
+        room_behind = float(rooms_ahead(-around, straight, self.margin, self.robot)[0])
+        # Half of what the wheels can do is counted on.
+        braking = self.robot.acceleration / 2
         ahead = speed_within(room, braking, self.reaction_s)
-        behind = speed_within(room_ahead(-around, self.margin, self.robot), braking, self.reaction_s)
+        behind = speed_within(room_behind, braking, self.reaction_s)
         fastest, backward = self.robot.max_speed, self.max_backward if self.robot.may_back else 0.0
         if sensors.scan is None or sensors.odometry is None:
             fastest, backward = min(fastest, self.max_blind), 0.0

@@ -193,7 +193,7 @@ def test_it_does_not_back_into_what_its_map_shows_behind() -> None:
     backing = CONTROLLER.step(world.observe(), state)
     assert backing.twist.linear < -0.05
     ground, x = state.ground, world.robot[0] - CONTROLLER.robot.half_length - 0.15
-    wall = CONTROLLER.grid.flat(ground, np.array([(x, y) for y in np.arange(-0.5, 0.5, 0.05)]))
+    wall, _ = CONTROLLER.grid.flat(ground, np.array([(x, y) for y in np.arange(-0.5, 0.5, 0.05)]))
     ground.occupied.flat[wall], ground.freed.flat[wall] = 2.0, -np.inf
     # It brakes as hard as it believes the wheels to.
     assert CONTROLLER.step(world.observe(), state).twist.linear > backing.twist.linear + 0.1

@@ -192,7 +192,7 @@ def test_the_depth_image_limits_the_speed_as_far_as_its_reach(depth: float) -> N
     view = whole(scan=scan(), depth=flat(depth))
     linear = guard.step(view, guard.start()).twist.linear
     # The nearest pixel column is 4 px beside the middle, under the ellipse's top.
-    assert linear == pytest.approx(speed_within(room, guard.braking, guard.reaction_s), abs=1e-3)
+    assert linear == pytest.approx(speed_within(room, LIMO.acceleration / 2, guard.reaction_s), abs=1e-3)
 
 
 @pytest.mark.parametrize(("free", "speed"), [(0.0, 0.0), (0.09, 0.2), (0.375, 0.5), (0.84, 0.8)])

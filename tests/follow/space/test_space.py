@@ -51,8 +51,8 @@ def test_walls_are_occupied_what_is_before_them_free_and_what_is_behind_unknown(
     ground = mapped()
     assert GRID.is_blocked(ground, at((WALL_X, 0.5), (WALL_X, 1.0))).all()
     assert not GRID.is_blocked(ground, at((1.5, 0.5), (2.6, 0.5), (2.6, -1.5))).any()
-    cells, _ = GRID.index(ground, at((1.5, 0.5), (2.6, 0.5), (3.0, -2.0)))
-    assert np.isfinite(ground.seen[tuple(cells.T)]).tolist() == [True, False, True]
+    cells, _ = GRID.flat(ground, at((1.5, 0.5), (2.6, 0.5), (3.0, -2.0)))
+    assert np.isfinite(ground.seen.take(cells)).tolist() == [True, False, True]
 
 
 def test_a_wall_hides_what_is_behind_it() -> None:

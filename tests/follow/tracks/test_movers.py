@@ -70,7 +70,7 @@ def test_the_end_of_a_wall_that_comes_into_view_does_not_move() -> None:
 
 def test_what_is_seen_of_a_wall_at_the_edge_of_its_cells_does_not_move_along_it() -> None:
     # The wall is in the cells up to 2 m; its returns stray by a centimetre to either side of that.
-    wall = GRID.flat(FREE, np.array([(1.95, 0.05 * step - 1.0) for step in range(60)]))
+    wall, _ = GRID.flat(FREE, np.array([(1.95, 0.05 * step - 1.0) for step in range(60)]))
     occupied, freed = FREE.occupied.copy(), FREE.freed.copy()
     occupied.flat[wall], freed.flat[wall] = 2.0, -np.inf
     walled = replace(FREE, stamp=0.0, occupied=occupied, freed=freed)

@@ -15,7 +15,6 @@ from limo_hog.follow.decision import Mode
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import NO_POINTS, Margin, from_odometry, rooms_ahead, to_odometry
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
-from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.routes import Router, along
 from limo_hog.follow.tracks.kalman import Track, rates
 from limo_hog.follow.tracks.person import Person
@@ -78,15 +77,6 @@ class Following:
         headway = (late_s + self.headway_s / math.sqrt(situation.acceleration)) * brisk
         keeps = max(asked, least, min(headway, self.most_headway))
         return self.near_hiding if keeps > self.near_hiding and situation.is_behind(soon) else keeps
-
-    def learnt(self, brisk: float, speed: float) -> float:
-        """Return how fast a person walks at most, as known after a measured `speed` [m/s]."""
-        return brisk + (self.rise if speed > brisk else self.fall) * (speed - brisk)
-
-    def side_of(self, track: Track, bearing: float, pose: Odometry) -> float:
-        """Return the side to which a person leaves, or is on if they stand: 1 left, -1 right."""
-        rate = rates(track, pose)[0]
-        return math.copysign(1.0, rate if abs(rate) > self.steady_bearing_rate else bearing)
 
     def is_hidden(self, bearing: float, distance: float, situation: Situation) -> bool:
         """Whether something is on the line of sight to the person."""

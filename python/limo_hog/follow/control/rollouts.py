@@ -10,7 +10,6 @@ import numpy as np
 from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.control.wheels import turn_acceleration
 from limo_hog.follow.parameters import param
-from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Margin, rooms_ahead
 from limo_hog.follow.sense.observation import Array
 
@@ -40,22 +39,6 @@ class Rollouts:
     wanted: Array
     free: Array  #: float64 (T, 2) [m]: where the first would be with nothing in its way.
     places: Array  #: float64 (T, N, 2) [m]: where the people are.
-
-    def gaps(self, places: Array, robot: RobotGeometry) -> Array:
-        """Return the distance from the outline to places (T, N, 2), float64 (K, T, N) [m]; negative inside it."""
-        poses = self.poses[:, :, None]
-        dx, dy = places[None, ..., 0] - poses[..., 0], places[None, ..., 1] - poses[..., 1]
-        cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-        ahead = np.abs(cos * dx + sin * dy) - robot.half_length
-        beside = np.abs(cos * dy - sin * dx) - robot.half_width
-        outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(beside, 0.0))
-        return np.asarray(outside + np.minimum(np.maximum(ahead, beside), 0.0))
-
-    def offs_to(self, places: Array) -> Array:
-        """Return how far off straight ahead places (T, 2) are, float64 (K, T) [rad], 0 … π."""
-        to = places[None] - self.poses[:, :, :2]
-        off = np.arctan2(to[..., 1], to[..., 0]) - self.poses[:, :, 2]
-        return np.asarray(np.abs(off - math.tau * np.rint(off / math.tau)))
 
 
 @dataclass(frozen=True, slots=True)

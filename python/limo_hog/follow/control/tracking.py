@@ -23,7 +23,7 @@ from limo_hog.follow.sense.observation import Observation, pose_at
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
 from limo_hog.follow.tracks.hiding import Hiding
-from limo_hog.follow.tracks.kalman import bearing_range, predict
+from limo_hog.follow.tracks.kalman import bearing_range, predict, rates
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.tracker import Tracker
 
@@ -208,9 +208,11 @@ class TrackingController:
 
         Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
         """
-        known = person.track if person.confirmed and self._is_sure(person, state) else state.known
-        brisk = self.following.learnt(state.brisk, math.hypot(*person.track.mean[2:]))
-        side = self.following.side_of(person.track, bearing, situation.pose)
+        following, track, brisk = self.following, person.track, state.brisk
+        known = track if person.confirmed and self._is_sure(person, state) else state.known
+        speed, (rate, _) = math.hypot(*track.mean[2:]), rates(track, situation.pose)
+        brisk += (following.rise if speed > brisk else following.fall) * (speed - brisk)
+        side = math.copysign(1.0, rate if abs(rate) > following.steady_bearing_rate else bearing)
         return replace(state, side=side, known=known, hunt=None, brisk=brisk)
 
     def _unsure(self, situation: Situation, state: TrackingState) -> Aimed:

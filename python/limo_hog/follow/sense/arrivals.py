@@ -51,10 +51,10 @@ class Arrivals:
         now = max(map(_CAME, self.newest.values()), default=0.0)
         clocks = {name: stamp + now - came for name, (stamp, came) in self.newest.items() if name != DEPTH}
         ahead = max(clocks, key=clocks.__getitem__, default="")
-        late = {name: clocks[ahead] - clock for name, clock in clocks.items() if name != ahead}
-        old = [name for name in late if late[name] > (max_late if name == CAMERA else max_age)]
+        old = [name for name in clocks if clocks[ahead] - clocks[name] > (max_late if name == CAMERA else max_age)]
         if not old:
             return ""
+        late = {name: clocks[ahead] - clock for name, clock in clocks.items() if name != ahead}
         if len(old) == len(late):
             return f"the {ahead}'s clock is {min(late.values()):.1f} s ahead of the {' and the '.join(late)}'s"
         return "; ".join(f"the {name} is {late[name]:.1f} s old" for name in old)

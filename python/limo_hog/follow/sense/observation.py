@@ -126,11 +126,6 @@ class Observation:
         newest = newest if self.odometry is None else max(newest, self.odometry.stamp)
         object.__setattr__(self, "now", newest)
 
-    @property
-    def at(self) -> float:
-        """When the readings were at hand, on the robot's own clock [s]."""
-        return self.now if self.clock is None else self.clock
-
 
 def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
     """Return the robot's pose at `stamp` [s], interpolated between the nearest of `poses`, oldest first.

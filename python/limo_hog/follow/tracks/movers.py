@@ -112,7 +112,7 @@ class Movers:
         return [
             one
             for one in movers
-            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.place, one.began) > self.least_way
+            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
         ]
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
@@ -123,7 +123,9 @@ class Movers:
     def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
         """Note whose legs they are: one mover to one person found by the camera, the nearest first."""
         pairs = []
-        felt = [(which, mover.track.place, mover.number) for which, mover in enumerate(movers) if mover.felt == stamp]
+        felt = [
+            (which, mover.track.mean[:2], mover.number) for which, mover in enumerate(movers) if mover.felt == stamp
+        ]
         for who, person in enumerate(seen):
             here = person.track.place
             for which, place, number in felt:

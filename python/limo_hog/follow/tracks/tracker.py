@@ -89,8 +89,7 @@ class Tracker:
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
         others = self.movers.others(moving, known, measured, pose, self.noise)
         pairs = self.association.pair(known, measured, pose, self.noise.turning(pose.angular), flat, others)
-        people: list[Person] = []
-        recall = tracks.recall
+        people, boxes, recall = list[Person](), dict[int, int](), tracks.recall
         for who, person in enumerate(known):
             bearing, distance = bearing_range(person.track, pose)
             expected = self.visibility.expected(
@@ -101,6 +100,7 @@ class Tracker:
             if expected and person.confirmed:
                 recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
+                boxes[person.number] = pairs[who]
                 person = self.correct(person, measured[pairs[who]], pose, chance)
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
@@ -109,7 +109,6 @@ class Tracker:
                 evidence = 0.0 if walks else self.existence.of_miss(chance)
                 person = self.existence.update(person, evidence, found=False)
             people.append(person)
-        boxes = {people[who].number: which for who, which in pairs.items()}
         number = tracks.next_number
         for which, seen in enumerate(measured):
             if which not in boxes.values() and which not in flat and self.association.is_new(seen, people, pose):
@@ -262,10 +261,11 @@ class Tracker:
         own = None if followed is None else people.get(followed.number)
         places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
+            if mover.number in people:
+                continue
             track = kalman.predict(mover.track, now, self.noise)
             here = track.place
-            gap = min([math.dist(here, place) for place in places], default=math.inf)
-            if mover.number in people or gap <= self.association.same_place:
+            if min([math.dist(here, place) for place in places], default=math.inf) <= self.association.same_place:
                 continue
             nameless.append(track)
             may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))

@@ -41,34 +41,10 @@ PICTURES, FILMS = (".png", ".jpg", ".bmp", ".webp", ".tiff", ".ppm", ".jp2"), ("
 
 #: A value in a text file, and what else may stand there.
 VALUE = re.compile(rb'-?\d+\.?\d*(?:[eE][-+]?\d+)?|"[^"\n]*"|\b(?:true|false|null)\b')
-OTHERS = [
-    b"nan",
-    b"inf",
-    b"-inf",
-    b"NaN",
-    b"Infinity",
-    b"1e999",
-    b"-1",
-    b"0",
-    b"-0.0",
-    b"1",
-    b"2.5",
-    b"1e-300",
-    b"1e300",
-]
-OTHERS += [
-    b"9" * 40,
-    b"4294967296",
-    b"true",
-    b"null",
-    b"[]",
-    b"{}",
-    b"[1, 2]",
-    b'""',
-    b'"x"',
-    b'"\\u001b[2J"',
-    b'"../.."',
-]
+OTHERS = b"nan inf -inf NaN Infinity 1e999 -1 0 -0.0 1 2.5 1e-300 1e300 4294967296 true null [] {} [1,2]".split()
+OTHERS += [b"9" * 40, b'""', b'"x"', b'"\\u001b[2J"', b'"../.."']
+#: Libraries that a command may import.
+LIBRARIES = "limo_hog limo_sim cv2 av numpy rich pymunk rosbags mcap".split()
 
 
 def _other_values(data: bytes, draw: random.Random) -> bytes:
@@ -162,17 +138,7 @@ def _import_what_it_needs(arguments: list[str], folder: Path) -> None:
         raise RuntimeError(f"a whole file is refused, so that nothing is tried: {done.stderr}")
     for name in done.stdout.splitlines():
         with suppress(Exception):
-            if name.partition(".")[0] in (
-                "limo_hog",
-                "limo_sim",
-                "cv2",
-                "av",
-                "numpy",
-                "rich",
-                "pymunk",
-                "rosbags",
-                "mcap",
-            ):
+            if name.partition(".")[0] in LIBRARIES:
                 importlib.import_module(name)
 
 

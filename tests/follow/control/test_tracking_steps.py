@@ -27,9 +27,9 @@ def step(own: int, *people: Person, seen: Observation | None = None, **known: An
     return CONTROLLER.step(seen, replace(before, tracks=replace(before.tracks, stamp=NOW - 0.1)))
 
 
-def keeps(one: Person, late: float = 0.0, **known: Any) -> float | None:
-    """The distance that is kept to a person, with images that come so late [s]."""
-    return step(1, one, seen=view(late), **known).belief.keeps
+def keeps(one: Person, **known: Any) -> float | None:
+    """The distance that is kept to a person."""
+    return step(1, one, **known).belief.keeps
 
 
 @pytest.mark.parametrize(

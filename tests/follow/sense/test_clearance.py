@@ -11,7 +11,6 @@ from tests.follow.views import flat, scan
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import (
-    NO_POINTS,
     DepthGrid,
     Margin,
     Points,
@@ -92,25 +91,12 @@ def test_what_every_scan_shares_cannot_be_changed() -> None:
     assert scan_points(seen, LIMO) is scan_points(seen, LIMO)
 
 
-def test_ranges_beyond_the_lidars_limits_are_no_points() -> None:
-    assert len(scan_points(scan(np.array([0.05, 9.0, np.nan, np.inf], np.float32)), LIMO)) == 0
-
-
-def test_a_range_of_exactly_the_lidars_least_is_a_point_and_a_shorter_one_is_not() -> None:
-    least = np.float32(0.125)
-    ranges = np.array([least, np.nextafter(least, np.float32(0.0))], np.float32)
-    assert len(scan_points(replace(scan(ranges), range_min=0.125), LIMO)) == 1
-
-
-def test_without_sensors_there_are_no_points() -> None:
-    assert NO_POINTS.shape == (0, 2)
-
-
-def test_a_range_of_exactly_the_lidars_reach_is_a_point() -> None:
+def test_ranges_within_the_lidars_limits_are_points() -> None:
     # sensor_msgs/LaserScan: what is beyond range_max is to be discarded.
-    assert (
-        len(scan_points(scan(np.array([8.0, np.nextafter(np.float32(8.0), np.float32(9.0))], np.float32)), LIMO)) == 1
-    )
+    least, most = np.float32(0.125), np.float32(8.0)
+    beyond = [np.nextafter(least, np.float32(0)), np.nextafter(most, np.float32(9)), 0.05, 9.0, np.nan, np.inf]
+    for ranges, points in (([least, most], 2), (beyond, 0)):
+        assert len(scan_points(replace(scan(np.array(ranges, np.float32)), range_min=0.125), LIMO)) == points
 
 
 def test_the_floor_is_no_obstacle() -> None:

@@ -81,6 +81,10 @@ class Guard(Generic[S]):
     without_lidar: bool = False
     depth_grid: DepthGrid = field(default_factory=DepthGrid)  #: Which depth pixels are looked at.
     robot: RobotGeometry = LIMO  #: The robot's outline, mounts and limits.
+    braking: float = field(init=False)  #: Deceleration counted on [m/s²]: half of what the wheels can do.
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "braking", self.robot.acceleration / 2)
 
     def start(self) -> GuardState[S]:
         """Return the state before the first observation."""
@@ -88,8 +92,7 @@ class Guard(Generic[S]):
 
     def step(self, observation: Observation, state: GuardState[S]) -> Decision[GuardState[S]]:
         """Ask the controller and let through what is safe; a faulty observation stops the robot."""
-        sensors = Sensors(observation.scan, observation.odometry)
-        now = observation.now if observation.clock is None else observation.clock
+        sensors, now = Sensors(observation.scan, observation.odometry), observation.at
         if fault := find_fault(observation, state.stamp):
             # When the clock was set back, what is remembered has stamps of the old clock.
             set_back = state.stamp is not None and observation.stamp < state.stamp
@@ -162,15 +165,13 @@ class Guard(Generic[S]):
         obstacles, straight = np.concatenate([around, state.depth_points]), np.zeros(1)
         room = float(rooms_ahead(obstacles, straight, self.margin, self.robot)[0])
         room_behind = float(rooms_ahead(-around, straight, self.margin, self.robot)[0])
-        # Half of what the wheels can do is counted on.
-        braking = self.robot.acceleration / 2
-        ahead = speed_within(room, braking, self.reaction_s)
-        behind = speed_within(room_behind, braking, self.reaction_s)
+        ahead = speed_within(room, self.braking, self.reaction_s)
+        behind = speed_within(room_behind, self.braking, self.reaction_s)
         fastest, backward = self.robot.max_speed, self.max_backward if self.robot.may_back else 0.0
         if sensors.scan is None or sensors.odometry is None:
             fastest, backward = min(fastest, self.max_blind), 0.0
         elif proposed.twist.linear < 0:
-            seen = speed_within(room_seen_behind(state.looks, pose, self.robot), braking, self.reaction_s)
+            seen = speed_within(room_seen_behind(state.looks, pose, self.robot), self.braking, self.reaction_s)
             behind = min(behind, max(seen, self.unseen_speed))
         wanted = min(max(proposed.twist.linear, -min(backward, fastest)), fastest)
         linear = min(max(wanted, -behind), ahead)

@@ -120,11 +120,13 @@ class Observation:
     clock: float | None = None
     depth_stamp: float | None = None  #: Of the newest depth image that has come [s]; None for `stamp`.
     now: float = field(init=False)  #: The newest stamp of all sensors [s]: a camera frame may arrive late.
+    at: float = field(init=False)  #: When the readings were at hand, on the robot's own clock [s].
 
     def __post_init__(self) -> None:
         newest = self.stamp if self.scan is None else max(self.stamp, self.scan.stamp)
         newest = newest if self.odometry is None else max(newest, self.odometry.stamp)
         object.__setattr__(self, "now", newest)
+        object.__setattr__(self, "at", newest if self.clock is None else self.clock)
 
 
 def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:

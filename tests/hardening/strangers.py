@@ -173,16 +173,16 @@ def _film_by_opencv(path: Path) -> None:
     film.release()
 
 
-def many(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
+def many(kind: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
     """Names, pictures and films, `AT_ONCE` in a folder with a good picture, which must be done."""
     ends: Counter[str] = Counter()
     findings = []
     whole = _whole(kind, folder)
     _import_what_it_needs(["detect", str(folder), "--json", "first"], folder)
-    for first in range(0, count, AT_ONCE):
+    for first in numbers[::AT_ONCE]:
         place = folder / f"{kind}{first}"
         write_image(place / "good.png", PICTURE)
-        for number in range(first, min(count, first + AT_ONCE)):
+        for number in range(first, min(numbers.stop, first + AT_ONCE)):
             draw = random.Random(number)
             suffix, data = draw.choice(whole)
             name = os.fsencode(place) + b"/" + (_bad_name(draw) if kind == "names" else b"%d" % number) + suffix
@@ -205,7 +205,7 @@ def many(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
     return ends, findings
 
 
-def single(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
+def single(kind: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
     """Labels, models, scenarios and recordings, one a command."""
     write_image(folder / "a.png", PICTURE)
     whole, suffix, command = _inputs(kind, folder)
@@ -214,7 +214,7 @@ def single(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]
     path = folder / f"bad{suffix}"
     path.write_bytes(whole[0])
     _import_what_it_needs(command(path), folder)
-    for number in range(count):
+    for number in numbers:
         draw = random.Random(number)
         change = damaged if kind == "recordings" or draw.random() < 0.5 else _other_values
         path.write_bytes(change(draw.choice(whole), draw))

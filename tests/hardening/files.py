@@ -5,18 +5,17 @@
 
 from __future__ import annotations
 
-import argparse
 import random
 import struct
 import sys
-import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.hardening.trials import main
 
 import limo_hog
 from limo_hog import HOGDescriptor
@@ -116,8 +115,9 @@ KINDS: dict[str, Callable[[Path], tuple[list[bytes], Callable[[bytes], None]]]] 
 }
 
 
-def run(kind: str, seeds: Sequence[int], folder: Path) -> tuple[Counter[str], list[str]]:
+def run(kind: str, seeds: range, folder: Path) -> tuple[Counter[str], list[str]]:
     """Read one damaged file a seed; return how they ended, and the findings."""
+    limo_hog.set_num_threads(1)
     whole, read = KINDS[kind](folder)
     ends: Counter[str] = Counter()
     findings = []
@@ -141,23 +141,5 @@ def run(kind: str, seeds: Sequence[int], folder: Path) -> tuple[Counter[str], li
     return ends, findings
 
 
-def main() -> int:
-    """Run from the command line; 1 where something was found."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("kinds", nargs="+", choices=list(KINDS))
-    parser.add_argument("--count", type=lambda text: int(float(text)), default=10_000)
-    parser.add_argument("--first", type=int, default=0, help="the first seed")
-    args = parser.parse_args()
-    limo_hog.set_num_threads(1)
-    wrong = False
-    for kind in args.kinds:
-        with tempfile.TemporaryDirectory() as folder:
-            ends, findings = run(kind, range(args.first, args.first + args.count), Path(folder))
-        wrong |= bool(findings)
-        print(f"{kind}: {args.count} damaged, {len(findings)} findings; {dict(ends)}")
-        print(*findings[:10], sep="\n")
-    return 1 if wrong else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(dict.fromkeys(KINDS, run), __doc__ or "", 10_000))

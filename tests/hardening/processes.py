@@ -157,12 +157,12 @@ def broken(path: Path) -> str:
     return ""
 
 
-def terminals(_: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
+def terminals(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
     """Each short command in each terminal ends with the code and the files of an ordinary one, and tells as little."""
     material(folder)
     ends: Counter[str] = Counter()
     findings = []
-    for number, typed in enumerate((*SHORT, *AT_A_ROBOT)[:count]):
+    for number, typed in enumerate((*SHORT, *AT_A_ROBOT)[numbers.start : numbers.stop]):
         ordinary: tuple[int, list[str], int] | None = None
         with _robot() if typed in AT_A_ROBOT else nullcontext():
             for how in ("", *TERMINALS):
@@ -214,7 +214,7 @@ def _running(mark: str) -> list[int]:
     return found
 
 
-def kills(_: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
+def kills(_: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
     """Kill a command at a random time, alone or with its group; look at what is left."""
     material(folder)
     # What ignores these, as a shell's background job or nohup does, hands that on, and rightly nothing ends.
@@ -223,7 +223,7 @@ def kills(_: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
     ends: Counter[str] = Counter()
     findings = []
     slowest = 0.0
-    for number in range(count):
+    for number in numbers:
         draw = random.Random(number)
         typed = LONG[number % len(LONG)]
         sent = draw.choice((signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP))

@@ -41,34 +41,10 @@ PICTURES, FILMS = (".png", ".jpg", ".bmp", ".webp", ".tiff", ".ppm", ".jp2"), ("
 
 #: A value in a text file, and what else may stand there.
 VALUE = re.compile(rb'-?\d+\.?\d*(?:[eE][-+]?\d+)?|"[^"\n]*"|\b(?:true|false|null)\b')
-OTHERS = [
-    b"nan",
-    b"inf",
-    b"-inf",
-    b"NaN",
-    b"Infinity",
-    b"1e999",
-    b"-1",
-    b"0",
-    b"-0.0",
-    b"1",
-    b"2.5",
-    b"1e-300",
-    b"1e300",
-]
-OTHERS += [
-    b"9" * 40,
-    b"4294967296",
-    b"true",
-    b"null",
-    b"[]",
-    b"{}",
-    b"[1, 2]",
-    b'""',
-    b'"x"',
-    b'"\\u001b[2J"',
-    b'"../.."',
-]
+OTHERS = b"nan inf -inf NaN Infinity 1e999 -1 0 -0.0 1 2.5 1e-300 1e300 4294967296 true null [] {} [1,2]".split()
+OTHERS += [b"9" * 40, b'""', b'"x"', b'"\\u001b[2J"', b'"../.."']
+#: Libraries that a command may import.
+LIBRARIES = "limo_hog limo_sim cv2 av numpy rich pymunk rosbags mcap".split()
 
 
 def _other_values(data: bytes, draw: random.Random) -> bytes:
@@ -162,17 +138,7 @@ def _import_what_it_needs(arguments: list[str], folder: Path) -> None:
         raise RuntimeError(f"a whole file is refused, so that nothing is tried: {done.stderr}")
     for name in done.stdout.splitlines():
         with suppress(Exception):
-            if name.partition(".")[0] in (
-                "limo_hog",
-                "limo_sim",
-                "cv2",
-                "av",
-                "numpy",
-                "rich",
-                "pymunk",
-                "rosbags",
-                "mcap",
-            ):
+            if name.partition(".")[0] in LIBRARIES:
                 importlib.import_module(name)
 
 
@@ -207,16 +173,16 @@ def _film_by_opencv(path: Path) -> None:
     film.release()
 
 
-def many(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
+def many(kind: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
     """Names, pictures and films, `AT_ONCE` in a folder with a good picture, which must be done."""
     ends: Counter[str] = Counter()
     findings = []
     whole = _whole(kind, folder)
     _import_what_it_needs(["detect", str(folder), "--json", "first"], folder)
-    for first in range(0, count, AT_ONCE):
+    for first in numbers[::AT_ONCE]:
         place = folder / f"{kind}{first}"
         write_image(place / "good.png", PICTURE)
-        for number in range(first, min(count, first + AT_ONCE)):
+        for number in range(first, min(numbers.stop, first + AT_ONCE)):
             draw = random.Random(number)
             suffix, data = draw.choice(whole)
             name = os.fsencode(place) + b"/" + (_bad_name(draw) if kind == "names" else b"%d" % number) + suffix
@@ -239,7 +205,7 @@ def many(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
     return ends, findings
 
 
-def single(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]]:
+def single(kind: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
     """Labels, models, scenarios and recordings, one a command."""
     write_image(folder / "a.png", PICTURE)
     whole, suffix, command = _inputs(kind, folder)
@@ -248,7 +214,7 @@ def single(kind: str, count: int, folder: Path) -> tuple[Counter[str], list[str]
     path = folder / f"bad{suffix}"
     path.write_bytes(whole[0])
     _import_what_it_needs(command(path), folder)
-    for number in range(count):
+    for number in numbers:
         draw = random.Random(number)
         change = damaged if kind == "recordings" or draw.random() < 0.5 else _other_values
         path.write_bytes(change(draw.choice(whole), draw))

@@ -16,7 +16,7 @@ from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.safety import Guard
 from limo_hog.follow.sense.clearance import completed
 from limo_hog.follow.sense.detectors import Region, detect_in
-from limo_hog.follow.sense.observation import Frame, Odometry, Scan, Sensors, observed
+from limo_hog.follow.sense.observation import Frame, Observation, Odometry, Scan, Sensors, clothes_in
 from limo_hog.follow.tracks.asking import Whom
 
 S = TypeVar("S")
@@ -125,10 +125,12 @@ class Follower(Generic[S]):
         detect_ms = 1e3 * (time.perf_counter() - began)
         if turned.scan is not None:
             turned = replace(turned, scan=completed(turned.scan, frame, turned.odometry, self._robot))
-        observation = observed(frame, turned, detections, region, failure)
-        observation = replace(observation, between=self._between, clock=now)
+        stamp, (height, width), scan, pose = frame.stamp, frame.image.shape[:2], turned.scan, turned.odometry
+        seen = Observation(stamp, width, height, frame.focal_px, detections, region, frame.depth, scan, pose, failure)
+        worn, between = clothes_in(frame.image, detections.windows), self._between
+        seen = replace(seen, clothes=worn, between=between, clock=now, depth_stamp=frame.depth_stamp)
         self._between = ()
-        decision = self._guard.step(observation, self._state)
+        decision = self._guard.step(seen, self._state)
         self._state, self._region = decision.state, decision.region
         told: Decision[None] = replace(decision, state=None)  # type: ignore[arg-type, assignment]
         return FrameLog(now, told, sensors, frame, detections, region, failure, detect_ms)

@@ -24,8 +24,8 @@ from limo_hog.follow.sense.clearance import (
     Margin,
     Points,
     from_odometry,
-    room_ahead,
     room_seen_behind,
+    rooms_ahead,
     scan_points,
     speed_within,
     to_odometry,
@@ -81,11 +81,10 @@ class Guard(Generic[S]):
     without_lidar: bool = False
     depth_grid: DepthGrid = field(default_factory=DepthGrid)  #: Which depth pixels are looked at.
     robot: RobotGeometry = LIMO  #: The robot's outline, mounts and limits.
+    braking: float = field(init=False)  #: Deceleration counted on [m/s²]: half of what the wheels can do.
 
-    @property
-    def braking(self) -> float:
-        """Deceleration counted on [m/s²]: half of what the wheels can do."""
-        return self.robot.acceleration / 2
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "braking", self.robot.acceleration / 2)
 
     def start(self) -> GuardState[S]:
         """Return the state before the first observation."""
@@ -93,19 +92,19 @@ class Guard(Generic[S]):
 
     def step(self, observation: Observation, state: GuardState[S]) -> Decision[GuardState[S]]:
         """Ask the controller and let through what is safe; a faulty observation stops the robot."""
-        sensors = Sensors(observation.scan, observation.odometry)
+        sensors, now = Sensors(observation.scan, observation.odometry), observation.at
         if fault := find_fault(observation, state.stamp):
             # When the clock was set back, what is remembered has stamps of the old clock.
             set_back = state.stamp is not None and observation.stamp < state.stamp
             stamp = observation.stamp if math.isfinite(observation.stamp) else state.stamp
             after = replace(self.start() if set_back else state, stamp=stamp, proposed=None)
-            after = self._heard(observation.at, sensors, after, observation)
+            after = self._heard(now, sensors, after, observation)
             return Decision(Twist(), after, Mode.BLOCKED, fault)
-        state = self._heard(observation.at, sensors, state, observation)
+        state = self._heard(now, sensors, state, observation)
         if fault := state.arrivals.disagreement(self.max_age_s, self.max_late_s):
             # Neither the controller nor the memory can do anything with times of several clocks.
             after = replace(state, stamp=observation.stamp, proposed=None)
-            fault = "; ".join(filter(None, (self._missing(observation.at, after), fault)))
+            fault = "; ".join(filter(None, (self._missing(now, after), fault)))
             return Decision(Twist(), after, Mode.BLOCKED, fault)
         state = self._remember(state, sensors)
         if observation.scan is not None and observation.odometry is not None:
@@ -117,7 +116,7 @@ class Guard(Generic[S]):
             reach = 2 * self.robot.half_length + self.margin.ahead + self.depth_reach
             seen = self.depth_grid.points(observation.depth, observation.focal_px, reach, self.robot)
             state = replace(state, depth_points=seen)
-        return self._limited(proposed, state, sensors, observation.at)
+        return self._limited(proposed, state, sensors, now)
 
     def ask(self, whom: Whom, state: GuardState[S]) -> GuardState[S]:
         """Return the state in which the guarded controller is asked to follow a person; raises `WhomError`."""
@@ -138,8 +137,9 @@ class Guard(Generic[S]):
         self, now: float, sensors: Sensors, state: GuardState[S], seen: Observation | None = None
     ) -> GuardState[S]:
         """Note which readings are new at `now` on the robot's own clock [s]."""
-        senses = (SCAN, sensors.scan), (ODOMETRY, sensors.odometry)
-        stamps = {name: reading.stamp for name, reading in senses if reading}
+        stamps = {} if sensors.scan is None else {SCAN: sensors.scan.stamp}
+        if sensors.odometry is not None:
+            stamps[ODOMETRY] = sensors.odometry.stamp
         if seen is not None:
             depth = seen.stamp if seen.depth_stamp is None else seen.depth_stamp
             stamps |= {CAMERA: seen.stamp, DEPTH: math.nan if seen.depth is None else depth}
@@ -162,9 +162,11 @@ class Guard(Generic[S]):
         if fault := self._missing(now, state):
             return decision(Twist(), Mode.BLOCKED, fault)
         around = from_odometry(state.scan_points, pose)
-        room = room_ahead(np.concatenate([around, state.depth_points]), self.margin, self.robot)
+        obstacles, straight = np.concatenate([around, state.depth_points]), np.zeros(1)
+        room = float(rooms_ahead(obstacles, straight, self.margin, self.robot)[0])
+        room_behind = float(rooms_ahead(-around, straight, self.margin, self.robot)[0])
         ahead = speed_within(room, self.braking, self.reaction_s)
-        behind = speed_within(room_ahead(-around, self.margin, self.robot), self.braking, self.reaction_s)
+        behind = speed_within(room_behind, self.braking, self.reaction_s)
         fastest, backward = self.robot.max_speed, self.max_backward if self.robot.may_back else 0.0
         if sensors.scan is None or sensors.odometry is None:
             fastest, backward = min(fastest, self.max_blind), 0.0
@@ -209,10 +211,10 @@ class Guard(Generic[S]):
         kept = out_of_view & (age >= 0) & (age < self.memory_s)
         points = np.concatenate([state.scan_points[kept], new])
         points_at = np.concatenate([state.scan_points_at[kept], np.full(len(new), scan.stamp)])
-        looks = tuple(look for look in state.looks if 0 <= scan.stamp - look.scan.stamp < self.memory_s)
+        looks = [look for look in state.looks if 0 <= scan.stamp - look.scan.stamp < self.memory_s]
         if not looks or scan.stamp - looks[-1].scan.stamp >= self.look_every_s:
-            looks = (*looks, Look(scan, pose))
-        return replace(state, scan_stamp=scan.stamp, scan_points=points, scan_points_at=points_at, looks=looks)
+            looks.append(Look(scan, pose))
+        return replace(state, scan_stamp=scan.stamp, scan_points=points, scan_points_at=points_at, looks=tuple(looks))
 
 
 def find_fault(observation: Observation, last_stamp: float | None) -> str:

@@ -62,6 +62,6 @@ def blocked(*places: tuple[float, float], since: float = -math.inf) -> Ground:
     """Ground on which something stands at places, and was not there until a stamp [s]."""
     ground = GRID.start(Odometry())
     occupied, freed = ground.occupied.copy(), np.full_like(ground.freed, NOW)
-    at = GRID.flat(ground, np.array(places))
+    at, _ = GRID.flat(ground, np.array(places))
     occupied.flat[at], freed.flat[at] = 2.0, since
     return replace(ground, occupied=occupied, freed=freed, stamp=NOW)

@@ -44,6 +44,8 @@ def wall(x: float, *, half: float) -> list[tuple[float, float]]:
 
 #: A wall at the robot's back: it cannot give way by backing.
 BEHIND = wall(-0.5, half=0.6)
+#: A post between the robot and the person followed.
+POST = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=wall(1.2, half=0.05), speed=0.5)
 
 
 def without(critic: str) -> Planner:
@@ -66,8 +68,7 @@ def test_a_plan_says_what_each_critic_adds_and_where_it_leads() -> None:
 
 
 def test_around_a_post_it_drives_and_says_so() -> None:
-    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=wall(1.2, half=0.05), speed=0.5)
-    plan = PLANNER.plan(seen, towards(3.5), DIRECT)
+    plan = PLANNER.plan(POST, towards(3.5), DIRECT)
     assert abs(plan.twist.angular) > 0.2
     assert plan.twist.linear > 0.3
     assert plan.reason == "driving around an obstacle"
@@ -81,8 +82,7 @@ def test_where_no_command_leads_anywhere_it_stands_and_says_so() -> None:
 
 def goal_distance(planner: Planner) -> bool:
     """It drives around a post that stands between it and its goal."""
-    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=wall(1.2, half=0.05), speed=0.5)
-    return planner.plan(seen, towards(3.5), DIRECT).manoeuvre != DIRECT
+    return planner.plan(POST, towards(3.5), DIRECT).manoeuvre != DIRECT
 
 
 def in_view(planner: Planner) -> bool:
@@ -126,9 +126,8 @@ def effort(planner: Planner) -> bool:
 
 def change_of_mind(planner: Planner) -> bool:
     """It goes on around a post on the side on which it began to."""
-    seen = situation((3.5, 0.0, 0.0, 0.0), followed=0, points=wall(1.2, half=0.05), speed=0.5)
     keen = replace(planner, stay=0.0)
-    return (keen.plan(seen, towards(3.5), Manoeuvre(0.32)).manoeuvre.heading or 0.0) > 0
+    return (keen.plan(POST, towards(3.5), Manoeuvre(0.32)).manoeuvre.heading or 0.0) > 0
 
 
 @pytest.mark.parametrize(

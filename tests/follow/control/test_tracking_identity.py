@@ -14,6 +14,10 @@ from limo_hog.follow.control.selection import TrackingState
 from limo_hog.follow.sense.observation import clothes_in
 
 
+def together(one: Detections, two: Detections) -> Detections:
+    return Detections(np.concatenate([one.windows, two.windows]), np.concatenate([one.scores, two.scores]))
+
+
 def test_it_stays_with_the_person_it_began_with() -> None:
     world = World()
     state = run(world, 5.0).state
@@ -23,11 +27,7 @@ def test_it_stays_with_the_person_it_began_with() -> None:
         other = World(person=(x + 0.5, y - 0.8), robot=world.robot, time=world.time)
         view, second = world.observe(), other.observe(score=5.0).detections
         assert len(second) == 1
-        together = Detections(
-            np.concatenate([second.windows, view.detections.windows]),
-            np.concatenate([second.scores, view.detections.scores]),
-        )
-        decision = CONTROLLER.step(replace(view, detections=together), state)
+        decision = CONTROLLER.step(replace(view, detections=together(second, view.detections)), state)
         state = decision.state
         world.time += 0.1
         assert state.choice.number == mine
@@ -93,13 +93,10 @@ def test_between_two_alike_it_stands_and_looks_and_says_that_it_is_not_sure() ->
     other = World(person=(2.5, 0.9), robot=world.robot, time=world.time)
     for _ in range(8):
         view, second = world.observe(), other.observe()
-        together = Detections(
-            np.concatenate([view.detections.windows, second.detections.windows]),
-            np.concatenate([view.detections.scores, second.detections.scores]),
-        )
+        people = together(view.detections, second.detections)
         assert view.depth is not None
         assert second.depth is not None
-        both = replace(view, detections=together, depth=np.minimum(view.depth, second.depth))
+        both = replace(view, detections=people, depth=np.minimum(view.depth, second.depth))
         state = CONTROLLER.step(both, state).state
         world.time, other.time = world.time + 0.1, other.time + 0.1
     one, two = (person.number for person in state.tracks.people)

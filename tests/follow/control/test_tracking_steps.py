@@ -27,9 +27,9 @@ def step(own: int, *people: Person, seen: Observation | None = None, **known: An
     return CONTROLLER.step(seen, replace(before, tracks=replace(before.tracks, stamp=NOW - 0.1)))
 
 
-def keeps(one: Person, late: float = 0.0, **known: Any) -> float | None:
-    """The distance that is kept to a person, with images that come so late [s]."""
-    return step(1, one, seen=view(late), **known).belief.keeps
+def keeps(one: Person, **known: Any) -> float | None:
+    """The distance that is kept to a person."""
+    return step(1, one, **known).belief.keeps
 
 
 @pytest.mark.parametrize(
@@ -143,12 +143,13 @@ def test_what_lasts_where_another_was_was_nobody() -> None:
 def test_the_people_believed_in_are_in_the_robots_frame_with_their_velocities() -> None:
     one = replace(someone(4, 1.0, 3.0, 0.5, -0.25), log_odds=math.log(3.0))
     known = state(one, pose=Odometry(NOW, 1.0, 1.0, math.pi / 2), choice=Choice(4, likely(_4=0.7), NOW))
-    (seen,) = believed(replace(known, tracks=replace(known.tracks, boxes=((4, 2),))), NOW, Noise())
+    tracks = replace(known.tracks, boxes=((4, 2),))
+    (seen,) = believed(replace(known, tracks=tracks), known.tracks.poses[-1], Noise())
     # The robot is at (1, 1) and looks along +y.
     assert (seen.x, seen.y, seen.vx, seen.vy) == pytest.approx((2.0, 0.0, -0.25, -0.5))
     assert (seen.number, seen.box, seen.same) == (4, 2, 0.7)
     assert seen.probability == pytest.approx(0.75)
-    (unknown,) = believed(state(one), NOW, Noise())
+    (unknown,) = believed(state(one), Odometry(NOW), Noise())
     assert (unknown.box, unknown.same) == (None, None)
 
 

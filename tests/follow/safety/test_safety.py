@@ -14,7 +14,7 @@ from limo_hog.detections import Detections
 from limo_hog.follow import Decision, Guard, Mode, Observation, Odometry, Sensors, Twist
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.safety import scan_fault
-from limo_hog.follow.sense.clearance import Look, room_seen_behind, speed_within
+from limo_hog.follow.sense.clearance import Look, room_seen_behind
 from limo_sim.world.robot import Drive
 
 
@@ -37,15 +37,6 @@ def test_a_person_near_ahead_stops_the_robot_but_not_its_turn() -> None:
     assert "ahead" in decision.reason
 
 
-def test_the_robot_slows_down_before_it_stops() -> None:
-    speeds = [
-        ahead().step(whole(scan=scan_of([(x, 0.0)])), ahead().start()).twist.linear for x in (2.0, 1.0, 0.9, 0.8, 0.7)
-    ]
-    assert speeds[0] == 0.5
-    assert speeds == sorted(speeds, reverse=True)
-    assert speeds[-1] < 0.05
-
-
 def test_depth_sees_what_the_lidar_misses() -> None:
     # A hand at 0.5 m, above the lidar's plane: nothing in the scan.
     depth = flat(8.0)
@@ -60,13 +51,10 @@ def test_a_depth_image_of_zeros_shows_nothing_and_stops_the_robot() -> None:
     assert "no valid pixel" in decision.reason
 
 
-def test_two_frames_may_have_one_stamp_but_time_may_not_run_backwards() -> None:
+def test_two_frames_may_have_one_stamp() -> None:
     first = ahead().step(whole(3.0, scan=scan(stamp=3.0)), ahead().start())
     again = ahead().step(whole(3.0, scan=scan(stamp=3.0)), first.state)
     assert again.twist.linear == 0.5
-    before = ahead().step(whole(2.9, scan=scan(stamp=3.0)), first.state)
-    assert before.twist.linear == 0.0
-    assert "backwards" in before.reason
 
 
 def test_what_was_seen_before_a_turn_stops_the_way_back() -> None:
@@ -139,60 +127,40 @@ def test_ground_behind_something_was_not_seen() -> None:
     assert room_seen_behind([Look(scan(), Odometry())], Odometry(x=0.8), LIMO) == pytest.approx(0.6, abs=0.11)
 
 
-def test_an_obstacle_that_has_left_the_lidars_view_empty_is_forgotten() -> None:
-    # It stood at 100 degrees to the left, near the end of the field of view, and walks off.
+def returns_kept(post: tuple[float, float], pose: Odometry, began: float = 0.0) -> tuple[int, int]:
+    """How many returns of a post are remembered, and how many of them after an empty scan from another pose."""
     guard = Guard(Headstrong(Twist(-0.3, 0.0)))
-    beside = (0.103 + 0.35 * np.cos(1.9), 0.35 * np.sin(1.9))
-    there = whole(scan=scan_of([beside]), odometry=Odometry())
-    first = guard.step(there, guard.start())
-    assert len(first.state.scan_points) > 0
-    gone = guard.step(whole(0.1, scan=scan(stamp=0.1), odometry=Odometry(0.1)), first.state)
-    assert len(gone.state.scan_points) == 0
+    there = whole(began, scan=scan_of([post], began), odometry=Odometry(began))
+    state = guard.step(there, guard.start()).state
+    after = guard.step(whole(pose.stamp, scan=scan(stamp=pose.stamp), odometry=pose), state).state
+    return len(state.scan_points), len(after.scan_points)
 
 
-def test_an_obstacle_on_either_side_behind_the_field_of_view_is_remembered() -> None:
-    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
-    for side in (1.0, -1.0):
-        there = whole(scan=scan_of([(0.6, side * 0.1)]), odometry=Odometry())
-        state = guard.step(there, guard.start()).state
-        for turn in (2.3, -2.3):
-            pose = Odometry(1.0, yaw=turn)
-            later = guard.step(whole(1.0, scan=scan(stamp=1.0), odometry=pose), state)
-            assert len(later.state.scan_points) == len(state.scan_points)
+@pytest.mark.parametrize("turn", [2.3, -2.3])
+@pytest.mark.parametrize("left", [0.1, -0.1])
+def test_an_obstacle_on_either_side_behind_the_field_of_view_is_remembered(left: float, turn: float) -> None:
+    before, after = returns_kept((0.6, left), Odometry(1.0, yaw=turn))
+    assert after == before > 0
 
 
 def test_an_obstacle_just_behind_the_lidars_field_of_view_is_remembered() -> None:
-    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
-    state = guard.step(whole(scan=scan_of([(0.6, 0.0)]), odometry=Odometry()), guard.start()).state
     # Drive to where the obstacle is at 109 degrees from the base, and at 121 from the lidar, which sees 115.
     yaw, x, y = -1.9, 0.4 * np.cos(1.9), 0.4 * np.sin(1.9)
     pose = Odometry(1.0, 0.6 - (np.cos(yaw) * x - np.sin(yaw) * y), -(np.sin(yaw) * x + np.cos(yaw) * y), yaw)
-    later = guard.step(whole(1.0, scan=scan(stamp=1.0), odometry=pose), state)
-    assert len(later.state.scan_points) == len(state.scan_points) > 0
+    before, after = returns_kept((0.6, 0.0), pose)
+    assert after == before > 0
 
 
-def test_returns_of_a_clock_that_was_set_back_are_forgotten() -> None:
-    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
-    state = guard.step(whole(scan=scan_of([(0.6, 0.0)], 100.0), odometry=Odometry()), guard.start()).state
-    back = Odometry(3.0, yaw=np.pi)
-    later = guard.step(whole(3.0, scan=scan(stamp=3.0), odometry=back), state)
-    assert len(later.state.scan_points) == 0
+def test_returns_are_forgotten_where_the_lidar_sees_nothing_now_or_its_clock_was_set_back() -> None:
+    # It stood at 100 degrees to the left, near the end of the field of view, and walks off.
+    before, after = returns_kept((0.103 + 0.35 * np.cos(1.9), 0.35 * np.sin(1.9)), Odometry(0.1))
+    assert before > after == 0
+    before, after = returns_kept((0.6, 0.0), Odometry(3.0, yaw=np.pi), began=100.0)
+    assert before > after == 0
 
 
 def test_points_further_than_the_robot_backs_off_are_not_remembered() -> None:
-    guard = Guard(Headstrong(Twist(-0.3, 0.0)))
-    view = whole(scan=scan_of([(1.6, 0.0)]), odometry=Odometry())
-    assert len(guard.step(view, guard.start()).state.scan_points) == 0
-
-
-@pytest.mark.parametrize("depth", [0.9, 1.5, 1.8])
-def test_the_depth_image_limits_the_speed_as_far_as_its_reach(depth: float) -> None:
-    guard = ahead(2.0)
-    room = 0.084 + depth - 0.145 - guard.margin.ahead
-    view = whole(scan=scan(), depth=flat(depth))
-    linear = guard.step(view, guard.start()).twist.linear
-    # The nearest pixel column is 4 px beside the middle, under the ellipse's top.
-    assert linear == pytest.approx(speed_within(room, guard.braking, guard.reaction_s), abs=1e-3)
+    assert returns_kept((1.6, 0.0), Odometry(0.1)) == (0, 0)
 
 
 @pytest.mark.parametrize(("free", "speed"), [(0.0, 0.0), (0.09, 0.2), (0.375, 0.5), (0.84, 0.8)])
@@ -377,9 +345,8 @@ def test_silence_of_the_camera_stops_the_robot_on_any_clock(began: float) -> Non
     state = guard.step(whole(began, scan=scan(stamp=began)), guard.start()).state
     for age, share in ((0.15, 1.0), (0.4, 0.95)):  # a late frame slows it down
         now = began + age
-        assert guard.recheck(now, Sensors(scan(stamp=now), Odometry(now)), state).twist.linear == pytest.approx(
-            0.5 * share, 0.01
-        )
+        slowed = guard.recheck(now, Sensors(scan(stamp=now), Odometry(now)), state).twist.linear
+        assert slowed == pytest.approx(0.5 * share, 0.01)
     decision = guard.recheck(began + 0.6, Sensors(scan(stamp=began + 0.6), Odometry(began + 0.6)), state)
     assert decision.twist == Twist()
     assert "no camera frame for 0.6 s" in decision.reason

@@ -11,12 +11,11 @@ from tests.follow.views import flat, scan
 
 from limo_hog.follow.robot import LIMO, RobotGeometry
 from limo_hog.follow.sense.clearance import (
-    NO_POINTS,
     DepthGrid,
     Margin,
+    Points,
     beam_directions,
     from_odometry,
-    room_ahead,
     rooms_ahead,
     scan_points,
     speed_within,
@@ -27,32 +26,33 @@ from limo_hog.follow.sense.observation import Odometry
 MARGIN = Margin(0.5, 0.2)
 
 
+#: Posts of a door 2 m wide.
+POSTS = np.array([[1.0, 1.0], [1.0, -1.0]])
+
+
+def room_ahead(points: Points, margin: Margin = MARGIN, robot: RobotGeometry = LIMO) -> float:
+    return float(rooms_ahead(points, np.zeros(1), margin, robot)[0])
+
+
 def test_an_obstacle_beside_the_way_is_passed_and_one_in_it_is_not() -> None:
-    assert room_ahead(np.array([[1.0, 0.4]]), MARGIN, LIMO) == math.inf
-    assert room_ahead(np.array([[1.0, 0.0]]), MARGIN, LIMO) == pytest.approx(1.0 - 0.145 - 0.5)
-
-
-def test_towards_the_side_the_margin_is_an_ellipse() -> None:
-    # Half the margin to the side: cos of 30 degrees of the margin ahead.
-    assert room_ahead(np.array([[1.0, 0.11 + 0.1]]), MARGIN, LIMO) == pytest.approx(0.855 - 0.5 * math.sqrt(0.75))
+    assert room_ahead(np.array([[1.0, 0.4]])) == math.inf
+    assert room_ahead(np.array([[1.0, 0.0]])) == pytest.approx(1.0 - 0.145 - 0.5)
+    # Towards the side the margin is an ellipse: half of it aside, cos of 30 degrees of the margin ahead.
+    assert room_ahead(np.array([[1.0, 0.11 + 0.1]])) == pytest.approx(0.855 - 0.5 * math.sqrt(0.75))
 
 
 def test_a_door_of_80_cm_is_passed_and_one_of_60_cm_is_not() -> None:
-    posts = np.array([[1.0, 1.0], [1.0, -1.0]])
-    assert room_ahead(posts * (1.0, 0.4), Margin(), LIMO) == math.inf
-    assert room_ahead(posts * (1.0, 0.3), Margin(), LIMO) < 1.0 - 0.145
-
-
-def test_what_touches_the_ellipse_only_from_the_side_is_passed() -> None:
+    assert room_ahead(POSTS * (1.0, 0.4), Margin()) == math.inf
+    assert room_ahead(POSTS * (1.0, 0.3), Margin()) < 1.0 - 0.145
+    # What touches the ellipse only from the side is passed.
     robot, margin = RobotGeometry(half_width=0.125), Margin(0.5, 0.25)
-    assert room_ahead(np.array([[1.0, 0.375]]), margin, robot) == math.inf
-    assert room_ahead(np.array([[1.0, 0.374]]), margin, robot) < math.inf
+    assert room_ahead(POSTS * (1.0, 0.375), margin, robot) == math.inf
+    assert room_ahead(POSTS * (1.0, 0.374), margin, robot) < math.inf
 
 
 def test_what_is_behind_is_not_in_the_way_ahead_nor_the_other_way_round() -> None:
-    assert room_ahead(np.array([[-0.3, 0.0]]), MARGIN, LIMO) == math.inf
-    assert room_ahead(-np.array([[0.3, 0.0]]), MARGIN, LIMO) == math.inf
-    assert room_ahead(-np.array([[-1.0, 0.0]]), MARGIN, LIMO) == pytest.approx(0.355)
+    assert room_ahead(np.array([[-0.3, 0.0]])) == room_ahead(-np.array([[0.3, 0.0]])) == math.inf
+    assert room_ahead(-np.array([[-1.0, 0.0]])) == pytest.approx(0.355)
 
 
 def test_the_room_ahead_of_a_turned_robot_is_that_of_points_turned_the_other_way() -> None:
@@ -60,7 +60,7 @@ def test_the_room_ahead_of_a_turned_robot_is_that_of_points_turned_the_other_way
     headings = np.array([-2.0, -0.4, 0.0, 0.3, 1.5, 3.0])
     cos, sin = np.cos(headings), np.sin(headings)
     turned = [points @ np.array([[c, -s], [s, c]]) for c, s in zip(cos, sin, strict=True)]
-    expected = [room_ahead(one, MARGIN, LIMO) for one in turned]
+    expected = [room_ahead(one) for one in turned]
     assert rooms_ahead(points, headings, MARGIN, LIMO) == pytest.approx(expected)
     assert rooms_ahead(points[:0], headings, MARGIN, LIMO).tolist() == [math.inf] * 6
 
@@ -91,25 +91,12 @@ def test_what_every_scan_shares_cannot_be_changed() -> None:
     assert scan_points(seen, LIMO) is scan_points(seen, LIMO)
 
 
-def test_ranges_beyond_the_lidars_limits_are_no_points() -> None:
-    assert len(scan_points(scan(np.array([0.05, 9.0, np.nan, np.inf], np.float32)), LIMO)) == 0
-
-
-def test_a_range_of_exactly_the_lidars_least_is_a_point_and_a_shorter_one_is_not() -> None:
-    least = np.float32(0.125)
-    ranges = np.array([least, np.nextafter(least, np.float32(0.0))], np.float32)
-    assert len(scan_points(replace(scan(ranges), range_min=0.125), LIMO)) == 1
-
-
-def test_without_sensors_there_are_no_points() -> None:
-    assert NO_POINTS.shape == (0, 2)
-
-
-def test_a_range_of_exactly_the_lidars_reach_is_a_point() -> None:
+def test_ranges_within_the_lidars_limits_are_points() -> None:
     # sensor_msgs/LaserScan: what is beyond range_max is to be discarded.
-    assert (
-        len(scan_points(scan(np.array([8.0, np.nextafter(np.float32(8.0), np.float32(9.0))], np.float32)), LIMO)) == 1
-    )
+    least, most = np.float32(0.125), np.float32(8.0)
+    beyond = [np.nextafter(least, np.float32(0)), np.nextafter(most, np.float32(9)), 0.05, 9.0, np.nan, np.inf]
+    for ranges, points in (([least, most], 2), (beyond, 0)):
+        assert len(scan_points(replace(scan(np.array(ranges, np.float32)), range_min=0.125), LIMO)) == points
 
 
 def test_the_floor_is_no_obstacle() -> None:

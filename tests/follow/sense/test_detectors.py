@@ -16,7 +16,6 @@ from limo_hog.follow.sense.detectors import (
     Cv2Detector,
     DetectorError,
     HalfSize,
-    OnnxDetector,
     Region,
     by_score,
     detect_in,
@@ -49,18 +48,18 @@ def test_our_hog_and_opencvs_find_the_same_person(frame: NDArray[np.uint8]) -> N
     assert ours.windows.tolist() == theirs.windows.tolist()
 
 
-def test_a_region_is_searched_alone_and_its_boxes_are_in_the_whole_image() -> None:
+@pytest.mark.parametrize(
+    ("region", "shown", "box"),
+    [
+        (Region(96, 32, 208, 192, 150.0), (192, 208, 3), [106, 52, 64, 128]),
+        # Large people are searched in a smaller picture.
+        (Region(0, 0, 400, 400, 320.0), (200, 200, 3), [20, 40, 128, 256]),
+    ],
+)
+def test_a_region_is_searched_alone(region: Region, shown: tuple[int, ...], box: list[int]) -> None:
     spy = Spy()
-    found = detect_in(spy, np.zeros((480, 640, 3), np.uint8), Region(96, 32, 208, 192, 150.0))
-    assert spy.shown == [(192, 208, 3)]
-    assert found.windows.tolist() == [[106, 52, 64, 128]]
-
-
-def test_large_people_are_searched_in_a_smaller_picture() -> None:
-    spy = Spy()
-    found = detect_in(spy, np.zeros((480, 640, 3), np.uint8), Region(0, 0, 400, 400, 320.0))
-    assert spy.shown == [(200, 200, 3)]
-    assert found.windows.tolist() == [[20, 40, 128, 256]]
+    assert detect_in(spy, np.zeros((480, 640, 3), np.uint8), region).windows.tolist() == [box]
+    assert spy.shown == [shown]
 
 
 def test_a_part_keeps_the_models_person_box_and_calibration() -> None:
@@ -106,22 +105,15 @@ def test_the_surest_comes_first() -> None:
     assert found.windows[0].tolist() == [3, 3, 1, 2]
 
 
-def test_a_network_from_a_file_finds_dark_cells(tmp_path: Path) -> None:
+@pytest.mark.parametrize("scale", [1, 2])
+def test_a_network_from_a_file_finds_dark_cells_in_an_image_of_any_size(tmp_path: Path, scale: int) -> None:
     path = tmp_path / "dark.onnx"
     path.write_bytes(dark_cells())
     image = np.full((480, 640, 3), 255, np.uint8)
     image[160:192, 320:352] = 0
-    found = detector_named(f"onnx:{path}").detect(image)
-    assert found.windows.tolist() == [[320, 144, 32, 64]]
+    found = detector_named(f"onnx:{path}").detect(image.repeat(scale, axis=0).repeat(scale, axis=1))
+    assert found.windows.tolist() == [[320 * scale, 144 * scale, 32 * scale, 64 * scale]]
     assert found.scores[0] > 0
-
-
-def test_a_network_sees_a_large_image_whole(tmp_path: Path) -> None:
-    path = tmp_path / "dark.onnx"
-    path.write_bytes(dark_cells())
-    image = np.full((960, 1280, 3), 255, np.uint8)
-    image[320:384, 640:704] = 0
-    assert OnnxDetector(path).detect(image).windows.tolist() == [[640, 288, 64, 128]]
 
 
 def test_what_is_no_network_or_no_detector_is_refused_by_name(tmp_path: Path) -> None:

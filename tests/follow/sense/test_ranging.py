@@ -19,6 +19,8 @@ from limo_hog.follow.sense.measurement import (
     top_row,
 )
 
+BOX = np.array([260, 120, 120, 240], np.int32)
+
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 100, 399, 400])
 def test_the_median_is_numpys(count: int) -> None:
@@ -46,7 +48,7 @@ def test_pixels_that_are_unknown_do_not_end_an_outline(unknown: float) -> None:
     # Of the head only three columns are known.
     depth[150:200, 290:350] = unknown
     depth[150:200, 318:321] = 2.0
-    assert top_row(depth, np.array([260, 120, 120, 240], np.int32), 2.0) == 150
+    assert top_row(depth, BOX, 2.0) == 150
 
 
 def test_without_depth_a_box_has_no_stature_and_may_be_low() -> None:
@@ -75,39 +77,31 @@ def test_the_depth_of_a_box_is_that_of_a_square_of_twenty_pixels_in_its_middle()
     assert person_depth(depth, np.array([270, 140, 60, 120], np.int32)) == 3.0
 
 
-def test_five_rows_without_the_person_end_the_outline_and_four_do_not() -> None:
-    for gap, top in ((4, 120), (5, 200)):
-        depth = flat(8.0)
-        depth[120:330, 290:350] = 2.0
-        depth[200 - gap : 200, 290:350] = 8.0
-        assert top_row(depth, np.array([260, 120, 120, 240], np.int32), 2.0) == top
-
-
-def test_a_row_is_the_persons_whose_known_pixels_are_theirs_in_one_of_four() -> None:
-    # A strip of 2 · round(.08 · 120) = 20 px around column 320; five of them are a quarter.
-    for own, top in ((5, 150), (4, 200)):
-        depth = flat(8.0)
-        depth[200:330, 290:350] = 2.0
-        depth[150:200, 320 : 320 + own] = 2.0
-        assert top_row(depth, np.array([260, 120, 120, 240], np.int32), 2.0) == top
-
-
-@pytest.mark.parametrize("nearer", [-1, 1])
-def test_a_pixel_is_the_persons_within_a_trunk_and_an_arm(nearer: int) -> None:
-    for off, top in ((0.34, 150), (0.36, 200)):
-        depth = flat(8.0)
-        depth[200:330, 290:350] = 2.0
-        depth[150:200, 290:350] = 2.0 + nearer * off
-        assert top_row(depth, np.array([260, 120, 120, 240], np.int32), 2.0) == top
-
-
-def test_a_narrow_box_is_looked_at_four_pixels_to_either_side() -> None:
-    box = np.array([310, 120, 20, 240], np.int32)
-    for columns, top in ((slice(316, 324), 150), (slice(310, 316), 200), (slice(324, 330), 200)):
-        depth = flat(8.0)
-        depth[200:330, 310:330] = 2.0
-        depth[150:200, columns] = 2.0
-        assert top_row(depth, box, 2.0) == top
+@pytest.mark.parametrize(
+    ("rows", "columns", "depth", "width", "top"),
+    [
+        # Five rows without the person end the outline, and four do not.
+        ((120, 196), (290, 350), 2.0, 120, 120),
+        ((120, 195), (290, 350), 2.0, 120, 200),
+        # A row is the person's if one in four known pixels is: 5 of the 2 · round(.08 · 120) = 20 px about column 320.
+        ((150, 200), (320, 325), 2.0, 120, 150),
+        ((150, 200), (320, 324), 2.0, 120, 200),
+        # A pixel is the person's within a trunk and an arm.
+        *(((150, 200), (290, 350), 2.0 + side * 0.34, 120, 150) for side in (-1, 1)),
+        *(((150, 200), (290, 350), 2.0 + side * 0.36, 120, 200) for side in (-1, 1)),
+        # A narrow box is looked at four pixels to either side.
+        ((150, 200), (316, 324), 2.0, 20, 150),
+        ((150, 200), (310, 316), 2.0, 20, 200),
+        ((150, 200), (324, 330), 2.0, 20, 200),
+    ],
+)
+def test_an_outline_goes_on_as_far_up_as_rows_are_the_persons(
+    rows: tuple[int, int], columns: tuple[int, int], depth: float, width: int, top: int
+) -> None:
+    image = flat(8.0)
+    image[200:330, 290:350] = 2.0
+    image[slice(*rows), slice(*columns)] = depth
+    assert top_row(image, np.array([320 - width // 2, 120, width, 240], np.int32), 2.0) == top
 
 
 def before_and_beside(rows: slice, columns: slice, wall: float = 4.0) -> float | None:
@@ -115,7 +109,7 @@ def before_and_beside(rows: slice, columns: slice, wall: float = 4.0) -> float |
     depth = flat(wall)
     depth[:, 300:340] = 2.0
     depth[rows, columns] = 3.0
-    return stands_out(depth, np.array([260, 120, 120, 240], np.int32))
+    return stands_out(depth, BOX)
 
 
 def test_a_person_stands_out_from_what_is_beside_the_chest() -> None:
@@ -138,7 +132,7 @@ def test_the_chest_is_looked_at_where_people_seen_from_the_side_still_are() -> N
     for half, near in ((4, 3.0), (3, 4.0)):
         depth = flat(4.0)
         depth[:, 320 - half : 320 + half] = 3.0
-        assert stands_out(depth, np.array([260, 120, 120, 240], np.int32)) == pytest.approx(4.0 - near)
+        assert stands_out(depth, BOX) == pytest.approx(4.0 - near)
 
 
 def test_a_strip_of_which_a_fifth_is_known_is_known() -> None:
@@ -148,7 +142,7 @@ def test_a_strip_of_which_a_fifth_is_known_is_known() -> None:
         depth[:, 300:340] = 2.0
         depth[185:240, 265:277] = np.nan
         depth[185 : 185 + rows, 265:277] = 4.0
-        relief = stands_out(depth, np.array([260, 120, 120, 240], np.int32))
+        relief = stands_out(depth, BOX)
         assert relief is not None
         assert (relief == pytest.approx(2.0)) == known
 
@@ -158,6 +152,7 @@ def test_an_outline_at_one_edge_of_the_image_stands_out_from_the_other_side_alon
     depth[:, :40] = 2.0
     assert stands_out(depth, np.array([-40, 120, 120, 240], np.int32)) == pytest.approx(2.0)
     assert stands_out(depth, np.array([-400, 120, 120, 240], np.int32)) is None
+    assert stands_out(np.empty((0, 0), np.float32), BOX) is None
 
 
 def seen_at(box: tuple[int, int, int, int], depth: float, top: int) -> Measurement:
@@ -217,7 +212,7 @@ def test_unknown_pixels_change_no_relief_as_long_as_a_fifth_is_known(unknown: fl
     depth = flat(4.0)
     depth[:, 300:340] = 2.0
     depth[185:225] = unknown
-    assert stands_out(depth, np.array([260, 120, 120, 240], np.int32)) == pytest.approx(2.0)
+    assert stands_out(depth, BOX) == pytest.approx(2.0)
 
 
 def test_an_outline_at_a_side_of_the_image_is_followed_in_what_is_left_of_its_strip() -> None:

@@ -23,6 +23,10 @@ ANGLES = np.linspace(-2.0, 2.0, 292)
 WALL_X, WALL_END = 2.04, -0.5
 
 
+def free_scan(stamp: float = 0.0) -> Scan:
+    return Scan(stamp, np.full(292, np.inf, np.float32), -2.0, 2.0, 0.12, 8.0)
+
+
 def wall_scan(pose: Odometry = HERE, stamp: float = 0.0) -> Scan:
     """What the lidar measures of that wall, by geometry."""
     x, y = pose.x + LIMO.lidar_x * math.cos(pose.yaw), pose.y + LIMO.lidar_x * math.sin(pose.yaw)
@@ -32,15 +36,29 @@ def wall_scan(pose: Odometry = HERE, stamp: float = 0.0) -> Scan:
         far = (WALL_X - x) / cos
         met = (far > 0) & (y + far * sin > WALL_END)
     ranges[met] = far[met]
-    return Scan(stamp, ranges.astype(np.float32), -2.0, 2.0, 0.12, 8.0)
+    return replace(free_scan(stamp), ranges=ranges.astype(np.float32))
 
 
-def mapped(scans: int = 3, pose: Odometry = HERE) -> Ground:
-    ground = None
-    for scan in range(scans):
-        ground = GRID.update(ground, wall_scan(pose, scan / 8), pose, NO_POINTS, NO_POINTS, LIMO)
+def entered(
+    *scans: Scan,
+    ground: Ground | None = None,
+    pose: Odometry = HERE,
+    people: NDArray[np.float64] = NO_POINTS,
+    depths: NDArray[np.float64] = NO_POINTS,
+) -> Ground:
+    """The map after scans taken at a pose."""
+    for scan in scans:
+        ground = GRID.update(ground, scan, pose, people, depths, LIMO)
     assert ground is not None
     return ground
+
+
+def wall_scans(pose: Odometry = HERE, began: float = 0.0) -> list[Scan]:
+    return [wall_scan(pose, began + scan / 8) for scan in range(3)]
+
+
+def mapped() -> Ground:
+    return entered(*wall_scans())
 
 
 def at(*points: tuple[float, float]) -> NDArray[np.float64]:
@@ -51,8 +69,8 @@ def test_walls_are_occupied_what_is_before_them_free_and_what_is_behind_unknown(
     ground = mapped()
     assert GRID.is_blocked(ground, at((WALL_X, 0.5), (WALL_X, 1.0))).all()
     assert not GRID.is_blocked(ground, at((1.5, 0.5), (2.6, 0.5), (2.6, -1.5))).any()
-    cells, _ = GRID.index(ground, at((1.5, 0.5), (2.6, 0.5), (3.0, -2.0)))
-    assert np.isfinite(ground.seen[tuple(cells.T)]).tolist() == [True, False, True]
+    cells, _ = GRID.flat(ground, at((1.5, 0.5), (2.6, 0.5), (3.0, -2.0)))
+    assert np.isfinite(ground.seen.take(cells)).tolist() == [True, False, True]
 
 
 def test_a_wall_hides_what_is_behind_it() -> None:
@@ -61,68 +79,50 @@ def test_a_wall_hides_what_is_behind_it() -> None:
 
 
 def test_the_map_moves_along_without_moving_what_stands() -> None:
-    ground = mapped()
     pose = Odometry(x=1.63, y=-1.21)
-    for scan in range(3):
-        ground = GRID.update(ground, wall_scan(pose, 1 + scan / 8), pose, NO_POINTS, NO_POINTS, LIMO)
+    ground = entered(*wall_scans(pose, 1.0), ground=mapped(), pose=pose)
     assert ground.corner != mapped().corner
     assert GRID.is_blocked(ground, at((WALL_X, 0.5))).all()
 
 
 def test_a_person_is_no_part_of_the_ground_and_what_moved_away_is_forgotten() -> None:
-    free = Scan(0.0, np.full(292, np.inf, np.float32), -2.0, 2.0, 0.12, 8.0)
-    person = at((WALL_X, 0.5))
-    ground = GRID.update(None, wall_scan(), HERE, person, NO_POINTS, LIMO)
-    ground = GRID.update(ground, wall_scan(), HERE, person, NO_POINTS, LIMO)
+    ground = entered(wall_scan(), wall_scan(), people=at((WALL_X, 0.5)))
     assert GRID.is_blocked(ground, at((WALL_X, 0.5), (WALL_X, 1.5))).tolist() == [False, True]
-    for _ in range(8):
-        ground = GRID.update(ground, free, HERE, NO_POINTS, NO_POINTS, LIMO)
-    assert not GRID.is_blocked(ground, at((WALL_X, 1.5)))[0]
+    assert not GRID.is_blocked(entered(*[free_scan()] * 8, ground=ground), at((WALL_X, 1.5)))[0]
 
 
 @pytest.mark.parametrize("began", [0.0, 1.7e9])
 def test_what_came_in_is_told_from_what_lasts_on_any_clock(began: float) -> None:
-    free = Scan(began, np.full(292, np.inf, np.float32), -2.0, 2.0, 0.12, 8.0)
-    ground, wall = GRID.update(None, free, HERE, NO_POINTS, NO_POINTS, LIMO), at((WALL_X, 0.5))
-    for seconds in np.arange(0.5, GRID.lasts_s + 0.5, 0.5).tolist():
-        ground = GRID.update(ground, wall_scan(stamp=began + seconds), HERE, NO_POINTS, NO_POINTS, LIMO)
+    seconds, wall = np.arange(0.5, GRID.lasts_s + 0.5, 0.5).tolist(), at((WALL_X, 0.5))
+    ground = entered(free_scan(began), *(wall_scan(stamp=began + one) for one in seconds))
     assert GRID.is_blocked(ground, wall).all()
     assert not GRID.is_blocked(ground, wall, lasting=True).any()
-    ground = GRID.update(ground, wall_scan(stamp=began + GRID.lasts_s + 0.5), HERE, NO_POINTS, NO_POINTS, LIMO)
+    ground = entered(wall_scan(stamp=began + GRID.lasts_s + 0.5), ground=ground)
     assert GRID.is_blocked(ground, wall, lasting=True).all()
 
 
 @pytest.mark.parametrize("began", [0.0, 1.7e9])
 def test_when_ground_was_free_is_known_to_the_scan_on_any_clock(began: float) -> None:
-    ground = None
-    for seconds in (0.0, 0.25, 40.0):
-        ground = GRID.update(ground, wall_scan(stamp=began + seconds), HERE, NO_POINTS, NO_POINTS, LIMO)
-    assert ground is not None
+    ground = entered(*(wall_scan(stamp=began + seconds) for seconds in (0.0, 0.25, 40.0)))
     before, behind = at((1.5, 0.5)), at((2.6, 0.5))
     assert GRID.is_free_since(ground, before, began + 39.75).all()
     assert not GRID.is_free_since(ground, before, began + 40.0).any()
     assert not GRID.is_free_since(ground, behind, -np.inf).any()
     turned = replace(HERE, yaw=math.pi)
-    ground = GRID.update(ground, wall_scan(turned, began + 50.0), turned, NO_POINTS, NO_POINTS, LIMO)
+    ground = entered(wall_scan(turned, began + 50.0), ground=ground, pose=turned)
     assert GRID.is_free_since(ground, before, began + 39.75).all()
     assert not GRID.is_free_since(ground, before, began + 40.25).any()
 
 
 def test_depth_fills_what_is_above_or_below_the_lidar() -> None:
-    table = at((1.0, 0.0), (1.0, 0.05))
-    ground = None
-    for _ in range(3):
-        ground = GRID.update(ground, wall_scan(), HERE, NO_POINTS, table, LIMO)
-    assert ground is not None
+    ground = entered(*[wall_scan()] * 3, depths=at((1.0, 0.0), (1.0, 0.05)))
     assert GRID.is_blocked(ground, at((1.0, 0.0)))[0]
 
 
 def test_a_way_round_a_wall_is_as_long_as_geometry_says_and_keeps_off_it() -> None:
-    ground = mapped()
     # What is behind the wall is seen from beside it.
     beside = Odometry(x=2.6, y=-2.4, yaw=math.pi / 2)
-    for scan in range(3):
-        ground = GRID.update(ground, wall_scan(beside, 1 + scan / 8), beside, NO_POINTS, NO_POINTS, LIMO)
+    ground = entered(*wall_scans(beside, 1.0), ground=mapped(), pose=beside)
     way = ROUTER.way_towards(GRID, ground, HERE, at((2.9, 0.4))[0])
     assert np.hypot(*(way[-1] - (2.9, 0.4))) < 0.15
     wall = np.stack([np.full(60, WALL_X), np.linspace(WALL_END, 2.5, 60)], axis=1)
@@ -138,10 +138,7 @@ def test_no_way_leads_through_a_door_narrower_than_the_robot_needs() -> None:
     far = (1.0 - LIMO.lidar_x) / np.cos(ANGLES)
     met = (np.cos(ANGLES) > 0.2) & (np.abs(far * np.sin(ANGLES)) > 0.2)
     ranges[met] = far[met]
-    scan, ground = Scan(0.0, ranges.astype(np.float32), -2.0, 2.0, 0.12, 8.0), None
-    for _ in range(3):
-        ground = GRID.update(ground, scan, HERE, NO_POINTS, NO_POINTS, LIMO)
-    assert ground is not None
+    ground = entered(*[replace(free_scan(), ranges=ranges.astype(np.float32))] * 3)
     assert ROUTER.way_towards(GRID, ground, HERE, at((2.5, 0.0))[0])[:, 0].max() < 1.0
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.follow.tracks.people import POSE, a_person, box
-from tests.follow.views import FOCAL, HEIGHT, before_wall, flat
+from tests.follow.views import FOCAL, HEIGHT
 
-from limo_hog.follow.sense.measurement import stands_out, top_row
+from limo_hog.follow.sense.measurement import stands_out
 from limo_hog.follow.tracks.person import Existence, Person, Recall
 from limo_hog.follow.tracks.tracker import Tracker
 
@@ -64,28 +64,6 @@ def test_a_picture_on_a_wall_stands_out_from_nothing_whatever_side_it_is_seen_fr
     assert abs(relief) < 0.02
     assert not EXISTENCE.is_solid(replace(box(2.5), stands_out=relief))
     assert EXISTENCE.of_box(replace(box(2.5), score=4.0, stands_out=relief), 0.9) < 0
-
-
-def test_a_person_before_a_wall_stands_out_by_the_distance_to_it() -> None:
-    assert stands_out(before_wall(2.0, tuple(BOX.tolist()), 2.6), BOX) == pytest.approx(0.6)
-
-
-def test_what_has_no_depth_beside_it_stands_out_and_without_any_nothing_is_known() -> None:
-    depth = before_wall(2.0, tuple(BOX.tolist()), np.nan)
-    relief = stands_out(depth, BOX)
-    assert relief is not None
-    assert relief > 5
-    assert stands_out(np.empty((0, 0), np.float32), BOX) is None
-
-
-def test_the_head_ends_the_outline() -> None:
-    depth = flat(8.0)
-    depth[150:330, 290:350] = 2.0
-    assert top_row(depth, BOX, 2.0) == 150
-    depth[200:203] = np.nan
-    assert top_row(depth, BOX, 2.0) == 150
-    depth[:330, 290:350] = 2.0
-    assert top_row(depth, BOX, 2.0) == 0
 
 
 def test_misses_are_counted_since_the_last_box() -> None:
@@ -150,12 +128,7 @@ def test_the_recall_is_learnt_of_people_of_a_size_as_the_share_of_frames(found: 
 
 
 def test_a_track_is_confirmed_from_95_percent_until_it_is_below_27() -> None:
-    for existence, before, after_ in (
-        (0.94, False, False),
-        (0.96, False, True),
-        (0.28, True, True),
-        (0.26, True, False),
-    ):
+    for existence, before, after_ in (0.94, False, False), (0.96, False, True), (0.28, True, True), (0.26, True, False):
         person = replace(a_person(1, 2.5), log_odds=math.log(existence / (1 - existence)), confirmed=before)
         assert person.existence == pytest.approx(existence)
         assert EXISTENCE.update(person, 0.0, found=True).confirmed == after_

@@ -8,10 +8,9 @@ import pytest
 from tests.follow.tracks.people import IN_GREEN, IN_RED, WINDOW
 from tests.follow.tracks.wearers import at, legs, person
 
-from limo_hog.follow.control.selection import Choice, Selection
 from limo_hog.follow.tracks.identity import Identity, Likeness, Traits
 
-IDENTITY, SELECTION = Identity(), Selection()
+IDENTITY = Identity()
 
 
 def followed() -> Likeness:
@@ -146,47 +145,6 @@ def test_two_alike_who_turn_round_each_other_cannot_be_told_apart_after_it() -> 
         known = IDENTITY.update(known, at(stamp, one, turns))
     assert known.of(1) < 0.9
     assert known.of(2) > 0.1
-
-
-def chosen(chances: tuple[tuple[int, float], ...], stamp: float, unsure_at: float | None = None) -> Choice:
-    """Return the choice between two people in view, who look alike, with these probabilities."""
-    likeness = replace(followed(), chances=chances, at=stamp)
-    choice = Choice(1, likeness, stamp, unsure_at=unsure_at)
-    people = at(stamp, person(1, stamp, clothes=None, tall=WINDOW), person(2, stamp, 1.0, None))
-    return SELECTION.choose(replace(people, people=tuple(replace(one, tall=None) for one in people.people)), choice)
-
-
-def test_between_two_as_likely_none_is_chosen_until_it_shows_or_takes_too_long() -> None:
-    assert chosen(((1, 0.9), (2, 0.1)), 2.0).candidates == ()
-    unsure = chosen(((1, 0.5), (2, 0.45)), 2.0)
-    assert set(unsure.candidates) == {1, 2}
-    assert unsure.unsure_at == 2.0
-    late = chosen(((1, 0.5), (2, 0.45)), 2.0, unsure_at=2.0 - SELECTION.decide_s - 0.1)
-    assert (late.number, late.candidates) == (1, ())
-
-
-def test_the_likelier_of_two_is_followed_even_if_the_other_was() -> None:
-    assert chosen(((1, 0.1), (2, 0.85)), 2.0).number == 2
-    assert chosen(((1, 0.02), (2, 0.02)), 2.0).number is None
-
-
-def test_before_one_is_followed_the_one_straight_ahead_and_near_is_meant() -> None:
-    ahead, aside, behind = person(1, 0.0, 0.1), person(2, 0.0, -1.0), person(3, 0.0)
-    behind = replace(behind, track=replace(behind.track, mean=(4.4, 0.0, 0.0, 0.0)))
-    assert SELECTION.choose(at(0.0, aside, behind, ahead), Choice()).number == 1
-
-
-def test_a_person_who_may_be_the_lost_person_is_looked_at_for_some_seconds() -> None:
-    def looked(stamp: float, unsure_at: float | None) -> Choice:
-        likeness = replace(followed(), chances=((2, 0.3),), at=stamp)
-        back = replace(person(2, stamp, clothes=None), tall=None)
-        return SELECTION.choose(at(stamp, back), Choice(None, likeness, 1.0, unsure_at=unsure_at))
-
-    assert looked(3.0, None).candidates == (2,)
-    later = looked(3.1 + SELECTION.decide_s, 3.0)
-    assert later.candidates == ()
-    # They are not looked at anew as long as they are in view.
-    assert later.unsure_at == 3.0
 
 
 def test_a_box_that_contradicts_the_track_in_this_frame_may_be_anothers() -> None:

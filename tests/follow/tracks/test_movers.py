@@ -17,6 +17,8 @@ from limo_hog.follow.tracks.kalman import Track
 from limo_hog.follow.tracks.movers import Mover, is_in_view
 
 Place = tuple[float, float]
+#: Ground that was never seen to be free.
+NEVER = replace(FREE, freed=np.full_like(FREE.freed, -np.inf))
 POSES = [Odometry(), Odometry(1.0, -1.0, 1.5, 0.7), Odometry(1.0, 2.0, -0.8, -2.5)]
 
 
@@ -59,8 +61,7 @@ def test_what_is_seen_of_a_wall_beside_a_nearer_post_does_not_begin_to_move() ->
 
 
 def test_the_end_of_a_wall_that_comes_into_view_does_not_move() -> None:
-    wall_stays = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
-    for ground, moving in ((FREE, 1), (wall_stays, 0)):
+    for ground, moving in ((FREE, 1), (NEVER, 0)):
         movers: tuple[Mover, ...] = ()
         for index in range(12):
             seen = [(2.0, 0.07 * index + 0.05 * step) for step in range(5)]
@@ -70,7 +71,7 @@ def test_the_end_of_a_wall_that_comes_into_view_does_not_move() -> None:
 
 def test_what_is_seen_of_a_wall_at_the_edge_of_its_cells_does_not_move_along_it() -> None:
     # The wall is in the cells up to 2 m; its returns stray by a centimetre to either side of that.
-    wall = GRID.flat(FREE, np.array([(1.95, 0.05 * step - 1.0) for step in range(60)]))
+    wall, _ = GRID.flat(FREE, np.array([(1.95, 0.05 * step - 1.0) for step in range(60)]))
     occupied, freed = FREE.occupied.copy(), FREE.freed.copy()
     occupied.flat[wall], freed.flat[wall] = 2.0, -np.inf
     walled = replace(FREE, stamp=0.0, occupied=occupied, freed=freed)
@@ -91,7 +92,6 @@ def test_what_the_camera_has_shown_for_long_is_counted() -> None:
 
 
 def test_a_place_is_empty_once_a_beam_ends_behind_it_and_nothing_is_nearer() -> None:
-    never = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
     wall = [(3.5, 0.05 * step - 3.0) for step in range(120)]
     post = [(0.8, 0.0), (0.8, 0.05)]
     for nearer, moving in (([], 1), (post, 0)):
@@ -101,7 +101,7 @@ def test_a_place_is_empty_once_a_beam_ends_behind_it_and_nothing_is_nearer() -> 
             hidden = [one for one in wall if abs(one[1] - y * 3.5 / 2.0) > 0.3]
             after = nearer if index > 1 else []
             points = sorted([(2.0, y - 0.03), (2.0, y + 0.03), *hidden, *after], key=lambda p: p[1] / p[0])
-            movers = update(movers, index * SCAN_S, *points, ground=never)
+            movers = update(movers, index * SCAN_S, *points, ground=NEVER)
         assert len(MOVERS.moving(movers)) == moving
 
 
@@ -200,9 +200,8 @@ def test_returns_are_one_movers_and_those_of_a_persons_legs_first() -> None:
 def test_a_place_is_empty_where_the_beams_beside_it_end_three_decimetres_behind(
     off: float, beyond: float, left: bool
 ) -> None:
-    never = replace(FREE, freed=np.full((GRID.cells, GRID.cells), -np.inf, np.float32))
     moved = replace(walker(None, 2.0, 0.9), began=(2.0, 0.0), left=False)
     far = 2.0 - LIMO.lidar_x + beyond
     behind = LIMO.lidar_x + far * math.cos(off), far * math.sin(off)
-    (after, *_) = update((moved,), 1.1, (2.0, 0.88), (2.0, 0.92), behind, ground=never)
+    (after, *_) = update((moved,), 1.1, (2.0, 0.88), (2.0, 0.92), behind, ground=NEVER)
     assert after.left is left

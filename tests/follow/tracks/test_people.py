@@ -19,7 +19,6 @@ from limo_hog.follow.tracks.person import Person, distance_to, predict
 from limo_hog.follow.tracks.tracker import Tracker, Tracks
 
 TRACKER = Tracker()
-APPEARANCE = TRACKER.association.appearance
 
 
 def pairs(people: tuple[Person, ...], *boxes: Measurement) -> dict[int, int]:
@@ -31,11 +30,6 @@ def test_a_person_long_unseen_does_not_take_the_box_of_one_in_view() -> None:
     # He may be anywhere by now, and so fits everywhere.
     assert pairs((gone,), box(1.7, 0.05)) == {0: 0}
     assert pairs((gone, seen), box(1.7, 0.05)) == {1: 0}
-
-
-def test_a_second_box_on_a_person_is_no_other_persons() -> None:
-    seen, gone = a_person(1, 1.6), predict(replace(a_person(2, 2.6), seen=-2.0), 2.0, NOISE)
-    assert pairs((seen, gone), box(1.6), box(1.65, 0.05)) == {0: 0}
 
 
 def test_two_who_meet_are_told_apart_by_their_clothes() -> None:
@@ -55,31 +49,6 @@ def test_somebody_unseen_does_not_become_somebody_in_other_clothes() -> None:
     assert pairs((gone,), box(2.5, 0.2, IN_GREEN)) == {}
 
 
-def test_a_box_behind_somebody_that_is_not_their_size_is_not_theirs() -> None:
-    behind = replace(box(1.6), range=4.0)
-    before = replace(box(1.6), range=0.8)
-    assert pairs((a_person(1, 1.6),), behind) == {}
-    assert pairs((a_person(1, 1.6),), before) == {0: 0}
-
-
-def test_a_person_grows_no_smaller_for_being_cut_off_by_the_image() -> None:
-    cut_off = replace(box(1.5), window=0.8 * WINDOW, whole=False)
-    assert TRACKER.correct(a_person(1, 1.5), cut_off, POSE).window == WINDOW
-    assert TRACKER.correct(a_person(1, 1.5), replace(cut_off, whole=True), POSE).window < WINDOW
-    assert TRACKER.correct(a_person(1, 1.5), replace(cut_off, window=1.5 * WINDOW), POSE).window == 1.5 * WINDOW
-
-
-def test_clothes_are_averaged_until_somebody_is_known_and_then_kept() -> None:
-    new = replace(a_person(1, 2.0, 0.0, IN_GREEN), confirmed=False, age=1)
-    for _ in range(10):
-        new = TRACKER.correct(replace(new, confirmed=False), box(2.0, 0.0, IN_RED), POSE)
-    assert APPEARANCE.cost(new.clothes, IN_RED) < APPEARANCE.other / 2
-    known = replace(new, confirmed=True, clothes=IN_RED)
-    for _ in range(30):
-        known = TRACKER.correct(known, box(2.0, 0.0, IN_GREEN), POSE)
-    assert APPEARANCE.cost(known.clothes, IN_RED) == 0
-
-
 def test_a_box_is_measured_from_the_robots_centre_by_its_depth() -> None:
     seen = look(boxes((68, 100, 64, 128)))
     slope = (320 - 100) / 448.6
@@ -94,12 +63,8 @@ def test_a_box_is_measured_from_the_robots_centre_by_its_depth() -> None:
 
 def test_a_box_without_a_range_is_as_far_off_as_across_the_line_of_sight() -> None:
     without = replace(box(2.0), range=None)
-    assert distance_to(a_person(1, 2.0), replace(without, bearing=0.3), POSE) == pytest.approx(2.0 * math.tan(0.3))
-    assert distance_to(a_person(1, 2.0), replace(without, bearing=-0.3), POSE) == pytest.approx(2.0 * math.tan(0.3))
-    assert distance_to(a_person(1, 2.0), replace(without, bearing=3.0), POSE) == math.inf
-    assert distance_to(a_person(1, 2.0), box(3.0, 0.3), POSE) == pytest.approx(
-        math.dist((2, 0), (3 * math.cos(0.3), 3 * math.sin(0.3)))
-    )
+    for bearing, off in ((0.3, 2.0 * math.tan(0.3)), (-0.3, 2.0 * math.tan(0.3)), (3.0, math.inf)):
+        assert distance_to(a_person(1, 2.0), replace(without, bearing=bearing), POSE) == pytest.approx(off)
 
 
 def test_a_new_person_without_a_range_may_be_anywhere_along_the_line_of_sight() -> None:
@@ -131,20 +96,17 @@ def expected(distance: float, bearing: float = 0.0, middle: float = 240.0, **oth
     return Visibility().expected(bearing, distance, WINDOW, (middle - 240) * distance, view, confirmed=confirmed)
 
 
-def test_a_person_in_the_middle_of_the_image_is_expected_to_be_found() -> None:
-    assert expected(2.5)
-    assert expected(2.5, 0.4)
-
-
-def test_a_person_beside_or_behind_the_camera_is_not_expected() -> None:
-    assert not expected(2.5, 0.7)
-    assert not expected(2.5, math.pi)
-    assert not expected(2.5, -math.pi + 0.01)
-
-
-def test_a_window_lower_than_the_models_is_not_expected() -> None:
-    assert expected(4.1)
-    assert not expected(4.3)
+def test_a_person_is_expected_to_be_found_where_the_search_shows_all_of_them() -> None:
+    for bearing, found in ((0.0, True), (0.4, True), (0.7, False), (math.pi, False), (-math.pi + 0.01, False)):
+        assert expected(2.5, bearing) == found
+    # Too near for HOG excuses a person and not a new track.
+    for distance, found in ((1.75, True), (1.7, True), (1.65, False)):
+        assert expected(distance) == found
+    assert expected(1.65, confirmed=False)
+    left = Region(0, 0, 320, 480, 200.0)
+    assert [expected(2.5, bearing, region=left) for bearing in (0.3, -0.1)] == [True, False]
+    # Behind something they are not found.
+    assert [expected(3.0, depth=flat(there)) for there in (2.6, 2.4)] == [True, False]
 
 
 @pytest.mark.parametrize("middle", [0.4 * WINDOW / 2, 480 - 0.4 * WINDOW / 2])
@@ -152,24 +114,6 @@ def test_a_window_cut_off_by_the_image_excuses_a_person_and_not_a_new_track(midd
     assert not expected(2.0, middle=middle)
     assert expected(2.0, middle=middle, confirmed=False)
     assert expected(2.0, middle=abs(middle - 0.1 * WINDOW) if middle > 240 else middle + 0.1 * WINDOW)
-
-
-def test_too_near_for_hog_excuses_a_person_and_not_a_new_track() -> None:
-    assert expected(1.75)
-    assert expected(1.7)
-    assert not expected(1.65)
-    assert expected(1.65, confirmed=False)
-
-
-def test_outside_the_region_searched_a_person_is_not_expected() -> None:
-    left = Region(0, 0, 320, 480, 200.0)
-    assert expected(2.5, 0.3, region=left)
-    assert not expected(2.5, -0.1, region=left)
-
-
-def test_a_person_behind_something_is_not_expected() -> None:
-    assert not expected(3.0, depth=flat(2.4))
-    assert expected(3.0, depth=flat(2.6))
 
 
 @pytest.mark.parametrize(("turn", "range_"), [(0.0, 2.5), (0.4, 2.0), (-0.7, 3.1), (2.0, 1.0)])

@@ -20,15 +20,10 @@ def test_after_the_last_reading_the_speeds_last(yaw: float) -> None:
 
 
 def test_between_two_readings_the_pose_is_between_them_the_short_way_round() -> None:
-    poses = (Odometry(1.0, 0.0, 4.0, 3.0), Odometry(2.0, 2.0, 0.0, -3.0))
-    found = pose_at(poses, 1.25)
+    found = pose_at((Odometry(1.0, 0.0, 4.0, 3.0, 0.2, 1.0), Odometry(2.0, 2.0, 0.0, -3.0, 0.6, -1.0)), 1.25)
+    assert (found.linear, found.angular) == pytest.approx((0.3, 0.5))
     assert (found.x, found.y) == pytest.approx((0.5, 3.0))
     assert found.yaw == pytest.approx(3.0 + 0.25 * (math.tau - 6.0))
-
-
-def test_between_two_readings_the_speeds_are_between_theirs() -> None:
-    found = pose_at((Odometry(1.0, linear=0.2, angular=1.0), Odometry(2.0, linear=0.6, angular=-1.0)), 1.25)
-    assert (found.linear, found.angular) == pytest.approx((0.3, 0.5))
 
 
 def test_before_the_first_reading_the_robot_stood() -> None:

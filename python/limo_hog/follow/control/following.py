@@ -15,19 +15,20 @@ from limo_hog.follow.decision import Mode
 from limo_hog.follow.parameters import param
 from limo_hog.follow.sense.clearance import NO_POINTS, Margin, from_odometry, rooms_ahead, to_odometry
 from limo_hog.follow.sense.measurement import PERSON_RADIUS
-from limo_hog.follow.sense.observation import Odometry
 from limo_hog.follow.space.routes import Router, along
-from limo_hog.follow.tracks.kalman import Track, bearing_range, rates
+from limo_hog.follow.tracks.kalman import Track, rates
 from limo_hog.follow.tracks.person import Person
 
 
 class Followed(NamedTuple):
-    """The person followed, at the newest stamp; the distance to hold [m]; whether nearing them shows if it is one."""
+    """The person followed."""
 
     person: Person
-    track: Track
-    keeps: float
-    worth_nearing: bool
+    track: Track  #: At the newest stamp; from there bearing and distance from the robot [rad, m].
+    bearing: float
+    distance: float
+    keeps: float  #: The distance to hold [m].
+    worth_nearing: bool  #: Whether nearing them shows if it is a person.
 
 
 class Aimed(NamedTuple):
@@ -77,15 +78,6 @@ class Following:
         keeps = max(asked, least, min(headway, self.most_headway))
         return self.near_hiding if keeps > self.near_hiding and situation.is_behind(soon) else keeps
 
-    def learnt(self, brisk: float, speed: float) -> float:
-        """Return how fast a person walks at most, as known after a measured `speed` [m/s]."""
-        return brisk + (self.rise if speed > brisk else self.fall) * (speed - brisk)
-
-    def side_of(self, track: Track, bearing: float, pose: Odometry) -> float:
-        """Return the side to which a person leaves, or is on if they stand: 1 left, -1 right."""
-        rate = rates(track, pose)[0]
-        return math.copysign(1.0, rate if abs(rate) > self.steady_bearing_rate else bearing)
-
     def is_hidden(self, bearing: float, distance: float, situation: Situation) -> bool:
         """Whether something is on the line of sight to the person."""
         x, y = situation.points.T
@@ -95,9 +87,8 @@ class Following:
 
     def aim(self, followed: Followed, situation: Situation, state: TrackingState, sampling: Sampling) -> Aimed:
         """Return the goal that holds the distance to a person."""
-        person, track, keeps, worth_nearing = followed
+        person, track, bearing, distance, keeps, worth_nearing = followed
         now, stamp = situation.now, state.tracks.stamp or 0.0
-        bearing, distance = bearing_range(track, situation.pose)
         bearing_rate, range_rate = rates(track, situation.pose)
         error = distance - situation.robot.camera_x - keeps
         speed = min(max(sampling.gain * error + range_rate, -self.max_speed), self.max_speed)

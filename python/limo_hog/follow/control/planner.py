@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -83,11 +82,10 @@ class Planner:
     nowhere: float = param(0.02, "m", "A rollout that leads no further beyond the way to stop leads nowhere.", 0, 1)
     max_turn: float = param(3.0, "rad/s", "Limit of the turn rate.", 0, 6)
 
-    def critics(self) -> Iterator[tuple[str, Critic]]:
-        """Name and hand out the critics."""
-        for part in dataclasses.fields(self):
-            if hasattr(critic := getattr(self, part.name), "cost"):
-                yield part.name, critic
+    def critics(self) -> list[tuple[str, Critic]]:
+        """Return the critics and their names."""
+        parts = dataclasses.fields(self)
+        return [(part.name, critic) for part in parts if hasattr(critic := getattr(self, part.name), "cost")]
 
     def plan(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> Move:
         """Return the command that costs least; `kept` is the manoeuvre begun."""
@@ -95,7 +93,7 @@ class Planner:
         rollouts = self.sampling.roll_out(situation, goal, kept)
         costs = np.array([critic.weight * critic.cost(rollouts, situation) for critic in critics])
         totals = costs.sum(axis=0)
-        if not kept.is_direct:
+        if rollouts.begun:
             totals[rollouts.begun] /= 1 + self.stay
         best = int(np.argmin(totals))
         gains = np.maximum(costs[:, 0] - costs[:, best], 0.0)

@@ -10,7 +10,6 @@ import numpy as np
 from limo_hog.follow.control.situation import Goal, Situation
 from limo_hog.follow.control.wheels import turn_acceleration
 from limo_hog.follow.parameters import param
-from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import Margin, rooms_ahead
 from limo_hog.follow.sense.observation import Array
 
@@ -22,11 +21,6 @@ class Manoeuvre:
     heading: float | None = None
     speed: float | None = None
 
-    @property
-    def is_direct(self) -> bool:
-        """Whether it is the goal's own."""
-        return self == DIRECT
-
 
 #: What the goal asks for, with nothing in the way.
 DIRECT = Manoeuvre()
@@ -34,10 +28,10 @@ DIRECT = Manoeuvre()
 
 @dataclass(frozen=True, slots=True)
 class Rollouts:
-    """K commands, each driven on for T steps; the first is the goal's own, the last the one begun, if it is another."""
+    """K commands, each driven on for T steps; the first is the goal's own."""
 
-    goal: Goal  #: What they were made for, and the manoeuvre begun.
-    kept: Manoeuvre
+    goal: Goal  #: What they were made for.
+    begun: int  #: Which of them goes on with the manoeuvre begun.
     times: Array  #: float64 (T,) [s].
     poses: Array  #: float64 (K, T, 3): x, y [m], yaw [rad], base frame as of now; float64 (K, T) [m/s].
     speeds: Array
@@ -45,27 +39,6 @@ class Rollouts:
     wanted: Array
     free: Array  #: float64 (T, 2) [m]: where the first would be with nothing in its way.
     places: Array  #: float64 (T, N, 2) [m]: where the people are.
-
-    @property
-    def begun(self) -> int:
-        """Which of them goes on with the manoeuvre begun."""
-        return 0 if self.kept.is_direct else len(self.offs) - 1
-
-    def gaps(self, places: Array, robot: RobotGeometry) -> Array:
-        """Return the distance from the outline to places (T, N, 2), float64 (K, T, N) [m]; negative inside it."""
-        poses = self.poses[:, :, None]
-        dx, dy = places[None, ..., 0] - poses[..., 0], places[None, ..., 1] - poses[..., 1]
-        cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-        ahead = np.abs(cos * dx + sin * dy) - robot.half_length
-        beside = np.abs(cos * dy - sin * dx) - robot.half_width
-        outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(beside, 0.0))
-        return np.asarray(outside + np.minimum(np.maximum(ahead, beside), 0.0))
-
-    def offs_to(self, places: Array) -> Array:
-        """Return how far off straight ahead places (T, 2) are, float64 (K, T) [rad], 0 … π."""
-        to = places[None] - self.poses[:, :, :2]
-        off = np.arctan2(to[..., 1], to[..., 0]) - self.poses[:, :, 2]
-        return np.asarray(np.abs(off - math.tau * np.rint(off / math.tau)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +58,10 @@ class Sampling:
     margin: Margin = field(default_factory=lambda: Margin(0.62, 0.22))
     blind_speed: float = param(0.2, "m/s", "Highest speed backwards onto ground that is not known.", 0, 1)
 
-    @property
-    def times(self) -> Array:
-        """When the steps end, float64 (T,) [s]."""
-        return np.arange(1.0, self.steps + 1) * self.step_s
+    times: Array = field(init=False, repr=False, compare=False)  #: When the steps end, float64 (T,) [s].
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "times", np.arange(1.0, self.steps + 1) * self.step_s)
 
     def roll_out(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> Rollouts:
         """Return the rollouts of all commands; `kept` is the manoeuvre begun."""
@@ -106,10 +79,8 @@ class Sampling:
         headings, which = np.unique(goal.heading + offs, return_inverse=True)
         near = np.hypot(*situation.points.T) < np.abs(far).max() + self.margin.ahead + situation.robot.half_length
         points = situation.points[near]
-        ahead, behind = (
-            np.maximum(rooms_ahead(side * points, headings, self.margin, situation.robot), 0.0)[which, None]
-            for side in (1, -1)
-        )
+        ahead = np.maximum(rooms_ahead(points, headings, self.margin, situation.robot), 0.0)[which, None]
+        behind = np.maximum(rooms_ahead(-points, headings, self.margin, situation.robot), 0.0)[which, None]
         # It brakes no faster than its wheels can.
         driven, braking = situation.driven.linear, np.minimum(reach, abs(situation.driven.linear))
         stops = math.copysign(1.0, driven) * braking * (abs(driven) - braking / 2) / situation.acceleration
@@ -120,7 +91,8 @@ class Sampling:
         free = np.stack([np.cumsum(unheld * np.cos(along[0])), np.cumsum(unheld * np.sin(along[0]))], axis=1)
         poses, speeds = np.stack([x, y, yaw], axis=2), stride / self.step_s
         wanted = np.maximum(np.where(np.isnan(wanted), goal.speed, wanted), least)
-        return Rollouts(goal, kept, self.times, poses, speeds, offs, wanted, free, self.walked(situation.people))
+        begun, people = 0 if kept == DIRECT else len(offs) - 1, self.walked(situation.people)
+        return Rollouts(goal, begun, self.times, poses, speeds, offs, wanted, free, people)
 
     def walked(self, people: Array) -> Array:
         """Return where people (N, 4) are after each step, float64 (T, N, 2) [m]."""
@@ -128,10 +100,10 @@ class Sampling:
 
     def _commands(self, situation: Situation, goal: Goal, kept: Manoeuvre) -> tuple[Array, Array]:
         """Return each command's direction from the goal's [rad] and its speed, NaN for the goal's own, (K,) each."""
-        offsets = np.array([0.0, *(side * off for off in self.offsets for side in (1, -1))])
+        offsets = np.append(0.0, np.outer(self.offsets, (1, -1)))
         speeds = np.array([math.nan, *self.speeds])
         offs, wanted = np.repeat(offsets, len(speeds)), np.tile(speeds, len(offsets))
-        if kept.is_direct:
+        if kept == DIRECT:
             return offs, wanted
         off = 0.0
         if kept.heading is not None:

@@ -14,7 +14,7 @@ from limo_hog.follow.decision import Believed
 from limo_hog.follow.parameters import param
 from limo_hog.follow.robot import Twist
 from limo_hog.follow.sense.clearance import NO_POINTS, Points
-from limo_hog.follow.sense.observation import pose_at
+from limo_hog.follow.sense.observation import Odometry, pose_at
 from limo_hog.follow.space.grid import Ground
 from limo_hog.follow.tracks.asking import Whom, picked
 from limo_hog.follow.tracks.hiding import Other
@@ -177,13 +177,14 @@ class TrackingState:
     kept: Manoeuvre = DIRECT  #: The manoeuvre begun.
 
 
-def believed(state: TrackingState, now: float, noise: Noise) -> tuple[Believed, ...]:
-    """Return everyone tracked, in the base frame, as of the newest stamp `now` [s]."""
+def believed(state: TrackingState, pose: Odometry, noise: Noise) -> tuple[Believed, ...]:
+    """Return everyone tracked, in the base frame of a robot at `pose`, as of its stamp."""
     boxes, likeness, people = dict(state.tracks.boxes), state.choice.likeness, state.tracks.people
-    means = np.array([predict(person.track, now, noise).mean for person in people]).reshape(-1, 4)
-    moved = carried(means, pose_at(state.tracks.poses, now)).tolist()
-    same = [None if likeness is None else likeness.of(person.number) for person in people]
-    return tuple(
-        Believed(x, y, person.existence, person.number, vx, vy, boxes.get(person.number), chance)
-        for person, chance, (x, y, vx, vy) in zip(people, same, moved, strict=True)
-    )
+    means = np.array([predict(person.track, pose.stamp, noise).mean for person in people]).reshape(-1, 4)
+    moved = carried(means, pose).tolist()
+    same = {} if likeness is None else dict(likeness.chances)
+    everybody = []
+    for person, (x, y, vx, vy) in zip(people, moved, strict=True):
+        box, chance = boxes.get(person.number), None if likeness is None else same.get(person.number, 0.0)
+        everybody.append(Believed(x, y, person.existence, person.number, vx, vy, box, chance))
+    return tuple(everybody)

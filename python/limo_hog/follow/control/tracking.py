@@ -23,7 +23,7 @@ from limo_hog.follow.sense.observation import Observation, pose_at
 from limo_hog.follow.space.grid import Grid
 from limo_hog.follow.tracks.asking import Whom, named
 from limo_hog.follow.tracks.hiding import Hiding
-from limo_hog.follow.tracks.kalman import bearing_range, predict
+from limo_hog.follow.tracks.kalman import bearing_range, predict, rates
 from limo_hog.follow.tracks.person import Person
 from limo_hog.follow.tracks.tracker import Tracker
 
@@ -90,7 +90,7 @@ class TrackingController:
         state = replace(state, kept=plan.manoeuvre, sent=twist, since_full=since_full)
         if (asked := choice.asked) is not None:
             reason = f"{reason}; asked for {named(asked)}, not found yet"
-        people, leads = believed(state, observation.now, self.tracker.noise), tuple(map(tuple, plan.rollout.tolist()))
+        people, leads = believed(state, situation.pose, self.tracker.noise), tuple(map(tuple, plan.rollout.tolist()))
         belief = replace(belief, people=people, rollout=leads, rollouts=plan.rollouts, shares=plan.shares)
         return Decision(twist, state, mode, reason, target, region, belief)
 
@@ -141,7 +141,7 @@ class TrackingController:
             others = tuple(one for one, stands in zip(others, lasts.tolist(), strict=True) if not stands)
         people = np.array([track.mean for track in around]).reshape(-1, 4)
         pace = np.hypot(people[:, 2], people[:, 3])
-        followed = next((row for row, track in enumerate(around) if track is own), None)
+        followed = None if own is None else around.index(own)
         walks = pace > self.slowest
         if followed is not None:
             if walks[followed] and pace[followed] < state.brisk:
@@ -196,7 +196,8 @@ class TrackingController:
         keeps = following.keeps(self.target_distance, least, brisk if person.confirmed else 0.0, soon, situation)
         too_small = person.window <= distance * self.tracker.visibility.smallest_window
         worth_nearing = too_small and person.existence >= self.selection.min_existence
-        aimed = following.aim(Followed(person, track, keeps, worth_nearing), situation, state, self.planner.sampling)
+        followed = Followed(person, track, bearing, distance, keeps, worth_nearing)
+        aimed = following.aim(followed, situation, state, self.planner.sampling)
         if keeps > self.target_distance + following.distance_tolerance and aimed.mode in (Mode.HOLD, Mode.FOLLOW):
             reason = f"{aimed.reason}, further off than asked: nearer the camera would not show all of them"
             aimed = aimed._replace(reason=reason)
@@ -207,9 +208,11 @@ class TrackingController:
 
         Only a measured bearing tells the side: a predicted one changes sign as the robot turns past it.
         """
-        known = person.track if person.confirmed and self._is_sure(person, state) else state.known
-        brisk = self.following.learnt(state.brisk, math.hypot(*person.track.mean[2:]))
-        side = self.following.side_of(person.track, bearing, situation.pose)
+        following, track, brisk = self.following, person.track, state.brisk
+        known = track if person.confirmed and self._is_sure(person, state) else state.known
+        speed, (rate, _) = math.hypot(*track.mean[2:]), rates(track, situation.pose)
+        brisk += (following.rise if speed > brisk else following.fall) * (speed - brisk)
+        side = math.copysign(1.0, rate if abs(rate) > following.steady_bearing_rate else bearing)
         return replace(state, side=side, known=known, hunt=None, brisk=brisk)
 
     def _unsure(self, situation: Situation, state: TrackingState) -> Aimed:

@@ -119,11 +119,6 @@ class Margin:
     beside: float = param(0.2, "m", "To either side.")
 
 
-def room_ahead(points: Points, margin: Margin, robot: RobotGeometry) -> float:
-    """Return `rooms_ahead` for straight on [m]."""
-    return float(rooms_ahead(points, np.zeros(1), margin, robot)[0])
-
-
 def rooms_ahead(points: Points, headings: Array, margin: Margin, robot: RobotGeometry) -> Array:
     """Return how far the robot, turned to each of H headings [rad], can drive until a point is too near, float64 (H,).
 

@@ -120,24 +120,13 @@ class Observation:
     clock: float | None = None
     depth_stamp: float | None = None  #: Of the newest depth image that has come [s]; None for `stamp`.
     now: float = field(init=False)  #: The newest stamp of all sensors [s]: a camera frame may arrive late.
+    at: float = field(init=False)  #: When the readings were at hand, on the robot's own clock [s].
 
     def __post_init__(self) -> None:
         newest = self.stamp if self.scan is None else max(self.stamp, self.scan.stamp)
         newest = newest if self.odometry is None else max(newest, self.odometry.stamp)
         object.__setattr__(self, "now", newest)
-
-    @property
-    def at(self) -> float:
-        """When the readings were at hand, on the robot's own clock [s]."""
-        return self.now if self.clock is None else self.clock
-
-
-def observed(frame: Frame, sensors: Sensors, detections: Detections, region: Region | None, fault: str) -> Observation:
-    """Return the observation of a frame and what was found in it: its size and people's clothes are filled in."""
-    height, width = frame.image.shape[:2]
-    seen = Observation(frame.stamp, width, height, frame.focal_px, detections, region, frame.depth)
-    seen = replace(seen, clothes=clothes_in(frame.image, detections.windows), depth_stamp=frame.depth_stamp)
-    return replace(seen, scan=sensors.scan, odometry=sensors.odometry, fault=fault)
+        object.__setattr__(self, "at", newest if self.clock is None else self.clock)
 
 
 def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
@@ -161,9 +150,9 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
     one, other = poses[after - 1], poses[after]
     share = (stamp - one.stamp) / (other.stamp - one.stamp)
     yaw = one.yaw + share * math.remainder(other.yaw - one.yaw, math.tau)
-    ends = (one.x, other.x), (one.y, other.y), (one.linear, other.linear), (one.angular, other.angular)
-    x, y, linear, angular = (begun + share * (ended - begun) for begun, ended in ends)
-    return Odometry(stamp, x, y, yaw, linear, angular)
+    x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
+    linear = one.linear + share * (other.linear - one.linear)
+    return Odometry(stamp, x, y, yaw, linear, one.angular + share * (other.angular - one.angular))
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,8 +84,9 @@ class Grid:
             ends = ends[gaps.min(axis=1) > self.person_radius]
         under = np.array([pose.x, pose.y]) + _square(self.own_radius, self.cell)
         passed = self._passed(ground, at, directions[:: self.every], clear[:: self.every])
-        crossed = np.concatenate([passed, self.flat(ground, under)])
-        cleared, filled = self._mask(crossed), self._mask(self.flat(ground, ends))
+        (own, own_inside), (at_end, end_inside) = self.flat(ground, under), self.flat(ground, ends)
+        cleared = self._mask(np.concatenate([passed, own[own_inside]]))
+        filled = self._mask(at_end[end_inside])
         before = ground.occupied
         lower = np.maximum(before - np.float32(self.free), np.float32(self.lowest))
         higher = np.minimum(before + np.float32(self.hit), np.float32(self.highest))
@@ -94,17 +95,13 @@ class Grid:
         freed = np.where(cleared & (occupied <= 0), scan.stamp, ground.freed)
         return Ground(ground.corner, occupied, seen, freed, scan.stamp)
 
-    def index(self, ground: Ground, points: Points) -> tuple[Cells, Mask]:
-        """Return the cell of each point, int64 (N, 2), and whether it is in the square, bool (N,)."""
+    def flat(self, ground: Ground, points: Points) -> tuple[NDArray[np.int64], Mask]:
+        """Return the flat index of each point's cell, int64 (N,), 0 where it is not in the square, and if it is."""
         cells: Cells = np.floor(points / self.cell).astype(np.int64) - ground.corner
         # As unsigned numbers, what is below 0 is large.
         within = cells.view(np.uint64) < self.cells
-        return cells, np.asarray(within[:, 0] & within[:, 1])
-
-    def flat(self, ground: Ground, points: Points) -> NDArray[np.int64]:
-        """Return the flat indices of the cells of those points that are in the square."""
-        cells, inside = self.index(ground, points)
-        return np.asarray(cells[inside, 0] * self.cells + cells[inside, 1])
+        inside = within[:, 0] & within[:, 1]
+        return np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0), inside
 
     def middle_of(self, ground: Ground, cells: Cells) -> Points:
         """Return the middle of each cell [m], float64 (N, 2)."""
@@ -112,39 +109,34 @@ class Grid:
 
     def is_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether each point is in an occupied cell; `lasting`: one not free within `lasts_s`. bool (N,)."""
-        cells, inside = self.index(ground, points)
-        flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
-        return inside & self._is_occupied(ground, flat, lasting)
+        flat, inside = self.flat(ground, points)
+        blocked = inside & (ground.occupied.take(flat) > 0)
+        return blocked & (ground.freed.take(flat) < ground.stamp - self.lasts_s) if lasting else blocked
 
     def is_free_since(self, ground: Ground, points: Points, stamps: float | Array) -> Mask:
         """Return whether each point was seen to be free after its stamp [s], bool (N,); outside of the square none."""
-        cells, inside = self.index(ground, points)
-        flat = np.where(inside, cells[:, 0] * self.cells + cells[:, 1], 0)
+        flat, inside = self.flat(ground, points)
         return inside & (ground.freed.take(flat) > stamps)
 
     def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether an occupied cell is within half a cell of each point, bool (N,); at the edge none is."""
-        lowest, _ = self.index(ground, points - self.cell / 2)
+        lowest: Cells = np.floor((points - self.cell / 2) / self.cell).astype(np.int64) - ground.corner
         within = lowest.view(np.uint64) < self.cells - 1
         inside = within[:, 0] & within[:, 1]
         flat = np.where(inside, lowest[:, 0] * self.cells + lowest[:, 1], 0)
-        steps = np.array((0, 1, self.cells, self.cells + 1), np.int64)
-        return np.asarray(inside & self._is_occupied(ground, flat[:, None] + steps, lasting).any(axis=1))
+        around = flat[:, None] + np.array((0, 1, self.cells, self.cells + 1), np.int64)
+        occupied = ground.occupied.take(around) > 0
+        if lasting:
+            occupied &= ground.freed.take(around) < ground.stamp - self.lasts_s
+        return np.asarray(inside & occupied.any(axis=1))
 
     def lasting_near(self, ground: Ground, pose: Odometry, reach: float) -> Points:
         """Return the middles of cells within `reach` [m] in which something lasts, float64 (N, 2), odometry frame."""
-        x, y = self.index(ground, np.array([[pose.x, pose.y]]))[0][0].tolist()
+        x, y = math.floor(pose.x / self.cell) - ground.corner[0], math.floor(pose.y / self.cell) - ground.corner[1]
         side = int(reach / self.cell)
         rows, columns = slice(max(x - side, 0), x + side + 1), slice(max(y - side, 0), y + side + 1)
         lasts = (ground.occupied[rows, columns] > 0) & (ground.freed[rows, columns] < ground.stamp - self.lasts_s)
         return self.middle_of(ground, np.argwhere(lasts) + np.array([rows.start, columns.start]))
-
-    def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> Mask:
-        """Return whether the cells of flat indices are occupied, bool of their shape; `lasting` as `is_blocked`."""
-        occupied = ground.occupied.take(flat) > 0
-        if lasting:
-            occupied &= ground.freed.take(flat) < ground.stamp - self.lasts_s
-        return np.asarray(occupied)
 
     def sees(self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False) -> Mask:
         """Return whether nothing occupied is between (K, 2) origins and (N, 2) places, at `samples` points, (K, N)."""

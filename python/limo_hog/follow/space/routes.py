@@ -35,14 +35,14 @@ class Router:
         wide, wider = _dilated(blocked, self.keep_off / grid.cell), _dilated(blocked, self.keep_off_far / grid.cell)
         reach = int(self.keep_off / grid.cell)
         free = np.isfinite(ground.seen) & ~wide
-        cells, inside = grid.index(ground, np.array([[pose.x, pose.y]]))
+        here, inside = grid.flat(ground, np.array([[pose.x, pose.y]]))
         distance = np.full(free.shape, np.inf, np.float32)
         if not inside[0]:
             return distance
-        x, y = cells[0]
+        x, y = divmod(int(here[0]), grid.cells)
         # The robot may stand nearer to something than a way should lead.
-        here = tuple(slice(max(at - reach, 0), at + reach + 1) for at in (x, y))
-        free[here] |= ~blocked[here]
+        near = tuple(slice(max(at - reach, 0), at + reach + 1) for at in (x, y))
+        free[near] |= ~blocked[near]
         distance[x, y] = 0.0
         closed = np.where(free, np.float32(self.detour * grid.cell) * wider, np.float32(np.inf)).astype(np.float32)
         straight, diagonal = np.float32(grid.cell), np.float32(math.sqrt(2) * grid.cell)

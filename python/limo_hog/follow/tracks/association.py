@@ -64,11 +64,13 @@ class Association:
                     # On a part of the body: its patches are not on shirt and trousers; or something stands before it.
                     ranged = replace(seen, range=None)
                 fit = innovation(person.track, ranged.bearing, ranged.range, pose, noise)
-                cost = fit.distance2 + fit.log_volume_ratio + clothes_cost
-                # A confirmed person may turn sharply, out of the gate; a pillar does not.
-                near = person.confirmed and distance_to(person, ranged, pose) < self.same_place
-                turned = near and clothes_cost <= self.appearance.other
-                if turned or (fit.distance2 <= self.gate and cost <= self.max_cost):
+                off = fit.distance2
+                cost = off + fit.log_volume_ratio + clothes_cost
+                matched = off <= self.gate and cost <= self.max_cost
+                if not matched and person.confirmed and clothes_cost <= self.appearance.other:
+                    # A confirmed person may turn sharply, out of the gate; a pillar does not.
+                    matched = distance_to(person, ranged, pose) < self.same_place
+                if matched:
                     matches.append((not person.confirmed, cost, who, which))
         pairs: dict[int, int] = {}
         for _, _, who, which in sorted(matches):
@@ -148,7 +150,8 @@ class Legs:
 
     def noise_at(self, distance: float, noise: Noise, pose: Odometry) -> Noise:
         """Return the noise with that of legs measured at a distance [m] from a robot at `pose`."""
-        return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma).turning(pose.angular)
+        bearing = math.hypot(self.sigma / max(distance, 0.3), noise.clocks * pose.angular)
+        return replace(noise, bearing=bearing, range=self.sigma)
 
 
 def distances(points: Points, track: Track) -> Array:

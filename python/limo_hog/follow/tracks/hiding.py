@@ -45,8 +45,11 @@ class Hiding:
         """
         # Of a few places, lists are faster than arrays.
         own, legs = followed.tolist(), felt.tolist()
-        known = [one for one in others if now - one.at < self.remembers_s]
-        left = [one for one in known if all(math.dist(place, (one.x, one.y)) > self.same for place in own)]
+        left = [
+            one
+            for one in others
+            if now - one.at < self.remembers_s and all(math.dist(place, one[:2]) > self.same for place in own)
+        ]
         kept: list[Other] = []
         for person in seen:
             same = [

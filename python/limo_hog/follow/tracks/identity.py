@@ -147,18 +147,23 @@ class Identity:
     def _is_gone(self, person: Person, tracks: Tracks, walking: AbstractSet[int]) -> bool:
         """Whether a track is not measured, or only by legs that may be those of somebody beside it."""
         stamp = tracks.stamp or 0.0
-        lost, unseen = (stamp - at > self.unseen_s for at in (person.measured, person.seen))
+        lost, unseen = stamp - person.measured > self.unseen_s, stamp - person.seen > self.unseen_s
         if lost or not unseen or person.number in walking:
             return lost
         beside = [one.track.place for one in tracks.movers if one.number != person.number]
-        near = any(math.dist(place, person.track.place) < self.meets for place in beside)
+        here = person.track.place
+        near = min([math.dist(here, place) for place in beside], default=math.inf) < self.meets
         return near or not self._is_alone(person, tracks)
 
     def _walks_on(self, person: Person, tracks: Tracks) -> bool:
         """Whether the scan shows that a track's legs are those they were, with nobody's beside them to change with."""
         others = [one.track.place for one in tracks.movers if one.left and one.number != person.number]
-        legs = [one for one in tracks.movers if one.number == person.number and one.felt - one.named >= self.legs_s]
-        return any(all(math.dist(own.track.place, place) > self.legs_apart for place in others) for own in legs)
+        for own in tracks.movers:
+            if own.number == person.number and own.felt - own.named >= self.legs_s:
+                here = own.track.place
+                if min([math.dist(here, place) for place in others], default=math.inf) > self.legs_apart:
+                    return True
+        return False
 
     def _is_alone(self, person: Person, tracks: Tracks) -> bool:
         """Whether nobody is so near that a person's box may show both or the other."""
@@ -172,8 +177,9 @@ class Identity:
         others = [traits for traits in known.others if traits.number == person.number]
         others = others or [traits for traits in known.others if traits.number != known.traits.number]
         same, strange = self._fit(person, known.traits, first=first), self._fit(person, None, first=first)
-        evidence = same - max([strange, *[self._fit(person, traits, first=first) for traits in others]])
-        return min(max(evidence, -self.most), self.most)
+        for traits in others:
+            strange = max(strange, self._fit(person, traits, first=first))
+        return min(max(same - strange, -self.most), self.most)
 
     def _fit(self, person: Person, traits: Traits | None, *, first: bool) -> float:
         """Return how likely a person's last box is on one who looks like this, or on anybody [log]."""

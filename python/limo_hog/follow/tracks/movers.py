@@ -80,7 +80,7 @@ class Movers:
         if ground is not None:
             points = points[~grid.is_near_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
-        movers = tuple(sorted(movers, key=lambda one: one.number is None))
+        movers = (*[one for one in movers if one.number is not None], *[one for one in movers if one.number is None])
         expected = [kalman.predict(one.track, returns.stamp, noise) for one in movers]
         gaps = all_distances(points, expected)
         whose, free, near = self._whose(movers, gaps), np.ones(len(points), bool), gaps < self.legs.radius
@@ -95,7 +95,7 @@ class Movers:
             due = is_in_view(expected[index], returns, lidar, self.robot, self.robot.lidar_yaw)
             if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
                 kept.append(mover)
-        if ground is not None and not all(one.left for one in kept):
+        if ground is not None and False in [one.left for one in kept]:
             began, since = np.array([one.began for one in kept]), np.array([one.since for one in kept])
             # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
@@ -109,8 +109,11 @@ class Movers:
 
     def moving(self, movers: tuple[Mover, ...]) -> list[Mover]:
         """Return those that have moved."""
-        gone = [one for one in movers if one.left and one.scans >= self.fewest_scans]
-        return [one for one in gone if math.dist(one.track.place, one.began) > self.least_way]
+        return [
+            one
+            for one in movers
+            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
+        ]
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:
         """Return the places of what a scan has just shown, moving or not, float64 (N, 2) [m], odometry frame."""
@@ -120,22 +123,27 @@ class Movers:
     def assign(self, movers: tuple[Mover, ...], seen: Sequence[Person], stamp: float) -> tuple[Mover, ...]:
         """Note whose legs they are: one mover to one person found by the camera, the nearest first."""
         pairs = []
+        felt = [
+            (which, mover.track.mean[:2], mover.number) for which, mover in enumerate(movers) if mover.felt == stamp
+        ]
         for who, person in enumerate(seen):
-            for which, mover in enumerate(movers):
-                gap = math.dist(person.track.place, mover.track.place)
-                if mover.felt == stamp and gap < self.beside:
-                    taken = self.taken if mover.number not in (None, person.number) else 0.0
+            here = person.track.place
+            for which, place, number in felt:
+                gap = math.dist(here, place)
+                if gap < self.beside:
+                    taken = self.taken if number not in (None, person.number) else 0.0
                     pairs.append((gap + taken, who, which))
         numbers: dict[int, int] = {}
         for _, who, which in sorted(pairs):
             if which not in numbers and seen[who].number not in numbers.values():
                 numbers[which] = seen[who].number
         # What was taken for the person's legs until now, and is no more, was a piece of them, or begins again.
-        return tuple(
+        kept = [
             named(mover, numbers[which], stamp) if which in numbers else mover
             for which, mover in enumerate(movers)
             if which in numbers or mover.number not in numbers.values()
-        )
+        ]
+        return tuple(kept)
 
     def others(
         self, moving: Sequence[Mover], people: list[Person], boxes: list[Measurement], pose: Odometry, noise: Noise
@@ -182,9 +190,8 @@ class Movers:
         """Return whether the beams nearest to each of (N, 2) places end behind it, bool (N,)."""
         pose, points = returns.pose, returns.points
         x, y = lidar_at(pose, self.robot)
-        (ends, far), (to, near) = (
-            (np.arctan2(at[:, 1] - y, at[:, 0] - x), np.hypot(at[:, 0] - x, at[:, 1] - y)) for at in (points, places)
-        )
+        ends, far = np.arctan2(points[:, 1] - y, points[:, 0] - x), np.hypot(points[:, 0] - x, points[:, 1] - y)
+        to, near = np.arctan2(places[:, 1] - y, places[:, 0] - x), np.hypot(places[:, 0] - x, places[:, 1] - y)
         off = ends[None, :] - to[:, None]
         beside = np.abs(off - math.tau * np.rint(off / math.tau)) < self.beams
         shortest = np.where(beside, far[None, :], np.inf).min(axis=1, initial=np.inf)

@@ -39,7 +39,10 @@ class Tracks:
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
-        return next((one for one in self.people if one.number == number), None)
+        for one in self.people:
+            if one.number == number:
+                return one
+        return None
 
     @property
     def in_view(self) -> list[Person]:
@@ -86,8 +89,7 @@ class Tracker:
         moving = [one for one in self.movers.moving(tracks.movers) if stamp - one.felt < self.movers.forget_s]
         others = self.movers.others(moving, known, measured, pose, self.noise)
         pairs = self.association.pair(known, measured, pose, self.noise.turning(pose.angular), flat, others)
-        people: list[Person] = []
-        recall = tracks.recall
+        people, boxes, recall = list[Person](), dict[int, int](), tracks.recall
         for who, person in enumerate(known):
             bearing, distance = bearing_range(person.track, pose)
             expected = self.visibility.expected(
@@ -98,6 +100,7 @@ class Tracker:
             if expected and person.confirmed:
                 recall = self.existence.learn(recall, height, found=who in pairs)
             if who in pairs:
+                boxes[person.number] = pairs[who]
                 person = self.correct(person, measured[pairs[who]], pose, chance)
             elif expected and (not person.confirmed or stamp - person.measured < self.restart_s):
                 # Later than that it shows only that the person walked on, not that there is none. Legs that walk show
@@ -106,7 +109,6 @@ class Tracker:
                 evidence = 0.0 if walks else self.existence.of_miss(chance)
                 person = self.existence.update(person, evidence, found=False)
             people.append(person)
-        boxes = {people[who].number: which for who, which in pairs.items()}
         number = tracks.next_number
         for which, seen in enumerate(measured):
             if which not in boxes.values() and which not in flat and self.association.is_new(seen, people, pose):
@@ -161,9 +163,9 @@ class Tracker:
             track = kalman.loosened(track, self.association.same_place, self.turn_speed)
             fit = innovation(track, seen.bearing, seen.range, pose, noise)
         clothes, track = self._clothes(person, worn), kalman.update(track, fit)
-        person = replace(self.existence.update(person, evidence, found=True), seen=track.stamp, track=track)
-        person = replace(person, window=window, centre=centre, clothes=clothes)
-        return replace(person, worn=worn, tall=tall, strained=strained or not in_place)
+        person = self.existence.update(person, evidence, found=True)
+        person = replace(person, seen=track.stamp, track=track, window=window, centre=centre)
+        return replace(person, clothes=clothes, worn=worn, tall=tall, strained=strained or not in_place)
 
     def follow_legs(self, person: Person, tracks: Tracks, grid: Grid, ground: Ground | None) -> tuple[Person, Tracks]:
         """Bring a person up to the newest scan, if their legs are in it; returns on the known `ground` are none.
@@ -216,8 +218,8 @@ class Tracker:
             movers = self.movers.update(movers, returns, views, self.noise, grid, ground)
             movers = self.movers.assign(movers, seen, returns.stamp)
             movers = self._come_back(movers, people, returns.stamp)
-            walking = {one.number for one in self.movers.moving(movers)}
             unseen = [one for one in people if one.confirmed and one.seen != tracks.stamp]
+            walking = {one.number for one in self.movers.moving(movers)} if unseen else set()
             for one in unseen:
                 if (tracks.stamp or 0.0) - one.seen < self.legs_only_s or one.number in walking:
                     now = self.movers.continued(one, movers, returns, self.noise)
@@ -230,6 +232,8 @@ class Tracker:
         Only where they can be one person's alone, and that person has no others to choose from.
         """
         lost = [one for one in people if one.confirmed and self.scan_period_s < stamp - one.measured < self.legs_only_s]
+        if not lost:
+            return movers
         walking = [one for one in self.movers.moving(movers) if one.number is None and one.felt == stamp]
         pairs = [(one, mover) for one in lost for mover in walking if mover.since > one.measured]
         pairs = [(one, mover) for one, mover in pairs if self._is_near(one, mover.track)]
@@ -247,27 +251,26 @@ class Tracker:
         None for none of them.
         """
         people: dict[int, Track] = {}
+        others: list[Other] = []
         for one in tracks.people:
             one = followed if followed is not None and one.number == followed.number else one
             if one.confirmed and now - one.measured <= self.walks_on_s:
-                people[one.number] = kalman.predict(one.track, now, self.noise)
+                people[one.number] = track = kalman.predict(one.track, now, self.noise)
+                if one is not followed and now - one.measured <= lately_s:
+                    others.append(Other(*track.place, now, one.clothes))
         own = None if followed is None else people.get(followed.number)
-        lately = {one.number: one.clothes for one in tracks.people if now - one.measured <= lately_s}
-        others = [
-            Other(*track.place, now, lately[number])
-            for number, track in people.items()
-            if track is not own and number in lately
-        ]
         places, nameless = [track.place for track in people.values()], []
         for mover in self.movers.moving(tracks.movers):
+            if mover.number in people:
+                continue
             track = kalman.predict(mover.track, now, self.noise)
-            gap = min((math.dist(track.place, place) for place in places), default=math.inf)
-            if mover.number in people or gap <= self.association.same_place:
+            here = track.place
+            if min([math.dist(here, place) for place in places], default=math.inf) <= self.association.same_place:
                 continue
             nameless.append(track)
             may_be_own = followed is not None and (mover.number == followed.number or self._is_near(followed, track))
             if now - mover.felt <= lately_s and not may_be_own:
-                others.append(Other(*track.place, now))
+                others.append(Other(*here, now))
         return [*people.values(), *nameless], others, own
 
     def _is_near(self, person: Person, track: Track) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,8 +28,10 @@ class FollowedInView:
         if not goal.faces:
             return np.zeros(len(rollouts.offs))
         if situation.followed is None:
-            off = np.abs(rollouts.poses[:, :, 2] - goal.heading - goal.rate * times)
+            off = rollouts.poses[:, :, 2] - goal.heading - goal.rate * times
         else:
-            off = rollouts.offs_to(rollouts.places[:, situation.followed])
-        off = np.minimum(off, self.most)
+            to = rollouts.places[:, situation.followed] - rollouts.poses[:, :, :2]
+            off = np.arctan2(to[..., 1], to[..., 0]) - rollouts.poses[:, :, 2]
+            off -= math.tau * np.rint(off / math.tau)
+        off = np.minimum(np.abs(off), self.most)
         return np.asarray((self.share * off + np.maximum(off - self.edge, 0.0)).mean(axis=1))

@@ -31,7 +31,14 @@ class Room:
         """Return the cost of each rollout by the people in these rows, float64 (K,) [m]."""
         if not people:
             return np.zeros(len(rollouts.offs))
-        gaps = rollouts.gaps(rollouts.places[:, people], situation.robot).min(axis=2)
+        # From the robot's outline, negative inside it.
+        robot, places, poses = situation.robot, rollouts.places[:, people], rollouts.poses[:, :, None]
+        dx, dy = places[..., 0] - poses[..., 0], places[..., 1] - poses[..., 1]
+        cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+        ahead = np.abs(cos * dx + sin * dy) - robot.half_length
+        beside = np.abs(cos * dy - sin * dx) - robot.half_width
+        outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(beside, 0.0))
+        gaps = (outside + np.minimum(np.maximum(ahead, beside), 0.0)).min(axis=2)
         fade, scale = np.exp(-rollouts.times / self.fades_s), self.error + self.spread * rollouts.times
         chance = (1 - np.tanh((gaps - self.touches) / scale / 2)) / 2
         short = (np.maximum(self.clear - gaps, 0.0) * fade).mean(axis=1)

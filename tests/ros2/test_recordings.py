@@ -260,7 +260,6 @@ def test_what_is_no_recording_is_one_line(
 
 
 def test_a_recording_that_may_not_be_read_is_an_error_of_the_system(tmp_path: Path) -> None:
-    (tmp_path / "folder.mcap").mkdir()
-    (tmp_path / "folder.mcap" / "part.mcap").mkdir()
+    (tmp_path / "folder.mcap" / "part.mcap").mkdir(parents=True)
     with pytest.raises(IsADirectoryError):
         list(read_bag(tmp_path / "folder.mcap"))

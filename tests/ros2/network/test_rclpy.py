@@ -158,13 +158,16 @@ def test_the_example_on_rclpy_follows_and_stops_at_ctrl_c(tmp_path: Path) -> Non
     rules = f"-r image:={names.IMAGE} -r camera_info:={names.CAMERA_INFO} -r depth:={names.DEPTH}"
     words = f"--ros-args -p robot:={tmp_path / 'limo.toml'} -p reliable:=true {rules}".split()
     log, said, until = tmp_path / "log.txt", "", time.monotonic() + 60
-    with arena("--scenario", "followable"), log.open("w") as errors:
-        node = start(ROOT / "examples" / "rclpy_follower.py", *words, stderr=errors, PYTHONPATH=PATH)
+    with (
+        arena("--scenario", "followable"),
+        log.open("w") as errors,
+        start(ROOT / "examples" / "rclpy_follower.py", *words, stderr=errors, PYTHONPATH=PATH) as node,
+    ):
+        while "following a person" not in said and time.monotonic() < until:
+            time.sleep(0.5)
+            said = log.read_text()
+        node.send_signal(2)
         try:
-            while "following a person" not in said and time.monotonic() < until:
-                time.sleep(0.5)
-                said = log.read_text()
-            node.send_signal(2)
             assert node.wait(20) != 0
         finally:
             node.kill()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 from pathlib import Path
-from typing import IO
+from typing import Any
 
 import pytest
 
@@ -13,7 +13,7 @@ PYTHON = Path(os.environ.get("LIMO_HOG_RCLPY", Path(__file__).parents[2] / "targ
 needs_rclpy = pytest.mark.skipif(not PYTHON.exists(), reason="needs ROS 2's own rclpy: run .ci/rclpy")
 
 
-def start(program: Path, *words: str, stderr: IO[str] | None = None, **environment: str) -> subprocess.Popen[str]:
+def start(program: Path, *words: str, stderr: Any = None, **environment: str) -> subprocess.Popen[str]:
     """Start a program under rclpy; what it prints is to be read, and what it is told comes by standard input.
 
     Its errors go where the test's go, unless to `stderr`: a program that fails must show why.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,13 +13,16 @@ PYTHON = Path(os.environ.get("LIMO_HOG_RCLPY", Path(__file__).parents[2] / "targ
 needs_rclpy = pytest.mark.skipif(not PYTHON.exists(), reason="needs ROS 2's own rclpy: run .ci/rclpy")
 
 
-def start(program: Path, *words: str, **environment: str) -> subprocess.Popen[str]:
-    """Start a program under rclpy; what it prints is to be read, and what it is told comes by standard input."""
-    # (A program that fails must show why: its errors go where the test's go.)
+def start(program: Path, *words: str, stderr: Any = None, **environment: str) -> subprocess.Popen[str]:
+    """Start a program under rclpy; what it prints is to be read, and what it is told comes by standard input.
+
+    Its errors go where the test's go, unless to `stderr`: a program that fails must show why.
+    """
     return subprocess.Popen(
         [str(PYTHON), str(program), *words],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
+        stderr=stderr,
         text=True,
         env={**os.environ, "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", **environment},
     )

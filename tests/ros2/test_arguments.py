@@ -56,6 +56,7 @@ WRONG = [
     "-p a:=[1",
     "--no",
 ]
+WRONG += ["--params-file /none.yaml"]
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from tests.follow.views import scan
 from limo_hog.cli import replay as command
 from limo_hog.cli.main import main
 from limo_hog.detections import Detections
-from limo_hog.follow import LIMO, Decision, Follower, Mode, Observation, Odometry, RobotGeometry, Scan, Twist
+from limo_hog.follow import LIMO, Decision, Follower, Mode, Observation, Odometry, RobotGeometry, Twist
 from limo_hog.ros2 import messages, names
 from limo_hog.ros2.bag import Record, bag_writer
 from limo_hog.ros2.findings import stamped_twist
@@ -43,24 +43,16 @@ class Driver:
         return Decision(Twist(0.2, 0.0), None, Mode.FOLLOW, "because")
 
 
-class Empty:
-    """Finds nobody."""
+@dataclass
+class Finder:
+    """Finds nobody; fails in one picture, counted from 1."""
 
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        del image
-        return Detections.none()
+    fails_in: int = 0
+    calls: int = 0
 
-
-class Failing:
-    """Fails in the second picture."""
-
-    def __init__(self) -> None:
-        self.calls = 0
-
-    def detect(self, image: NDArray[np.uint8]) -> Detections:
-        del image
+    def detect(self, _: NDArray[np.uint8]) -> Detections:
         self.calls += 1
-        if self.calls == 2:
+        if self.calls == self.fails_in:
             raise RuntimeError("out of memory")
         return Detections.none()
 
@@ -78,28 +70,26 @@ def records(*depths: tuple[float, NDArray[Any]], stamp: float = 1.0) -> Iterator
     yield Record(names.COMMAND, stamp, messages.twist(Twist()))
 
 
-def told_depth(*depths: tuple[float, NDArray[Any]]) -> float | None:
-    """Which depth a controller is told for the picture at 1.0 s."""
+@pytest.mark.parametrize(
+    ("depths", "told"),
+    [
+        ([(1.0, depth(2.0))], 2.0),
+        ([(0.96, depth(2.0))], 2.0),
+        ([(0.94, depth(2.0))], None),
+        ([(1.06, depth(2.0))], None),
+        ([(0.9, depth(1.0)), (0.98, depth(2.0)), (1.04, depth(3.0))], 2.0),
+        ([(1.0, np.full((48, 64), 2500, np.uint16))], 2.5),
+        ([(1.0, np.ones((24, 32), np.float32))], None),
+    ],
+    ids=["its own", "earlier", "too early", "too late", "not the newest", "millimetres", "of another size"],
+)
+def test_a_depth_image_belongs_to_the_picture_that_is_nearest_in_time(
+    depths: list[tuple[float, NDArray[Any]]], told: float | None
+) -> None:
     driver = Driver()
-    assert len(list(replay(records(*depths), driver, Empty()))) == 1
-    told = driver.told[0].depth
-    return None if told is None else float(told[0, 0])
-
-
-def test_a_depth_image_belongs_to_a_picture_of_its_time_alone() -> None:
-    assert told_depth((1.0, depth(2.0))) == 2.0
-    assert told_depth((0.96, depth(2.0))) == 2.0
-    assert told_depth((0.94, depth(2.0))) is None
-    assert told_depth((1.06, depth(2.0))) is None
-
-
-def test_of_several_depth_images_the_nearest_in_time_counts_not_the_newest() -> None:
-    assert told_depth((0.9, depth(1.0)), (0.98, depth(2.0)), (1.04, depth(3.0))) == 2.0
-
-
-def test_depth_in_millimetres_is_read_and_depth_of_another_size_is_left_alone() -> None:
-    assert told_depth((1.0, np.full((48, 64), 2500, np.uint16))) == 2.5
-    assert told_depth((1.0, np.ones((24, 32), np.float32))) is None
+    assert len(list(replay(records(*depths), driver, Finder()))) == 1
+    given = driver.told[0].depth
+    assert (None if given is None else given[0, 0]) == told
 
 
 def test_until_the_calibration_comes_the_limos_own_focal_length_is_taken() -> None:
@@ -119,42 +109,36 @@ def test_what_is_no_depth_image_is_named() -> None:
 
 def frames(count: int) -> Iterator[Record]:
     yield Record(names.CAMERA_INFO, 0.0, messages.camera_info(0.0, 64, 48, 50.0))
-    for k in range(count):
-        yield Record(names.DEPTH, 0.1 * k, messages.image(0.1 * k, depth(8.0)))
-        yield Record(names.SCAN, 0.1 * k, messages.laser_scan(scan(stamp=0.1 * k)))
-        yield Record(names.ODOMETRY, 0.1 * k, messages.odometry(Odometry(0.1 * k)))
-        yield Record(names.IMAGE, 0.1 * k, messages.image(0.1 * k, PICTURE))
+    for at in (0.1 * k for k in range(count)):
+        yield Record(names.DEPTH, at, messages.image(at, depth(8.0)))
+        yield Record(names.SCAN, at, messages.laser_scan(scan(stamp=at)))
+        yield Record(names.ODOMETRY, at, messages.odometry(Odometry(at)))
+        yield Record(names.IMAGE, at, messages.image(at, PICTURE))
 
 
-def stamped(stamp: float, command: Twist) -> Record:
-    return Record(names.COMMAND, stamp, stamped_twist(stamp, command))
+def bag(path: Path, records: Iterable[Record]) -> str:
+    """Record; returns the recording's name."""
+    with bag_writer(path / "run.mcap") as write:
+        for record in records:
+            write(*record)
+    return str(path / "run.mcap")
 
 
 @pytest.mark.parametrize("kind", ["Twist", "TwistStamped"])
 def test_the_recorded_command_is_what_drove_the_robot_of_either_type(kind: str) -> None:
     drove = Twist(0.3, -0.2)
     planned = Record("/cmd_vel_nav", 1.01, messages.twist(Twist(9.0, 9.0)))
-    sent = Record(names.COMMAND, 1.02, messages.twist(drove)) if kind == "Twist" else stamped(1.02, drove)
-    first, *rest = records()
-    done = list(replay([first, rest[0], planned, sent], Driver(), Empty()))
+    sent = messages.twist(drove) if kind == "Twist" else stamped_twist(1.02, drove)
+    *before, _ = records()
+    done = list(replay([*before, planned, Record(names.COMMAND, 1.02, sent)], Driver(), Finder()))
     assert [frame.recorded_twist for frame in done] == [drove]
-
-
-def test_a_detector_that_raises_is_a_fault_of_that_frame_and_the_replay_goes_on() -> None:
-    done = list(replay(frames(3), Driver(), Failing()))
-    assert [frame.log.failure for frame in done] == ["", "the detector failed: out of memory", ""]
-    assert [frame.log.decision.twist.linear for frame in done] == [0.2, 0.0, 0.2]
-    assert done[1].log.decision.mode is Mode.BLOCKED
 
 
 def test_the_command_line_counts_the_failures_and_says_the_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with bag_writer(tmp_path / "run.mcap") as write:
-        for record in frames(3):
-            write(record.topic, record.time, record.message)
-    monkeypatch.setattr(command, "detector_named", lambda _name: Failing())
-    assert main(["replay", str(tmp_path / "run.mcap"), "--json", "-"]) == 0
+    monkeypatch.setattr(command, "detector_named", lambda _name: Finder(fails_in=2))
+    assert main(["replay", bag(tmp_path, frames(3)), "--json", "-"]) == 0
     out, err = capsys.readouterr()
     card = json.loads(out)
     assert (card["frames"], card["detector_failures"]) == (3, 1)
@@ -176,25 +160,22 @@ def test_one_line_says_which_senses_are_there_and_which_are_not() -> None:
 def test_a_recording_of_other_names_is_replayed_by_the_robots_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    scan = messages.laser_scan(Scan(0.9, np.ones(292, np.float32), -2.0, 2.0, 0.12, 8.0))
     names_there = {names.IMAGE: "/r/rgb/image", names.CAMERA_INFO: "/r/rgb/camera_info", names.COMMAND: "/r/cmd_vel"}
-    with bag_writer(tmp_path / "run.mcap") as write:
-        write("/r/scan_filtered", 0.9, scan)
-        for record in records((1.0, depth(2.0))):
-            write(names_there.get(record.topic, "/r/depth"), record.time, record.message)
+    some = [Record("/r/scan_filtered", 0.9, messages.laser_scan(scan(stamp=0.9)))]
+    some += [one._replace(topic=names_there.get(one.topic, "/r/depth")) for one in records((1.0, depth(2.0)))]
     driver = Driver()
     monkeypatch.setattr(command, "controller_named", lambda _name: driver)
-    monkeypatch.setattr(command, "detector_named", lambda _name: Empty())
-    some = ["replay", str(tmp_path / "run.mcap"), "--json", "-", "--ros-args", "-r", "__ns:=/r"]
-    some += ["-r", "limo_camera/image:=rgb/image"]
-    assert main(some) == 0
+    monkeypatch.setattr(command, "detector_named", lambda _name: Finder())
+    words = ["replay", bag(tmp_path, some), "--json", "-", "--ros-args", "-r", "__ns:=/r"]
+    words += ["-r", "limo_camera/image:=rgb/image"]
+    assert main(words) == 0
     out, err = capsys.readouterr()
     # Without a scan the robot stands, as it did when this was recorded.
     assert json.loads(out)["linear_difference_max"] == 0.0
     assert driver.told[0].scan is None
     assert "/r/scan_filtered (sensor_msgs/msg/LaserScan); give --ros-args -r scan:=/r/scan_filtered" in err
     assert "/r/depth (depth); give --ros-args -r limo_camera/depth/image_raw:=/r/depth" in err
-    assert main([*some, "-r", "scan:=scan_filtered", "-r", "limo_camera/depth/image_raw:=depth"]) == 0
+    assert main([*words, "-r", "scan:=scan_filtered", "-r", "limo_camera/depth/image_raw:=depth"]) == 0
     assert capsys.readouterr().err == ""
     assert driver.told[1].scan is not None
     assert driver.told[1].depth is not None
@@ -204,18 +185,16 @@ def test_a_replay_has_the_robot_of_a_file_and_its_sensors_where_tf_static_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "robot.toml").write_text("half_length = 0.25\ncamera_x = 0.2\n")
-    with bag_writer(tmp_path / "run.mcap") as write:
-        write(names.TF_STATIC, 0.0, static_transforms(0.0, replace(LIMO, camera_z=0.25, lidar_yaw=3.1)))
-        for record in frames(2):
-            write(record.topic, record.time, record.message)
+    mounts = static_transforms(0.0, replace(LIMO, camera_z=0.25, lidar_yaw=3.1))
+    recording = bag(tmp_path, [Record(names.TF_STATIC, 0.0, mounts), *frames(2)])
     robots: list[RobotGeometry] = []
 
-    def noted(controller: Driver, detector: Empty, robot: RobotGeometry) -> Follower[None]:
+    def noted(controller: Driver, detector: Finder, robot: RobotGeometry) -> Follower[None]:
         robots.append(robot)
         return Follower(controller, detector, robot)
 
     monkeypatch.setattr("limo_hog.ros2.replay.Follower", noted)
-    assert main(["replay", str(tmp_path / "run.mcap"), "--robot", str(tmp_path / "robot.toml")]) == 0
+    assert main(["replay", recording, "--robot", str(tmp_path / "robot.toml")]) == 0
     (made,) = robots
     assert (made.half_length, made.camera_x, made.camera_z) == (0.25, 0.2, 0.25)
     assert made.lidar_yaw == pytest.approx(3.1)

@@ -6,10 +6,7 @@ import json
 import re
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -18,10 +15,10 @@ import pytest
 pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
 
 from cyclonedds import builtin
-from cyclonedds.idl import make_idl_struct, types
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy
 from cyclonedds.topic import Topic
+from tests.ros2.network.publishing import publishing
 
 from limo_hog.cli.main import main
 from limo_hog.cli.topic import as_yaml
@@ -32,65 +29,9 @@ from limo_sim.ros.live import second_publishers
 from limo_sim.run.arena import Arena
 from limo_sim.world.scenario import Scenario
 
-TWIST = "geometry_msgs/msg/Twist"
-
-
+SCAN = messages.laser_scan(Scan(1.0, np.ones(292, np.float32), -2.0, 2.0, 0.12, 8.0))
+BLACK = messages.image(1.0, np.zeros((8, 8, 3), np.uint8))
 LIMO_SITS = "camera 0.08 m ahead, 0.17 m high · lidar 0.10 m ahead, turned by 0°"
-
-
-@contextmanager
-def publishing(topic: str, message: Any, hertz: float = 10.0) -> Iterator[dds.Publisher]:
-    """Publish a message again and again from a thread."""
-    publisher = dds.Bus().publisher(topic, message.__msgtype__, kept=topic == names.TF_STATIC)
-    over = threading.Event()
-
-    def work() -> None:
-        at = time.monotonic()
-        while not over.is_set():
-            publisher.publish(message)
-            at += 1 / hertz
-            time.sleep(max(at - time.monotonic(), 0))
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    try:
-        yield publisher
-    finally:
-        over.set()
-        thread.join()
-
-
-def test_the_bytes_are_those_that_cyclone_dds_makes_itself() -> None:
-    vector: Any = make_idl_struct("V", "V", dict.fromkeys("xyz", types.float64))
-    plain: Any = make_idl_struct("T", "T", {"linear": vector, "angular": vector})
-    ours = dds.dds_type(TWIST)(messages.twist(Twist(0.2, -0.7))).serialize()
-    assert ours == plain(linear=vector(x=0.2, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=-0.7)).serialize(
-        use_version_2=False
-    )
-
-
-def test_sequences_and_strings_have_the_bytes_that_cyclone_dds_makes_itself() -> None:
-    generic: Any = types
-    time_: Any = make_idl_struct("Tm", "Tm", {"sec": types.int32, "nanosec": types.uint32})
-    header: Any = make_idl_struct("H", "H", {"stamp": time_, "frame_id": str})
-    floats = dict.fromkeys(("a", "b", "c", "d", "e", "f", "g"), types.float32)
-    scan_type: Any = make_idl_struct(
-        "S", "S", {"h": header, **floats, "r": generic.sequence[types.float32], "i": generic.sequence[types.float32]}
-    )
-    message = messages.laser_scan(Scan(1.25, np.array([1.0, 2.5, np.inf], np.float32), -2.0, 2.0, 0.12, 8.0))
-    theirs = scan_type(
-        h=header(stamp=time_(sec=1, nanosec=250_000_000), frame_id="laser_link"),
-        a=-2.0,
-        b=2.0,
-        c=2.0,
-        d=0.0,
-        e=0.125,
-        f=0.12,
-        g=8.0,
-        r=[1.0, 2.5, float("inf")],
-        i=[],
-    )
-    assert messages.serialize(message) == theirs.serialize(use_version_2=False)
 
 
 def test_names_types_and_hashes_are_what_ros_2_looks_for() -> None:
@@ -123,8 +64,15 @@ print(len(late), np.percentile(late, 95), stamps[:1], np.unique(np.diff(stamps) 
 """
 
 
-def exchange(seconds: float, hertz: float) -> tuple[int, int, float]:
-    """Send images to another process; returns how many were sent and came, and the 95 % latency [s]."""
+@pytest.mark.parametrize(
+    ("seconds", "hertz", "latest"),
+    [
+        # A receiver that images do not wake is late by up to 2 s; the minute's figure is exact.
+        (3.0, 20.0, 0.5),
+        pytest.param(60.0, 10.0, 0.010, marks=pytest.mark.slow),
+    ],
+)
+def test_images_reach_another_process_whole_and_in_time(seconds: float, hertz: float, latest: float) -> None:
     count = int(seconds * hertz)
     command = [sys.executable, "-c", RECEIVER, str(seconds + 20), str(count)]
     receiver = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -139,48 +87,30 @@ def exchange(seconds: float, hertz: float) -> tuple[int, int, float]:
         publisher.publish(messages.image(time.time(), pixels))
         # (Without catching up: a machine that stood for a second would send more at once than a writer keeps.)
         time.sleep(1 / hertz)
-    out = receiver.communicate(timeout=30)[0].split()
-    assert out[2:] == ["[0]", "[1]"], "the numbers on the images do not run from 0 by 1"
-    return count, int(out[0]), float(out[1])
-
-
-def test_images_reach_another_process_and_none_is_lost() -> None:
-    sent, came, late = exchange(3.0, 20.0)
-    assert came == sent
-    assert late < 0.5  # a receiver that images do not wake is late by up to 2 s; the minute's test is exact
-
-
-@pytest.mark.slow
-def test_a_minute_of_images_at_10_hz_comes_whole_and_within_10_ms() -> None:
-    sent, came, late = exchange(60.0, 10.0)
-    assert came == sent == 600
-    assert late <= 0.010
+    came, late, *numbers = receiver.communicate(timeout=30)[0].split()
+    assert numbers == ["[0]", "[1]"], "the numbers on the images do not run from 0 by 1"
+    assert int(came) == count
+    assert float(late) <= latest
 
 
 @pytest.mark.parametrize("publisher_first", [True, False])
 def test_a_driver_that_sends_with_best_effort_is_heard(publisher_first: bool) -> None:
     listening, sending = dds.Bus(), dds.Bus()
-    qos = dds._qos(names.TYPES[names.SCAN], 10, reliable=False)
     kind = dds.dds_type(names.TYPES[names.SCAN])
 
-    def subscribe() -> dds.Subscription:
-        return listening.subscription(names.SCAN, names.TYPES[names.SCAN])
-
     def writer() -> Any:
+        qos = dds._qos(names.TYPES[names.SCAN], 10, reliable=False)
         return DataWriter(sending._participant, Topic(sending._participant, f"rt{names.SCAN}", kind), qos=qos)
 
+    driver = writer() if publisher_first else None
     if publisher_first:
-        driver = writer()
         listening.topics(10.0, enough=lambda found: names.SCAN in found)
-        scans = subscribe()
-    else:
-        scans = subscribe()
-        driver = writer()
-    message = messages.laser_scan(Scan(1.0, np.ones(292, np.float32), -2.0, 2.0, 0.12, 8.0))
+    scans = listening.subscription(names.SCAN, names.TYPES[names.SCAN])
+    driver = driver or writer()
     heard: list[Any] = []
     until = time.monotonic() + 10
     while not heard and time.monotonic() < until:
-        driver.write(kind(message))
+        driver.write(kind(SCAN))
         listening.wait(0.1)
         heard = scans.take()
     assert len(heard[0].ranges) == 292
@@ -231,9 +161,7 @@ def test_topic_echo_shows_what_a_publisher_kept(capsys: pytest.CaptureFixture[st
 
 def test_the_follower_takes_its_sensors_places_from_tf_static() -> None:
     own = RobotGeometry(camera_x=0.2, camera_z=0.25, lidar_x=-0.1, lidar_yaw=3.0)
-    scan = messages.laser_scan(Scan(0.0, np.ones(9, np.float32), -2.0, 2.0, 0.12, 8.0))
-    image = messages.image(0.0, np.zeros((4, 4, 3), np.uint8))
-    with publishing(names.SCAN, scan), publishing(names.IMAGE, image):
+    with publishing(names.SCAN, SCAN), publishing(names.IMAGE, BLACK):
         bus = dds.Bus()
         inputs = follower.Inputs(bus, names.IMAGE)
         assert follower.mounted(bus, inputs, names.IMAGE, LIMO) == (LIMO, f"{LIMO_SITS} (a Limo's)")
@@ -278,7 +206,7 @@ def test_a_camera_of_another_name_is_named_and_taken_under_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(follower, "SILENT_AFTER", 3.0)
-    with publishing("/robot1/camera/image_raw", messages.image(1.0, np.zeros((8, 8, 3), np.uint8))):
+    with publishing("/robot1/camera/image_raw", BLACK):
         assert main(["follow", "--ros2", "--seconds", "5"]) == 1
         said = "images are on /robot1/camera/image_raw: choose one by --ros-args -r limo_camera/image:=TOPIC"
         assert said in capsys.readouterr().err
@@ -297,7 +225,7 @@ def test_a_parameter_that_is_not_known_is_named_and_one_of_the_wrong_kind_refuse
     said = capsys.readouterr().err
     assert "parameter base_fame is not known; known are base_frame, camera_frame" in said
     assert "use_sim_time" not in said
-    with publishing(names.IMAGE, messages.image(1.0, np.zeros((8, 8, 3), np.uint8))):
+    with publishing(names.IMAGE, BLACK):
         monkeypatch.setattr(follower, "SILENT_AFTER", 5.0)
         assert main(["follow", "--ros2", "--seconds", "1", "--ros-args", "-p", "base_frame:=7"]) == 1
     assert "parameter base_frame is 7; wanted is a frame's name" in capsys.readouterr().err
@@ -306,17 +234,15 @@ def test_a_parameter_that_is_not_known_is_named_and_one_of_the_wrong_kind_refuse
 def test_an_arena_names_the_topics_that_another_publishes() -> None:
     arena = dds.Bus()
     assert second_publishers(arena) == []
-    with publishing(names.SCAN, messages.laser_scan(Scan(1.0, np.ones(292, np.float32), -2.0, 2.0, 0.12, 8.0))):
+    with publishing(names.SCAN, SCAN):
         assert second_publishers(arena) == [names.SCAN]
 
 
 @pytest.mark.parametrize("kind", ["compressed", "mono8", "rgb8"])
 def test_the_follower_reads_whatever_pictures_the_camera_sends(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     image = Arena(Scenario.load("standing"), 0).frame().image
-    message: Any
-    if kind == "compressed":
-        topic, message = names.IMAGE_COMPRESSED, messages.compressed_image(1.0, image)
-    else:
+    topic, message = names.IMAGE_COMPRESSED, messages.compressed_image(1.0, image)
+    if kind != "compressed":
         topic, message = names.IMAGE, messages.image(1.0, image[..., ::-1] if kind == "rgb8" else image[..., 1])
         message.encoding = kind
     with publishing(topic, message):
@@ -337,21 +263,3 @@ def test_a_picture_of_a_kind_that_is_not_read_is_counted_and_the_robot_given_up(
     said = capsys.readouterr().err
     assert "no image on /limo_camera/image/compressed in ROS domain" in said
     assert "messages were not read: 20 bytes of 'bgr8; jpeg compressed bgr8' are no picture" in said
-
-
-def test_two_processes_close_the_loop(capsys: pytest.CaptureFixture[str]) -> None:
-    command = [sys.executable, "-m", "limo_hog.cli.main"]
-    arena = subprocess.Popen(
-        [*command, "arena", "--ros2", "--scenario", "followable", "--seconds", "30"],
-        stderr=subprocess.DEVNULL,
-    )
-    bus = dds.Bus()
-    bus.topics(20.0, enough=lambda found: names.IMAGE in found)
-    odometry = bus.subscription(names.ODOMETRY, names.TYPES[names.ODOMETRY], depth=1)
-    assert main(["follow", "--ros2", "--seconds", "6", "--json", "-"]) == 0
-    assert '"found": 0' not in capsys.readouterr().out
-    bus.wait(1.0)
-    last = [messages.to_odometry(message) for message in odometry.take()]
-    arena.terminate()
-    arena.wait(10)
-    assert np.hypot(last[-1].x, last[-1].y) > 0.1

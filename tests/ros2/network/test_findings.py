@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip("cyclonedds", reason="needs limo-hog[ros2]")
 
 from cyclonedds.idl import make_idl_struct, types
+from tests.ros2.network.publishing import publishing
 
 from limo_hog.detections import Detections
 from limo_hog.follow.control.naming import controller_named
@@ -21,6 +22,7 @@ from limo_hog.follow.decision import Believed, Mode
 from limo_hog.follow.pipeline import FrameLog
 from limo_hog.follow.robot import LIMO, Twist
 from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.follow.sense.observation import Scan
 from limo_hog.ros2 import dds, findings, follower, frames, messages, names
 from limo_hog.ros2.bag import to_detections
 from limo_hog.ros2.outputs import Commands
@@ -33,13 +35,15 @@ OTHER = Believed(3.0, -1.0, 0.95, 12)
 BOXES = Detections(np.array([[10, 20, 64, 128], [300, 20, 50, 101]], np.int32), np.array([1.5, 0.25]))
 
 MESSAGES = {
+    "scan": messages.laser_scan(Scan(1.25, np.array([1.0, 2.5, np.inf], np.float32), -2.0, 2.0, 0.12, 8.0)),
     "detections": findings.detections_message(12.5, BOXES, "depth_link", {1: 7}),
     "no detections": findings.detections_message(12.5, Detections.none(), "depth_link"),
     "pose": findings.person_pose(12.5, PERSON),
     "people": findings.people_message(12.5, [PERSON, OTHER]),
     "frames": findings.person_frames(12.5, [PERSON, OTHER], 7),
     "robot": frames.static_transforms(12.5, LIMO),
-    "command": findings.stamped_twist(12.5, Twist(0.5, -0.25)),
+    "command": messages.twist(Twist(0.5, -0.25)),
+    "stamped command": findings.stamped_twist(12.5, Twist(0.5, -0.25)),
 }
 
 
@@ -148,25 +152,12 @@ def test_a_drive_publishes_where_the_person_is(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_robot_that_publishes_images_alone_is_told_what_is_missing_and_stands() -> None:
-    bus, heard = dds.Bus(), dds.Bus()
-    commands = heard.subscription(names.COMMAND, names.TYPES[names.COMMAND], depth=1000)
-    images = bus.publisher(names.IMAGE, names.TYPES[names.IMAGE])
-    done = threading.Event()
-
-    def shine() -> None:
-        while not done.wait(0.1):
-            images.publish(messages.image(time.time(), np.full((480, 640, 3), 90, np.uint8)))
-
-    camera = threading.Thread(target=shine)
-    camera.start()
+    commands = dds.Bus().subscription(names.COMMAND, names.TYPES[names.COMMAND], depth=1000)
     said: list[str] = []
     logs: list[FrameLog] = []
-    controller, detector = controller_named("tracking", 1.5), detector_named("hog")
-    try:
-        follower.drive(dds.Bus(), controller, detector, follower.Settings(6.0, watch=logs.append, say=said.append))
-    finally:
-        done.set()
-        camera.join()
+    settings = follower.Settings(6.0, watch=logs.append, say=said.append)
+    with publishing(names.IMAGE, messages.image(1.0, np.full((480, 640, 3), 90, np.uint8))):
+        follower.drive(dds.Bus(), controller_named("tracking", 1.5), detector_named("hog"), settings)
     assert said[0].endswith("(a Limo's)")
     assert said[1:] == ["camera yes · camera_info no, 71° wide is assumed · depth no · scan NO · odom no"]
     assert {log.decision.reason for log in logs} == {"no depth image has come; no scan has come; no odometry has come"}
@@ -177,11 +168,6 @@ def test_a_robot_that_publishes_images_alone_is_told_what_is_missing_and_stands(
 
 def test_a_command_that_is_no_number_is_shown_and_recorded_as_standing() -> None:
     steps: list[Step] = []
-    arena = threading.Thread(target=run_live, args=(Scenario(name="empty"), 0, 4.0, dds.Bus(), steps.append))
-    arena.start()
-    commands = dds.Bus().publisher(names.COMMAND, names.TYPES[names.COMMAND])
-    while arena.is_alive():
-        commands.publish(messages.twist(Twist(math.nan, 0.5)))
-        time.sleep(0.05)
-    arena.join()
+    with publishing(names.COMMAND, messages.twist(Twist(math.nan, 0.5)), hertz=20.0):
+        run_live(Scenario(name="empty"), 0, 4.0, dds.Bus(), steps.append)
     assert {(step.log.decision.twist, step.log.decision.mode) for step in steps} == {(Twist(), Mode.STAND)}

@@ -7,7 +7,9 @@ import os
 import shutil
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,7 +44,7 @@ BUILDS = {
 }
 
 
-def built(kind: str, folder: Path, source: str = "peer") -> Path:
+def built(kind: str, folder: Path, source: str) -> Path:
     """Build a peer."""
     packages, generate, compile_ = BUILDS[kind]
     if shutil.which(generate[0]) is None or shutil.which(compile_[0]) is None:
@@ -54,52 +56,46 @@ def built(kind: str, folder: Path, source: str = "peer") -> Path:
     return folder / "peer"
 
 
-@pytest.mark.parametrize("kind", ["cyclone", pytest.param("fast", marks=pytest.mark.slow)])
-def test_a_peer_receives_every_image_and_twist_and_its_twists_arrive(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    peer = built(kind, tmp_path)
-    domain = str(121 + list(BUILDS).index(kind))
-    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    bus = dds.Bus()
-    commands = bus.subscription(names.COMMAND, names.TYPES[names.COMMAND])
-    images = bus.publisher(names.IMAGE, names.TYPES[names.IMAGE])
-    heard = bus.publisher("/heard", names.TYPES[names.COMMAND])
-    environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK_0_10}
-    other = subprocess.Popen([str(peer), domain, "300"], stdout=subprocess.PIPE, text=True, env=environment)
-    assert other.stdout is not None
-    assert other.stdout.readline() == "ready\n"
-    until = time.monotonic() + 5
-    while not (images.has_readers and heard.has_readers) and time.monotonic() < until:
-        time.sleep(0.01)
+@pytest.fixture(params=["cyclone", pytest.param("fast", marks=pytest.mark.slow)])
+def exchange(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Build and start a peer, and send it messages; gives what it says, and the commands that came from it."""
+
+    def run(source: str, sent: dict[str, Any], times: int, hertz: float, command: str) -> tuple[Any, list[Any]]:
+        peer = built(request.param, tmp_path, source)
+        domain = str(121 + list(BUILDS).index(request.param) + 2 * (source == "findings"))
+        monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+        bus = dds.Bus()
+        commands = bus.subscription(names.COMMAND, command)
+        writers = {topic: bus.publisher(topic, message.__msgtype__) for topic, message in sent.items()}
+        environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK_0_10}
+        # (It counts periods of 20 ms.)
+        other = subprocess.Popen([str(peer), domain, "300"], stdout=subprocess.PIPE, text=True, env=environment)
+        assert other.stdout is not None
+        assert other.stdout.readline() == "ready\n"
+        until = time.monotonic() + 5
+        while not all(writer.has_readers for writer in writers.values()) and time.monotonic() < until:
+            time.sleep(0.01)
+        for _ in range(times):
+            for topic, message in sent.items():
+                writers[topic].publish(message)
+            time.sleep(1 / hertz)
+        said = json.loads(other.communicate(timeout=60)[0].splitlines()[-1])
+        assert commands.dropped == 0
+        return said, commands.take()
+
+    return run
+
+
+def test_a_peer_receives_every_image_and_twist_and_its_twists_arrive(exchange: Callable[..., Any]) -> None:
     pixels = np.random.default_rng(0).integers(0, 255, (480, 640, 3)).astype(np.uint8)
-    for number in range(30):
-        images.publish(messages.image(number / 15, pixels))
-        heard.publish(messages.twist(Twist(0.0, 0.125)))
-        time.sleep(1 / 15)
-    said = json.loads(other.communicate(timeout=60)[0].splitlines()[-1])
-    assert said == {
-        "images": 30,
-        "encoding": "bgr8",
-        "pixel_sum": int(pixels.sum()),
-        "twists": 30,
-        "angular": 0.125,
-    }
-    got = [messages.to_twist(message) for message in commands.take()]
-    assert got
-    assert set(got) == {Twist(0.5, -0.25)}
-    assert commands.dropped == 0
+    sent = {names.IMAGE: messages.image(1.5, pixels), "/heard": messages.twist(Twist(0.0, 0.125))}
+    said, got = exchange("peer", sent, 30, 15.0, names.TYPES[names.COMMAND])
+    sums = {"encoding": "bgr8", "pixel_sum": int(pixels.sum())}
+    assert said == {"images": 30, "twists": 30, "angular": 0.125, **sums}
+    assert {messages.to_twist(message) for message in got} == {Twist(0.5, -0.25)}
 
 
-@pytest.mark.parametrize("kind", ["cyclone", pytest.param("fast", marks=pytest.mark.slow)])
-def test_a_peer_receives_what_the_follower_finds_and_its_stamped_commands_arrive(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    peer = built(kind, tmp_path, "findings")
-    domain = str(123 + list(BUILDS).index(kind))
-    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    bus = dds.Bus()
-    commands = bus.subscription(names.COMMAND, names.STAMPED_COMMAND_TYPE)
+def test_a_peer_receives_what_the_follower_finds_and_its_stamped_commands_arrive(exchange: Callable[..., Any]) -> None:
     person = Believed(2.0, 0.0, 0.875, 7, 0.5, -0.25, 1)
     boxes = Detections(np.array([[10, 20, 64, 128], [300, 20, 50, 100]], np.int32), np.array([1.5, 0.5]))
     sent = {
@@ -108,25 +104,15 @@ def test_a_peer_receives_what_the_follower_finds_and_its_stamped_commands_arrive
         names.PEOPLE: findings.people_message(12.5, [person]),
         names.TF: findings.person_frames(12.5, [person], 7),
     }
-    writers = {topic: bus.publisher(topic, message.__msgtype__) for topic, message in sent.items()}
-    environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK_0_10}
-    other = subprocess.Popen([str(peer), domain, "200"], stdout=subprocess.PIPE, text=True, env=environment)
-    assert other.stdout is not None
-    assert other.stdout.readline() == "ready\n"
-    until = time.monotonic() + 5
-    while not all(writer.has_readers for writer in writers.values()) and time.monotonic() < until:
-        time.sleep(0.01)
-    for _ in range(5):
-        for topic, message in sent.items():
-            writers[topic].publish(message)
-        time.sleep(0.1)
-    assert json.loads(other.communicate(timeout=60)[0].splitlines()[-1]) == [
+    said, got = exchange("findings", sent, 5, 10.0, names.STAMPED_COMMAND_TYPE)
+    assert said == [
         "12.500000000 base_link 2 0 1",
         "2  person 1.5 42 100 7",
         "1 7 2 -0.25 0.875",
         "2 base_link person_7 2",
     ]
-    heard = commands.take()
-    assert heard
-    assert all(message.header.stamp.sec == 12 and message.header.frame_id == "base_link" for message in heard)
-    assert {messages.to_twist(message.twist) for message in heard} == {Twist(0.5, -0.25)}
+    headers = {(message.header.stamp.sec, message.header.frame_id) for message in got}
+    assert (headers, {messages.to_twist(message.twist) for message in got}) == (
+        {(12, "base_link")},
+        {Twist(0.5, -0.25)},
+    )

@@ -5,13 +5,9 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from tests.sim.ros.scripts import HEAD, NOBODY, Run, run_script
-
-from limo_sim.ros.stage import Ended
-from limo_sim.world.scenario import Scenario
+from tests.sim.ros.scripts import HEAD, Run, run_script
 
 
 @pytest.fixture
@@ -28,9 +24,5 @@ def script(tmp_path: Path) -> Callable[[str], Path]:
 
 @pytest.fixture
 def run(script: Callable[[str], Path]) -> Run:
-    """Run a script's text against the arena; returns how it ended."""
-
-    def run_text(text: str, scenario: Scenario = NOBODY, seconds: float = 2.0, **options: Any) -> Ended:
-        return run_script(script(text), scenario, seconds, **options)
-
-    return run_text
+    """Run a script's text, with the arguments of `run_script`."""
+    return lambda text, *arguments, **options: run_script(script(text), *arguments, **options)

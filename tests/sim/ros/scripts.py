@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,35 +45,46 @@ cv2.imshow('camera', image)
 cv2.waitKey(1)
 """
 
-Run = Callable[..., Ended]
+
+@dataclass(frozen=True)
+class Ran(Ended):
+    """How a run ended, and what the node said meanwhile."""
+
+    logged: list[tuple[float, str, str]]  #: time [s], level, message
+    printed: dict[str, str]  #: on "stdout" and "stderr"
+
+    @property
+    def said(self) -> list[str]:
+        """What it logged, of a run that did not fail."""
+        assert self.failure == "", self.traceback
+        return [message for _, _, message in self.logged]
+
+
+Run = Callable[..., Ran]
 
 
 def run_script(
     script: Path,
-    scenario: Scenario,
-    seconds: float,
+    scenario: Scenario = NOBODY,
+    seconds: float = 2.0,
     seed: int = 0,
     *,
     arguments: Sequence[str] = (),
     patience: float = 20.0,
-    said: Callable[[str, str], None] | None = None,
     **watching: Any,
-) -> Ended:
-    """Run a script against the arena as `limo-hog run` does; what it prints is printed, or given to `said`."""
+) -> Ran:
+    """Run a script against the arena as `limo-hog run` does."""
+    logged: list[tuple[float, str, str]] = []
+    printed = {"stdout": "", "stderr": ""}
 
-    def printed(name: str, text: str) -> None:
-        (sys.stdout if name == "stdout" else sys.stderr).write(text)
+    def hear(name: str, text: str) -> None:
+        printed[name] += text
+        getattr(sys, name).write(text)
 
-    stage = Stage(script, scenario, seconds, seed, **watching)
-    return run_node(stage, arguments, limits=Limits(patience), said=said or printed)
-
-
-def said(run: Run, text: str, **options: Any) -> list[str]:
-    """Run a script that does not fail, and return what it logged."""
-    lines: list[str] = []
-    outcome = run(text, log=lambda _t, _l, _n, message: lines.append(message), **options)
-    assert outcome.failure == "", outcome.traceback
-    return lines
+    stage = Stage(
+        script, scenario, seconds, seed, log=lambda at, level, _, text: logged.append((at, level, text)), **watching
+    )
+    return Ran(**vars(run_node(stage, arguments, limits=Limits(patience), said=hear)), logged=logged, printed=printed)
 
 
 def node(body: str, make: str = "") -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.sim.ros.scripts import DRIVE, HEAD, STANDING, node
+from tests.sim.ros.scripts import DRIVE, HEAD, STANDING, node, run_script
 
 from limo_sim import workshop
 from limo_sim.ros.runner import run_node
@@ -46,7 +46,7 @@ COUNTED = f"""
 
 
 def test_a_frame_takes_few_calls_in_both_processes_together(tmp_path: Path) -> None:
-    script, said, files, seen = tmp_path / "node.py", list[str](), Counter[str](), list[float]()
+    script, files, seen = tmp_path / "node.py", Counter[str](), list[float]()
     head = "\n    def on_image(self, message):\n"
     script.write_text(workshop.solution("follower").replace(head, COUNTED), encoding="utf-8")
 
@@ -64,12 +64,11 @@ def test_a_frame_takes_few_calls_in_both_processes_together(tmp_path: Path) -> N
 
     before = sys.getprofile()
     try:
-        stage = Stage(script, Scenario.load("followable"), 7.0, 1, watch=watch)
-        ended = run_node(stage, said=lambda name, text: said.append(text) if name == "stdout" else None)
+        ended = run_script(script, Scenario.load("followable"), 7.0, 1, watch=watch)
     finally:
         sys.setprofile(before)
     assert ended.failure == ""
-    there = Counter(json.loads("".join(said)))
+    there = Counter(json.loads(ended.printed["stdout"]))
     # 426 in 39 files; three more for each piece in which a picture comes, and a file where the node is waited for.
     assert files.total() + there.total() <= 450 * FRAMES
     assert len(files.keys() | there.keys()) <= 40

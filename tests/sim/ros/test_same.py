@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from tests.ros2.real import needs_rclpy, start
-from tests.sim.ros.scripts import NOBODY, run_script
+from tests.sim.ros.scripts import run_script
 
 from limo_sim import workshop
 from limo_sim.run.log import Step
@@ -40,9 +40,7 @@ def theirs() -> dict[str, list[str]]:
 
 @pytest.fixture(scope="module")
 def ours() -> dict[str, list[str]]:
-    said: list[str] = []
-    run_script(SMALL, NOBODY, 60.0, said=lambda name, text: said.append(text) if name == "stdout" else None)
-    return by_program("".join(said))
+    return by_program(run_script(SMALL, seconds=60.0).printed["stdout"])
 
 
 @pytest.mark.parametrize("name", re.findall(r"^@program\ndef (\w+)", SMALL.read_text(), re.MULTILINE))

@@ -9,24 +9,10 @@ import sys
 import time
 
 import pytest
-from tests.sim.ros.scripts import Run, said
+from tests.sim.ros.scripts import Run
 
 NODE = "import threading, time\nrclpy.init()\nn = Node('n')\npub = n.create_publisher(Twist, 'cmd_vel', 1)\n"
 SERVICE = "from std_srvs.srv import Trigger\n"
-
-
-def test_main_sleeps_while_a_thread_spins(run: Run) -> None:
-    text = """
-n.create_timer(0.5, lambda: n.get_logger().info(f'{n.get_clock().now().nanoseconds / 1e9:.1f}'))
-threading.Thread(target=rclpy.spin, args=(n,), daemon=True).start()
-began = time.monotonic()
-while rclpy.ok():
-    pub.publish(Twist())
-    if time.monotonic() - began > 1.75:
-        break
-    time.sleep(0.1)
-"""
-    assert said(run, NODE + text) == ["0.5", "1.0", "1.5"]
 
 
 def test_the_scripts_end_waits_for_its_threads_but_not_for_daemons(run: Run) -> None:
@@ -39,7 +25,7 @@ threading.Thread(target=count, args=('waited for', 2, 0.5)).start()
 threading.Thread(target=count, args=('daemon', 99, 0.6), daemon=True).start()
 pub.publish(Twist())
 """
-    assert said(run, NODE + text) == ["waited for 0", "daemon 0", "waited for 1"]
+    assert run(NODE + text).said == ["waited for 0", "daemon 0", "waited for 1"]
 
 
 def test_events_and_queues_wait_in_the_arenas_time(run: Run) -> None:
@@ -62,7 +48,7 @@ n.get_logger().info(box.get())
 worker.join()
 pub.publish(Twist())
 """
-    assert said(run, NODE + text) == ["False", "empty at 0.9", "done"]
+    assert run(NODE + text).said == ["False", "empty at 0.9", "done"]
 
 
 def test_a_pool_computes_without_simulated_time(run: Run) -> None:
@@ -72,15 +58,14 @@ with ThreadPoolExecutor(2) as pool:
     n.get_logger().info(str(sum(pool.map(lambda k: k * k, range(5)))))
 n.get_logger().info(str(n.get_clock().now().nanoseconds))
 pub.publish(Twist())
+raise SystemExit(0)
 """
-    assert said(run, NODE + text) == ["30", "0"]
+    assert run(NODE + text).said == ["30", "0"]
 
 
 def test_what_a_thread_raises_ends_the_run(run: Run) -> None:
     text = NODE + "threading.Thread(target=lambda: 1 / 0).start()\npub.publish(Twist())\nrclpy.spin(n)"
-    outcome = run(text)
-    assert "failed with ZeroDivisionError at 0.00 s" in outcome.failure
-    assert "1 / 0" in outcome.traceback
+    assert "failed with ZeroDivisionError at 0.00 s" in run(text).failure
 
 
 def test_an_endless_loop_in_a_thread_is_stopped(run: Run) -> None:
@@ -167,45 +152,8 @@ def test_what_would_wait_for_ever_or_is_misused_is_named(run: Run, text: str, na
     assert named in run(NODE + "pub.publish(Twist())\n" + text, seconds=60.0).failure
 
 
-def test_a_callback_may_be_a_coroutine_that_awaits_a_service(run: Run) -> None:
-    text = (
-        SERVICE
-        + """
-def answer(request, response):
-    response.message = 'answered'
-    return response
-n.create_service(Trigger, 'go', answer)
-client = n.create_client(Trigger, 'go')
-from rclpy.callback_groups import ReentrantCallbackGroup
-async def ask():
-    response = await client.call_async(Trigger.Request())
-    n.get_logger().info(response.message)
-    pub.publish(Twist())
-n.create_timer(1.0, ask, callback_group=ReentrantCallbackGroup())
-rclpy.spin(n)
-"""
-    )
-    assert said(run, NODE + text, seconds=2.5) == ["answered", "answered"]
-
-
 def test_a_service_that_no_node_offers_is_warned_of(run: Run) -> None:
     text = SERVICE + "pub.publish(Twist())\nn.create_client(Trigger, 'goo').wait_for_service()"
-    assert said(run, NODE + text, seconds=3.0) == [
+    assert run(NODE + text, seconds=3.0).said == [
         "no node offers the service '/goo', asked for at line 13; offered: none"
     ]
-
-
-def test_late_subscriptions_get_what_was_published_to_be_kept(run: Run) -> None:
-    text = """
-from rclpy.qos import QoSProfile, DurabilityPolicy
-from std_msgs.msg import String
-kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-writer = n.create_publisher(String, 'map', kept)
-writer.publish(String(data='old'))
-writer.publish(String(data='new'))
-n.create_subscription(String, 'map', lambda m: n.get_logger().info(m.data), kept)
-n.create_subscription(String, 'map', lambda m: n.get_logger().info('volatile ' + m.data), 1)
-pub.publish(Twist())
-rclpy.spin(n)
-"""
-    assert said(run, NODE + text) == ["new"]

@@ -6,7 +6,7 @@ import message_filters
 import numpy as np
 import rclpy
 from cv_bridge import CvBridge
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import TwistStamped
 from image_geometry import PinholeCameraModel
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
@@ -23,7 +23,7 @@ class Synchronised(Node):
         info = message_filters.Subscriber(self, CameraInfo, "/limo_camera/depth/camera_info")
         self.sync = message_filters.ApproximateTimeSynchronizer([rgb, depth, info], queue_size=10, slop=0.05)
         self.sync.registerCallback(self.on_images)
-        self.pub = self.create_publisher(Twist, "/cmd_vel", 10)
+        self.pub = self.create_publisher(TwistStamped, "/cmd_vel", 10)
 
     def on_images(self, rgb, depth, info):
         self.model.fromCameraInfo(info)
@@ -32,20 +32,14 @@ class Synchronised(Node):
         ray = self.model.projectPixelTo3dRay((float(near[1]), float(near[0])))
         bearing = -math.atan2(ray[0], ray[2])
         self.get_logger().info(f"{rgb.encoding} nearest {metres[near]:.1f} m at {bearing:+.2f} rad", once=True)
-        twist = Twist()
-        twist.angular.z = 1.0 * bearing
+        twist = TwistStamped(header=rgb.header)
+        twist.twist.angular.z = 1.0 * bearing
         self.pub.publish(twist)
 
 
 def main():
-    rclpy.init()
-    node = Synchronised()
-    try:
-        rclpy.spin(node)
-    except KeyboardInterrupt:
-        pass
-    node.destroy_node()
-    rclpy.shutdown()
+    with rclpy.init():
+        rclpy.spin(Synchronised())
 
 
 if __name__ == "__main__":

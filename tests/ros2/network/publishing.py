@@ -1,0 +1,35 @@
+"""A publisher in a thread of its own."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from limo_hog.ros2 import dds, messages, names
+
+
+@contextmanager
+def publishing(topic: str, message: Any, hertz: float = 10.0) -> Iterator[None]:
+    """Publish a message again and again, stamped with the time where it has a header."""
+    publisher = dds.Bus().publisher(topic, message.__msgtype__, kept=topic == names.TF_STATIC)
+    over = threading.Event()
+
+    def work() -> None:
+        at = time.monotonic()
+        while not over.is_set():
+            if hasattr(message, "header"):
+                message.header.stamp = messages.to_time(time.time())
+            publisher.publish(message)
+            at += 1 / hertz
+            time.sleep(max(at - time.monotonic(), 0))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()

@@ -66,35 +66,31 @@ def first_hit(figure: BodyMesh, directions: NDArray[np.float64]) -> NDArray[np.f
     return nearest
 
 
-@pytest.mark.parametrize("distance", [1.6, 3.0])
-@pytest.mark.parametrize("yaw", [0.0, 2.3, math.pi / 2])
-def test_a_body_covers_the_pixels_and_has_the_depth_of_its_solids(distance: float, yaw: float) -> None:
+@pytest.mark.parametrize(
+    ("person", "distance", "yaw"),
+    [
+        *((SOMEBODY, distance, yaw) for distance in (1.6, 3.0) for yaw in (0.0, 2.3, math.pi / 2)),
+        *((ADULT, distance, math.pi) for distance in (3.9, 4.6)),
+    ],
+)
+def test_a_body_covers_the_pixels_and_has_the_depth_of_its_solids(person: Person, distance: float, yaw: float) -> None:
     pose = Pose(distance, 0.15, yaw, phase=1.1, swing=1.0)
-    _, depth, [(visible, box)] = picture(pose)
-    assert visible == 1.0
+    _, depth, [(visible, box)] = picture(pose, person=person)
+    assert visible == pytest.approx(1.0, abs=0.01)
     assert box is not None
     left, top, width, height = box
+    silhouette = depth < picture(None)[1] - 0.01
+    rows, columns = np.nonzero(silhouette)
+    edges = columns.min() - left, rows.min() - top, left + width - 1 - columns.max(), top + height - 1 - rows.max()
+    assert np.abs(edges).max() <= 2
     rows, columns = (grid.reshape(-1) for grid in np.mgrid[top : top + height, left : left + width])
-    expected = first_hit(body(SOMEBODY, pose), rays(columns, rows))
-    drawn = depth[rows, columns]
-    there, seen = np.isfinite(expected), drawn < picture(None)[1][rows, columns] - 0.01
-    assert (there & seen).sum() / (there | seen).sum() > 0.97
+    expected = first_hit(body(person, pose), rays(columns, rows))
+    there, seen = np.isfinite(expected), silhouette[rows, columns]
     both = there & seen
-    gaps = np.abs(drawn[both] - expected[both])
+    assert both.sum() / (there | seen).sum() > 0.97
+    gaps = np.abs(depth[rows, columns][both] - expected[both]) / max(person.height, 1.0)
     assert np.median(gaps) < 0.003
     assert np.percentile(gaps, 95) < 0.015
-
-
-def test_the_box_is_as_tight_as_the_silhouette() -> None:
-    pose = Pose(2.5, -0.4, 2.0, phase=0.4, swing=1.0)
-    _, depth, [(_, box)] = picture(pose)
-    rows, columns = np.nonzero(depth < picture(None)[1] - 0.01)
-    assert box is not None
-    left, top, width, height = box
-    assert abs(columns.min() - left) <= 2
-    assert abs(rows.min() - top) <= 2
-    assert abs(columns.max() - (left + width - 1)) <= 2
-    assert abs(rows.max() - (top + height - 1)) <= 2
 
 
 def inside(piece: Furniture, points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -125,30 +121,11 @@ def test_furniture_has_the_depth_that_marching_along_the_rays_finds(kind: str) -
     floor = picture()[1][rows, columns]
     there, seen = np.isfinite(expected) & (expected < floor), drawn < floor - 1e-3
     assert there.sum() > 100
-    assert (there & seen).sum() / (there | seen).sum() > 0.93
     both = there & seen
+    assert both.sum() / (there | seen).sum() > 0.93
     gaps = np.abs(drawn[both] - expected[both])
     assert np.median(gaps) < 0.003
     assert np.percentile(gaps, 90) < 0.02
-
-
-@pytest.mark.parametrize("camera", [HERE, CameraPose(1.0, -2.0, 0.7), CameraPose(-3.0, 3.0, -2.5)])
-def test_the_room_has_the_depth_of_its_planes(camera: CameraPose) -> None:
-    _, depth, _ = picture(camera=camera)
-    for row, column in ((470, 10), (300, 320), (238, 5), (239, 600), (240, 320), (100, 320), (5, 5)):
-        right, down = (column - CENTRE_X) / LIMO.focal_px(640), (row - CENTRE_Y) / LIMO.focal_px(640)
-        look = math.cos(camera.yaw), math.sin(camera.yaw)
-        ahead = look[0] + right * look[1], look[1] - right * look[0]
-        walls = [
-            (math.copysign(4.9, along) - start) / along
-            for start, along in zip((camera.x, camera.y), ahead, strict=True)
-        ]
-        expected = min(walls)
-        if down * expected > 0.175:
-            expected = 0.175 / down
-        elif -down * expected > 1.0 - 0.175:
-            expected = math.inf
-        assert depth[row, column] == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize("camera", [HERE, CameraPose(1.0, -2.0, 0.7), CameraPose(-3.0, 3.0, -0.6)])
@@ -225,14 +202,6 @@ def test_the_nearer_of_two_people_hides_the_other_whoever_comes_first() -> None:
     np.testing.assert_array_equal(depth, same_depth)
 
 
-def test_visible_share_falls_as_somebody_leaves_the_image() -> None:
-    shares = [picture(Pose(2.0, y, 0.0))[2][0] for y in (0.0, 1.2, 1.35, 1.42, 1.5, 1.9)]
-    assert [share for share, _ in shares] == sorted((share for share, _ in shares), reverse=True)
-    assert shares[0][0] == 1.0
-    assert 0.3 < shares[3][0] < 0.7
-    assert shares[-1] == (0.0, None)
-
-
 @pytest.mark.parametrize(
     ("person", "pose", "gap"),
     [
@@ -252,27 +221,6 @@ def test_of_somebody_nearby_the_image_shows_what_single_rays_show(person: Person
     assert 0 <= rows[shown].min() - box[1] < 6
     gaps = np.abs(depth[rows[shown], columns[shown]] - expected[shown])
     assert np.median(gaps) < gap
-
-
-@pytest.mark.parametrize("height", [1.5, 1.75, 2.0])
-@pytest.mark.parametrize("distance", [3.9, 4.6])
-def test_an_adult_is_as_high_in_the_image_as_a_pinhole_camera_makes_them(height: float, distance: float) -> None:
-    adult = Person(route=((3, 0, 0),), height=height)
-    _, depth, [(visible, box)] = picture(Pose(distance, 0.0, math.pi), person=adult)
-    figure = body(adult, Pose(distance, 0.0, math.pi))
-    crown = max(float((figure.centre[:, 2] + np.linalg.norm(figure.axes[:, 2], axis=1)).max()), 0.0)
-    assert crown == pytest.approx(height, rel=0.025)
-    assert box is not None
-    head, feet = (
-        CENTRE_Y - LIMO.focal_px(640) * (crown - 0.175) / distance,
-        CENTRE_Y + LIMO.focal_px(640) * 0.175 / distance,
-    )
-    assert visible == pytest.approx(1.0, abs=0.01)
-    assert box[1] == pytest.approx(max(head, 0.0), abs=2.5)
-    # the toes stand before the axis, lower in the image
-    assert 0.0 <= box[1] + box[3] - feet < 0.2 * LIMO.focal_px(640) * height / distance * 0.175 / (distance - 0.2) + 3.0
-    trunk = depth[round(CENTRE_Y - LIMO.focal_px(640) * (0.65 * height - 0.175) / distance), 320]
-    assert trunk == pytest.approx(distance - 0.06 * height, abs=0.03 * height)
 
 
 def test_somebody_behind_the_camera_is_not_seen() -> None:

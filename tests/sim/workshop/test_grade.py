@@ -14,17 +14,10 @@ import pytest
 
 from limo_hog.cli.main import main
 from limo_sim.ros.runner import Limits
-from limo_sim.workshop import solution, template
+from limo_sim.workshop import template
 from limo_sim.workshop.grade import grade, nodes_in
 
 LOOP = "while True:\n    try:\n        n = 0\n        while True: n += 1\n    except BaseException: pass\n"
-HOSTILE = {
-    "loop": LOOP,
-    "exit": "import os\nos._exit(0)\n",
-    "memory": "keep = bytearray(10 * 10**9)\n",
-    "child": "import subprocess\nsubprocess.Popen(['sleep', '600'])\n" + LOOP,
-}
-REASONS = {"loop": "it took no interrupt", "exit": "status 0", "child": "took no interrupt", "memory": "MemoryError"}
 
 
 def table_of(folder: Path) -> dict[str, dict[str, str]]:
@@ -34,13 +27,20 @@ def table_of(folder: Path) -> dict[str, dict[str, str]]:
     return {row["file"]: row for row in csv.DictReader(table.read_text(encoding="utf-8").splitlines())}
 
 
-@pytest.mark.parametrize("name", HOSTILE)
-def test_a_hostile_node_ends_within_its_limits_and_gets_no_points(tmp_path: Path, name: str) -> None:
-    (tmp_path / "node.py").write_text(HOSTILE[name])
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("import subprocess\nsubprocess.Popen(['sleep', '600'])\n" + LOOP, "it took no interrupt"),
+        ("import os\nos._exit(0)\n", "status 0"),
+        ("keep = bytearray(10 * 10**9)\n", "MemoryError"),
+    ],
+)
+def test_a_hostile_node_ends_within_its_limits_and_gets_no_points(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "node.py").write_text(text)
     (graded,) = grade(nodes_in(tmp_path), tmp_path, 1, "follower", Limits(patience=2.0, seconds=60.0))
     assert graded.result is not None
     assert graded.result["points"] == 0
-    assert REASONS[name] in graded.result["checkpoints"][0]["evidence"]
+    assert said in graded.result["checkpoints"][0]["evidence"]
 
 
 def test_what_is_no_file_costs_its_own_row_alone(tmp_path: Path) -> None:
@@ -119,19 +119,6 @@ def test_a_signal_does_not_wait_for_a_nodes_process_that_still_imports(action: s
         assert run.wait(5) == 128 + 15
 
 
-def test_a_folder_becomes_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "amy").mkdir()
-    (tmp_path / "amy" / "node.py").write_text(solution("follower"))
-    (tmp_path / "bob.py").write_text(template("follower"))
-    (tmp_path / "eve.py").write_text(HOSTILE["exit"])
-    rows = list(table_of(tmp_path).values())
-    assert [(row["file"], row["points"]) for row in rows] == [("amy/node.py", "100"), ("bob.py", "0"), ("eve.py", "0")]
-    assert [rows[0][f"task_{task}"] for task in (1, 2, 3, 4)] == ["10", "25", "25", "40"]
-    assert rows[1]["first_mistake"].startswith("the camera image is shown: ")
-    assert "died at 0.00 s: its process ended with status 0" in rows[2]["first_mistake"]
-    assert "3 files" in capsys.readouterr().err
-
-
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system binds no process to a core")
 def test_where_one_core_may_be_used_one_node_runs_at_a_time(tmp_path: Path) -> None:
     log = tmp_path / "log.txt"
@@ -151,22 +138,3 @@ def test_where_one_core_may_be_used_one_node_runs_at_a_time(tmp_path: Path) -> N
 def test_a_folder_without_nodes_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["workshop", "grade", str(tmp_path)]) == 2
     assert "no Python file" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-def test_thirty_submissions_three_of_them_hostile_are_graded_in_five_minutes(tmp_path: Path) -> None:
-    good, empty = solution("follower"), template("follower")
-    wrong = good.replace("middle - cx", "cx - middle")
-    for number in range(27):
-        (tmp_path / f"s{number:02}.py").write_text((good, wrong, empty)[number % 3])
-    for name in ("loop", "memory", "exit"):
-        (tmp_path / f"x_{name}.py").write_text(HOSTILE[name])
-    began = time.monotonic()
-    rows = list(table_of(tmp_path).values())
-    took = time.monotonic() - began
-    assert [row["points"] for row in rows[:27]] == ["100", "80", "0"] * 9
-    assert "the sign is swapped" in rows[1]["first_mistake"]
-    assert [row["points"] for row in rows[27:]] == ["0", "0", "0"]
-    assert "hung at 0.00 s" in rows[28]["first_mistake"]
-    assert took < 300, f"{took:.0f} s"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from limo_hog.follow.robot import Twist
+from limo_sim.run.arena import STEPS_PER_SECOND, Arena
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
 from limo_sim.world.crowd import STEP_S, Crowd
@@ -22,6 +24,15 @@ def steps_of(*arguments: Any, **options: Any) -> list[Step]:
     steps: list[Step] = []
     run_episode(*arguments, watch=kept_in(steps), **options)
     return steps
+
+
+def drive(arena: Arena, seconds: float, twist: Twist | None = None) -> Arena:
+    """Let a time pass, with a command before every step where there is one."""
+    for _ in range(round(seconds * STEPS_PER_SECOND)):
+        if twist is not None:
+            arena.command(twist)
+        arena.step()
+    return arena
 
 
 def poses_of(

@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.sim.logs import drive
 
 from limo_hog.cli.main import main
 from limo_hog.follow.robot import LIMO
@@ -24,9 +25,7 @@ PILLAR = Furniture("pillar", 2.0, 0.3)
 
 
 def arena_after_a_frame(*furniture: Furniture) -> Arena:
-    arena = Arena(Scenario("bare", furniture=furniture))
-    for _ in range(10):
-        arena.step()
+    arena = drive(Arena(Scenario("bare", furniture=furniture)), 0.2)
     arena.frame()
     return arena
 

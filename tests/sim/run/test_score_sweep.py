@@ -18,13 +18,9 @@ from limo_sim.run.sweep import Run, in_processes, play
 
 
 def test_every_card_belongs_to_its_run_whatever_the_scenario_calls_itself(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text('name = "another name"\n', encoding="utf-8")
-    runs = [
-        Run(str(file), "proxemic", "hog", 0, 0.2, 1.8),
-        Run("workshop", "approach", "hog", 1, 0.4),
-        Run("empty", "proxemic", "hog", 2, 0.1),
-    ]
+    (tmp_path / "mine.toml").write_text('name = "another name"\n')
+    runs = [Run(str(tmp_path / "mine.toml"), "proxemic", "hog", 0, 0.2, 1.8)]
+    runs += [Run("workshop", "approach", "hog", 1, 0.4), Run("empty", "proxemic", "hog", 2, 0.1)]
     cards = dict(in_processes(play, runs, 1))
     assert set(cards) == set(runs)
     assert [cards[run].scenario for run in runs] == ["another name", "workshop", "empty"]

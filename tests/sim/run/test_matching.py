@@ -6,17 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.sim.run.steps import OFF, ON, person
+from tests.sim.run.steps import person
 
 from limo_sim.run.matching import on_person, person_of
 from limo_sim.world.truth import PersonTruth
-
-
-def test_a_box_is_on_a_person_of_its_size_and_place() -> None:
-    assert on_person(np.array(ON, np.int32), person())
-    assert not on_person(np.array(OFF, np.int32), person())
-    assert not on_person(np.array([0, 0, 320, 480], np.int32), person())
-    assert not on_person(np.array(ON, np.int32), person(box=None))
 
 
 @pytest.mark.parametrize(
@@ -42,6 +35,7 @@ def test_a_box_is_on_a_person_of_its_size_and_place() -> None:
 def test_the_middle_of_a_box_and_its_height_decide_whom_it_is_on(column: int, row: int, height: int, on: bool) -> None:
     box = np.array([column - 40, row - height // 2, 80, height], np.int32)
     assert on_person(box, person()) is on
+    assert not on_person(box, person(box=None))
 
 
 def test_a_box_on_two_people_is_on_the_one_in_view_then_on_the_nearer_one() -> None:

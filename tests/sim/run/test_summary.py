@@ -22,6 +22,7 @@ def test_the_interval_is_students() -> None:
     assert found.mean == pytest.approx(3.5)
     assert found.interval == pytest.approx(half, rel=0.02)
     assert (found.least, found.most) == (1.0, 7.0)
+    assert estimate([1.0, 2.0]).interval is not None
     assert estimate([3.0]).interval is None
     assert not estimate([3.0]).is_sure
 
@@ -73,9 +74,3 @@ def test_students_quantile_is_right_to_the_third_power_of_the_degrees_of_freedom
     assert found.interval is not None
     quantile = found.interval / (np.std(values, ddof=1) / math.sqrt(count))
     assert quantile == pytest.approx(float(student.ppf(0.975, freedom)), abs=5 / freedom**3)
-
-
-def test_two_runs_have_an_interval() -> None:
-    # Half the difference of two values is their deviation over the square root of two.
-    assert estimate([1.0, 2.0]).interval is not None
-    assert (estimate([1.0, 2.0]).mean, estimate([1.0, 2.0]).least, estimate([1.0, 2.0]).most) == (1.5, 1.0, 2.0)

@@ -34,12 +34,8 @@ def steps() -> list[Step]:
     """Steps whose pictures are noise: 300 kB each, so that a stalled client's buffers are full at once."""
     seen: list[Step] = []
     run_episode(WORKSHOP, controller_named("tracking", None), PeopleDetector(scale=1.2), 0.5, 0, watch=seen.append)
-    rng = np.random.default_rng(0)
-    return [
-        pictured(step, rng.integers(0, 256, (480, 640, 3), dtype=np.uint8))
-        for step in seen
-        if step.log.frame is not None
-    ]
+    noise = np.random.default_rng(0).integers(0, 256, (len(seen), 480, 640, 3), dtype=np.uint8)
+    return [pictured(step, image) for step, image in zip(seen, noise, strict=True) if step.log.frame is not None]
 
 
 def pictured(step: Step, image: NDArray[np.uint8]) -> Step:

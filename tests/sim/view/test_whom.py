@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from dataclasses import replace
 
 import pytest
-from tests.sim.view.browser import CHROMIUM, chromium
+from tests.sim.view.browser import CHROMIUM, chromium, played
 
 from limo_hog.follow.control.naming import ControllerError, controller_named
 from limo_hog.follow.sense.detectors import detector_named
 from limo_hog.follow.tracks.asking import Whom
 from limo_hog.live.controls import apply
 from limo_hog.live.pace import Pace
-from limo_sim.run.episode import run_episode, score
+from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
 from limo_sim.view.reading import followed_person
-from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.people import Person
 from limo_sim.world.scenario import Scenario
@@ -65,36 +63,25 @@ def test_only_the_tracking_controller_can_be_asked() -> None:
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
 def test_a_click_on_a_person_and_a_button_change_whom_the_robot_follows() -> None:
     controller = Tunable(controller_named("tracking"))
-    with View(TWO, controller, pace=Pace(1)) as view, chromium() as browser:
-
-        def episode() -> None:
-            view.end(score(run_episode(TWO, controller, detector_named("hog"), 90, 0, watch=view.watch)).to_json())
-
-        run = threading.Thread(target=episode)
-        run.start()
-        try:
-            page = browser.new_page(viewport={"width": 1280, "height": 900})
-            page.goto(view.url)
-            # The two in turns, by a click and then by the keyboard.
-            for side, click in (("0", True), ("1", True), ("0", False)):
-                deadline, followed = time.monotonic() + 60, False
-                while not followed:
-                    assert time.monotonic() < deadline
-                    page.wait_for_timeout(500)
-                    if page.evaluate("now === null || now.choices.length < 2"):
-                        continue
-                    # While the robot turns, a box of 2 s ago is beside the person: the click is repeated, as people do.
-                    number, followed, x, y, width, height = page.evaluate(
-                        f"[...now.choices].sort((a, b) => a[2] - b[2])[{side}]"
-                    )
-                    if followed:
-                        assert page.get_attribute(f"#choices button[value='{number}']", "aria-pressed") == "true"
-                    elif click:
-                        box = page.evaluate("(({x, y, width}) => [x, y, width / 640])(camera.getBoundingClientRect())")
-                        page.mouse.click(box[0] + (x + width / 2) * box[2], box[1] + (y + height / 4) * box[2])
-                    else:
-                        page.locator(f"#choices button[value='{number}']").press("Enter")
-        finally:
-            view.pace.set_speed(0)
-            view.pace.resume()
-            run.join()
+    with played(TWO, controller, detector_named("hog"), 1) as view, chromium() as browser:
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.goto(view.url)
+        # The two in turns, by a click and then by the keyboard.
+        for side, click in (("0", True), ("1", True), ("0", False)):
+            deadline, followed = time.monotonic() + 60, False
+            while not followed:
+                assert time.monotonic() < deadline
+                page.wait_for_timeout(500)
+                if page.evaluate("now === null || now.choices.length < 2"):
+                    continue
+                # While the robot turns, a box of 2 s ago is beside the person: the click is repeated, as people do.
+                number, followed, x, y, width, height = page.evaluate(
+                    f"[...now.choices].sort((a, b) => a[2] - b[2])[{side}]"
+                )
+                if followed:
+                    assert page.get_attribute(f"#choices button[value='{number}']", "aria-pressed") == "true"
+                elif click:
+                    box = page.evaluate("(({x, y, width}) => [x, y, width / 640])(camera.getBoundingClientRect())")
+                    page.mouse.click(box[0] + (x + width / 2) * box[2], box[1] + (y + height / 4) * box[2])
+                else:
+                    page.locator(f"#choices button[value='{number}']").press("Enter")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from tests.sim.logs import drive
 
-from limo_hog.follow.robot import LIMO, Twist
+from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
-from limo_sim.world.robot import Drive, integrate
+from limo_sim.world.robot import integrate
 from limo_sim.world.scenario import Person, Robot, Scenario, Wheels
 
 EMPTY = dataclasses.replace(Scenario.load("empty"), odometry=Wheels(slip=0.0))
@@ -124,14 +124,6 @@ def test_the_imu_feels_gravity_turns_and_speeding_up() -> None:
     reading = arena.imu()[1]
     assert reading.angular_velocity[2] == pytest.approx(1.0, abs=0.05)
     assert reading.acceleration[1] == pytest.approx(0.4, abs=0.3)
-
-
-def test_a_drive_that_was_never_told_anything_stands_still() -> None:
-    idle = Drive(LIMO.wheel_separation, 1.0, 1.0, 0.5)
-    for step in range(100):
-        idle.advance(step / 50, 0.02)
-    assert idle.twist == Twist()
-    assert idle.watchdog_stops == 0
 
 
 @pytest.mark.parametrize(("speed", "turn"), [(0.3, 0.0), (0.3, 0.5), (0.0, 1.0)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import STEPS_PER_SECOND, Arena
@@ -12,6 +12,8 @@ from limo_sim.run.log import Step
 from limo_sim.world.crowd import STEP_S, Crowd
 from limo_sim.world.person import Pose
 from limo_sim.world.scenario import Scenario
+
+T = TypeVar("T")
 
 
 def kept_in(steps: list[Step]) -> Callable[[Step], None]:
@@ -48,7 +50,7 @@ def poses_of(
     return seen
 
 
-def there(pose: Pose | None) -> Pose:
-    """Return the pose of a person who is in the arena."""
-    assert pose is not None
-    return pose
+def there(one: T | None) -> T:
+    """Return what is there: somebody in the arena, a box in the image."""
+    assert one is not None
+    return one

@@ -12,6 +12,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from tests.sim.logs import there
 
 from limo_hog.follow.robot import LIMO
 from limo_hog.follow.sense.observation import Odometry
@@ -180,9 +181,8 @@ def test_a_glimpse_is_what_the_camera_shows() -> None:
         bearing, distance = random.uniform(-1.0, 1.0), random.uniform(0.8, 4.2)
         place = (distance * math.cos(bearing), distance * math.sin(bearing))
         arena = Arena(Scenario(people=(Person(route=((*place, 0.0),)),)))
-        truth = arena.truth().people[0]
-        seen = glimpse(arena.plan(), arena.scenario, 0, hiding(arena.scenario))
-        assert truth is not None and seen is not None
+        truth = there(arena.truth().people[0])
+        seen = there(glimpse(arena.plan(), arena.scenario, 0, hiding(arena.scenario)))
         assert (seen.distance, seen.bearing) == pytest.approx((truth.distance, truth.bearing))
         assert seen.surface == pytest.approx(truth.surface_distance)
         errors.append(abs(seen.visible - truth.visible))
@@ -192,9 +192,7 @@ def test_a_glimpse_is_what_the_camera_shows() -> None:
 
 @pytest.mark.parametrize("blocked", [False, True])
 @pytest.mark.parametrize("place", [(2.5, 0.4), (1.9, -0.6), (3.1, 0.0)])
-def test_a_glimpse_is_the_same_wherever_robot_and_person_are_together(
-    place: tuple[float, float], blocked: bool
-) -> None:
+def test_a_glimpse_is_the_same_wherever_both_are(place: tuple[float, float], blocked: bool) -> None:
     def seen(x: float, y: float, yaw: float) -> Glimpse:
         def moved(at: tuple[float, float]) -> tuple[float, float]:
             turned = complex(x, y) + complex(*at) * cmath.rect(1.0, yaw)
@@ -203,9 +201,7 @@ def test_a_glimpse_is_the_same_wherever_robot_and_person_are_together(
         wall = Wall(moved((1.0, -0.5)), moved((1.6, 0.7) if blocked else (0.9, -1.5)))
         scenario = Scenario(people=(Person(route=((2.5, 0.0, 0.0),), height=1.7),), walls=(wall,))
         pose = Pose(*moved(place), math.pi + yaw)
-        found = glimpse(Plan(0.0, (x, y, yaw), (pose,)), scenario, 0, hiding(scenario))
-        assert found is not None
-        return found
+        return there(glimpse(Plan(0.0, (x, y, yaw), (pose,)), scenario, 0, hiding(scenario)))
 
     here = seen(0.0, 0.0, 0.0)
     # A pinhole's image of a height is focal length × height / depth.
@@ -235,9 +231,7 @@ def test_a_person_behind_a_wall_or_a_pillar_is_not_seen(hides: Wall | Furniture,
 
 def seen_at(x: float, y: float, **stands: Any) -> Glimpse:
     scenario = replace(STANDING, **stands)
-    seen = glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(x, y, math.pi),)), scenario, 0, hiding(scenario))
-    assert seen is not None
-    return seen
+    return there(glimpse(Plan(0.0, (0.0, 0.0, 0.0), (Pose(x, y, math.pi),)), scenario, 0, hiding(scenario)))
 
 
 @pytest.mark.parametrize(
@@ -245,9 +239,7 @@ def seen_at(x: float, y: float, **stands: Any) -> Glimpse:
     [(2.5, 0, True), (1.2, 0, False), (4.6, 0, False)]
     + [(2.5, side * column, column < 260) for side in (-1, 1) for column in (250, 275)],
 )
-def test_what_hog_cannot_find_or_is_near_a_side_of_the_image_is_not_found(
-    ahead: float, column: int, found: bool
-) -> None:
+def test_what_hog_cannot_find_is_not_found(ahead: float, column: int, found: bool) -> None:
     # 320 px from the middle to a side, of which the last 60 are too near to it.
     seen = seen_at(ahead, -column * (ahead - LIMO.camera_x) / LIMO.focal_px(640))
     assert seen.visible == pytest.approx(1.0) or not column

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +25,12 @@ DRAWN = Scenario(
     name="drawn", people=(Person(route=((2.5, 0.0, 0.0), (3.0, 1.5, 0.0))),), vary=Vary(clothes=True, place=0.4)
 )
 UNKIND = Scenario(name="unkind", detector=DetectorFaults(recall=0.5))
-NODE = "import rclpy\nrclpy.init()\nnode = rclpy.create_node('idle')\nrclpy.spin(node)\n"
 
 
 @pytest.fixture
 def node(tmp_path: Path) -> Path:
-    path = tmp_path / "node.py"
-    path.write_text(NODE, encoding="utf-8")
-    return path
+    (tmp_path / "node.py").write_text("import rclpy\nrclpy.init()\nrclpy.spin(rclpy.create_node('idle'))\n")
+    return tmp_path / "node.py"
 
 
 @pytest.mark.parametrize(
@@ -60,10 +57,7 @@ def test_a_sweep_runs_with_the_people_of_the_seed(tmp_path: Path) -> None:
 
 def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
     env = LimoFollowV1(DRAWN)
-    places = []
-    for seed in (0, 1, 0):
-        env.reset(seed=seed)
-        places.append(env.step(env.action_space.sample() * 0)[4]["distance"])
+    places = [env.reset(seed=seed)[0].tolist() for seed in (0, 1, 0)]
     assert places[0] == places[2] != places[1]
 
 
@@ -76,10 +70,6 @@ def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
     ],
     ids=["run", "arena", "images of LimoFollow-v1"],
 )
-def test_faults_of_a_detector_are_refused_where_the_detector_is_another_s(
-    start: Callable[[Path], object], node: Path
-) -> None:
+def test_faults_are_refused_where_the_detector_is_anothers(start: Callable[[Path], object], node: Path) -> None:
     with pytest.raises(ScenarioError, match=r"scenario 'unkind': detector: .*; leave the table out"):
         start(node)
-    start_plain = replace(UNKIND, detector=DetectorFaults())
-    assert Arena(start_plain).scenario == start_plain

@@ -92,9 +92,7 @@ def test_what_is_written_is_coco_with_depth_and_identities(tmp_path: Path, capsy
 
 
 @pytest.mark.parametrize("more", [[], ["--resume"]])
-def test_a_folder_of_others_is_not_written_into(
-    more: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_of_others_stays(more: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.txt").write_text("")
     assert main(["export", "--out", str(tmp_path), *more]) == 2
     assert "would be overwritten" in capsys.readouterr().err

@@ -247,9 +247,7 @@ def test_a_switch_is_a_target_that_changes_from_one_person_to_another(targets: s
         ("11111100001", 0, 0.5, True),  # from .5 s to 1 s, and no longer than allowed
     ],
 )
-def test_success_is_a_person_in_view_at_the_end_untouched_and_never_lost_for_long(
-    shown: str, contacts: int, unseen_s: float, success: bool
-) -> None:
+def test_success_is_a_person_in_view_untouched(shown: str, contacts: int, unseen_s: float, success: bool) -> None:
     steps = [step(k, person(visible=float(seen))) for k, seen in enumerate(shown)]
     assert card(*steps, contacts=Contacts(contacts, 3), criteria=Criteria(unseen_s=unseen_s)).success is success
 
@@ -304,9 +302,7 @@ def test_the_critics_are_the_mean_of_what_each_adds_to_the_command_sent() -> Non
 @pytest.mark.parametrize(
     ("until", "lost", "found_again"), [(0.5, 0, None), (0.75, 1, 1.0), (3.0, 1, 1.0), (3.25, 1, 0.0)]
 )
-def test_a_person_is_lost_after_half_a_second_and_found_again_within_three(
-    until: float, lost: int, found_again: float | None
-) -> None:
+def test_who_is_lost_half_a_second_is_found_in_three(until: float, lost: int, found_again: float | None) -> None:
     # Times whose sums are exact.
     without = [step(0, person(), boxes=[ON], time=float(time)) for time in np.arange(0.25, until, 0.25)]
     result = card(followed(0), *without, followed(0, until))

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.sim.logs import drive
+from tests.sim.logs import drive, there
 
 from limo_hog.follow.robot import LIMO, Twist
 from limo_sim.run.arena import Arena
@@ -44,13 +44,10 @@ def test_a_place_in_the_image_moves_as_opencvs_camera_model_says(k1: float, k2: 
 def test_the_true_box_goes_round_the_bent_silhouette(k1: float) -> None:
     person = Person(route=((2.2, 0.9, 3600.0),))
     scenario = Scenario(camera=Camera(k1=k1), depth=Depth(noise=0.0, invalid=0.0))
-    there = Arena(dataclasses.replace(scenario, people=(person,)), 0).frame()
+    frame = Arena(dataclasses.replace(scenario, people=(person,)), 0).frame()
     empty = Arena(scenario, 0).frame()
-    rows, columns = np.nonzero(there.depth < empty.depth - 0.05)
-    truth = there.truth.people[0]
-    assert truth is not None
-    assert truth.box is not None
-    left, top, width, height = truth.box
+    rows, columns = np.nonzero(frame.depth < empty.depth - 0.05)
+    left, top, width, height = there(there(frame.truth.people[0]).box)
     # Nothing is cut off; a box's corner may bend farther than the silhouette, which has none.
     beside = columns.min() - left, left + width - columns.max() - 1
     above = rows.min() - top, top + height - rows.max() - 1
@@ -61,12 +58,11 @@ def test_the_true_box_goes_round_the_bent_silhouette(k1: float) -> None:
 def test_what_the_lens_moves_out_of_the_image_is_not_visible(x: float, y: float) -> None:
     people, pillar = (Person(route=((x, y, 3600.0),)),), (Furniture("pillar", x, -y),)
     scenario = Scenario(depth=Depth(noise=0.0, invalid=0.0), camera=Camera(k1=0.3, k2=0.1))
-    there = Arena(dataclasses.replace(scenario, people=people, furniture=pillar), 0)
-    assert np.array_equal(there.frame().depth, Arena(scenario, 0).frame().depth, equal_nan=True)
+    bent = Arena(dataclasses.replace(scenario, people=people, furniture=pillar), 0)
+    assert np.array_equal(bent.frame().depth, Arena(scenario, 0).frame().depth, equal_nan=True)
     plain = Arena(Scenario(people=people, furniture=pillar), 0)
-    for arena, within in ((plain, True), (there, False)):
-        person = arena.frame().truth.people[0]
-        assert person is not None
+    for arena, within in ((plain, True), (bent, False)):
+        person = there(arena.frame().truth.people[0])
         for visible, box in ((person.visible, person.box), *arena.furniture_in_frame()):
             assert bool(visible > 0.0) is within
             assert (box is not None) is within

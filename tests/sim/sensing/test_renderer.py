@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.sim.logs import there
 
 from limo_hog.follow.robot import LIMO
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, CameraPose
@@ -77,17 +78,16 @@ def test_a_body_covers_the_pixels_and_has_the_depth_of_its_solids(person: Person
     pose = Pose(distance, 0.15, yaw, phase=1.1, swing=1.0)
     _, depth, [(visible, box)] = picture(pose, person=person)
     assert visible == pytest.approx(1.0, abs=0.01)
-    assert box is not None
-    left, top, width, height = box
+    left, top, width, height = there(box)
     silhouette = depth < picture(None)[1] - 0.01
     rows, columns = np.nonzero(silhouette)
     edges = columns.min() - left, rows.min() - top, left + width - 1 - columns.max(), top + height - 1 - rows.max()
     assert np.abs(edges).max() <= 2
     rows, columns = (grid.reshape(-1) for grid in np.mgrid[top : top + height, left : left + width])
     expected = first_hit(body(person, pose), rays(columns, rows))
-    there, seen = np.isfinite(expected), silhouette[rows, columns]
-    both = there & seen
-    assert both.sum() / (there | seen).sum() > 0.97
+    solid, seen = np.isfinite(expected), silhouette[rows, columns]
+    both = solid & seen
+    assert both.sum() / (solid | seen).sum() > 0.97
     gaps = np.abs(depth[rows, columns][both] - expected[both]) / max(person.height, 1.0)
     assert np.median(gaps) < 0.003
     assert np.percentile(gaps, 95) < 0.015
@@ -119,10 +119,10 @@ def test_furniture_has_the_depth_that_marching_along_the_rays_finds(kind: str) -
     expected = np.where(hits.any(axis=0), depths[hits.argmax(axis=0)], np.inf)
     drawn = depth[rows, columns]
     floor = picture()[1][rows, columns]
-    there, seen = np.isfinite(expected) & (expected < floor), drawn < floor - 1e-3
-    assert there.sum() > 100
-    both = there & seen
-    assert both.sum() / (there | seen).sum() > 0.93
+    solid, seen = np.isfinite(expected) & (expected < floor), drawn < floor - 1e-3
+    assert solid.sum() > 100
+    both = solid & seen
+    assert both.sum() / (solid | seen).sum() > 0.93
     gaps = np.abs(drawn[both] - expected[both])
     assert np.median(gaps) < 0.003
     assert np.percentile(gaps, 90) < 0.02
@@ -134,33 +134,21 @@ def test_inner_walls_have_the_depth_that_marching_along_the_rays_finds(camera: C
     walls = (Wall((1.5, -1.0), (3.5, 0.5), 0.2), Wall((2.0, 1.0), (2.0, 3.5)), Wall((-3.0, 0.0), (1.0, 3.0), 0.05))
     flat = dataclasses.replace(EXACT, room=Room(half), walls=walls)
     _, depth, _ = picture(camera=camera, scenario=flat)
-    steps = np.arange(0.0, 2 * half, 0.002)
-    look = math.cos(camera.yaw), math.sin(camera.yaw)
-    kinds = set()
-    for row in (120, 200, 230, 250, 300):
-        for column in range(7, 640, 48):
-            right, down = (column - CENTRE_X) / LIMO.focal_px(640), (row - CENTRE_Y) / LIMO.focal_px(640)
-            x = camera.x + steps * (look[0] + right * look[1])
-            y = camera.y + steps * (look[1] - right * look[0])
-            z = 0.175 - steps * down
-            solid = (np.maximum(np.abs(x), np.abs(y)) > half) & (z < 1.0)
-            for number, wall in enumerate(walls):
-                (x0, y0), (x1, y1) = wall.start, wall.end
-                length = math.hypot(x1 - x0, y1 - y0)
-                along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length
-                across = ((x - x0) * (y1 - y0) - (y - y0) * (x1 - x0)) / length
-                inside = (along > 0) & (along < length) & (np.abs(across) < wall.thickness / 2) & (z < 1.0)
-                if inside.any() and not solid[: inside.argmax()].any():
-                    kinds.add(number)
-                solid |= inside
-            solid |= z < 0.0
-            expected = steps[solid.argmax()] if solid.any() and (z[solid.argmax()] < 1.0) else math.inf
-            limit = flat.depth.far_m
-            if min(expected, limit) == limit:
-                assert depth[row, column] > limit - 0.01
-            else:
-                assert depth[row, column] == pytest.approx(expected, abs=0.004)
-    assert kinds
+    rows, columns = (grid.reshape(-1) for grid in np.meshgrid((120, 200, 230, 250, 300), range(7, 640, 48)))
+    steps, cos, sin = np.arange(0.0, 2 * half, 0.002)[:, None], math.cos(camera.yaw), math.sin(camera.yaw)
+    ahead, left, up = rays(columns, rows).T
+    x, y = camera.x + steps * (cos * ahead - sin * left), camera.y + steps * (sin * ahead + cos * left)
+    z, walled = EYE[2] + steps * up, np.zeros(x.shape, bool)
+    for (x0, y0), (x1, y1), thickness in ((wall.start, wall.end, wall.thickness) for wall in walls):
+        length = math.hypot(x1 - x0, y1 - y0)
+        along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length
+        across = ((x - x0) * (y1 - y0) - (y - y0) * (x1 - x0)) / length
+        walled |= (along > 0) & (along < length) & (np.abs(across) < thickness / 2)
+    solid = ((walled | (np.maximum(np.abs(x), np.abs(y)) > half)) & (z < 1.0)) | (z < 0.0)
+    hit, ray, furthest = solid.argmax(axis=0), np.arange(len(rows)), flat.depth.far_m - 0.01
+    assert walled[hit, ray].any()
+    expected = np.where(solid[hit, ray], steps[hit, 0], np.inf).clip(max=furthest)
+    np.testing.assert_allclose(depth[rows, columns].clip(max=furthest), expected, rtol=0, atol=0.004)
 
 
 def test_somebody_behind_an_inner_wall_is_hidden_and_in_its_door_is_not() -> None:
@@ -216,9 +204,8 @@ def test_of_somebody_nearby_the_image_shows_what_single_rays_show(person: Person
     shown = covered & (rows >= 0) & (rows < 480) & (columns >= 0) & (columns < 640)
     _, depth, [(visible, box)] = picture(pose, person=person)
     assert visible == pytest.approx(shown.sum() / covered.sum(), abs=0.03)
-    assert box is not None
     # The rays are six pixels apart, and one is of row 0.
-    assert 0 <= rows[shown].min() - box[1] < 6
+    assert 0 <= rows[shown].min() - there(box)[1] < 6
     gaps = np.abs(depth[rows[shown], columns[shown]] - expected[shown])
     assert np.median(gaps) < gap
 

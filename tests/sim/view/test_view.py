@@ -35,9 +35,7 @@ DETECTOR = PeopleDetector(model="opencv", scale=1.2)
 
 
 @pytest.mark.parametrize(("speed", "apart_s", "least", "most"), [(4, 0.2, 0.19, 0.8), (0, 250.0, 0.0, 5.0)])
-def test_real_time_takes_its_time_and_all_it_can_does_not(
-    speed: float, apart_s: float, least: float, most: float
-) -> None:
+def test_a_run_takes_its_time(speed: float, apart_s: float, least: float, most: float) -> None:
     pace, start = Pace(speed), time.monotonic()
     for tick in range(5):
         pace.wait(apart_s * tick)

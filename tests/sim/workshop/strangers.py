@@ -1,4 +1,4 @@
-"""Sixty nodes by people who knew the tutorials alone: thirty right ones, and thirty with one mistake each.
+"""Nodes by people who knew the tutorials alone: right ones, and others with one mistake each.
 
 A node is a template and what is exchanged in it. All were written before the checker was read, and are not fitted to
 it.
@@ -7,6 +7,9 @@ it.
 from __future__ import annotations
 
 import re
+from pathlib import Path
+
+from limo_sim.workshop.check import Verdict, examine
 
 #: A class that does all in the callback of the image.
 CALLBACK = """
@@ -288,6 +291,12 @@ if __name__ == "__main__":
 """
 
 
+def checked(folder: Path, text: str, exercise: str = "follower") -> list[Verdict]:
+    """Return what the checker says of a node."""
+    (folder / "node.py").write_text(text, encoding="utf-8")
+    return examine(folder / "node.py", exercise).verdicts
+
+
 def exchanged(text: str, exchanges: str) -> str:
     """Exchange "old → new", one a line, in a node's text; ⏎ begins a line, in `new` as deep as that of `old`."""
     for exchange in filter(None, map(str.strip, re.sub(r"\n *⏎", "⏎", exchanges).splitlines())):
@@ -354,13 +363,6 @@ limo_hog's PeopleDetector
     rects, w = → found =
     .detectMultiScale(img, winStride=(8, 8), padding=(4, 4), scale=1.05) → .detect(img)
     for r in rects], [float(v) for v in np.ravel(w)] → for r in found.boxes], found.scores.tolist()
-limo_hog's windows
-    import cv2 → import cv2⏎import limo_hog
-    cv2.HOGDescriptor() → limo_hog.PeopleDetector()
-    self.det.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector()) → pass
-    rects, w = → found =
-    .detectMultiScale(img, winStride=(8, 8), padding=(4, 4), scale=1.05) → .detect(img)
-    for r in rects], [float(v) for v in np.ravel(w)] → for r in found.windows], found.scores.tolist()
 limo_hog's HOGDescriptor
     import cv2 → import cv2⏎import limo_hog
     cv2.HOGDescriptor() → limo_hog.HOGDescriptor()
@@ -421,25 +423,17 @@ WRONG = {
         "follower",
         CALLBACK,
         """
-1 no window
-    cv2.imshow("Limo Camera", canvas) → pass
 1 a window three seconds late
     cv2.imshow("Limo Camera", canvas) → self.old = getattr(self, "old", []) + [canvas]
         ⏎cv2.imshow("Limo Camera", self.old[-30:][0])
 2 a number that was made up
     self.get_logger().info(f"Detections: {count}") → if self.n % 30 == 1:
         ⏎    self.get_logger().info('Detections: 1')
-2 boxes of the enlarged copy
-    detectMultiScale(img, → detectMultiScale(cv2.resize(img, None, fx=1.5, fy=1.5),
-2 float image
-    detectMultiScale(img, → detectMultiScale(img / 255.0,
 3 the last command again
     self.pub.publish(Twist()) → self.pub.publish(getattr(self, 'last', Twist()))
     self.pub.publish(t) → self.last = t⏎self.pub.publish(t)
 3 a timer that always drives
     self.n = 0 → self.n = 0⏎self.create_timer(0.1, lambda: self.drive(0))
-3 nothing is published
-    self.pub.publish(Twist()) → pass
 3 searches by turning
     self.pub.publish(Twist()) → t = Twist()⏎t.angular.z = 0.5⏎self.pub.publish(t )
 3 fails without a box
@@ -448,8 +442,6 @@ WRONG = {
     int(np.argmax(weights)) → min(range(len(rects)), key=lambda i: rects[i][0])
 3 largest
     int(np.argmax(weights)) → max(range(len(rects)), key=lambda i: rects[i][2])
-3 first
-    int(np.argmax(weights)) → 0
 3 least sure
     int(np.argmax(weights)) → int(np.argmin(weights))
 3 all red
@@ -457,25 +449,13 @@ WRONG = {
 3 colours of RGB
     (0, 0, 255), 3) → (255, 0, 0), 3)
     6, (255, 0, 0), -1) → 6, (0, 0, 255), -1)
-3 no dot
-    cv2.circle(canvas, (x + w // 2, y + h // 2), 6, (255, 0, 0), -1) → pass
 3 boxes of a second ago
     self.paint(canvas, rects, best) → self.past = (getattr(self, 'past', []) + [rects[best]])[-10:]
         ⏎self.paint(canvas, self.past[:1], 0)
-4 turns away
-    0.005 * error → -0.005 * error
-4 no dead-band
-    0.0 if abs(error) < 20 else 0.005 * error → 0.005 * error
-4 only turns
-    t.linear.x = 0.2 → t.linear.x = 0.0
 4 drives back
     t.linear.x = 0.2 → t.linear.x = -0.2
 4 a gain too small
     0.005 * error → 0.0002 * error
-4 a command in eight
-    self.pub.publish(t) → if self.n % 8 == 1:⏎    self.pub.publish(t)
-4 sleeps
-    self.pub.publish(t) → self.pub.publish(t)⏎__import__('time').sleep(0.2)
 4 steers by the blue shirt
     self.drive(img.shape[1] / 2 - (x + w / 2)) → blue = (img[..., 0].astype(int) - img[..., 2] > 50).nonzero()[1]
         ⏎self.drive(img.shape[1] / 2 - blue.mean() if len(blue) else 0.0)

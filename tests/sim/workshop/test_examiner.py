@@ -8,7 +8,7 @@ import weakref
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import CALLBACK, SEQUEL, WRONG, exchanged
+from tests.sim.workshop.strangers import CALLBACK, SEQUEL, WRONG, checked, exchanged
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution
@@ -40,12 +40,6 @@ contacts_person = [0, 0]
 points = 40
 name = "nobody is touched"
 """
-
-
-def checked(tmp_path: Path, text: str, name: str = "follower") -> list[Verdict]:
-    script = tmp_path / "node.py"
-    script.write_text(text, encoding="utf-8")
-    return examine(script, name).verdicts
 
 
 def named(verdicts: list[Verdict], words: str) -> Verdict:
@@ -161,9 +155,7 @@ PACKAGE = {
 }
 
 
-def test_a_class_of_packages_is_one_row_and_one_page_a_student(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_class_is_one_row_and_page_a_student(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "class"
     for name, text in PACKAGE.items():
         path = folder / "amy" / "amy_pkg" / name
@@ -192,9 +184,7 @@ def test_a_class_of_packages_is_one_row_and_one_page_a_student(
     assert "<svg" in (tmp_path / "pages" / "bob.py.html").read_text()
 
 
-def test_the_report_cites_a_frame_and_folds_what_was_not_tried(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_report_cites_a_frame_and_is_short(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     script = tmp_path / "my node.py"
     script.write_text(TURNS_AWAY)
     assert main(["workshop", "check", str(script), "--html", str(tmp_path / "page.html")]) == 1

@@ -25,6 +25,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what a node lea
 
 LIMITS = Limits(patience=4.0, seconds=40.0, memory_mb=3000, printed_mb=5)
 FOREVER = "while True:\n    try:\n        n = range(99)\n        while True: sum(n)\n    except BaseException: pass"
+LINK = "import gc\nlink = next(o for o in gc.get_objects() if type(o).__name__ == 'SocketLink')\n"
 SLEEP = "import subprocess; subprocess.Popen(['sleep', '98765'], start_new_session=True)"
 
 #: What the third image makes each node do, and words of the sentence that says so.
@@ -90,14 +91,9 @@ IN_A_CALLBACK = {
         "threading.Thread(target=spin).start()\ntime.sleep(0.1)",
         "hung at 0.20 s",
     ),
-    "forged messages": (
-        "import gc\nlink = next(o for o in gc.get_objects() if type(o).__name__ == 'SocketLink')\n"
-        "link.tell('points', 100)",
-        "it sent what is no message of a node",
-    ),
+    "forged messages": (LINK + "link.tell('points', 100)", "it sent what is no message of a node"),
     "a deep message": (
-        "import gc\nlink = next(o for o in gc.get_objects() if type(o).__name__ == 'SocketLink')\n"
-        "link._connection.sendall(bytes((160, 134, 1, 0, 0, 0, 0, 0)) + b'[' * 100000)",
+        LINK + "link._connection.sendall(bytes((160, 134, 1, 0, 0, 0, 0, 0)) + b'[' * 100000)",
         "it sent what is no message of a node",
     ),
 }
@@ -136,18 +132,15 @@ def left_running() -> list[str]:
 
 
 @pytest.mark.parametrize("name", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in HOSTILE])
-def test_a_hostile_node_is_reported_and_leaves_nothing(
-    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_hostile_node_leaves_nothing(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     text, said = HOSTILE[name]
     monkeypatch.setattr(runner, "GRACE_S", 1.0)
-    folder = tmp_path / "there"
-    folder.mkdir()
-    script = folder / "node.py"
+    script = tmp_path / "there" / "node.py"
+    script.parent.mkdir()
     script.write_text(text)
     began = time.monotonic()
     # (It runs in that folder, and in no other.)
-    verdicts = examine(script, limits=replace(LIMITS, folder=folder)).verdicts
+    verdicts = examine(script, limits=replace(LIMITS, folder=script.parent)).verdicts
     assert verdicts[0].holds is False
     assert said in verdicts[0].evidence
     assert total(verdicts) == (0, 100)
@@ -155,9 +148,7 @@ def test_a_hostile_node_is_reported_and_leaves_nothing(
     assert left_running() == []
 
 
-def test_of_a_node_that_prints_and_exits_the_report_is_whole(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_json_of_a_node_that_exits_is_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "node.py").write_text("print('{oh}', flush=True)\nimport os; os._exit(0)\n")
     assert main(["workshop", "check", str(tmp_path / "node.py"), "--json", "-"]) == 1
     said = capsys.readouterr()

@@ -6,12 +6,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import RIGHT, WRONG
+from tests.sim.workshop.strangers import RIGHT, WRONG, checked
 
-from limo_sim.workshop.check import examine
 from limo_sim.workshop.report import total
 
-#: Of the sixty, those that are checked with every change; the others are marked slow.
+#: Those that are checked with every change; the others are marked slow.
 QUICK = (
     *("timer of 3 Hz", "functions and spin_once", "threads", "crop of the rows", "enlarged copy"),
     "logs every tenth image",
@@ -27,8 +26,7 @@ def listed(nodes: Iterable[str]) -> list[object]:
 @pytest.mark.parametrize("name", listed(RIGHT))
 def test_a_right_node_gets_all_points(tmp_path: Path, name: str) -> None:
     exercise, text = RIGHT[name]
-    (tmp_path / "node.py").write_text(text)
-    verdicts = examine(tmp_path / "node.py", exercise).verdicts
+    verdicts = checked(tmp_path, text, exercise)
     assert [(verdict.checkpoint, verdict.evidence) for verdict in verdicts if verdict.holds is not True] == []
     assert total(verdicts) == (100, 100)
 
@@ -36,8 +34,7 @@ def test_a_right_node_gets_all_points(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", listed(WRONG))
 def test_a_wrong_node_loses_points_of_its_task(tmp_path: Path, name: str) -> None:
     exercise, text = WRONG[name]
-    (tmp_path / "node.py").write_text(text)
-    verdicts = examine(tmp_path / "node.py", exercise).verdicts
+    verdicts = checked(tmp_path, text, exercise)
     lost = {str(verdict.task) for verdict in verdicts if verdict.holds is False}
     assert lost if name.startswith("any") else name[0] in lost
     assert total(verdicts)[0] < 100

@@ -6,11 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import exchanged, nodes
+from tests.sim.workshop.strangers import checked, exchanged, nodes
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution, template
-from limo_sim.workshop.check import Verdict, examine
 
 FOLLOWER = solution("follower")
 
@@ -78,26 +77,16 @@ MISSED = {
 }
 
 
-def written(tmp_path: Path, text: str) -> Path:
-    path = tmp_path / "node.py"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def checked(tmp_path: Path, text: str, task: str) -> list[Verdict]:
-    return examine(written(tmp_path, text), f"stretch {task}").verdicts
-
-
 @pytest.mark.parametrize("name", DONE)
 def test_a_node_that_does_the_task_has_all_points(tmp_path: Path, name: str) -> None:
-    verdicts = checked(tmp_path, DONE[name][1], name[0])
+    verdicts = checked(tmp_path, DONE[name][1], f"stretch {name[0]}")
     assert [verdict for verdict in verdicts if not verdict.holds] == []
     assert sum(verdict.points for verdict in verdicts) == 100
 
 
 @pytest.mark.parametrize("task", MISSED)
 def test_the_workshops_solution_is_told_what_is_missing(tmp_path: Path, task: str) -> None:
-    verdicts = {verdict.checkpoint: verdict for verdict in checked(tmp_path, FOLLOWER, task)}
+    verdicts = {verdict.checkpoint: verdict for verdict in checked(tmp_path, FOLLOWER, f"stretch {task}")}
     name, said = MISSED[task]
     assert verdicts[name].holds is False
     assert said in verdicts[name].evidence
@@ -105,7 +94,7 @@ def test_the_workshops_solution_is_told_what_is_missing(tmp_path: Path, task: st
 
 @pytest.mark.parametrize("node", ["in time", "late"])
 def test_the_way_driven_and_the_way_left_add_up_to_the_chair(tmp_path: Path, node: str) -> None:
-    verdicts = checked(tmp_path, LATE if node == "late" else DONE["e"][1], "e")
+    verdicts = checked(tmp_path, LATE if node == "late" else DONE["e"][1], "stretch e")
     (stops,) = (verdict for verdict in verdicts if verdict.checkpoint == "the robot stops before the chair")
     driven, left = map(float, re.findall(r"(\d\.\d\d) m", stops.evidence)[:2])
     # The seat's edge is at 1.5 - 0.17 m, the robot's front at 0.145 m when it starts, and the person straight ahead.
@@ -116,21 +105,19 @@ def test_the_way_driven_and_the_way_left_add_up_to_the_chair(tmp_path: Path, nod
 
 @pytest.mark.parametrize("task", MISSED)
 def test_the_template_has_no_points(tmp_path: Path, task: str) -> None:
-    verdicts = checked(tmp_path, template("follower"), task)
+    verdicts = checked(tmp_path, template("follower"), f"stretch {task}")
     assert sum(verdict.points for verdict in verdicts) == 0
 
 
-def test_the_report_is_one_page_with_points_evidence_and_the_nodes_pictures(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    node, page = written(tmp_path, DONE["a"][1].replace("'Camera'", "'<b>Camera</b>'")), tmp_path / "report.html"
+def test_the_report_has_points_evidence_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    node, page = tmp_path / "node.py", tmp_path / "report.html"
+    node.write_text(DONE["a"][1].replace("'Camera'", "'<b>Camera</b>'"))
     assert main(["workshop", "check", str(node), "--stretch", "a", "--html", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
     assert "100 <small>of 100 points" in text
     assert text.count("data:image/jpeg;base64,") == 4
     assert "A person stands 3.4 m ahead" in text
     assert "&lt;b&gt;Camera" in text
-    assert "<b>" not in text
-    assert "http" not in text
+    assert "<b>" not in text and "http" not in text
     assert "task A  60/60" in capsys.readouterr().out
     assert main(["workshop", "check", str(node), "--stretch", "a", "--sequel"]) == 2

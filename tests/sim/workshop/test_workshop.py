@@ -9,11 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import exchanged, nodes
+from tests.sim.workshop.strangers import checked, exchanged, nodes
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution, template
-from limo_sim.workshop.check import Verdict, examine
 from limo_sim.workshop.report import by_task, total
 
 #: The workshop's two nodes: the follower of tasks 1 to 4, and the sequel that keeps a distance.
@@ -93,12 +92,6 @@ detectMultiScale was never called
     self.hog.detectMultiScale(image, winStride=(8, 8), padding=(4, 4), scale=1.05) → [], []
 """,
 )
-
-
-def checked(tmp_path: Path, text: str, node: str = "follower") -> list[Verdict]:
-    script = tmp_path / "node.py"
-    script.write_text(text, encoding="utf-8")
-    return examine(script, node).verdicts
 
 
 @pytest.mark.parametrize("node", NODES)

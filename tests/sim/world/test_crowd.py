@@ -1,4 +1,4 @@
-"""People who yield come and go through doors, find their way, keep clear of the robot or react to it."""
+"""People who yield come and go, find their way, keep clear of the robot or react to it; furniture moves among them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from tests.sim.logs import poses_of as poses
 from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.world.crowd import STEP_S
-from limo_sim.world.scenario import Furniture, Group, Person, Robot, Room, Scenario, Wall
+from limo_sim.world.movers import Movers
+from limo_sim.world.scenario import Camera, Furniture, Group, Mover, Person, Robot, Room, Scenario, Wall
 
 YIELDS = Person(route=((-2, 1, 0), (2, 1, 1.0), (2, 3, 0)), behaviour="social_force")
 CORNER = Robot(x=-4.5, y=-4.5)
@@ -78,7 +79,7 @@ def test_a_person_who_arrives_walks_in_through_a_door_and_who_leaves_walks_out()
         (YIELDS.route, (0.0, -8.0), 8.0, 0.0, -8.5),
     ],
 )
-def test_people_come_in_by_the_nearest_door_or_their_own(
+def test_people_come_in_by_a_door(
     route: tuple[Any, ...], door: tuple[float, ...], half: float, x: float, y: float
 ) -> None:
     person = dataclasses.replace(YIELDS, route=route, arrives_s=0.5, enters=door)
@@ -174,3 +175,51 @@ def test_a_group_in_a_file_becomes_people_who_look_at_its_middle(tmp_path: Path)
         x, y, _ = person.route[0]
         assert math.dist((x, y), (-2, 1)) == pytest.approx(0.7)
         assert (x + 0.7 * math.cos(person.facing), y + 0.7 * math.sin(person.facing)) == pytest.approx((-2, 1))
+
+
+TROLLEY = Scenario(movers=(Mover("trolley", ((2.0, -1.0, 0), (2.0, 1.0, 0)), 0.5),))
+
+
+def test_a_mover_keeps_its_timetable() -> None:
+    for time, y in ((0.0, -1.0), (2.0, 0.0), (4.0, 1.0), (6.0, 0.0), (10.0, 0.0)):
+        (piece,) = Movers(TROLLEY.movers).at(time)
+        assert (piece.x, piece.y) == pytest.approx((2.0, y))
+
+
+def test_camera_and_lidar_see_a_mover_where_it_was_when_they_looked() -> None:
+    arena = drive(Arena(dataclasses.replace(TROLLEY, camera=Camera(latency_s=0.4)), 0), 2.4)
+    frame, scan = arena.frame(), arena.scan()
+    assert frame.stamp == pytest.approx(2.0)
+    # Long side along y: the trolley drives sideways to the camera, 0.17 m deep.
+    assert frame.depth[200:280, 320].min() == pytest.approx(2.0 - 0.17 - 0.084, abs=0.03)
+    angles = np.linspace(-2.0, 2.0, 292)
+    hit = scan.ranges < 2.5
+    assert np.median(np.sin(angles[hit]) * scan.ranges[hit]) == pytest.approx(0.5 * (scan.stamp - 2.0), abs=0.1)
+
+
+def test_a_mover_pushes_the_robot_aside_which_counts_as_a_contact() -> None:
+    arena = drive(Arena(Scenario(movers=(Mover("trolley", ((1.0, 0.05, 0), (-1.0, 0.05, 0)), 0.4),)), 0), 4.0)
+    assert arena.contacts.wall == 1
+    assert arena.contacts.person == 0
+    assert arena.truth().robot[0] < -0.3
+
+
+@pytest.mark.parametrize("heading", [0.0, math.pi / 2, -2.0])
+def test_a_mover_has_the_velocity_of_its_way_in_the_physics(heading: float) -> None:
+    end = (2.0 + math.cos(heading), math.sin(heading), 0)
+    arena = drive(Arena(Scenario(movers=(Mover("trolley", ((2.0, 0.0, 0), end), 0.5),))), 0.5)
+    (body,) = arena._moving
+    # Half a second at half a metre a second.
+    assert tuple(body.velocity) == pytest.approx((0.5 * math.cos(heading), 0.5 * math.sin(heading)))
+    assert tuple(body.position) == pytest.approx((2.0 + 0.25 * math.cos(heading), 0.25 * math.sin(heading)))
+
+
+def test_a_person_who_yields_walks_round_a_mover() -> None:
+    person = Person(route=((-1.0, 0.03, 0), (4.0, 0.03, 900)), behaviour="social_force", speed=0.7)
+    scenario = dataclasses.replace(
+        TROLLEY, people=(person,), robot=Robot(x=-4), movers=(Mover("trolley", ((4.2, 0, 0), (-2.0, 0, 0)), 0.4),)
+    )
+    seen = [there(pose) for (pose,) in poses(scenario, 10.0, (-4.0, 0.0, 0.0))]
+    pieces = [piece for step in range(len(seen)) for piece in Movers(scenario.movers).at(step * STEP_S)]
+    assert min(math.dist((a.x, a.y), (b.x, b.y)) for a, b in zip(seen, pieces, strict=True)) > 0.17 + 0.1
+    assert seen[-1].x > 3.8

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.sim.logs import drive
+from tests.sim.logs import drive, there
 
 from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
@@ -98,8 +98,7 @@ def test_driving_into_a_standing_person_is_a_contact_and_moves_nobody() -> None:
     truth = arena.truth()
     assert arena.contacts.person == 1
     assert truth.contacts == arena.contacts
-    assert truth.people[0] is not None
-    assert (truth.people[0].x, truth.people[0].y) == (1.5, 0.0)
+    assert (there(truth.people[0]).x, there(truth.people[0]).y) == (1.5, 0.0)
     assert truth.robot[0] == pytest.approx(1.5 - standing.radius - 0.145, abs=0.01)
 
 
@@ -107,11 +106,10 @@ def test_a_person_who_walks_into_the_robot_pushes_it_aside() -> None:
     walker = Person(route=((2.0, 0.02, 0.0), (-2.0, 0.02, 0.0)), speed=0.5)
     arena = drive(Arena(dataclasses.replace(EMPTY, people=(walker,))), 6.0, Twist())
     truth = arena.truth()
-    assert truth.people[0] is not None
-    assert truth.people[0].x == pytest.approx(-1.0)
+    pushing = there(truth.people[0])
+    assert pushing.x == pytest.approx(-1.0)
     assert arena.contacts.person >= 1
-    distance = math.hypot(truth.robot[0] - truth.people[0].x, truth.robot[1] - truth.people[0].y)
-    assert distance > walker.radius + 0.1
+    assert math.dist(truth.robot[:2], (pushing.x, pushing.y)) > walker.radius + 0.1
 
 
 def test_the_imu_feels_gravity_turns_and_speeding_up() -> None:

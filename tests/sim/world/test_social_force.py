@@ -36,9 +36,7 @@ def potential(at: F64, velocity: F64) -> float:
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.9, 0.0), (-0.3, 1.1)])
 @pytest.mark.parametrize("at", [(-0.9, 0.3), (-1.4, -0.6), (-0.6, 0.02)])
-def test_people_are_pushed_down_the_slope_of_the_papers_potential(
-    at: tuple[float, float], velocity: tuple[float, float]
-) -> None:
+def test_the_push_is_the_slope_of_the_papers_potential(at: tuple[float, float], velocity: tuple[float, float]) -> None:
     place, pace, tiny = np.array(at), np.array(velocity), 1e-6
     around = [[potential(place + side * axis, pace) for axis in np.eye(2)] for side in (-tiny, tiny)]
     downhill = -np.diff(around, axis=0)[0] / (2 * tiny)

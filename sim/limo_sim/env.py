@@ -157,7 +157,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         arena = self._arena = Arena(scenario, int(self.np_random.integers(2**31)))
         self._walls = hiding(arena.scenario)
         self._noise = np.random.default_rng([arena.seed, SIGHTING_STREAM])
-        self._misses: list[Missing] = []
+        self._misses: list[Missing[Any]] = []
         if scenario.detector != DetectorFaults():
             self._misses = misses_of(scenario.detector, scenario.camera.rate_hz, 1, arena.seed)
         self._last: LastSeen | None = None

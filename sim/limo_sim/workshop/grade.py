@@ -31,9 +31,7 @@ _MOST_FILES, _DEEPEST, _MOST_BYTES = 1000, 8, 200 * 10**6
 #: Longest cell of the table [characters].
 _CELL = 1000
 #: Files of a package that are no nodes.
-_ASIDE = re.compile(
-    r"(^|/)((setup|conftest|__init__|test_[^/]*|[^/]*[._]launch)\.py$|(test|tests|launch|build|install)/)"
-)
+_ASIDE = re.compile(r"(^|/)((setup|conftest|__init__|test_[^/]*|[^/]*[._]launch)\.py$|(tests?|launch|build|install)/)")
 #: What students hand in that must be unpacked or exported first.
 _PACKED = (".zip", ".ipynb", ".gz", ".7z", ".rar")
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,12 +14,17 @@ from limo_hog.follow.robot import LIMO, RobotGeometry, load_robot
 from limo_sim.world.furniture import Disc, Furniture, Rectangle, distance_to
 from limo_sim.world.movers import Mover
 from limo_sim.world.people import Group, Person, Surroundings, Vary, check_person
-from limo_sim.world.schema import WIDEST, ScenarioError, build, check_fields, one_of, required, within
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found]
+from limo_sim.world.schema import (
+    WIDEST,
+    ScenarioError,
+    build,
+    check_fields,
+    from_toml,
+    misfit,
+    one_of,
+    required,
+    within,
+)
 
 __all__ = [
     "ROOM_HALF",
@@ -33,16 +37,8 @@ __all__ = [
     "Imu",
     "Lidar",
     "Light",
-    "Mover",
-    "Person",
-    "Robot",
-    "Room",
-    "Scenario",
-    "Vary",
-    "Wall",
-    "WallsTexture",
-    "Wheels",
 ]
+__all__ += ["Mover", "Person", "Robot", "Room", "Scenario", "Vary", "Wall", "WallsTexture", "Wheels"]
 
 #: Where the walls' inner faces stand without `room.half`, ± this, and how high they are [m]; as in `hri_world.world`.
 ROOM_HALF, WALL_HEIGHT = 4.9, 1.0
@@ -307,7 +303,7 @@ class Scenario:
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
         try:
-            table = tomllib.loads(text)
+            table = from_toml(text)
         # Beside its own error, which is a ValueError: numbers of thousands of digits, lists within hundreds of lists.
         except (ValueError, RecursionError) as error:
             raise ScenarioError(f"{path}: not TOML that can be read: {error}") from error
@@ -327,7 +323,7 @@ class Scenario:
         check_fields(self, where)
         for kind, most in _MOST.items():
             if len(getattr(self, kind)) > most:
-                raise ScenarioError(f"{where}{kind}: {len(getattr(self, kind))} of them, want at most {most}")
+                raise misfit(f"{where}{kind}", f"{len(getattr(self, kind))} of them", f"at most {most}")
         if math.hypot(*self.light.sun) < 0.1:
             raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
         self.detector.check(self.camera.rate_hz, f"{where}detector.")
@@ -341,16 +337,12 @@ class Scenario:
                 key = f"{where}walls[{index}].{name}"
                 self._check_inside(place, 0.0, (f"{key}[0]", f"{key}[1]"))
             if wall.length < _SHORTEST_WALL:
-                raise ScenarioError(
-                    f"{where}walls[{index}]: is {wall.length:g} m long, want at least {_SHORTEST_WALL} m"
-                )
+                raise misfit(f"{where}walls[{index}]", f"is {wall.length:g} m long", f"at least {_SHORTEST_WALL} m")
         for name, footprint in self._obstacles():
             distance = distance_to(footprint, self.robot.x, self.robot.y)
             if distance < self.robot.radius:
-                raise ScenarioError(
-                    f"{where}{name.split(' ')[0]}: is {max(distance, 0.0):.2f} m from the robot's centre, "
-                    f"want at least {self.robot.radius:.2f} m"
-                )
+                found = f"is {max(distance, 0.0):.2f} m from the robot's centre"
+                raise misfit(f"{where}{name.split(' ')[0]}", found, f"at least {self.robot.radius:.2f} m")
         around = self.surroundings
         for index, person in enumerate(self.people):
             check_person(person, around, f"{where}people[{index}]")

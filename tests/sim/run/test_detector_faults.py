@@ -10,7 +10,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.sim.run.steps import Finds, figures
+from tests.sim.logs import Finds, figures
 
 from limo_hog.detections import Detections, Detector
 from limo_hog.follow import TrackingController

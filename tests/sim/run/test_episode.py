@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.sim.logs import drive, steps_of
-from tests.sim.run.steps import Finds, commands, figures
+from tests.sim.logs import Finds, commands, drive, figures, steps_of
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow import ApproachController, Mode, ProxemicController, TrackingController, Twist, controller_named

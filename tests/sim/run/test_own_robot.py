@@ -13,6 +13,7 @@ from tests.sim.logs import drive
 
 from limo_hog import PeopleDetector
 from limo_hog.follow import LIMO, Decision, Follower, Mode, RobotError, Twist
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import completed, scan_points
 from limo_hog.follow.sense.observation import Sensors
 from limo_sim.run.arena import Arena
@@ -84,10 +85,11 @@ def test_wheels_do_what_the_file_says(tmp_path: Path) -> None:
     assert drive(arena, 3.0, Twist(0.0, 5.0)).odometry().angular == pytest.approx(2 * 0.6 / 0.3, abs=1e-6)
 
 
+@dataclasses.dataclass(frozen=True)
 class Ahead:
     """Drives ahead, whatever there is."""
 
-    robot = LIMO
+    robot: RobotGeometry = LIMO
 
     def start(self) -> None:
         return None
@@ -99,8 +101,7 @@ class Ahead:
 @pytest.mark.parametrize("text", ["", OWN], ids=["limo", "own"])
 def test_the_outline_keeps_its_distance_from_a_wall(text: str, tmp_path: Path) -> None:
     arena = Arena(quiet(own(tmp_path, text)))
-    controller: Any = dataclasses.make_dataclass("Ahead", [("robot", Any, LIMO)], bases=(Ahead,), frozen=True)()
-    follower = Follower(controller, PeopleDetector(), arena.robot)
+    follower = Follower(Ahead(), PeopleDetector(), arena.robot)
     while arena.time < 14.0:
         log = follower.tick(arena.time, arena.frame(), Sensors(arena.scan(), arena.odometry()))
         if log is not None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.sim.run.steps import CAMERA, OFF, ON, TRUNK, add, card, followed, other_person, person, step
+from tests.sim.logs import CAMERA, OFF, ON, TRUNK, add, card, followed, other_person, person, step
 
 from limo_hog.follow.decision import Belief
 from limo_sim.run.log import Step

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 from scipy.stats import ttest_1samp
-from tests.sim.run.steps import card, person, step
+from tests.sim.logs import card, person, step
 
 from limo_sim.run.score import ScoreCard
 from limo_sim.run.sweep import Run, compare, estimate, in_processes, play, summarise

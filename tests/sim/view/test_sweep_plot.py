@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from tests.sim.run.steps import card, person, step
+from tests.sim.logs import card, person, step
 
 from limo_sim.run.sweep import summarise
 from limo_sim.view.sweep_plot import plot

@@ -6,10 +6,11 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import checked, exchanged, nodes
+from tests.sim.workshop.strangers import RIGHT, WRONG, checked, exchanged, nodes
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution, template
@@ -204,3 +205,33 @@ def test_a_mistake_of_task_4_costs_no_points_of_another(tmp_path: Path, reason: 
     verdicts = checked(tmp_path, text)
     assert len([verdict for verdict in verdicts if verdict.holds is False]) == 1
     assert by_task(verdicts) == {1: (10, 10), 2: (25, 25), 3: (25, 25), 4: (points, 40)}
+
+
+#: Those that are checked with every change; the others are marked slow.
+QUICK = (
+    *("timer of 3 Hz", "functions and spin_once", "threads", "crop of the rows", "enlarged copy"),
+    "logs every tenth image",
+    *("2 a number that was made up", "3 a timer that always drives", "3 largest", "4 steers by the blue shirt"),
+    *("any best effort commands", "any the model solution, read", "5 one pixel, unknown is nine metres"),
+)
+
+
+def listed(nodes: Iterable[str]) -> list[object]:
+    return [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow, id=name) for name in nodes]
+
+
+@pytest.mark.parametrize("name", listed(RIGHT))
+def test_a_right_node_gets_all_points(tmp_path: Path, name: str) -> None:
+    exercise, text = RIGHT[name]
+    verdicts = checked(tmp_path, text, exercise)
+    assert [(verdict.checkpoint, verdict.evidence) for verdict in verdicts if verdict.holds is not True] == []
+    assert total(verdicts) == (100, 100)
+
+
+@pytest.mark.parametrize("name", listed(WRONG))
+def test_a_wrong_node_loses_points_of_its_task(tmp_path: Path, name: str) -> None:
+    exercise, text = WRONG[name]
+    verdicts = checked(tmp_path, text, exercise)
+    lost = {str(verdict.task) for verdict in verdicts if verdict.holds is False}
+    assert lost if name.startswith("any") else name[0] in lost
+    assert total(verdicts)[0] < 100

@@ -40,7 +40,7 @@ class Finds:
 
     def __init__(self, *windows: list[int], first: Callable[[], None] = lambda: None) -> None:
         self.first = first
-        self.found = Detections(np.array(windows, np.int32).reshape(-1, 4), 1.0 - 0.2 * np.arange(len(windows)))
+        self.found = Detections(np.array(windows, np.int32).reshape(-1, 4), np.linspace(1.0, 0.8, len(windows)))
 
     def detect(self, _image: NDArray[np.uint8]) -> Detections:
         self.first()

@@ -288,8 +288,8 @@ def test_the_state_is_of_the_scenarios_first_person(others: tuple[tuple[float, f
 
 
 def test_the_depth_image_may_be_as_deep_as_a_scenario_may_ask_for() -> None:
-    space: Any = LimoFollowV1(observe="camera").observation_space["depth"]
-    furthest = float(space.high.max())
+    spaces: Any = LimoFollowV1(observe="camera").observation_space
+    space, furthest = spaces["depth"], float(spaces["depth"].high.max())
     assert space.low.min() == 0.0
     replace(STANDING, depth=Depth(far_m=furthest)).check()
     with pytest.raises(ScenarioError, match="far_m"):

@@ -92,7 +92,11 @@ def test_each_sensor_keeps_its_own_rate() -> None:
 
 def test_a_reading_arrives_as_late_as_the_scenario_says() -> None:
     crowd = dataclasses.replace(FOLLOWABLE, people=(*FOLLOWABLE.people, YIELDS))
-    slow = {"camera": Camera(latency_s=0.4), "lidar": Lidar(latency_s=0.2), "odometry": Wheels(latency_s=0.1)}
+    slow: dict[str, Any] = {
+        "camera": Camera(latency_s=0.4),
+        "lidar": Lidar(latency_s=0.2),
+        "odometry": Wheels(latency_s=0.1),
+    }
     arena, prompt = Arena(dataclasses.replace(crowd, **slow), 0), Arena(crowd, 0)
     shown = {}
     for _ in range(100):

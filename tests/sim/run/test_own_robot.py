@@ -41,7 +41,7 @@ def own(tmp_path: Path, text: str = OWN, scenario: str = "empty") -> Scenario:
 
 
 def quiet(scenario: Scenario) -> Scenario:
-    exact = {"depth": Depth(noise=0.0, invalid=0.0, far_m=20.0), "camera": Camera(noise=0.0)}
+    exact: dict[str, Any] = {"depth": Depth(noise=0.0, invalid=0.0, far_m=20.0), "camera": Camera(noise=0.0)}
     exact |= {"lidar": Lidar(noise_m=0.0), "odometry": Wheels(slip=0.0), "room": Room(3.0)}
     return dataclasses.replace(scenario, **exact)
 

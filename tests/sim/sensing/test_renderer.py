@@ -276,8 +276,8 @@ def test_a_door_is_drawn_where_the_pinhole_sees_it(yaw: float, x: float, y: floa
 
 
 def test_bricks_lie_at_their_height_on_every_side_of_an_inner_wall() -> None:
-    bricks = {"walls": (Wall((2, -1), (2, 1), 0.3),), "walls_texture": WallsTexture("bricks", 0.6)}
-    scenario = dataclasses.replace(EXACT, **bricks)
+    wall, bricks = Wall((2, -1), (2, 1), 0.3), WallsTexture("bricks", 0.6)
+    scenario = dataclasses.replace(EXACT, walls=(wall,), walls_texture=bricks)
     for camera in (HERE, CameraPose(4, 0, math.pi)):
         image, depth, _ = picture(scenario=scenario, camera=camera)
         distance = 1.85

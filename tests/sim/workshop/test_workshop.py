@@ -126,8 +126,8 @@ def test_the_template_runs_and_is_told_what_to_do_first(tmp_path: Path, node: st
 @pytest.mark.parametrize("more", ["", "node.create_timer(0.1, lambda: pub.publish(Twist()))"])
 @pytest.mark.parametrize("name", NODES)
 def test_a_node_that_does_nothing_gets_no_points(tmp_path: Path, name: str, more: str) -> None:
-    lines = ("import rclpy", "from geometry_msgs.msg import Twist", "rclpy.init()", "node = rclpy.create_node('empty')")
-    lines += ("pub = node.create_publisher(Twist, '/cmd_vel', 10)", more, "rclpy.spin(node)")
+    lines = ["import rclpy", "from geometry_msgs.msg import Twist", "rclpy.init()", "node = rclpy.create_node('empty')"]
+    lines += ["pub = node.create_publisher(Twist, '/cmd_vel', 10)", more, "rclpy.spin(node)"]
     verdicts = checked(tmp_path, "\n".join(lines), name)
     assert total(verdicts) == (0, 100)
     assert verdicts[0].evidence.startswith("the node has no subscription")

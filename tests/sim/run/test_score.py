@@ -135,7 +135,8 @@ CARDS: dict[str, tuple[list[Step], dict[str, Any]]] = {
         [step(0, None, person(1.0))],
         {"clearance_min_m": 1.0 - 0.145 - SECOND_RADIUS},
     ),
-} | {
+}
+CARDS |= {
     # A switch is a target that changes from one person to another.
     f"the targets are {of}": (log(of), {"identity_switches": switches})
     for of, switches in {"aaaa": 0, "aabb": 1, "abab": 3, "a-a-": 0, "a-b-": 1, "----": 0, "axbx": 1}.items()

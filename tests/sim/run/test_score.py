@@ -288,27 +288,18 @@ def test_who_is_lost_half_a_second_is_found_in_three(until: float, lost: int, fo
     assert (result.lost, result.found_again) == (lost, found_again)
 
 
-@pytest.mark.parametrize(
-    ("column", "row", "height", "on"),
-    [
-        (330, 160, 160, True),
-        # the silhouette is 60 px wide from 300 on: a quarter of it more on either side
-        (285, 160, 160, True),
-        (284, 160, 160, False),
-        (375, 160, 160, True),
-        (376, 160, 160, False),
-        # 120 px high from 100 on
-        (330, 100, 160, True),
-        (330, 99, 160, False),
-        (330, 220, 160, True),
-        (330, 221, 160, False),
-        (330, 160, 72, True),
-        (330, 160, 70, False),
-        (330, 160, 300, True),
-        (330, 160, 302, False),
-    ],
-)
-def test_the_middle_of_a_box_and_its_height_decide_whom_it_is_on(column: int, row: int, height: int, on: bool) -> None:
+def boxes(columns: list[int], rows: list[int], heights: list[int]) -> list[tuple[int, int, int]]:
+    """Return middles and heights of boxes [px], each off those of a box on somebody in one of the three."""
+    return [(c, 160, 160) for c in columns] + [(330, r, 160) for r in rows] + [(330, 160, h) for h in heights]
+
+
+# The silhouette is 60 px by 120 from (300, 100) on; a quarter of its breadth more counts on either side.
+INSIDE, OUTSIDE = boxes([285, 330, 375], [100, 220], [72, 300]), boxes([284, 376], [99, 221], [70, 302])
+
+
+@pytest.mark.parametrize(("place", "on"), [(place, True) for place in INSIDE] + [(place, False) for place in OUTSIDE])
+def test_the_middle_of_a_box_and_its_height_decide_whom_it_is_on(place: tuple[int, int, int], on: bool) -> None:
+    column, row, height = place
     box = np.array([column - 40, row - height // 2, 80, height], np.int32)
     assert on_person(box, person()) is on
     assert not on_person(box, person(box=None))

@@ -20,6 +20,14 @@ from limo_sim.workshop.grade import grade, nodes_in
 LOOP = "while True:\n    try:\n        n = 0\n        while True: n += 1\n    except BaseException: pass\n"
 
 
+def written(folder: Path, **texts: str) -> Path:
+    """Write files of these names, and return their folder."""
+    folder.mkdir(exist_ok=True)
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text)
+    return folder
+
+
 def table_of(folder: Path) -> dict[str, dict[str, str]]:
     """Grade a folder by the command line; return its rows by file."""
     table = folder.parent / f"{folder.name}.csv"
@@ -36,25 +44,21 @@ def table_of(folder: Path) -> dict[str, dict[str, str]]:
     ],
 )
 def test_a_hostile_node_ends_within_its_limits_and_gets_no_points(tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / "node.py").write_text(text)
+    written(tmp_path, node=text)
     (graded,) = grade(nodes_in(tmp_path), tmp_path, 1, "follower", Limits(patience=2.0, seconds=60.0))
-    assert graded.result is not None
-    assert graded.result["points"] == 0
+    assert graded.result is not None and graded.result["points"] == 0
     assert said in graded.result["checkpoints"][0]["evidence"]
 
 
 def test_what_is_no_file_costs_its_own_row_alone(tmp_path: Path) -> None:
-    folder = tmp_path / "class"
-    folder.mkdir()
-    (folder / "amy.py").write_text(template("follower"))
+    deep = "import os\nfor _ in range(1500):\n    os.mkdir('d'); os.chdir('d')\n"
+    folder = written(tmp_path / "class", amy=template("follower"))
     (folder / "bob.py").symlink_to(folder / "gone.py")
     (folder / "eve.py").symlink_to(folder / "eve.py")
     os.mkfifo(folder / "ian.py")
     (folder / "joe.py").mkdir()
     (folder / os.fsdecode(b"kim\xe9.py")).write_text(template("follower"))
-    deep = folder / "lou"
-    deep.mkdir()
-    (deep / "node.py").write_text("import os\nfor _ in range(1500):\n    os.mkdir('d'); os.chdir('d')\n")
+    written(folder / "lou", node=deep)
     before = set(Path(tempfile.gettempdir()).glob("limo-hog-*"))
     rows = table_of(folder)
     assert len(rows) == 7
@@ -68,16 +72,10 @@ def test_what_is_no_file_costs_its_own_row_alone(tmp_path: Path) -> None:
 
 
 def test_no_student_is_run_among_the_files_of_another(tmp_path: Path) -> None:
-    folder = tmp_path / "class"
-    folder.mkdir()
-    (folder / "amy.py").write_text("import bob\n")
-    (folder / "bob.py").write_text(template("follower"))
+    folder = written(tmp_path / "class", amy="import bob\n", bob=template("follower"))
     # (Names that this program or a library imports late.)
-    for name in ("ruamel", "helper", "sitecustomize"):
-        (folder / f"{name}.py").write_text("raise RuntimeError('imported')\n")
-    (folder / "eve").mkdir()
-    (folder / "eve" / "node.py").write_text("import own\n")
-    (folder / "eve" / "own.py").write_text(template("follower"))
+    written(folder, **dict.fromkeys(("ruamel", "helper", "sitecustomize"), "raise RuntimeError('imported')\n"))
+    written(folder / "eve", node="import own\n", own=template("follower"))
     rows = table_of(folder)
     assert "No module named 'bob'" in rows["amy.py"]["first_mistake"]
     assert rows["bob.py"]["first_mistake"].startswith("the camera image is shown")
@@ -85,11 +83,8 @@ def test_no_student_is_run_among_the_files_of_another(tmp_path: Path) -> None:
 
 
 def test_a_signal_to_grade_keeps_the_rows_that_are_done_and_ends_the_nodes(tmp_path: Path) -> None:
-    folder, table, unfinished = tmp_path / "class", tmp_path / "points.csv", tmp_path / ".points.part.csv"
-    folder.mkdir()
-    (folder / "amy.py").write_text("raise ValueError\n")
-    for name in ("bob", "eve"):
-        (folder / f"{name}.py").write_text(LOOP)
+    folder = written(tmp_path / "class", amy="raise ValueError\n", bob=LOOP, eve=LOOP)
+    table, unfinished = tmp_path / "points.csv", tmp_path / ".points.part.csv"
     command = [sys.executable, "-m", "limo_hog.cli.main", "workshop", "grade", str(folder), "--csv", str(table)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as run:
         until = time.monotonic() + 60
@@ -107,10 +102,8 @@ def test_a_signal_to_grade_keeps_the_rows_that_are_done_and_ends_the_nodes(tmp_p
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a node's process is killed at once")
 @pytest.mark.parametrize("action", ["check", "grade"])
 def test_a_signal_does_not_wait_for_a_nodes_process_that_still_imports(action: str, tmp_path: Path) -> None:
-    slow = "import sys, time\nif 'limo_sim.ros.child' in sys.orig_argv:\n    time.sleep(30)\n"
-    (tmp_path / "sitecustomize.py").write_text(slow)
-    (tmp_path / "class").mkdir()
-    (tmp_path / "class" / "amy.py").write_text(template("follower"))
+    written(tmp_path, sitecustomize="import sys, time\nif 'limo_sim.ros.child' in sys.orig_argv:\n    time.sleep(30)\n")
+    written(tmp_path / "class", amy=template("follower"))
     command = [sys.executable, "-m", "limo_hog", "workshop", action, "class" if action == "grade" else "class/amy.py"]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL) as run:
@@ -124,8 +117,7 @@ def test_where_one_core_may_be_used_one_node_runs_at_a_time(tmp_path: Path) -> N
     log = tmp_path / "log.txt"
     busy = f"def note(word):\n    with open({str(log)!r}, 'a') as log:\n        log.write(f'{{word}} ')\n"
     busy += "note('begun')\nsum(range(40_000_000))\nnote('ended')\nimport os\nos._exit(0)\n"
-    for name in ("amy", "bob"):
-        (tmp_path / f"{name}.py").write_text(busy)
+    written(tmp_path, amy=busy, bob=busy)
     allowed = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(allowed)})
     try:

@@ -17,14 +17,20 @@ from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.world.crowd import STEP_S
 from limo_sim.world.movers import Movers
+from limo_sim.world.person import Pose
 from limo_sim.world.scenario import Camera, Furniture, Group, Mover, Person, Robot, Room, Scenario, Wall
 
 YIELDS = Person(route=((-2, 1, 0), (2, 1, 1.0), (2, 3, 0)), behaviour="social_force")
 CORNER = Robot(x=-4.5, y=-4.5)
 
 
+def walked(person: Person, seconds: float, *walls: Wall) -> list[Pose]:
+    """Return a person's poses from step to step, alone with a robot that stands in a corner."""
+    return [there(one) for (one,) in poses(Scenario(people=(person,), walls=walls, robot=CORNER), seconds)]
+
+
 def test_the_corners_of_the_route_are_visited_in_order_with_their_pauses() -> None:
-    seen = [there(one) for (one,) in poses(Scenario(people=(YIELDS,), robot=CORNER), 25.0)]
+    seen = walked(YIELDS, 25.0)
     reached = [
         next(index for index, pose in enumerate(seen) if math.dist((pose.x, pose.y), corner[:2]) < 0.3)
         for corner in YIELDS.route[1:]
@@ -35,7 +41,7 @@ def test_the_corners_of_the_route_are_visited_in_order_with_their_pauses() -> No
 
 
 def test_headings_and_gait_are_those_of_a_person_who_walks() -> None:
-    seen = [there(one) for (one,) in poses(Scenario(people=(YIELDS,), robot=CORNER), 25.0)]
+    seen = walked(YIELDS, 25.0)
     turns = [math.remainder(b.yaw - a.yaw, math.tau) for a, b in pairwise(seen)]
     assert max(map(abs, turns)) < math.radians(6)
     at = seen[150]
@@ -46,9 +52,8 @@ def test_headings_and_gait_are_those_of_a_person_who_walks() -> None:
 
 
 def test_somebody_finds_the_door_between_two_rooms() -> None:
-    walls = Wall((0, -4.9), (0, 2.0)), Wall((0, 2.8), (0, 4.9))
     person = dataclasses.replace(YIELDS, route=((-2, -2, 0), (2, -2, 30)))
-    seen = [there(one) for (one,) in poses(Scenario(people=(person,), walls=walls, robot=CORNER), 25.0)]
+    seen = walked(person, 25.0, Wall((0, -4.9), (0, 2.0)), Wall((0, 2.8), (0, 4.9)))
     crossing = next(pose for pose in seen if pose.x > 0)
     assert 2.1 < crossing.y < 2.7
     assert math.dist((seen[-1].x, seen[-1].y), (2, -2)) < 0.1
@@ -160,10 +165,9 @@ def test_a_crowd_in_a_furnished_room_stays_inside_and_out_of_the_furniture() -> 
         route = tuple((float(x), float(y), 0.5) for x, y in random.permutation(corners)[:4])
         people.append(Person(route, behaviour="social_force", speed=float(random.uniform(0.4, 1.0))))
     scenario = Scenario(people=tuple(people), furniture=furniture, robot=Robot(x=4.5, y=0.0, yaw=1.0))
-    for step in poses(scenario, 30.0, (4.5, 0.0, 1.0)):
-        for pose in step:
-            assert max(abs(there(pose).x), abs(there(pose).y)) < 4.9 - 0.1
-            assert all(math.dist((there(pose).x, there(pose).y), (f.x, f.y)) > 0.15 + 0.1 for f in furniture)
+    for x, y in ((there(pose).x, there(pose).y) for step in poses(scenario, 30.0, (4.5, 0.0, 1.0)) for pose in step):
+        assert max(abs(x), abs(y)) < 4.9 - 0.1
+        assert all(math.dist((x, y), (piece.x, piece.y)) > 0.15 + 0.1 for piece in furniture)
 
 
 def test_a_group_in_a_file_becomes_people_who_look_at_its_middle(tmp_path: Path) -> None:

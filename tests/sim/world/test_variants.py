@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import pytest
 
@@ -16,14 +15,11 @@ PLAIN = Scenario(people=(Person(route=ROUTE, speed=0.4), Person(route=((-2.0, 1.
 DRAWN = dataclasses.replace(PLAIN, vary=Vary(clothes=True, height=0.1, speed=0.3, place=0.4))
 
 
-def test_without_vary_every_seed_has_the_same_people() -> None:
-    assert of_run(PLAIN, 1) is PLAIN
-
-
 def test_a_seed_draws_clothes_stature_speed_and_places_within_what_is_asked_for() -> None:
     runs = [of_run(DRAWN, seed) for seed in range(200)]
     assert runs[3] == of_run(DRAWN, 3)
     assert of_run(runs[3], 4) is runs[3]
+    assert of_run(PLAIN, 1) is PLAIN
     assert len({run.people for run in runs}) == 200
     for run in runs:
         run.check()
@@ -42,11 +38,6 @@ def test_what_is_not_asked_for_stays() -> None:
     assert run.people[0].speed != PLAIN.people[0].speed
     for person, plain in zip(run.people, PLAIN.people, strict=True):
         assert dataclasses.replace(person, speed=plain.speed) == plain
-
-
-def test_adults_stay_adults() -> None:
-    adult = dataclasses.replace(DRAWN, people=(Person(route=((3.0, 0.0, 0.0),), height=1.75),))
-    assert all(math.isclose(of_run(adult, seed).people[0].height, 1.75, rel_tol=0.1) for seed in range(20))
 
 
 def test_people_that_do_not_fit_are_refused_by_name() -> None:

@@ -274,8 +274,7 @@ def _reward(seen: Glimpse | None, touched_person: int, touched_wall: int) -> dic
 
 
 def _rgb(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    rgb: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
-    return rgb
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
 
 def hiding(scenario: Scenario) -> FloorPlan:

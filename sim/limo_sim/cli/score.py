@@ -60,31 +60,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--scenario", nargs="+", metavar="NAME|FILE.toml", help="only these (all that come along)")
     which.add_argument("--suite", metavar="v1", help="the frozen scenarios of a benchmark, summed up by group")
-    parser.add_argument(
-        "--controller",
-        nargs="+",
-        type=_controller,
-        metavar="NAME",
-        default=CONTROLLERS,
-        help="only these, of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)",
+    add, named = (
+        parser.add_argument,
+        "of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)",
     )
+    add("--controller", nargs="+", type=_controller, metavar="NAME", default=CONTROLLERS, help=f"only these, {named}")
     arguments.add_robot(parser)
-    parser.add_argument("--against", metavar="NAME", help="compare the others with this controller, run by run")
-    parser.add_argument("--seeds", type=count, default=20, metavar="N", help="how many of each (%(default)s)")
-    parser.add_argument("--seed-start", type=seed, default=0, metavar="N", help="the first of the seeds (%(default)s)")
-    parser.add_argument("--seconds", type=seconds, metavar="S", help=f"simulated time of a run ({_SECONDS:g})")
+    add("--against", metavar="NAME", help="compare the others with this controller, run by run")
+    add("--seeds", type=count, default=20, metavar="N", help="how many of each (%(default)s)")
+    add("--seed-start", type=seed, default=0, metavar="N", help="the first of the seeds (%(default)s)")
+    add("--seconds", type=seconds, metavar="S", help=f"simulated time of a run ({_SECONDS:g})")
     arguments.add_target_and_detector(parser)
-    parser.add_argument("--workers", type=count, metavar="N", help="processes (one for each core)")
+    add("--workers", type=count, metavar="N", help="processes (one for each core)")
     arguments.add_json(parser, "every score card and the summary as JSON")
-    parser.add_argument(
-        "--csv",
-        type=file_ending(".csv"),
-        metavar="FILE.csv",
-        help="write the score cards' figures, a line for each run",
-    )
-    parser.add_argument(
-        "--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help="draw the comparison"
-    )
+    lines = "write the score cards' figures, a line for each run"
+    add("--csv", type=file_ending(".csv"), metavar="FILE.csv", help=lines)
+    add("--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help="draw the comparison")
 
 
 def _controller(text: str) -> str:

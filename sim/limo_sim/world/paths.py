@@ -54,8 +54,7 @@ class FloorPlan:
         """Where ways may turn: float64 (k, 2) [m]."""
         kept = _pairs([node for node in self._corners if max(map(abs, node)) <= self._half - self._margin])
         # A node within another widened obstacle is none: the way from it to itself crosses that obstacle.
-        free: F64 = kept[~self._crossed(kept, kept + 1e-9, self._margin)]
-        return free
+        return np.asarray(kept[~self._crossed(kept, kept + 1e-9, self._margin)])
 
     def away(self, position: F64) -> F64:
         """Return the way from each obstacle's nearest point to each place.
@@ -107,8 +106,7 @@ class FloorPlan:
         """Lengths of the straight ways from a place to every node [m]; inf where there is none."""
         straight = np.hypot(*(self._nodes - place).T)
         crossed = self._crossed(np.broadcast_to(place, self._nodes.shape), self._nodes, margin)
-        reach: F64 = np.where(crossed, np.inf, straight)
-        return reach
+        return np.asarray(np.where(crossed, np.inf, straight))
 
     @cached_property
     def _lengths(self) -> F64:

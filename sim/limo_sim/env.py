@@ -205,10 +205,8 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
             linear, angular = float(action[0]), float(action[1])
             if abs(linear) <= 1.0 and abs(angular) <= 1.0:
                 return linear, angular
-        raise gymnasium.error.InvalidAction(
-            f"action: got {action!r}, want two numbers in -1 … 1: forward speed in {SCALE.linear} m/s, turn rate in "
-            f"{SCALE.angular} rad/s"
-        )
+        units = f"forward speed in {SCALE.linear} m/s, turn rate in {SCALE.angular} rad/s"
+        raise gymnasium.error.InvalidAction(f"action: got {action!r}, want two numbers in -1 … 1: {units}")
 
     def _observe(self) -> Observation:
         arena = self._running()

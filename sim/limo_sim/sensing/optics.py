@@ -50,10 +50,8 @@ class Lens:
         images = self._bent(radii)
         rising = int(np.argmax(np.diff(images) <= 0)) or len(radii)
         shrink = np.interp(bent, images[:rising], radii[:rising]) / np.maximum(bent, 1e-12)
-        return (
-            (CENTRE_X + self._focal * x * shrink).astype(np.float32),
-            (CENTRE_Y + self._focal * y * shrink).astype(np.float32),
-        )
+        columns, rows = CENTRE_X + self._focal * x * shrink, CENTRE_Y + self._focal * y * shrink
+        return columns.astype(np.float32), rows.astype(np.float32)
 
     def image(self, picture: U8) -> U8:
         """Return what the lens makes of a colour image."""

@@ -77,17 +77,12 @@ class Paint:
 
     def __init__(self, scenario: Scenario, sides: list[Side]) -> None:
         self._texture, self._sides = scenario.walls_texture, sides
-        self._doors: list[tuple[tuple[float, float], float]] = []
         around = scenario.surroundings
-        for person in scenario.people:
-            if person.walks_in or (person.yields and math.isfinite(person.leaves_s)):
-                self._doors.append((door_of(person, around), person.height))
+        passing = (one for one in scenario.people if one.walks_in or (one.yields and math.isfinite(one.leaves_s)))
+        self._doors = [(door_of(person, around), person.height) for person in passing]
         plain = self._texture.kind == "plain" and not self._texture.posters
-        self._bare = {
-            number
-            for number, side in enumerate(sides)
-            if plain and not any(_on(side, place) for place, _ in self._doors)
-        }
+        doorless = (n for n, side in enumerate(sides) if not any(_on(side, place) for place, _ in self._doors))
+        self._bare = set(doorless) if plain else set()
         self.is_bare = len(self._bare) == len(sides)  #: whether there is nothing on any wall
         self._pictures: dict[int, list[U8]] = {}
 

@@ -86,9 +86,8 @@ def no_picture(source: ast.Module, takes: Sequence[Take]) -> Finding | None:
         return Finding(False, *_no_subscription(calls))
     if not calls.spun:
         name, line = next(iter(calls.nodes.items()))
-        return Finding(
-            False, f"the node {name!r} is made and never spun: without rclpy.spin(node) no callback runs", line
-        )
+        said = f"the node {name!r} is made and never spun: without rclpy.spin(node) no callback runs"
+        return Finding(False, said, line)
     line = next(calls.readers[topic] for topic in _IMAGES if topic in calls.readers)
     for said, there in calls.unmatched.items():
         if any(f"'{topic}'" in said for topic in _IMAGES):

@@ -78,13 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _known(file: Path, info: dict[str, Any]) -> int:
-    """Return how many pictures an earlier run has labelled; 0 where the folder is new or empty.
-
-    Raises
-    ------
-    UsageError
-        Something else lies there.
-    """
+    """Return how many pictures an earlier run has labelled, 0 where the folder is new or empty; refuse any other."""
     if not file.exists():
         refuse_to_overwrite([file.parent])
         return 0

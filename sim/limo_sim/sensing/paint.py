@@ -92,14 +92,9 @@ class Paint:
         return 1.0 if self._texture.kind == "plain" else 1.0 - self._texture.contrast / 2
 
     def draw(self, image: U8, faces: NDArray[np.int64], depth: NDArray[np.float32], camera: CameraPose) -> None:
-        """Draw what is on the walls over them.
+        """Draw what is on the walls over them in an image, uint8 (480, 640, 4): blue, green, red, 0.
 
-        Parameters
-        ----------
-        image
-            uint8 (480, 640, 4), blue, green, red, 0; the walls have their plain colour already.
-        faces, depth
-            (640,): which side the camera sees in each column, and how far away it is [m].
+        `faces` and `depth`, (640,), are which side the camera sees in each column, and how far away it is [m].
         """
         edges = [0, *(np.flatnonzero(np.diff(faces)) + 1).tolist(), WIDTH]
         for first, end in pairwise(edges):

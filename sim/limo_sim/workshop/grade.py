@@ -84,13 +84,7 @@ def _imported(module: str, texts: Sequence[str]) -> bool:
 
 
 def _files(folder: Path) -> Iterator[os.DirEntry[str]]:
-    """Yield the regular files of a folder and of those in it.
-
-    Raises
-    ------
-    ValueError
-        If it holds too much.
-    """
+    """Yield the regular files of a folder and of those in it; a `ValueError` says that it holds too much."""
     files, size, waiting = 0, 0, [(str(folder), 0)]
     while waiting:
         source, depth = waiting.pop()
@@ -158,10 +152,7 @@ def _scratch() -> Iterator[Path]:
 def _alone(file: Path, folder: Path, scratch: Path) -> Path:
     """Copy a file, and of a student's own folder the files in it; return the copy.
 
-    Raises
-    ------
-    ValueError
-        If the file is none, or the folder holds too much.
+    A `ValueError` says that the file is none, or that the folder holds too much.
     """
     if file.suffix in _PACKED:
         raise ValueError(f"it is a {file.suffix} file: wanted is a .py file, or a folder")

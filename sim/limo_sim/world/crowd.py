@@ -257,9 +257,8 @@ class Crowd:
         hidden[:, -1] |= ignore
         away = self._away(walkers, people)
         away[ignore, -1] = np.inf
-        for walker, push, (wanted, looks) in zip(
-            walkers, acceleration(people, away, hidden, MODEL), wishes, strict=True
-        ):
+        pushes = acceleration(people, away, hidden, MODEL)
+        for walker, push, (wanted, looks) in zip(walkers, pushes, wishes, strict=True):
             jolt = MANNERS.wander * math.hypot(*wanted) / math.sqrt(STEP_S)
             walker.move(push + jolt * walker.random.standard_normal(2), wanted, looks)
 

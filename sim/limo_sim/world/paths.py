@@ -25,16 +25,9 @@ _SLACK = 1e-3
 
 
 class FloorPlan:
-    """Obstacles on a floor: what is near, what hides what, and how to get round.
+    """Obstacles on a floor, in the arena's frame: what is near, what hides what, and how to get round.
 
-    Parameters
-    ----------
-    shapes
-        The obstacles, in the arena's frame.
-    half
-        The room's outer walls stand at ± this [m].
-    margin
-        Ways keep this distance from obstacles and outer walls [m].
+    The room's outer walls stand at ± `half`; ways keep a `margin` from them and from obstacles [m].
     """
 
     def __init__(self, shapes: Sequence[Disc | Rectangle], half: float, margin: float) -> None:
@@ -57,16 +50,9 @@ class FloorPlan:
         return np.asarray(kept[~self._crossed(kept, kept + 1e-9, self._margin)])
 
     def away(self, position: F64) -> F64:
-        """Return the way from each obstacle's nearest point to each place.
+        """Return the way from each obstacle's nearest point to each place, float64 (n, 2) [m].
 
-        Parameters
-        ----------
-        position
-            float64 (n, 2) [m].
-
-        Returns
-        -------
-        float64 (n, number of obstacles, 2) [m], rectangles first; nearly 0 for a place within one.
+        It is float64 (n, number of obstacles, 2) [m], rectangles first; nearly 0 for a place within one.
         """
         count = len(self._halves)
         apart = position[:, None] - self._middle[None, :]

@@ -57,16 +57,8 @@ class People:
 def acceleration(people: People, away: F64, hidden: NDArray[np.bool_], model: SocialForce) -> F64:
     """Return what the first n people feel: float64 (n, 2) [m/s²].
 
-    Parameters
-    ----------
-    people
-        Who and what moves in the room.
-    away
-        float64 (n, k, 2): from the nearest point of each obstacle to each person [m]; inf where one does not count.
-    hidden
-        bool (n, m): the person does not see the other, or does not care, so that it has no effect.
-    model
-        The parameters.
+    `away`, float64 (n, k, 2), is from the nearest point of each obstacle to each person [m], inf where one does not
+    count. Where `hidden`, bool (n, m), the person does not see the other, or does not care: it has no effect.
     """
     count = len(people.wanted)
     driven = (people.wanted - people.velocity[:count]) / model.relaxation_s

@@ -1,11 +1,13 @@
-"""A scenario's detector faults: as often, as long and as many as asked for, and the same for the same seed."""
+"""`[detector]` and `[vary]`: as much of each as is asked for, the same for the same seed, wherever a run begins."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +15,20 @@ from numpy.typing import NDArray
 from tests.sim.logs import Finds, figures
 
 from limo_hog.detections import Detections, Detector
-from limo_hog.follow import TrackingController
+from limo_hog.follow import ApproachController, TrackingController
 from limo_hog.follow.sense.detectors import HalfSize, Region, detector_named
+from limo_sim.env import LimoFollowV1
+from limo_sim.ros.live import run_live
+from limo_sim.ros.runner import run_node
+from limo_sim.ros.stage import Stage
+from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FaultySearch, fit_of
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.sweep import Run, in_processes, play
-from limo_sim.world.scenario import Camera, DetectorFaults, Person, Scenario
+from limo_sim.world.scenario import Camera, DetectorFaults, Person, Scenario, Vary
+from limo_sim.world.schema import ScenarioError
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
+from limo_sim.world.variants import of_run
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
 SILHOUETTES = ((100, 150, 60, 180), (420, 150, 60, 180))
@@ -216,3 +225,57 @@ def test_one_and_two_workers_play_the_same_runs(unkind: str) -> None:
     runs = [Run(unkind, "tracking", "hog", seed, 2.0) for seed in (0, 1)]
     one, two = (dict(in_processes(play, runs, workers)) for workers in (1, 2))
     assert all(figures(one[run]) == figures(two[run]) for run in runs)
+
+
+DRAWN = Scenario(
+    name="drawn", people=(Person(route=((2.5, 0.0, 0.0), (3.0, 1.5, 0.0))),), vary=Vary(clothes=True, place=0.4)
+)
+UNKIND = Scenario(name="unkind", detector=DetectorFaults(recall=0.5))
+
+
+@pytest.fixture
+def node(tmp_path: Path) -> Path:
+    (tmp_path / "node.py").write_text("import rclpy\nrclpy.init()\nrclpy.spin(rclpy.create_node('idle'))\n")
+    return tmp_path / "node.py"
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        lambda _: Arena(DRAWN, 3),
+        lambda _: run_episode(DRAWN, ApproachController(), detector_named("hog"), 0.2, 3),
+        lambda node: run_node(Stage(node, DRAWN, 0.5, 3)).episode,
+        lambda _: run_live(DRAWN, 3, 0.04, None),
+    ],
+    ids=["arena", "closed loop", "node", "arena on the network"],
+)
+def test_whoever_runs_meets_the_people_of_the_seed(start: Callable[[Path], Any], node: Path) -> None:
+    assert start(node).scenario == of_run(DRAWN, 3)
+
+
+def test_a_sweep_runs_with_the_people_of_the_seed(tmp_path: Path) -> None:
+    assert Arena(DRAWN).scenario == Arena(DRAWN, 0).scenario != Arena(DRAWN, 3).scenario
+    file = tmp_path / "drawn.toml"
+    file.write_text("[vary]\nplace = 0.4\n[[people]]\nroute = [[2.5, 0.0, 0.0], [3.0, 1.5, 0.0]]\n", encoding="utf-8")
+    cards = [play(Run(str(file), "approach", "hog", seed, 0.2)) for seed in (3, 4, 3)]
+    assert cards[0].scenario_hash == cards[2].scenario_hash != cards[1].scenario_hash
+
+
+def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
+    env = LimoFollowV1(DRAWN)
+    places = [env.reset(seed=seed)[0].tolist() for seed in (0, 1, 0)]
+    assert places[0] == places[2] != places[1]
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        lambda node: Stage(node, UNKIND, 0.5),
+        lambda _: run_live(UNKIND, 0, 0.04, None),
+        lambda _: LimoFollowV1(UNKIND, "camera"),
+    ],
+    ids=["run", "arena", "images of LimoFollow-v1"],
+)
+def test_faults_are_refused_where_the_detector_is_anothers(start: Callable[[Path], object], node: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"scenario 'unkind': detector: .*; leave the table out"):
+        start(node)

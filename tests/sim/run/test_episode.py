@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.hardening.lost_senses import Ride, Row, judged
 from tests.sim.logs import Finds, commands, drive, figures, steps_of
 
 from limo_hog.detector import PeopleDetector
@@ -148,3 +149,21 @@ def test_in_the_corridor_one_person_walks_ahead_and_the_other_passes_the_robot()
     in_corridor = (towards[:, 0] > -7.5) & (towards[:, 0] < 1.0)
     assert np.abs(towards[in_corridor, 1]).max() < 0.95
     assert arena.contacts.person == 0
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        Row(3, ("scan",), 0.0),
+        Row(0, ("depth", "camera_info"), 0.0),
+        Row(1, ("scan", "odometry"), 2.0),
+        Row(2, ("depth",), 2.0),
+        Row(0, ("camera",), 2.0, "odometry", 100.0),
+        Row(1, ("scan",), 2.0, "camera", -0.3),
+    ],
+    ids=str,
+)
+def test_without_a_sense_the_robot_stands_and_says_which(row: Row) -> None:
+    ride = Ride(row.seed, row.shifted, row.shift)
+    ride.until(row.at)
+    assert judged(ride, row).wrong == []

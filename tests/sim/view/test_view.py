@@ -1,4 +1,4 @@
-"""The live page's pace, parameters and numbers."""
+"""The live page's pace, parameters and numbers; and the figure of many runs, on which everything can be read."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ import socket
 import statistics
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from tests.sim.logs import steps_of
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from tests.sim.logs import card, person, step, steps_of
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
@@ -23,8 +27,10 @@ from limo_hog.live.controls import Parameter, ParameterError
 from limo_hog.live.pace import Pace
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
+from limo_sim.run.sweep import summarise
 from limo_sim.view.reading import depth_colours, depth_picture, figures, followed_person, measured_m, rollouts
 from limo_sim.view.server import View
+from limo_sim.view.sweep_plot import plot
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
 
@@ -183,3 +189,33 @@ def test_a_run_goes_on_with_every_parameter_at_its_bound(name: str, bound: str) 
     steps = steps_of(WORKSHOP, controller, DETECTOR, 6, 0)
     reasons = [step.log.decision.reason for step in steps]
     assert not any("failed" in reason or "finite" in reason for reason in reasons), set(reasons)
+
+
+@pytest.fixture
+def figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Figure:
+    drawn: list[Figure] = []
+    save = Figure.savefig
+
+    def kept(self: Figure, *args: object, **options: object) -> None:
+        drawn.append(self)
+        save(self, *args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    one = replace(card(step(0, person())), success=False, time_to_find_again_s=None, intrusion_personal=0.0)
+    plot(summarise([one, replace(one, seed=1)]), tmp_path / "a.png")
+    return drawn[0]
+
+
+def test_no_title_is_cut_off(figure: Figure) -> None:
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    titles = [axes._left_title.get_window_extent(canvas.get_renderer()) for axes in figure.axes]  # type: ignore[attr-defined]
+    assert all(left.x1 < right.x0 for left, right in pairwise(titles))
+    assert titles[-1].x1 < figure.bbox.x1
+
+
+def test_a_marker_at_0_is_whole_and_an_empty_panel_says_so(figure: Figure) -> None:
+    assert all(axes.get_xlim()[0] < 0 for axes in figure.axes)
+    said = [[text.get_text() for text in axes.texts] for axes in figure.axes]
+    assert said[3] == ["no data"]
+    assert said[0] == said[4] == []

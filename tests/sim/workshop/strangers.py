@@ -6,9 +6,11 @@ it.
 
 from __future__ import annotations
 
+import csv
 import re
 from pathlib import Path
 
+from limo_hog.cli.main import main
 from limo_sim.workshop.check import Verdict, examine
 
 #: A class that does all in the callback of the image.
@@ -295,6 +297,21 @@ def checked(folder: Path, text: str, exercise: str = "follower") -> list[Verdict
     """Return what the checker says of a node."""
     (folder / "node.py").write_text(text, encoding="utf-8")
     return examine(folder / "node.py", exercise).verdicts
+
+
+def written(folder: Path, **texts: str) -> Path:
+    """Write files of these names, and return their folder."""
+    folder.mkdir(exist_ok=True)
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text)
+    return folder
+
+
+def table_of(folder: Path, *options: str) -> dict[str, dict[str, str]]:
+    """Grade a folder by the command line; return its rows by file."""
+    table = folder.parent / f"{folder.name}.csv"
+    assert main(["workshop", "grade", str(folder), "--csv", str(table), *options]) == 0
+    return {row["file"]: row for row in csv.DictReader(table.read_text(encoding="utf-8").splitlines())}
 
 
 def exchanged(text: str, exchanges: str) -> str:

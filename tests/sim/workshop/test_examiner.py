@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import gc
 import weakref
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import CALLBACK, SEQUEL, WRONG, checked, exchanged
+from tests.sim.workshop.strangers import CALLBACK, SEQUEL, WRONG, checked, exchanged, table_of, written
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution
@@ -104,17 +103,11 @@ def test_commands_that_the_robot_cannot_get_are_told_as_ros_tells_it(tmp_path: P
 
 def test_an_exercise_can_be_a_lecturers_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.toml").write_text(QUICK)
-    (tmp_path / "class").mkdir()
-    for name, text in (("amy", CALLBACK), ("bob", TURNS_AWAY)):
-        (tmp_path / "class" / f"{name}.py").write_text(text)
-    node = str(tmp_path / "class" / "amy.py")
-    own = ["--exercise", str(tmp_path / "mine.toml")]
-    assert main(["workshop", "check", node, *own, "--html", str(tmp_path / "amy.html")]) == 0
+    folder, own = written(tmp_path / "class", amy=CALLBACK, bob=TURNS_AWAY), ["--exercise", str(tmp_path / "mine.toml")]
+    assert main(["workshop", "check", str(folder / "amy.py"), *own, "--html", str(tmp_path / "amy.html")]) == 0
     assert "100 of 100 points" in capsys.readouterr().out
     assert "a lecturer&#x27;s own" in (tmp_path / "amy.html").read_text()
-    table = tmp_path / "points.csv"
-    assert main(["workshop", "grade", str(tmp_path / "class"), *own, "--csv", str(table)]) == 0
-    assert [row["points"] for row in csv.DictReader(table.read_text().splitlines())] == ["100", "40"]
+    assert [row["points"] for row in table_of(folder, *own).values()] == ["100", "40"]
 
 
 @pytest.mark.parametrize(
@@ -161,13 +154,10 @@ def test_a_class_is_one_row_and_page_a_student(tmp_path: Path, capsys: pytest.Ca
         path = folder / "amy" / "amy_pkg" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    (folder / "bob.py").write_text("# mine\n" + solution("follower").replace("twist", "command"))
-    (folder / "eve.py").write_text("import rclpy\nraise ValueError('=1+1 \\x1b[2J')\n")
+    copy = "# mine\n" + solution("follower").replace("twist", "command")
+    written(folder, bob=copy, eve="import rclpy\nraise ValueError('=1+1 \\x1b[2J')\n")
     (folder / "=ian.ipynb").write_text("{}")
-    table = tmp_path / "points.csv"
-    options = ["--csv", str(table), "--html", str(tmp_path / "pages")]
-    assert main(["workshop", "grade", str(folder), *options]) == 0
-    rows = {row["file"]: row for row in csv.DictReader(table.read_text(encoding="utf-8").splitlines())}
+    rows = table_of(folder, "--html", str(tmp_path / "pages"))
     assert {name: row["points"] for name, row in rows.items()} == {
         "'=ian.ipynb": "0",
         "amy/amy_pkg/amy_pkg/human_detector.py": "100",
@@ -178,7 +168,7 @@ def test_a_class_is_one_row_and_page_a_student(tmp_path: Path, capsys: pytest.Ca
     assert [rows["bob.py"][f"task_{task}"] for task in (1, 2, 3, 4)] == ["10", "25", "25", "40"]
     assert "4 files" in capsys.readouterr().err
     assert "wanted is a .py file" in rows["'=ian.ipynb"]["first_mistake"]
-    assert "\x1b" not in table.read_text()
+    assert "\x1b" not in (tmp_path / "class.csv").read_text()
     pages = {path.name for path in (tmp_path / "pages").iterdir()}
     assert pages == {"amy.amy_pkg.amy_pkg.human_detector.py.html", "bob.py.html", "eve.py.html"}
     assert "<svg" in (tmp_path / "pages" / "bob.py.html").read_text()

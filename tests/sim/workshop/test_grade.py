@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+from tests.sim.workshop.strangers import table_of, written
 
 from limo_hog.cli.main import main
 from limo_sim.ros.runner import Limits
@@ -18,21 +19,6 @@ from limo_sim.workshop import template
 from limo_sim.workshop.grade import grade, nodes_in
 
 LOOP = "while True:\n    try:\n        n = 0\n        while True: n += 1\n    except BaseException: pass\n"
-
-
-def written(folder: Path, **texts: str) -> Path:
-    """Write files of these names, and return their folder."""
-    folder.mkdir(exist_ok=True)
-    for name, text in texts.items():
-        (folder / f"{name}.py").write_text(text)
-    return folder
-
-
-def table_of(folder: Path) -> dict[str, dict[str, str]]:
-    """Grade a folder by the command line; return its rows by file."""
-    table = folder.parent / f"{folder.name}.csv"
-    assert main(["workshop", "grade", str(folder), "--csv", str(table)]) == 0
-    return {row["file"]: row for row in csv.DictReader(table.read_text(encoding="utf-8").splitlines())}
 
 
 @pytest.mark.parametrize(

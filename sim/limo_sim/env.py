@@ -157,7 +157,7 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
         arena = self._arena = Arena(scenario, int(self.np_random.integers(2**31)))
         self._walls = hiding(arena.scenario)
         self._noise = np.random.default_rng([arena.seed, SIGHTING_STREAM])
-        self._misses: list[Missing] = []
+        self._misses: list[Missing[Any]] = []
         if scenario.detector != DetectorFaults():
             self._misses = misses_of(scenario.detector, scenario.camera.rate_hz, 1, arena.seed)
         self._last: LastSeen | None = None
@@ -205,10 +205,8 @@ class LimoFollowV1(gymnasium.Env[Observation, NDArray[np.float32]]):
             linear, angular = float(action[0]), float(action[1])
             if abs(linear) <= 1.0 and abs(angular) <= 1.0:
                 return linear, angular
-        raise gymnasium.error.InvalidAction(
-            f"action: got {action!r}, want two numbers in -1 … 1: forward speed in {SCALE.linear} m/s, turn rate in "
-            f"{SCALE.angular} rad/s"
-        )
+        units = f"forward speed in {SCALE.linear} m/s, turn rate in {SCALE.angular} rad/s"
+        raise gymnasium.error.InvalidAction(f"action: got {action!r}, want two numbers in -1 … 1: {units}")
 
     def _observe(self) -> Observation:
         arena = self._running()
@@ -274,8 +272,7 @@ def _reward(seen: Glimpse | None, touched_person: int, touched_wall: int) -> dic
 
 
 def _rgb(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    rgb: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
-    return rgb
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
 
 def hiding(scenario: Scenario) -> FloorPlan:

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from tests.sim.ros.scripts import HEAD, node
-from tests.sim.workshop.strangers import RIGHT, WRONG, source
+from tests.sim.workshop.strangers import RIGHT, WRONG
 from tests.sim.workshop.test_hostile import FILES, IN_A_CALLBACK, THEN, left_running
 
 #: Short, so that hundreds are graded in minutes.
@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--kinds", type=int, default=60, help="how many different honest nodes")
     count, kinds = vars(parser.parse_args()).values()
-    honest = [source(one) for one in (*RIGHT.values(), *WRONG.values()) if one[0] == ""]
+    honest = [text for exercise, text in (*RIGHT.values(), *WRONG.values()) if exercise == "follower"]
     honest = honest[:: max(len(honest) // kinds, 1)]
     hostile = [HEAD + node(THEN + body) for body, _ in IN_A_CALLBACK.values()] + [text for text, _ in FILES.values()]
     with tempfile.TemporaryDirectory() as scratch:

@@ -22,9 +22,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Run the arena in real time, until Ctrl-C. With --ros2 its sensors are ROS 2 topics, and "
         "every publisher of /cmd_vel drives the robot: Humble, Jazzy, or limo-hog follow --ros2.",
     )
-    parser.add_argument(
-        "--ros2", action="store_true", help="publish and subscribe to ROS 2 topics over DDS, on this machine alone"
-    )
+    topics = "publish and subscribe to ROS 2 topics over DDS, on this machine alone"
+    parser.add_argument("--ros2", action="store_true", help=topics)
     add_scenario(parser, math.inf, "simulated time after which to stop (never)")
     add_watching(parser, plot=False)
     add_ros_arguments(parser)

@@ -28,19 +28,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Let the robot wander through the arena and write what its camera sees, with the boxes of people "
         "and furniture: DIR/coco.json and DIR/images, for `limo-hog train` and `limo-hog evaluate`.",
     )
-    parser.add_argument(
-        "--scenario", default="workshop", metavar="NAME|FILE.toml", help="the scenario to look at (%(default)s)"
-    )
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="a new or empty folder")
-    parser.add_argument("--frames", type=count, default=150, metavar="N", help="how many pictures (%(default)s)")
-    parser.add_argument(
-        "--every", type=seconds, default=1.0, metavar="S", help="simulated time between two (%(default)s)"
-    )
-    parser.add_argument("--depth", action="store_true", help="write depth pictures too: PNG, 16 bits, millimetres")
-    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
-    parser.add_argument(
-        "--resume", action="store_true", help="complete what an earlier run with the same options began"
-    )
+    add = parser.add_argument
+    add("--scenario", default="workshop", metavar="NAME|FILE.toml", help="the scenario to look at (%(default)s)")
+    add("--out", type=Path, required=True, metavar="DIR", help="a new or empty folder")
+    add("--frames", type=count, default=150, metavar="N", help="how many pictures (%(default)s)")
+    add("--every", type=seconds, default=1.0, metavar="S", help="simulated time between two (%(default)s)")
+    add("--depth", action="store_true", help="write depth pictures too: PNG, 16 bits, millimetres")
+    add("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
+    add("--resume", action="store_true", help="complete what an earlier run with the same options began")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -83,13 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _known(file: Path, info: dict[str, Any]) -> int:
-    """Return how many pictures an earlier run has labelled; 0 where the folder is new or empty.
-
-    Raises
-    ------
-    UsageError
-        Something else lies there.
-    """
+    """Return how many pictures an earlier run has labelled, 0 where the folder is new or empty; refuse any other."""
     if not file.exists():
         refuse_to_overwrite([file.parent])
         return 0

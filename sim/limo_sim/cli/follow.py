@@ -28,9 +28,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_follower(parser)
     add_scenario(parser, 60.0, "simulated time (60)")
     add_json(parser, "the score card as JSON")
-    parser.add_argument(
-        "--ros2", action="store_true", help="follow on a ROS 2 robot instead (see `follow --ros2 --help`)"
-    )
+    instead = "follow on a ROS 2 robot instead (see `follow --ros2 --help`)"
+    parser.add_argument("--ros2", action="store_true", help=instead)
     add_watching(parser)
 
 

@@ -14,15 +14,8 @@ from rich.table import Table
 from rich.text import Text
 
 from limo_hog.atomic import about, whole_file
-from limo_hog.cli.support.arguments import (
-    add_json,
-    add_robot,
-    add_target_and_detector,
-    count,
-    file_ending,
-    seconds,
-    seed,
-)
+from limo_hog.cli.support import arguments
+from limo_hog.cli.support.arguments import count, file_ending, seconds, seed
 from limo_hog.cli.support.console import console
 from limo_hog.cli.support.output import STDOUT, UsageError, write_json
 from limo_hog.cli.support.progress import progress
@@ -67,31 +60,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--scenario", nargs="+", metavar="NAME|FILE.toml", help="only these (all that come along)")
     which.add_argument("--suite", metavar="v1", help="the frozen scenarios of a benchmark, summed up by group")
-    parser.add_argument(
-        "--controller",
-        nargs="+",
-        type=_controller,
-        metavar="NAME",
-        default=CONTROLLERS,
-        help="only these, of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)",
+    add, named = (
+        parser.add_argument,
+        "of approach, proxemic, tracking, pursuit, ppo and policy:FILE.npz (the first three)",
     )
-    add_robot(parser)
-    parser.add_argument("--against", metavar="NAME", help="compare the others with this controller, run by run")
-    parser.add_argument("--seeds", type=count, default=20, metavar="N", help="how many of each (%(default)s)")
-    parser.add_argument("--seed-start", type=seed, default=0, metavar="N", help="the first of the seeds (%(default)s)")
-    parser.add_argument("--seconds", type=seconds, metavar="S", help=f"simulated time of a run ({_SECONDS:g})")
-    add_target_and_detector(parser)
-    parser.add_argument("--workers", type=count, metavar="N", help="processes (one for each core)")
-    add_json(parser, "every score card and the summary as JSON")
-    parser.add_argument(
-        "--csv",
-        type=file_ending(".csv"),
-        metavar="FILE.csv",
-        help="write the score cards' figures, a line for each run",
-    )
-    parser.add_argument(
-        "--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help="draw the comparison"
-    )
+    add("--controller", nargs="+", type=_controller, metavar="NAME", default=CONTROLLERS, help=f"only these, {named}")
+    arguments.add_robot(parser)
+    add("--against", metavar="NAME", help="compare the others with this controller, run by run")
+    add("--seeds", type=count, default=20, metavar="N", help="how many of each (%(default)s)")
+    add("--seed-start", type=seed, default=0, metavar="N", help="the first of the seeds (%(default)s)")
+    add("--seconds", type=seconds, metavar="S", help=f"simulated time of a run ({_SECONDS:g})")
+    arguments.add_target_and_detector(parser)
+    add("--workers", type=count, metavar="N", help="processes (one for each core)")
+    arguments.add_json(parser, "every score card and the summary as JSON")
+    lines = "write the score cards' figures, a line for each run"
+    add("--csv", type=file_ending(".csv"), metavar="FILE.csv", help=lines)
+    add("--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help="draw the comparison")
 
 
 def _controller(text: str) -> str:
@@ -157,13 +141,10 @@ def _runs(args: argparse.Namespace, suite: Suite | None) -> list[Run]:
     if suite is not None and args.seconds is not None:
         raise UsageError(f"--seconds and --suite {suite.name}: a run of this suite takes {suite.seconds:g} s")
     if args.against and args.against not in args.controller:
-        raise UsageError(
-            f"--against {args.against}: is none of the controllers, want one of {', '.join(args.controller)}"
-        )
-    if suite is None:
-        scenarios = args.scenario or Scenario.names()
-    else:
-        scenarios = [str(suite.path(entry)) for entry in suite.scenarios]
+        known = ", ".join(args.controller)
+        raise UsageError(f"--against {args.against}: is none of the controllers, want one of {known}")
+    frozen = [] if suite is None else [str(suite.path(entry)) for entry in suite.scenarios]
+    scenarios = frozen or args.scenario or Scenario.names()
     # The table and the score cards know a scenario by the name it gives itself.
     called: dict[str, str] = {}
     for name in scenarios:

@@ -28,12 +28,11 @@ def add_scenario(
     parser: argparse.ArgumentParser, default_seconds: float | None, seconds_help: str, more: str = ""
 ) -> None:
     """Add --scenario, --robot, --seconds and --seed."""
-    parser.add_argument(
-        "--scenario", default="workshop", metavar="NAME|FILE.toml", help=f"the scenario to run{more} (%(default)s)"
-    )
+    add = parser.add_argument
+    add("--scenario", default="workshop", metavar="NAME|FILE.toml", help=f"the scenario to run{more} (%(default)s)")
     add_robot(parser)
-    parser.add_argument("--seconds", type=seconds, default=default_seconds, metavar="S", help=seconds_help)
-    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
+    add("--seconds", type=seconds, default=default_seconds, metavar="S", help=seconds_help)
+    add("--seed", type=seed, default=0, metavar="N", help="of all random numbers (%(default)s)")
 
 
 def add_watching(parser: argparse.ArgumentParser, *, plot: bool = True) -> None:
@@ -44,21 +43,12 @@ def add_watching(parser: argparse.ArgumentParser, *, plot: bool = True) -> None:
         f"show the run, in real time, on a page ({PORT}), which opens where there is a display; without HOST to "
         "this machine alone. `follow` shows it unasked where nothing else is asked for",
     )
-    group.add_argument(
-        "--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="film what the follower saw (H.264)"
-    )
-    group.add_argument(
-        "--record",
-        type=file_ending(".mcap"),
-        metavar="FILE.mcap",
-        help="record everything sensed, found and commanded as ROS 2 messages (8 MB/s)",
-    )
-    group.add_argument(
-        "--plot",
-        type=file_ending(".png", ".svg", ".pdf"),
-        metavar="FILE.png",
-        help="draw path, pixel error, distance and speed in one figure" if plot else argparse.SUPPRESS,
-    )
+    add, figure = group.add_argument, "draw path, pixel error, distance and speed in one figure"
+    messages = "record everything sensed, found and commanded as ROS 2 messages (8 MB/s)"
+    add("--video", type=file_ending(".mp4"), metavar="FILE.mp4", help="film what the follower saw (H.264)")
+    add("--record", type=file_ending(".mcap"), metavar="FILE.mcap", help=messages)
+    shown = figure if plot else argparse.SUPPRESS
+    add("--plot", type=file_ending(".png", ".svg", ".pdf"), metavar="FILE.png", help=shown)
 
 
 def finish(args: argparse.Namespace, card: ScoreCard) -> None:

@@ -9,6 +9,7 @@ import shlex
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack, closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -46,36 +47,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         ("solution", "write the model solution; - is standard output"),
     ):
         one = actions.add_parser(action, help=words, description=words.capitalize() + ".")
-        one.add_argument(
-            "file", metavar="FILE.py", type=Path, nargs=None if action == "check" else "?", help="the node"
-        )
+        add = one.add_argument
+        add("file", metavar="FILE.py", type=Path, nargs=None if action == "check" else "?", help="the node")
         if action == "check":
-            one.add_argument(
-                "--hint",
-                nargs="?",
-                type=count,
-                const=1,
-                default=0,
-                metavar="N",
-                help="show N hints for the first checkpoint that does not hold (1)",
-            )
+            hints = "show N hints for the first checkpoint that does not hold (1)"
+            add("--hint", nargs="?", type=count, const=1, default=0, metavar="N", help=hints)
             add_json(one, "points and evidence as JSON")
-            one.add_argument("--html", metavar="FILE", help="write a report with the node's pictures as one page")
+            add("--html", metavar="FILE", help="write a report with the node's pictures as one page")
             _add_exercise(one)
-            one.add_argument(
-                "--gradescope", type=output_file, metavar="FILE", help="write results.json for a Gradescope autograder"
-            )
+            results = "write results.json for a Gradescope autograder"
+            add("--gradescope", type=output_file, metavar="FILE", help=results)
         else:
-            one.add_argument("--sequel", action="store_true", help="the second part: keep a distance")
+            add("--sequel", action="store_true", help="the second part: keep a distance")
     words = "check every node in a folder, each in a process of its own, and write a table of points"
     one = actions.add_parser("grade", help=words, description=words.capitalize() + ".")
-    one.add_argument("folder", metavar="FOLDER", type=Path, help="a .py file or a folder, such as a package, a student")
-    one.add_argument(
-        "--csv", type=output_file, metavar="FILE", default=STDOUT, help="where the table goes (-: standard output)"
-    )
-    one.add_argument("--seconds", type=seconds, default=100.0, metavar="S", help="wall time of a node (100)")
-    one.add_argument("--memory", type=count, default=4000, metavar="MB", help="memory of a node, not on Windows (4000)")
-    one.add_argument("--html", metavar="DIR", type=Path, help="write a page of feedback for each node into this folder")
+    add, table = one.add_argument, "where the table goes (-: standard output)"
+    add("folder", metavar="FOLDER", type=Path, help="a .py file or a folder, such as a package, a student")
+    add("--csv", type=output_file, metavar="FILE", default=STDOUT, help=table)
+    add("--seconds", type=seconds, default=100.0, metavar="S", help="wall time of a node (100)")
+    add("--memory", type=count, default=4000, metavar="MB", help="memory of a node, not on Windows (4000)")
+    add("--html", metavar="DIR", type=Path, help="write a page of feedback for each node into this folder")
     _add_exercise(one)
 
 
@@ -102,9 +93,8 @@ def run(args: argparse.Namespace) -> int:
             from limo_sim.workshop.html_report import to_html
             from limo_sim.workshop.report import to_gradescope, to_json
         # What the node prints must not mix with the report or the JSON.
-        examination = examine(
-            args.file, node, said=lambda _, text: print(text, end="", file=sys.stderr), workers=min(cores(), 2)
-        )
+        said = partial(print, end="", file=sys.stderr)
+        examination = examine(args.file, node, said=lambda _, text: said(text), workers=min(cores(), 2))
         verdicts = examination.verdicts
         if args.html:
             write_text(Path(args.html), to_html(args.file, node, examination))
@@ -190,9 +180,8 @@ def _show(verdicts: list[Verdict], hints: int) -> None:
             won = f"{verdict.points:3d}/{verdict.worth:<3d}" if verdict.worth else " " * 7
             title = f" task {task_name(verdict.task)} {won} {verdict.checkpoint}"
             if holds is None and len(several) > _FOLDED:
-                title = (
-                    f" {len(several)} checkpoints of task {task_name(verdict.task)} to {task_name(several[-1].task)}"
-                )
+                tasks = f"{task_name(verdict.task)} to {task_name(several[-1].task)}"
+                title = f" {len(several)} checkpoints of task {tasks}"
             screen.print(Text.assemble(marks[holds], title))
             if not holds:
                 told = Padding(Text(evidence(verdict), overflow="fold"), (0, 0, 0, 4), expand=False)

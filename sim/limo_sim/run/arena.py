@@ -237,9 +237,8 @@ class Arena:
     def _earlier(self, state: _State, age: float) -> tuple[CameraPose, list[Pose | None], tuple[Furniture, ...]]:
         """Return what there was some seconds before a state, within a step or a few of it."""
         (speed_x, speed_y), share = state.velocity, age / STEP_S
-        camera = CameraPose.on_robot(
-            self.robot, state.x - age * speed_x, state.y - age * speed_y, state.yaw - age * state.turn_rate
-        )
+        x, y, yaw = state.x - age * speed_x, state.y - age * speed_y, state.yaw - age * state.turn_rate
+        camera = CameraPose.on_robot(self.robot, x, y, yaw)
         people = [earlier(was, now, share) for was, now in zip(state.people_before, state.people, strict=True)]
         return camera, people, self._movers.at(max(state.time - age, 0.0))
 
@@ -301,8 +300,7 @@ class Arena:
 
     def _place_people(self) -> None:
         """Give each person the velocity that leads to their place at the end of the step."""
-        for index, pose in enumerate(self._crowd.poses):
-            person = self._people[index]
+        for index, (pose, person) in enumerate(zip(self._crowd.poses, self._people, strict=True)):
             if pose is None:
                 if person is not None:
                     self._space.remove(person, *person.shapes)

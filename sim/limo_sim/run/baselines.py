@@ -48,9 +48,8 @@ def controller_of(name: str, target: float | None = None) -> Controller[Any]:
         if target is not None:
             raise ControllerError(f"the controller {name} holds the distance it was trained for: leave --target out")
         return Policy(PPO_FILE if name == "ppo" else Path(name.removeprefix("policy:")))
-    raise ControllerError(
-        f"no controller {name!r}: want one of {', '.join((*CONTROLLERS, *BASELINES))}, policy:FILE.npz"
-    )
+    known = ", ".join((*CONTROLLERS, *BASELINES))
+    raise ControllerError(f"no controller {name!r}: want one of {known}, policy:FILE.npz")
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from statistics import NormalDist
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from limo_sim.sensing.camera import HEIGHT, WIDTH
 from limo_sim.world.scenario import DetectorFaults, Scenario
 from limo_sim.world.truth import Truth
 from limo_sim.world.variants import FALSE_STREAM, MISS_STREAM
+
+S = TypeVar("S")
 
 # What boxes on nothing look like. Measured: the 30 boxes that OpenCV's model finds, threshold 0, grouped, in 14
 # photographs without people, each at 1, 1.5 and 2 times its size, and mirrored. Few, so that a single parameter was
@@ -68,10 +70,12 @@ def fit_of(model: str) -> Fit:
     return Fit(photographs, arena, table["memory_s"], table["false_rate"])
 
 
-class Missing(ABC):
-    """When one person is missed."""
+class Missing(Generic[S]):
+    """When one person is missed: by the state of a process with a step for each period of the camera, and a height."""
 
-    _period = 0
+    def __init__(self, states: Iterator[S], is_missed: Callable[[S, float], bool]) -> None:
+        self._states, self._is_missed = states, is_missed
+        self._state, self._period = next(states), 0
 
     def at(self, period: int, height: float) -> bool:
         """Return whether the person, so high in the image [px], is missed in a period of the camera.
@@ -79,66 +83,52 @@ class Missing(ABC):
         No earlier period than the last one asked for.
         """
         for _ in range(period - self._period):
-            self._advance()
+            self._state = next(self._states)
         self._period = max(period, self._period)
-        return self._is_missed(height)
-
-    @abstractmethod
-    def _advance(self) -> None:
-        """Go on to the next period."""
-
-    @abstractmethod
-    def _is_missed(self, height: float) -> bool: ...
+        return self._is_missed(self._state, height)
 
 
-class FittedMisses(Missing):
-    """When one person is missed, by a model's fit.
+def _fitted(fit: Fit, rate_hz: float, random: np.random.Generator) -> Missing[float]:
+    """Return the misses of a model's fit.
 
     Missed while a standard normal process with correlation exp(-t / memory) is above the quantile of the share kept at
     the person's height: that share is kept at every height, and misses come in bursts at all of them.
     """
+    correlation = math.exp(-1.0 / (rate_hz * fit.memory_s))
 
-    def __init__(self, fit: Fit, rate_hz: float, random: np.random.Generator) -> None:
-        self._fit, self._random = fit, random
-        self._correlation = math.exp(-1.0 / (rate_hz * fit.memory_s))
-        self._value = float(random.standard_normal())
+    def values() -> Iterator[float]:
+        value = float(random.standard_normal())
+        while True:
+            yield value
+            value = correlation * value + math.sqrt(1.0 - correlation**2) * random.standard_normal()
 
-    def _advance(self) -> None:
-        new = math.sqrt(1.0 - self._correlation**2) * self._random.standard_normal()
-        self._value = self._correlation * self._value + new
-
-    def _is_missed(self, height: float) -> bool:
-        return NormalDist().cdf(self._value) >= self._fit.kept(height)
+    return Missing(values(), lambda value, height: NormalDist().cdf(value) >= fit.kept(height))
 
 
-class Misses(Missing):
-    """When one person is missed: a Markov chain of two states, one step for each period of the camera.
+def _in_bursts(faults: DetectorFaults, rate_hz: float, random: np.random.Generator) -> Missing[bool]:
+    """Return the misses of a Markov chain of two states, the same at every height.
 
     A burst is left with probability q = 1 / (its mean length in frames), and begins with q (1 - recall) / recall: the
     stationary share of found frames is `recall` (Gilbert's burst-noise channel, 1960).
     """
+    leaves = min(1.0 / (faults.burst_s * rate_hz), 1.0) if faults.recall > 0 else 0.0
+    begins = leaves * (1.0 - faults.recall) / faults.recall if faults.recall > 0 else 1.0
 
-    def __init__(self, faults: DetectorFaults, rate_hz: float, random: np.random.Generator) -> None:
-        self._random = random
-        self._leaves = min(1.0 / (faults.burst_s * rate_hz), 1.0)
-        self._begins = self._leaves * (1.0 - faults.recall) / faults.recall if faults.recall > 0 else 1.0
-        if faults.recall == 0:
-            self._leaves = 0.0
-        self._missed = bool(random.random() >= faults.recall)
+    def states() -> Iterator[bool]:
+        missed = bool(random.random() >= faults.recall)
+        while True:
+            yield missed
+            missed ^= bool(random.random() < (leaves if missed else begins))
 
-    def _advance(self) -> None:
-        self._missed ^= bool(self._random.random() < (self._leaves if self._missed else self._begins))
-
-    def _is_missed(self, height: float) -> bool:  # noqa: ARG002 - the same at every height
-        return self._missed
+    return Missing(states(), lambda missed, _: missed)
 
 
-def misses_of(faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> list[Missing]:
+def misses_of(faults: DetectorFaults, rate_hz: float, people: int, seed: int) -> list[Missing[Any]]:
     """Return when each person of a run is missed by a camera of `rate_hz` [Hz]."""
     randoms = [np.random.default_rng([seed, MISS_STREAM, person]) for person in range(people)]
     if faults.misses_like == "none":
-        return [Misses(faults, rate_hz, random) for random in randoms]
-    return [FittedMisses(fit_of(faults.misses_like), rate_hz, random) for random in randoms]
+        return [_in_bursts(faults, rate_hz, random) for random in randoms]
+    return [_fitted(fit_of(faults.misses_like), rate_hz, random) for random in randoms]
 
 
 class FaultySearch:

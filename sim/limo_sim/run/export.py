@@ -44,10 +44,7 @@ def labelled_frames(
 ) -> Iterator[tuple[TrueFrame, tuple[Thing, ...]]]:
     """Take `count` pictures, one every `every_s` seconds of the arena, while the robot wanders.
 
-    Yields
-    ------
-    frame, things
-        A frame, and all of which a part lies within the image, hidden or not.
+    Yield each frame, and all of which a part lies within the image, hidden or not.
     """
     arena = Arena(scenario, seed)
     random = np.random.default_rng([seed, WANDERING_STREAM])

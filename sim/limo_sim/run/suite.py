@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from limo_sim.run.provenance import fingerprint
-from limo_sim.world.schema import ScenarioError, build
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found]
+from limo_sim.world.schema import ScenarioError, build, from_toml
 
 _FOLDER = Path(__file__).parents[1] / "suites"
 
@@ -61,7 +55,7 @@ class Suite:
         """
         if name not in Suite.names():
             raise ScenarioError(f"unknown suite {name}: want one of {', '.join(Suite.names())}")
-        table = tomllib.loads((_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+        table = from_toml((_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
         suite = build(Suite, {"name": name, **table}, f"suite {name}: ")
         for entry in suite.scenarios:
             found = fingerprint(suite.path(entry).read_bytes())

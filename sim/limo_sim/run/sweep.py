@@ -141,10 +141,8 @@ def in_processes(task: Callable[[R], C], runs: Sequence[R], workers: int) -> Ite
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
     if missing:
-        raise WorkerError(
-            f"a worker process was killed, perhaps for want of memory: {missing} of {len(runs)} runs are missing; "
-            "fewer --workers need less"
-        )
+        killed = "a worker process was killed, perhaps for want of memory"
+        raise WorkerError(f"{killed}: {missing} of {len(runs)} runs are missing; fewer --workers need less")
 
 
 def summarise(cards: Sequence[ScoreCard], groups: Mapping[str, str] | None = None) -> list[Summary]:

@@ -51,8 +51,7 @@ class CameraPose:
 
     def to_camera(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Take points (N, 3) from the arena's frame to the camera's [m]."""
-        offset: NDArray[np.float64] = (points - np.array([self.x, self.y, self.height])) @ self.rotation.T
-        return offset
+        return np.asarray((points - np.array([self.x, self.y, self.height])) @ self.rotation.T)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,20 +22,10 @@ _ANGLES = np.linspace(-ANGLE_MAX, ANGLE_MAX, BEAMS)
 def cast(
     x: float, y: float, yaw: float, shapes: Iterable[Disc | Rectangle], half: float = ROOM_HALF
 ) -> NDArray[np.float64]:
-    """Distance [m] along every beam to the nearest wall or shape.
+    """Return the distance [m] along every beam to the nearest outer wall, at ± `half` [m], or shape in its plane.
 
-    Parameters
-    ----------
-    x, y, yaw
-        The lidar's pose in the arena's frame, inside the walls.
-    shapes
-        Obstacles at the height of its plane.
-    half
-        The outer walls stand at ± this [m].
-
-    Returns
-    -------
-    float64 (292,), counter-clockwise from -2 rad, without noise or limits.
+    It is float64 (292,), counter-clockwise from -2 rad, without noise or limits; x, y, yaw are the lidar's pose in the
+    arena's frame, inside the walls.
     """
     angles = _ANGLES + yaw
     cos, sin = np.cos(angles), np.sin(angles)

@@ -50,10 +50,8 @@ class Lens:
         images = self._bent(radii)
         rising = int(np.argmax(np.diff(images) <= 0)) or len(radii)
         shrink = np.interp(bent, images[:rising], radii[:rising]) / np.maximum(bent, 1e-12)
-        return (
-            (CENTRE_X + self._focal * x * shrink).astype(np.float32),
-            (CENTRE_Y + self._focal * y * shrink).astype(np.float32),
-        )
+        columns, rows = CENTRE_X + self._focal * x * shrink, CENTRE_Y + self._focal * y * shrink
+        return columns.astype(np.float32), rows.astype(np.float32)
 
     def image(self, picture: U8) -> U8:
         """Return what the lens makes of a colour image."""
@@ -97,14 +95,9 @@ class Shutter:
         self.is_instant = self._exposure == 0.0 and self._readout == 0.0
 
     def expose(self, picture: Callable[[float], U8], turn_rate: float) -> U8:
-        """Return the frame.
+        """Return the frame of a camera that turns [rad/s].
 
-        Parameters
-        ----------
-        picture
-            Draws the scene as it was so many seconds before the stamp: uint8 (480, 640, 3).
-        turn_rate
-            Of the camera [rad/s].
+        `picture` draws the scene as it was so many seconds before the stamp: uint8 (480, 640, 3).
         """
         time = self._exposure + self._readout
         shift = time * (abs(turn_rate) * self._focal + _PERSON_TURN * self._focal)

@@ -77,17 +77,12 @@ class Paint:
 
     def __init__(self, scenario: Scenario, sides: list[Side]) -> None:
         self._texture, self._sides = scenario.walls_texture, sides
-        self._doors: list[tuple[tuple[float, float], float]] = []
         around = scenario.surroundings
-        for person in scenario.people:
-            if person.walks_in or (person.yields and math.isfinite(person.leaves_s)):
-                self._doors.append((door_of(person, around), person.height))
+        passing = (one for one in scenario.people if one.walks_in or (one.yields and math.isfinite(one.leaves_s)))
+        self._doors = [(door_of(person, around), person.height) for person in passing]
         plain = self._texture.kind == "plain" and not self._texture.posters
-        self._bare = {
-            number
-            for number, side in enumerate(sides)
-            if plain and not any(_on(side, place) for place, _ in self._doors)
-        }
+        doorless = (n for n, side in enumerate(sides) if not any(_on(side, place) for place, _ in self._doors))
+        self._bare = set(doorless) if plain else set()
         self.is_bare = len(self._bare) == len(sides)  #: whether there is nothing on any wall
         self._pictures: dict[int, list[U8]] = {}
 
@@ -97,14 +92,9 @@ class Paint:
         return 1.0 if self._texture.kind == "plain" else 1.0 - self._texture.contrast / 2
 
     def draw(self, image: U8, faces: NDArray[np.int64], depth: NDArray[np.float32], camera: CameraPose) -> None:
-        """Draw what is on the walls over them.
+        """Draw what is on the walls over them in an image, uint8 (480, 640, 4): blue, green, red, 0.
 
-        Parameters
-        ----------
-        image
-            uint8 (480, 640, 4), blue, green, red, 0; the walls have their plain colour already.
-        faces, depth
-            (640,): which side the camera sees in each column, and how far away it is [m].
+        `faces` and `depth`, (640,), are which side the camera sees in each column, and how far away it is [m].
         """
         edges = [0, *(np.flatnonzero(np.diff(faces)) + 1).tolist(), WIDTH]
         for first, end in pairwise(edges):

@@ -101,22 +101,10 @@ class Renderer:
         time: float = 0.0,
         past: Earlier | None = None,
     ) -> tuple[U8, F32, list[Seen]]:
-        """Expose one frame.
+        """Expose one frame of what there is at the stamp, `time` [s]: people, and furniture beside the scenario's.
 
-        Parameters
-        ----------
-        camera, people, movers
-            What there is at the stamp; `movers` are pieces of furniture beside the scenario's.
-        noise
-            Of this frame.
-        time
-            The stamp [s].
-        past
-            What there was before, for a shutter that takes time; without it the shutter takes none.
-
-        Returns
-        -------
-        uint8 (480, 640, 3) BGR; float32 (480, 640) depth [m]; per person the visible share and the box.
+        Return uint8 (480, 640, 3) BGR; float32 (480, 640) depth [m]; per person the visible share and the box. `past`
+        is what there was before, for a shutter that takes time; without it the shutter takes none.
         """
         depth, seen = self._draw(camera, people, movers)
         if past is not None and not self._shutter.is_instant:

@@ -24,24 +24,17 @@ Columns = tuple[F32, NDArray[np.int64]]
 
 
 class Room:
-    """The room of one scenario, as its robot's camera sees it.
-
-    Attributes
-    ----------
-    columns
-        float32 (640,): how far to the right of straight ahead each column looks [m at 1 m].
-    floor_depth
-        float32 (480, 1): depth of the bare floor in each row [m]; inf above the horizon.
-    """
+    """The room of one scenario, as its robot's camera sees it."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-        geometry = scenario.robot.geometry
+        self._scenario, geometry = scenario, scenario.robot.geometry
         focal, self._height = geometry.focal_px(WIDTH), geometry.camera_z
         self._focal = focal
+        #: float32 (640,): how far to the right of straight ahead each column looks [m at 1 m]
         self.columns = ((np.arange(WIDTH) - CENTRE_X) / focal).astype(np.float32)
         rows = ((np.arange(HEIGHT) - CENTRE_Y) / focal).astype(np.float32)[:, None]
         with np.errstate(divide="ignore"):
+            #: float32 (480, 1): depth of the bare floor in each row [m]; inf above the horizon
             self.floor_depth: F32 = np.where(rows > 0, self._height / rows, np.inf).astype(np.float32)
         self._backdrop = self._make_backdrop()
         self._walls = [wall.footprint for wall in scenario.walls]

@@ -32,11 +32,8 @@ _ZONES = {Zone.INTIMATE: "#d1242f", Zone.PERSONAL: "#e8a317", Zone.SOCIAL: "#2da
 def plot(episode: Episode, steps: Sequence[Step], path: Path) -> None:
     """Draw an episode by its steps into a picture of the kind the path's suffix says."""
     figure = Figure(figsize=(11, 6.4), layout="constrained", dpi=150)
-    figure.suptitle(
-        f"{episode.scenario.name} · {episode.controller} · {episode.detector} · seed {episode.seed}",
-        color=_INK,
-        fontweight="bold",
-    )
+    title = f"{episode.scenario.name} · {episode.controller} · {episode.detector} · seed {episode.seed}"
+    figure.suptitle(title, color=_INK, fontweight="bold")
     grid = figure.add_gridspec(3, 2, width_ratios=[1, 1.1], height_ratios=[1, 1.2, 1])
     _path(figure.add_subplot(grid[:, 0]), episode.scenario, steps)
     error, distance, speed = (figure.add_subplot(grid[row, 1]) for row in range(3))
@@ -79,11 +76,8 @@ def _path(axes: Axes, scenario: Scenario, steps: Sequence[Step]) -> None:
         axes.plot(*people[-1:].T, "o", color=_PERSON)
     axes.plot(robot[:, 0], robot[:, 1], color=_ROBOT, linewidth=1.8, label="robot")
     every = max(1, len(robot) // 12)
-    looks = robot[::every]
-    axes.quiver(
-        looks[:, 0], looks[:, 1], np.cos(looks[:, 2]), np.sin(looks[:, 2]),
-        color=_ROBOT, scale=22, width=0.005, alpha=0.7,
-    )  # fmt: skip
+    x, y, yaw = robot[::every].T
+    axes.quiver(x, y, np.cos(yaw), np.sin(yaw), color=_ROBOT, scale=22, width=0.005, alpha=0.7)
     half = scenario.room.half
     axes.add_patch(Bar((-half, -half), 2 * half, 2 * half, fill=False, color=_INK, linewidth=2))
     axes.set_aspect("equal")

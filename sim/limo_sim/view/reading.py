@@ -104,8 +104,7 @@ def hits(scan: Scan | None, robot: RobotGeometry, poses: list[tuple[float, float
     hit[1::2] = False
     ahead = x + robot.lidar_x * math.cos(yaw) + ranges[hit] * np.cos(angles[hit])
     left = y + robot.lidar_x * math.sin(yaw) + ranges[hit] * np.sin(angles[hit])
-    points: list[list[float]] = np.round(np.stack([ahead, left], axis=1), 2).tolist()
-    return points
+    return list(np.round(np.stack([ahead, left], axis=1), 2).tolist())
 
 
 def believed(step: Step) -> list[list[float | None]]:
@@ -131,8 +130,7 @@ def rollouts(step: Step) -> list[list[list[float]]]:
         return []
     _, which = np.unique(np.round(belief.rollouts[:, -1], 1), axis=0, return_index=True)
     ways = np.concatenate([[belief.rollout], belief.rollouts[np.sort(which)]])
-    drawn: list[list[list[float]]] = _in_arena(ways[:, 2::3], step).tolist()
-    return drawn
+    return list(_in_arena(ways[:, 2::3], step).tolist())
 
 
 def _in_arena(places: NDArray[np.float64], step: Step) -> NDArray[np.float64]:

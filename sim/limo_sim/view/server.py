@@ -27,14 +27,7 @@ _BOX_S = 2.0
 class View(Live[Step]):
     """Serves the page of one run; a context manager, whose `watch` goes to `run_episode`.
 
-    Parameters
-    ----------
-    scenario
-        What is on the map.
-    controller
-        Whose parameters the page may set; None for a run without one of ours.
-    host, port, pace
-        As `Live` has them.
+    The page may set the parameters of `controller`, None for a run without one of ours; the rest is as `Live` has it.
     """
 
     def __init__(
@@ -74,6 +67,7 @@ class View(Live[Step]):
 
     def _welcome(self) -> dict[str, Any]:
         robot = self._scenario.robot.geometry
+        set_here = self._controller.parameters.values() if self._controller else ()
         return {
             "scenario": self._scenario.name,
             "room": self._scenario.room.half,
@@ -85,10 +79,7 @@ class View(Live[Step]):
             ],
             "zones": list(ZONE_ENDS.values()),
             "depth": {"far": self._scenario.depth.far_m, "colours": reading.depth_colours(self._scenario.depth.far_m)},
-            "parameters": [
-                {**asdict(one), "whole": one.whole}
-                for one in (self._controller.parameters.values() if self._controller else ())
-            ],
+            "parameters": [{**asdict(one), "whole": one.whole} for one in set_here],
         }
 
     def _state(self, step: Step) -> dict[str, Any]:
@@ -117,11 +108,8 @@ class View(Live[Step]):
         """Return who can be clicked on: number, whether followed, and the newest box x, y, w, h [px] of each."""
         belief = log.decision.belief
         boxes = {one.number: self._boxes.get(one.number, (-math.inf, [])) for one in belief.people}
-        return [
-            [number, number == belief.followed, *box]
-            for number, (at, box) in sorted(boxes.items())
-            if log.time - at < _BOX_S
-        ]
+        fresh = ((number, box) for number, (at, box) in sorted(boxes.items()) if log.time - at < _BOX_S)
+        return [[number, number == belief.followed, *box] for number, box in fresh]
 
     def _pictures(self, step: Step) -> list[bytes]:
         """Encode the pictures of a step: the camera's, the depth's and a node's windows; a letter tells which."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from limo_hog.atomic import about, whole_file
 from limo_hog.extras import needed
@@ -39,11 +39,8 @@ def plot(summaries: Sequence[Summary], path: Path) -> None:
     """Draw summaries into a picture of the kind the path's suffix says."""
     scenarios = list(dict.fromkeys(one.scenario for one in summaries))
     controllers = list(dict.fromkeys(one.controller for one in summaries))
-    figure = Figure(
-        figsize=(2.6 * len(_PANELS), 1.4 + (0.2 + 0.1 * len(controllers)) * len(scenarios)),
-        layout="constrained",
-        dpi=150,
-    )
+    size = 2.6 * len(_PANELS), 1.4 + (0.2 + 0.1 * len(controllers)) * len(scenarios)
+    figure = Figure(figsize=size, layout="constrained", dpi=150)
     panels = figure.subplots(1, len(_PANELS), sharey=True, squeeze=False)[0]
     for axes, (name, title, share) in zip(panels, _PANELS, strict=True):
         for place, controller in enumerate(controllers):
@@ -71,13 +68,7 @@ def _dots(axes: Axes, summaries: Sequence[Summary], name: str, scenarios: Sequen
     found = [(one.scenario, one.measures[name]) for one in summaries]
     dots = [(scenarios.index(where) + shift, estimate) for where, estimate in found if estimate is not None]
     colour, marker = _STYLES.get(summaries[0].controller, (_INK, "x"))
-    axes.errorbar(
-        [estimate.mean for _, estimate in dots],
-        [row for row, _ in dots],
-        xerr=[estimate.interval or 0.0 for _, estimate in dots],
-        fmt=marker,
-        markersize=4,
-        linewidth=1.2,
-        color=colour,
-        label=summaries[0].controller,
-    )
+    means, rows = [estimate.mean for _, estimate in dots], [row for row, _ in dots]
+    errors = [estimate.interval or 0.0 for _, estimate in dots]
+    style: dict[str, Any] = {"markersize": 4, "linewidth": 1.2, "fmt": marker, "color": colour}
+    axes.errorbar(means, rows, xerr=errors, label=summaries[0].controller, **style)

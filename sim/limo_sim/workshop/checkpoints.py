@@ -159,8 +159,7 @@ def speaks(takes: Sequence[Take], seconds: float = SILENCE) -> Finding:
         if not seen:
             continue
         times = [command.time for command in take.outcome.stage.commands if command.time < seen[-1]]
-        times = [0.0, *times, seen[-1]]
-        gap, at = max((b - a, a) for a, b in itertools.pairwise(times))
+        gap, at = max((b - a, a) for a, b in itertools.pairwise([0.0, *times, seen[-1]]))
         if gap > seconds + 1e-6 and not blocked(take):
             said = f"{take.scene.words}: no command for {gap:.1f} s after {at:.1f} s; the watchdog stops the robot"
             return Finding(False, said)

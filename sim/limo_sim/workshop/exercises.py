@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -15,22 +14,15 @@ from limo_sim.workshop import checkpoints, sights, stretch
 from limo_sim.workshop.mistakes import Finding
 from limo_sim.workshop.takes import Scene
 from limo_sim.world.scenario import Person, Scenario
-from limo_sim.world.schema import ScenarioError, build
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found]
+from limo_sim.world.schema import ScenarioError, build, from_toml, misfit
 
 _FOLDER = Path(__file__).with_name("exercises")
 
 #: What a checkpoint's `check` may be.
 CHECKS: dict[str, Callable[..., Finding]] = {
     **{name: getattr(sights, name) for name in ("shown", "found", "logged", "scaled_back", "best")},
-    **{
-        name: getattr(checkpoints, name)
-        for name in "stands turns dead_band drives speaks returns keeps limits figures".split()
-    },
+    **{name: getattr(checkpoints, name) for name in "stands turns dead_band drives speaks returns keeps".split()},
+    **{name: getattr(checkpoints, name) for name in ("limits", "figures")},
     **stretch.CHECKS,
 }
 
@@ -117,9 +109,7 @@ def exercise(name_or_path: str) -> Exercise:
     own = common["scene"] | file.scene
     for name in file.scenes:
         if name not in own:
-            raise ScenarioError(
-                f"{where}scenes: unknown scene {name!r}, want one of {', '.join(own)}, or [scene.{name}]"
-            )
+            raise misfit(f"{where}scenes", f"unknown scene {name!r}", f"one of {', '.join(own)}, or [scene.{name}]")
     keys = {name: f"{where}scene.{name}." for name in file.scenes}
     scenes = tuple(build(_SceneTable, own[name], key).scene(name, key) for name, key in keys.items())
     task = {"task": file.task} if file.task else {}
@@ -155,7 +145,7 @@ def _checkpoint(common: dict[str, Any], given: dict[str, Any], scenes: tuple[str
 
 def _table(path: Path) -> dict[str, Any]:
     try:
-        return dict(tomllib.loads(path.read_text(encoding="utf-8")))
+        return from_toml(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise ScenarioError(f"{path}: cannot be read as TOML: {getattr(error, 'strerror', None) or error}") from error
 

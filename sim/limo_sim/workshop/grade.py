@@ -31,9 +31,7 @@ _MOST_FILES, _DEEPEST, _MOST_BYTES = 1000, 8, 200 * 10**6
 #: Longest cell of the table [characters].
 _CELL = 1000
 #: Files of a package that are no nodes.
-_ASIDE = re.compile(
-    r"(^|/)((setup|conftest|__init__|test_[^/]*|[^/]*[._]launch)\.py$|(test|tests|launch|build|install)/)"
-)
+_ASIDE = re.compile(r"(^|/)((setup|conftest|__init__|test_[^/]*|[^/]*[._]launch)\.py$|(tests?|launch|build|install)/)")
 #: What students hand in that must be unpacked or exported first.
 _PACKED = (".zip", ".ipynb", ".gz", ".7z", ".rar")
 
@@ -86,13 +84,7 @@ def _imported(module: str, texts: Sequence[str]) -> bool:
 
 
 def _files(folder: Path) -> Iterator[os.DirEntry[str]]:
-    """Yield the regular files of a folder and of those in it.
-
-    Raises
-    ------
-    ValueError
-        If it holds too much.
-    """
+    """Yield the regular files of a folder and of those in it; a `ValueError` says that it holds too much."""
     files, size, waiting = 0, 0, [(str(folder), 0)]
     while waiting:
         source, depth = waiting.pop()
@@ -160,10 +152,7 @@ def _scratch() -> Iterator[Path]:
 def _alone(file: Path, folder: Path, scratch: Path) -> Path:
     """Copy a file, and of a student's own folder the files in it; return the copy.
 
-    Raises
-    ------
-    ValueError
-        If the file is none, or the folder holds too much.
+    A `ValueError` says that the file is none, or that the folder holds too much.
     """
     if file.suffix in _PACKED:
         raise ValueError(f"it is a {file.suffix} file: wanted is a .py file, or a folder")

@@ -42,12 +42,9 @@ def parsed(node: Path | str) -> ast.Module | None:
 
 def _first_call(source: ast.Module, function: str) -> int | None:
     """Return the first line that calls a function or a method of this name; None where there is none."""
-    lines = [
-        node.lineno
-        for node in ast.walk(source)
-        if isinstance(node, ast.Call) and function in (getattr(node.func, "attr", ""), getattr(node.func, "id", ""))
-    ]
-    return min(lines, default=None)
+    calls = (node for node in ast.walk(source) if isinstance(node, ast.Call))
+    named = ((call, getattr(call.func, "attr", ""), getattr(call.func, "id", "")) for call in calls)
+    return min((call.lineno for call, *names in named if function in names), default=None)
 
 
 def fingerprint(node: Path | str) -> str:
@@ -86,9 +83,8 @@ def no_picture(source: ast.Module, takes: Sequence[Take]) -> Finding | None:
         return Finding(False, *_no_subscription(calls))
     if not calls.spun:
         name, line = next(iter(calls.nodes.items()))
-        return Finding(
-            False, f"the node {name!r} is made and never spun: without rclpy.spin(node) no callback runs", line
-        )
+        said = f"the node {name!r} is made and never spun: without rclpy.spin(node) no callback runs"
+        return Finding(False, said, line)
     line = next(calls.readers[topic] for topic in _IMAGES if topic in calls.readers)
     for said, there in calls.unmatched.items():
         if any(f"'{topic}'" in said for topic in _IMAGES):

@@ -201,27 +201,19 @@ class Walker:
 
 
 class Crowd:
-    """All people of a run.
-
-    Attributes
-    ----------
-    poses
-        In the scenario's order, now; None for a person who is not in the arena.
-    """
+    """All people of a run."""
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         self._scenario = scenario
         people, around = scenario.people, scenario.surroundings
         self._walks = {index: Walk(person) for index, person in enumerate(people) if not person.yields}
-        self._walkers = {
-            index: Walker(
-                person, scenario, around.plan(person.way_margin), np.random.default_rng([seed, CROWD_STREAM, index])
-            )
-            for index, person in enumerate(people)
-            if person.yields
-        }
+        self._walkers: dict[int, Walker] = {}
+        for index, person in ((index, person) for index, person in enumerate(people) if person.yields):
+            random = np.random.default_rng([seed, CROWD_STREAM, index])
+            self._walkers[index] = Walker(person, scenario, around.plan(person.way_margin), random)
         self._movers = Movers(scenario.movers)
         self._plan = around.plan(max((person.way_margin for person in people if person.yields), default=0.0))
+        #: In the scenario's order, now; None for a person who is not in the arena.
         self.poses: tuple[Pose | None, ...] = ()
         self._time = 0.0
         self._robot: RobotPose | None = None  # where it was a step ago
@@ -265,9 +257,8 @@ class Crowd:
         hidden[:, -1] |= ignore
         away = self._away(walkers, people)
         away[ignore, -1] = np.inf
-        for walker, push, (wanted, looks) in zip(
-            walkers, acceleration(people, away, hidden, MODEL), wishes, strict=True
-        ):
+        pushes = acceleration(people, away, hidden, MODEL)
+        for walker, push, (wanted, looks) in zip(walkers, pushes, wishes, strict=True):
             jolt = MANNERS.wander * math.hypot(*wanted) / math.sqrt(STEP_S)
             walker.move(push + jolt * walker.random.standard_normal(2), wanted, looks)
 

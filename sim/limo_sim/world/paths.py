@@ -25,16 +25,9 @@ _SLACK = 1e-3
 
 
 class FloorPlan:
-    """Obstacles on a floor: what is near, what hides what, and how to get round.
+    """Obstacles on a floor, in the arena's frame: what is near, what hides what, and how to get round.
 
-    Parameters
-    ----------
-    shapes
-        The obstacles, in the arena's frame.
-    half
-        The room's outer walls stand at ± this [m].
-    margin
-        Ways keep this distance from obstacles and outer walls [m].
+    The room's outer walls stand at ± `half`; ways keep a `margin` from them and from obstacles [m].
     """
 
     def __init__(self, shapes: Sequence[Disc | Rectangle], half: float, margin: float) -> None:
@@ -54,20 +47,12 @@ class FloorPlan:
         """Where ways may turn: float64 (k, 2) [m]."""
         kept = _pairs([node for node in self._corners if max(map(abs, node)) <= self._half - self._margin])
         # A node within another widened obstacle is none: the way from it to itself crosses that obstacle.
-        free: F64 = kept[~self._crossed(kept, kept + 1e-9, self._margin)]
-        return free
+        return np.asarray(kept[~self._crossed(kept, kept + 1e-9, self._margin)])
 
     def away(self, position: F64) -> F64:
-        """Return the way from each obstacle's nearest point to each place.
+        """Return the way from each obstacle's nearest point to each place, float64 (n, 2) [m].
 
-        Parameters
-        ----------
-        position
-            float64 (n, 2) [m].
-
-        Returns
-        -------
-        float64 (n, number of obstacles, 2) [m], rectangles first; nearly 0 for a place within one.
+        It is float64 (n, number of obstacles, 2) [m], rectangles first; nearly 0 for a place within one.
         """
         count = len(self._halves)
         apart = position[:, None] - self._middle[None, :]
@@ -107,8 +92,7 @@ class FloorPlan:
         """Lengths of the straight ways from a place to every node [m]; inf where there is none."""
         straight = np.hypot(*(self._nodes - place).T)
         crossed = self._crossed(np.broadcast_to(place, self._nodes.shape), self._nodes, margin)
-        reach: F64 = np.where(crossed, np.inf, straight)
-        return reach
+        return np.asarray(np.where(crossed, np.inf, straight))
 
     @cached_property
     def _lengths(self) -> F64:

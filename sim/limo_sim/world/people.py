@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from limo_sim.world.furniture import Disc, Rectangle, distance_to
 from limo_sim.world.paths import FloorPlan
-from limo_sim.world.schema import WIDEST, ScenarioError, one_of, required, within
+from limo_sim.world.schema import WIDEST, ScenarioError, misfit, one_of, required, within
 
 # Corners of routes keep this distance from the walls [m]: the first, or a person's radius and the second, if that is
 # more. Chosen: the robot's diagonal is 0.364 m, so that a person does not press the robot against a wall.
@@ -148,26 +148,20 @@ def check_person(person: Person, around: Surroundings, where: str) -> None:
     half = math.floor(100 * (around.half - max(_WALL_DISTANCE, person.radius + _WALL_GAP))) / 100
     for index, (x, y, pause) in enumerate(person.route):
         if max(abs(x), abs(y)) > half:
-            raise ScenarioError(
-                f"{where}.route[{index}]: ({x:g}, {y:g}) is in a wall or too near one, "
-                f"want x and y in {-half:g} … {half:g}"
-            )
+            found = f"({x:g}, {y:g}) is in a wall or too near one"
+            raise misfit(f"{where}.route[{index}]", found, f"x and y in {-half:g} … {half:g}")
         if pause < 0:
             raise ScenarioError(f"{where}.route[{index}]: pause {pause:g} s, want 0 … 3600")
     if person.leaves_s <= person.arrives_s:
-        raise ScenarioError(
-            f"{where}.leaves_s: got {person.leaves_s:g}, want more than arrives_s, {person.arrives_s:g}"
-        )
+        raise misfit(f"{where}.leaves_s", f"got {person.leaves_s:g}", f"more than arrives_s, {person.arrives_s:g}")
     if person.sits and len(person.route) > 1:
         raise ScenarioError(f"{where}.sits: got true with {len(person.route)} corners, want a route of one corner")
     x, y, _ = person.route[0]
     if person.arrives_s == 0 and not person.walks_in:
         free = math.dist((x, y), around.robot) - person.radius
         if free < around.robot_radius:
-            raise ScenarioError(
-                f"{where}.route[0]: is {max(free, 0.0):.2f} m from the robot's centre, "
-                f"want at least {around.robot_radius:.2f} m"
-            )
+            found = f"is {max(free, 0.0):.2f} m from the robot's centre"
+            raise misfit(f"{where}.route[0]", found, f"at least {around.robot_radius:.2f} m")
     if person.yields:
         _check_yielding(person, around, where)
     else:
@@ -184,10 +178,8 @@ def _check_timetable(person: Person, around: Surroundings, where: str) -> None:
         for name, footprint in around.obstacles:
             gap = _gap(corner, after, footprint) - person.radius
             if gap < _CLEARANCE:
-                raise ScenarioError(
-                    f"{where}.route[{index}]: the way to the next corner passes {max(gap, 0.0):.2f} m "
-                    f"from {name}, want at least {_CLEARANCE} m"
-                )
+                found = f"the way to the next corner passes {max(gap, 0.0):.2f} m from {name}"
+                raise misfit(f"{where}.route[{index}]", found, f"at least {_CLEARANCE} m")
 
 
 def _check_yielding(person: Person, around: Surroundings, where: str) -> None:
@@ -197,24 +189,20 @@ def _check_yielding(person: Person, around: Surroundings, where: str) -> None:
         for name, footprint in around.obstacles:
             gap = distance_to(footprint, x, y)
             if gap < least - 1e-9:
-                raise ScenarioError(
-                    f"{where}.route[{index}]: is {max(gap, 0.0):.2f} m from {name}, want at least {least:.2f} m"
-                )
+                found = f"is {max(gap, 0.0):.2f} m from {name}"
+                raise misfit(f"{where}.route[{index}]", found, f"at least {least:.2f} m")
     first = person.route[0][:2]
     ends = [(f"route[{index}]", corner[:2]) for index, corner in enumerate(person.route)]
     if door := person.enters:
         if len(door) != 2 or abs(max(map(abs, door)) - around.half) > _ON_WALL:
-            raise ScenarioError(
-                f"{where}.enters: got {list(door)}, want [x, y] on an outer wall: the one or the other ±{around.half:g}"
-            )
+            want = f"[x, y] on an outer wall: the one or the other ±{around.half:g}"
+            raise misfit(f"{where}.enters", f"got {list(door)}", want)
         ends.append(("enters", before_door((door[0], door[1]), around.half, person.way_margin)))
     plan = around.plan(person.way_margin)
     for key, end in ends:
         if math.isinf(plan.way(first, end)[1]):
-            raise ScenarioError(
-                f"{where}.{key}: no way leads there from the first corner, want doors of at least "
-                f"{2 * person.way_margin:.2f} m for a person of {person.height:g} m"
-            )
+            want = f"doors of at least {2 * person.way_margin:.2f} m for a person of {person.height:g} m"
+            raise misfit(f"{where}.{key}", "no way leads there from the first corner", want)
 
 
 def before_door(door: tuple[float, float], half: float, distance: float) -> tuple[float, float]:

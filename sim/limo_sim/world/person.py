@@ -322,10 +322,7 @@ def colours(person: Person) -> list[Colour]:
 def trunk_radius(person: Person, pose: Pose, direction: float) -> float:
     """Return the distance [m] from the person's axis to the surface of the trunk that faces a camera.
 
-    Parameters
-    ----------
-    direction
-        In which the camera looks at the person [rad], arena's frame.
+    The camera looks at the person in a direction [rad] of the arena's frame.
     """
     turn = direction - pose.yaw
     depth, breadth = _TRUNK_HALF_DEPTH * math.cos(turn), _TRUNK_HALF_BREADTH * math.sin(turn)

@@ -23,12 +23,10 @@ def slab(origin: Any, direction: Rays, half: Any) -> tuple[Rays, Rays]:
 
 
 def meet(shape: Rectangle, x: float, y: float, ahead_x: Rays, ahead_y: Rays) -> tuple[Rays, NDArray[np.int64]]:
-    """Where rays from a place outside meet a rectangle.
+    """Return where rays from a place outside meet a rectangle, and the side they meet.
 
-    Returns
-    -------
-    The distance in lengths of the rays' direction, inf where they miss; and the side they meet: 0 … 3 for +x, +y, -x,
-    -y of the rectangle's own frame.
+    The distance is in lengths of the rays' direction, inf where they miss; the sides 0 … 3 are +x, +y, -x, -y of the
+    rectangle's own frame.
     """
     cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
     from_x, from_y = x - shape.x, y - shape.y

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,12 +14,17 @@ from limo_hog.follow.robot import LIMO, RobotGeometry, load_robot
 from limo_sim.world.furniture import Disc, Furniture, Rectangle, distance_to
 from limo_sim.world.movers import Mover
 from limo_sim.world.people import Group, Person, Surroundings, Vary, check_person
-from limo_sim.world.schema import WIDEST, ScenarioError, build, check_fields, one_of, required, within
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found]
+from limo_sim.world.schema import (
+    WIDEST,
+    ScenarioError,
+    build,
+    check_fields,
+    from_toml,
+    misfit,
+    one_of,
+    required,
+    within,
+)
 
 __all__ = [
     "ROOM_HALF",
@@ -33,16 +37,8 @@ __all__ = [
     "Imu",
     "Lidar",
     "Light",
-    "Mover",
-    "Person",
-    "Robot",
-    "Room",
-    "Scenario",
-    "Vary",
-    "Wall",
-    "WallsTexture",
-    "Wheels",
 ]
+__all__ += ["Mover", "Person", "Robot", "Room", "Scenario", "Vary", "Wall", "WallsTexture", "Wheels"]
 
 #: Where the walls' inner faces stand without `room.half`, ± this, and how high they are [m]; as in `hri_world.world`.
 ROOM_HALF, WALL_HEIGHT = 4.9, 1.0
@@ -57,24 +53,12 @@ _MOST = {"people": 64, "movers": 64, "furniture": 256, "walls": 256}
 
 @dataclass(frozen=True, slots=True)
 class WallsTexture:
-    """What is on the walls.
+    """What is on the walls."""
 
-    Attributes
-    ----------
-    kind
-        "plain", "bricks" or "boards" (upright).
-    contrast
-        By how much tiles and joints are darker than a plain wall, at most [1].
-    posters
-        Posters for each metre of wall [1/m].
-    seed
-        Of the tiles' shades and of what the posters show.
-    """
-
-    kind: str = one_of(("plain", "bricks", "boards"), "plain")
-    contrast: float = within(0.15, 0.0, 0.6)
-    posters: float = within(0.0, 0.0, 1.5)
-    seed: int = within(0, 0, 1_000_000)
+    kind: str = one_of(("plain", "bricks", "boards"), "plain")  #: "boards" are upright
+    contrast: float = within(0.15, 0.0, 0.6)  #: by how much tiles and joints are darker than a plain wall, at most [1]
+    posters: float = within(0.0, 0.0, 1.5)  #: posters for each metre of wall [1/m]
+    seed: int = within(0, 0, 1_000_000)  #: of the tiles' shades and of what the posters show
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,28 +109,15 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """The colour camera.
+    """The colour camera."""
 
-    Attributes
-    ----------
-    rate_hz, latency_s, drop_probability
-        Rate [Hz], age of a frame on arrival [s], share of frames lost.
-    noise
-        Of brightness [of 255].
-    exposure_s
-        How long each row is exposed: what moves is blurred [s].
-    readout_s
-        Between the first row and the last, of a rolling shutter [s].
-    k1, k2
-        Radial distortion, as in OpenCV's camera model; the limits keep it one to one within the image.
-    """
-
-    rate_hz: float = within(10.0, 0.5, 50.0)
-    latency_s: float = within(0.0, 0.0, 5.0)
-    drop_probability: float = within(0.0, 0.0, 1.0)
-    noise: float = within(1.0, 0.0, 20.0)
-    exposure_s: float = within(0.0, 0.0, 0.1)
-    readout_s: float = within(0.0, 0.0, 0.1)
+    rate_hz: float = within(10.0, 0.5, 50.0)  #: [Hz]
+    latency_s: float = within(0.0, 0.0, 5.0)  #: age of a frame on arrival [s]
+    drop_probability: float = within(0.0, 0.0, 1.0)  #: share of frames lost
+    noise: float = within(1.0, 0.0, 20.0)  #: of brightness [of 255]
+    exposure_s: float = within(0.0, 0.0, 0.1)  #: how long each row is exposed: what moves is blurred [s]
+    readout_s: float = within(0.0, 0.0, 0.1)  #: between the first row and the last, of a rolling shutter [s]
+    #: k1, k2: radial distortion, as in OpenCV's camera model; the limits keep it one to one within the image
     k1: float = within(0.0, -0.15, 0.3)
     k2: float = within(0.0, -0.02, 0.1)
 
@@ -189,35 +160,23 @@ class Imu:
 
 @dataclass(frozen=True, slots=True)
 class DetectorFaults:
-    """What a less kind detector would do: each person's misses come in bursts, and there are boxes on nothing.
+    """What a less kind detector would do: each person's misses come in bursts, and there are boxes on nothing."""
 
-    Attributes
-    ----------
-    misses_like
-        "opencv" or "limo": misses by the person's height in the image, bursts and false boxes as that model of people
-        has them on photographs (docs/detector-model.md); the other keys are then left out. "none": those count.
-    recall
-        Share of the camera's frames in which a person is not missed, in the long run, of those in which the detector
-        itself finds the person [0 … 1].
-    burst_s
-        Mean length of an unbroken row of missed frames [s].
-    false_rate
-        Mean number of false boxes in a frame that is searched as a whole.
-    """
-
+    #: "opencv" or "limo": misses by the person's height in the image, bursts and false boxes as that model of people
+    #: has them on photographs (docs/detector-model.md); the other keys are then left out. "none": those count.
     misses_like: str = one_of(("none", "opencv", "limo"), "none")
+    #: Share of the camera's frames in which a person is not missed, in the long run, of those in which the detector
+    #: itself finds the person [0 … 1].
     recall: float = within(1.0, 0.0, 1.0)
-    burst_s: float = within(0.3, 0.02, 60.0)
-    false_rate: float = within(0.0, 0.0, 20.0)
+    burst_s: float = within(0.3, 0.02, 60.0)  #: mean length of an unbroken row of missed frames [s]
+    false_rate: float = within(0.0, 0.0, 20.0)  #: mean number of false boxes in a frame that is searched as a whole
 
     def check(self, rate_hz: float, where: str) -> None:
         """Raise `ScenarioError` unless these keys go together, and a camera of `rate_hz` can show such bursts."""
         for name in ("recall", "burst_s", "false_rate") if self.misses_like != "none" else ():
             if getattr(self, name) != getattr(DetectorFaults(), name):
-                raise ScenarioError(
-                    f"{where}{name}: got {getattr(self, name):g} beside misses_like {self.misses_like!r}, "
-                    f"which has its own; give one of the two"
-                )
+                both = f"got {getattr(self, name):g} beside misses_like {self.misses_like!r}"
+                raise ScenarioError(f"{where}{name}: {both}, which has its own; give one of the two")
         if not 0.0 < self.recall < 1.0:
             return
         # At best every gap between two bursts is one frame long.
@@ -307,7 +266,7 @@ class Scenario:
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
         try:
-            table = tomllib.loads(text)
+            table = from_toml(text)
         # Beside its own error, which is a ValueError: numbers of thousands of digits, lists within hundreds of lists.
         except (ValueError, RecursionError) as error:
             raise ScenarioError(f"{path}: not TOML that can be read: {error}") from error
@@ -327,7 +286,7 @@ class Scenario:
         check_fields(self, where)
         for kind, most in _MOST.items():
             if len(getattr(self, kind)) > most:
-                raise ScenarioError(f"{where}{kind}: {len(getattr(self, kind))} of them, want at most {most}")
+                raise misfit(f"{where}{kind}", f"{len(getattr(self, kind))} of them", f"at most {most}")
         if math.hypot(*self.light.sun) < 0.1:
             raise ScenarioError(f"{where}light.sun: got {self.light.sun}, want a direction longer than 0.1")
         self.detector.check(self.camera.rate_hz, f"{where}detector.")
@@ -341,16 +300,12 @@ class Scenario:
                 key = f"{where}walls[{index}].{name}"
                 self._check_inside(place, 0.0, (f"{key}[0]", f"{key}[1]"))
             if wall.length < _SHORTEST_WALL:
-                raise ScenarioError(
-                    f"{where}walls[{index}]: is {wall.length:g} m long, want at least {_SHORTEST_WALL} m"
-                )
+                raise misfit(f"{where}walls[{index}]", f"is {wall.length:g} m long", f"at least {_SHORTEST_WALL} m")
         for name, footprint in self._obstacles():
             distance = distance_to(footprint, self.robot.x, self.robot.y)
             if distance < self.robot.radius:
-                raise ScenarioError(
-                    f"{where}{name.split(' ')[0]}: is {max(distance, 0.0):.2f} m from the robot's centre, "
-                    f"want at least {self.robot.radius:.2f} m"
-                )
+                found = f"is {max(distance, 0.0):.2f} m from the robot's centre"
+                raise misfit(f"{where}{name.split(' ')[0]}", found, f"at least {self.robot.radius:.2f} m")
         around = self.surroundings
         for index, person in enumerate(self.people):
             check_person(person, around, f"{where}people[{index}]")
@@ -372,16 +327,13 @@ class Scenario:
     def check_detector_is_plain(self, why: str) -> None:
         """Raise `ScenarioError` if `[detector]` asks for faults where none can be added, which `why` explains."""
         if self.detector != DetectorFaults():
-            raise ScenarioError(
-                f"scenario {self.name!r}: detector: {why}; leave the table out, or use `limo-hog follow` or `score`"
-            )
+            instead = "leave the table out, or use `limo-hog follow` or `score`"
+            raise ScenarioError(f"scenario {self.name!r}: detector: {why}; {instead}")
 
     def _obstacles(self) -> list[tuple[str, Disc | Rectangle]]:
         """Return what stands in the room, by the name that a message gives it."""
-        furniture = [
-            (f"furniture[{index}] ({piece.kind})", piece.footprint) for index, piece in enumerate(self.furniture)
-        ]
-        return [*furniture, *((f"walls[{index}]", wall.footprint) for index, wall in enumerate(self.walls))]
+        pieces = ((f"furniture[{index}] ({one.kind})", one.footprint) for index, one in enumerate(self.furniture))
+        return [*pieces, *((f"walls[{index}]", wall.footprint) for index, wall in enumerate(self.walls))]
 
     def _check_inside(self, place: tuple[float, float], distance: float, names: tuple[str, str]) -> None:
         """Refuse a place nearer to the outer walls than a distance [m]."""

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from limo_hog.exceptions import LimoHogError
 from limo_hog.follow.robot import RobotError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # type: ignore[import-not-found]
 
 T = TypeVar("T")
 
@@ -19,6 +25,16 @@ WIDEST = 15.0
 
 class ScenarioError(LimoHogError):
     """A scenario that cannot be run; the message names the file, the key and what is allowed."""
+
+
+def from_toml(text: str) -> dict[str, Any]:
+    """Parse TOML; what is none, or too deep, is a `ValueError` or a `RecursionError`."""
+    return dict(tomllib.loads(text))
+
+
+def misfit(key: str, found: str, want: str) -> ScenarioError:
+    """Return the error of a key: what was found there, and what is allowed."""
+    return ScenarioError(f"{key}: {found}, want {want}")
 
 
 @dataclass(frozen=True, slots=True)

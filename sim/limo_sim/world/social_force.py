@@ -57,16 +57,8 @@ class People:
 def acceleration(people: People, away: F64, hidden: NDArray[np.bool_], model: SocialForce) -> F64:
     """Return what the first n people feel: float64 (n, 2) [m/s²].
 
-    Parameters
-    ----------
-    people
-        Who and what moves in the room.
-    away
-        float64 (n, k, 2): from the nearest point of each obstacle to each person [m]; inf where one does not count.
-    hidden
-        bool (n, m): the person does not see the other, or does not care, so that it has no effect.
-    model
-        The parameters.
+    `away`, float64 (n, k, 2), is from the nearest point of each obstacle to each person [m], inf where one does not
+    count. Where `hidden`, bool (n, m), the person does not see the other, or does not care: it has no effect.
     """
     count = len(people.wanted)
     driven = (people.wanted - people.velocity[:count]) / model.relaxation_s
@@ -81,8 +73,7 @@ def from_borders(away: F64, scale: F64, model: SocialForce) -> F64:
     gap = np.where(counts, np.maximum(gap, _TINY), 1.0)
     size = scale[:, None]
     strength = np.where(counts, size * model.border / model.border_m * np.exp(-gap / (size * model.border_m)), 0.0)
-    pushes: F64 = (np.where(counts[..., None], away, 0.0) * (strength / gap)[..., None]).sum(axis=1)
-    return pushes
+    return np.asarray((np.where(counts[..., None], away, 0.0) * (strength / gap)[..., None]).sum(axis=1))
 
 
 def from_others(people: People, scale: F64, hidden: NDArray[np.bool_], model: SocialForce) -> F64:
@@ -106,5 +97,4 @@ def from_others(people: People, scale: F64, hidden: NDArray[np.bool_], model: So
     touching = people.radius[:count, None] + people.radius[None, :] - gap
     force += (model.stiffness * np.maximum(touching, 0.0) / gap)[..., None] * apart
     itself = np.arange(everyone)[None, :] == np.arange(count)[:, None]
-    pushes: F64 = np.where((itself | hidden)[..., None], 0.0, force).sum(axis=1)
-    return pushes
+    return np.asarray(np.where((itself | hidden)[..., None], 0.0, force).sum(axis=1))

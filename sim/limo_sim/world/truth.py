@@ -7,32 +7,22 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PersonTruth:
-    """One person at one instant.
+    """One person at one instant."""
 
-    Attributes
-    ----------
-    x, y, yaw
-        In the arena's frame [m, m, rad].
-    distance, bearing
-        From the robot's base centre to the person's axis [m], and its direction from straight ahead,
-        left positive [rad].
-    surface_distance
-        From the camera to the front of the person's trunk [m]: the distance that the depth image shows in the middle
-        of the person, and that a follower holds.
-    visible
-        Share of the person's silhouette in the image: 0 (hidden, or outside the image) … 1.
-    box
-        x, y, w, h [px] around the silhouette as if nothing stood in front of it, cut at the image's edge;
-        None when all of it is outside.
-    """
-
+    #: x, y, yaw: in the arena's frame [m, m, rad]
     x: float
     y: float
     yaw: float
+    #: distance, bearing: from the robot's base centre to the person's axis [m], and its direction from straight ahead,
+    #: left positive [rad]
     distance: float
     bearing: float
+    #: From the camera to the front of the person's trunk [m]: the distance that the depth image shows in the middle of
+    #: the person, and that a follower holds.
     surface_distance: float
-    visible: float
+    visible: float  #: share of the person's silhouette in the image: 0 (hidden, or outside the image) … 1
+    #: x, y, w, h [px] around the silhouette as if nothing stood in front of it, cut at the image's edge; None when all
+    #: of it is outside.
     box: tuple[int, int, int, int] | None
 
 
@@ -46,21 +36,10 @@ class Contacts:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The arena at one instant.
+    """The arena at one instant."""
 
-    Attributes
-    ----------
-    stamp
-        The instant [s].
-    robot
-        x, y, yaw of the base centre in the arena's frame [m, m, rad].
-    people
-        In the scenario's order; None for a person who is not in the arena, yet or any more.
-    contacts
-        Of the robot since the start.
-    """
-
-    stamp: float
-    robot: tuple[float, float, float]
+    stamp: float  #: the instant [s]
+    robot: tuple[float, float, float]  #: x, y, yaw of the base centre in the arena's frame [m, m, rad]
+    #: In the scenario's order; None for a person who is not in the arena, yet or any more.
     people: tuple[PersonTruth | None, ...]
-    contacts: Contacts
+    contacts: Contacts  #: of the robot since the start

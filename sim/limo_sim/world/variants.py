@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from limo_sim.world.scenario import Person, Scenario, Vary
-from limo_sim.world.schema import ScenarioError
+from limo_sim.world.schema import ScenarioError, misfit
 
 # The random streams of a run: what draws from one is `default_rng([seed, number, …])`, so that none changes another.
 # Every published figure rests on these numbers: a new stream takes the next one, and none is changed.
@@ -45,9 +45,8 @@ def of_run(scenario: Scenario, seed: int) -> Scenario:
         except ScenarioError:
             continue
         return drawn
-    raise ScenarioError(
-        f"{scenario.name}: vary: no people that fit found in {_TRIES} tries, want a smaller place or height"
-    )
+    found = f"no people that fit found in {_TRIES} tries"
+    raise misfit(f"{scenario.name}: vary", found, "a smaller place or height")
 
 
 def _another(person: Person, vary: Vary, random: np.random.Generator) -> Person:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -47,7 +46,6 @@ def test_pure_pursuit_stands_at_its_distance_and_never_backs_off() -> None:
     for x in (1.584, 1.2):
         assert PurePursuit().step(seeing((x, 0.0)), None).twist.linear == pytest.approx(0.0, abs=1e-6)
     nearer = controller_of("pursuit", 1.0)
-    assert nearer == PurePursuit(target_distance=1.0)
     assert nearer.step(seeing((1.2, 0.0)), None).twist.linear > 0
 
 
@@ -72,17 +70,16 @@ def test_the_person_is_the_one_nearest_to_the_last_sighting_not_the_surest() -> 
 
 
 def network(path: Path, *layers: tuple[NDArray[np.float32], NDArray[np.float32]]) -> Path:
-    arrays: dict[str, Any] = {}
-    for index, (weights, biases) in enumerate(layers):
-        arrays |= {f"w{index}": weights, f"b{index}": biases}
-    np.savez(path, **arrays)
+    arrays = {
+        f"{name}{index}": array for index, layer in enumerate(layers) for name, array in zip("wb", layer, strict=True)
+    }
+    np.savez(path, allow_pickle=False, **arrays)
     return path
 
 
 def test_a_policy_is_a_network_with_tanh_between_its_layers(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
-    w0, w1 = random.normal(size=(SIZE, 4)).astype(np.float32), random.normal(size=(4, 2)).astype(np.float32)
-    b0, b1 = random.normal(size=4).astype(np.float32), random.normal(size=2).astype(np.float32)
+    w0, w1, b0, b1 = (random.normal(size=size).astype(np.float32) for size in ((SIZE, 4), (4, 2), 4, 2))
     policy = controller_of(f"policy:{network(tmp_path / 'a.npz', (w0, b0), (w1, b1))}")
     assert isinstance(policy, Policy)
     state = random.normal(size=SIZE).astype(np.float32)
@@ -112,14 +109,13 @@ def test_wrong_controllers_are_refused_by_name(name: str, target: float | None, 
 
 
 def test_files_that_are_no_policies_are_refused_by_name(tmp_path: Path) -> None:
-    text = tmp_path / "text.npz"
-    text.write_text("no network", encoding="utf-8")
-    wrong = network(tmp_path / "wrong.npz", (np.zeros((4, 2), np.float32), np.zeros(2, np.float32)))
-    pickled = tmp_path / "pickled.npz"
-    np.savez(pickled, w0=np.array([object()]), b0=np.zeros(2))
-    for path, told in ((text, "cannot be read"), (wrong, "want a network from 9 numbers to 2"), (pickled, "cannot be")):
-        with pytest.raises(ControllerError, match=f"{path.name}: .*{told}"):
-            Policy(path)
+    (tmp_path / "text.npz").write_text("no network")
+    network(tmp_path / "wrong.npz", (np.zeros((4, 2), np.float32), np.zeros(2, np.float32)))
+    np.savez(tmp_path / "pickled.npz", w0=np.array([object()]), b0=np.zeros(2))
+    wanted = {"text": "cannot be read", "wrong": "want a network from 9 numbers to 2", "pickled": "cannot be"}
+    for name, told in wanted.items():
+        with pytest.raises(ControllerError, match=rf"{name}\.npz: .*{told}"):
+            Policy(tmp_path / f"{name}.npz")
 
 
 def test_the_policy_that_comes_along_earns_more_than_standing_still() -> None:

@@ -1,39 +1,38 @@
-"""A scenario's detector faults: as often, as long and as many as asked for, and the same for the same seed."""
+"""`[detector]` and `[vary]`: as much of each as is asked for, the same for the same seed, wherever a run begins."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.sim.run.steps import figures
+from tests.sim.logs import Finds, figures
 
 from limo_hog.detections import Detections, Detector
-from limo_hog.follow import TrackingController
+from limo_hog.follow import ApproachController, TrackingController
 from limo_hog.follow.sense.detectors import HalfSize, Region, detector_named
+from limo_sim.env import LimoFollowV1
+from limo_sim.ros.live import run_live
+from limo_sim.ros.runner import run_node
+from limo_sim.ros.stage import Stage
+from limo_sim.run.arena import Arena
 from limo_sim.run.detector_faults import FaultySearch, fit_of
 from limo_sim.run.episode import run_episode, score
 from limo_sim.run.sweep import Run, in_processes, play
-from limo_sim.world.scenario import Camera, DetectorFaults, Person, Scenario
+from limo_sim.world.scenario import Camera, DetectorFaults, Person, Scenario, Vary
+from limo_sim.world.schema import ScenarioError
 from limo_sim.world.truth import Contacts, PersonTruth, Truth
+from limo_sim.world.variants import of_run
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
 SILHOUETTES = ((100, 150, 60, 180), (420, 150, 60, 180))
 WINDOWS = np.array([[85, 120, 90, 240], [405, 120, 90, 240]], np.int32)
-
-
-class Sees:
-    """Finds the same windows in every image, whatever it shows."""
-
-    def __init__(self, windows: NDArray[np.int32] = WINDOWS) -> None:
-        self.found = Detections(windows, np.array([1.0, 0.8])[: len(windows)])
-
-    def detect(self, _image: NDArray[np.uint8]) -> Detections:
-        return self.found
 
 
 def truth(frame: int, rate: float = 10.0) -> Truth:
@@ -58,7 +57,7 @@ class Faulty:
 
 
 def seen(faults: DetectorFaults, frames: int, seed: int = 0, rate: float = 10.0) -> list[Detections]:
-    faulty = Faulty(Sees(), faults, seed, rate)
+    faulty = Faulty(Finds(*WINDOWS), faults, seed, rate)
     return [faulty.at(truth(frame, rate)) for frame in range(frames)]
 
 
@@ -78,15 +77,12 @@ def test_recall_and_bursts_are_those_asked_for_in_ten_thousand_frames(recall: fl
         assert abs(np.mean(bursts) - mean) < 4 * math.sqrt(mean * (mean - 1) / len(bursts))
 
 
-def test_people_are_missed_independently_of_each_other() -> None:
+def test_people_are_missed_independently_of_each_other_all_or_never() -> None:
     frames = seen(DetectorFaults(recall=0.5), 10_000)
     one, other = found_of(frames, 0), found_of(frames, 1)
     assert abs((one & other).mean() - 0.25) < 0.03
-
-
-@pytest.mark.parametrize(("recall", "share"), [(1.0, 1.0), (0.0, 0.0)])
-def test_recall_of_one_loses_nobody_and_recall_of_none_everybody(recall: float, share: float) -> None:
-    assert found_of(seen(DetectorFaults(recall=recall), 500), 0).mean() == share
+    for recall in (0.0, 1.0):
+        assert found_of(seen(DetectorFaults(recall=recall), 500), 0).mean() == recall
 
 
 def test_false_boxes_come_at_their_rate_within_the_image_and_best_first() -> None:
@@ -106,7 +102,7 @@ def test_false_boxes_come_at_their_rate_within_the_image_and_best_first() -> Non
 def test_a_seed_fixes_every_miss_and_false_box_whichever_frames_are_read() -> None:
     faults = DetectorFaults(recall=0.5, false_rate=0.5)
     every = seen(faults, 300, seed=4)
-    sparse = Faulty(Sees(), faults, 4)
+    sparse = Faulty(Finds(*WINDOWS), faults, 4)
     for frame in range(0, 300, 7):
         found = sparse.at(truth(frame))
         np.testing.assert_array_equal(found.windows, every[frame].windows)
@@ -139,7 +135,7 @@ def test_a_search_in_part_of_the_image_or_at_half_size_loses_the_same_people(win
 
 @pytest.mark.parametrize("half", [1, 2])
 def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(half: int) -> None:
-    faulty = Faulty(Sees(WINDOWS[:0]), DetectorFaults(false_rate=2.0))
+    faulty = Faulty(Finds(), DetectorFaults(false_rate=2.0))
     region = Region(32, 64, 512, 384, 200.0 * half)
     count = from_the_top = 0
     for frame in range(100):
@@ -158,7 +154,7 @@ def test_in_a_part_of_the_image_the_false_boxes_are_those_that_lie_within_it(hal
 
 
 def test_the_half_size_detector_keeps_its_own_boxes() -> None:
-    faulty = Faulty(HalfSize(Sees()), DetectorFaults(false_rate=0.001))
+    faulty = Faulty(HalfSize(Finds(*WINDOWS)), DetectorFaults(false_rate=0.001))
     np.testing.assert_array_equal(faulty.at(truth(0)).windows[:2], WINDOWS * 2)
 
 
@@ -168,7 +164,7 @@ def at_height(height: int, model: str, frames: int, seed: int = 0) -> NDArray[np
     person = PersonTruth(2.0, 0.0, 0.0, 2.0, 0.0, 1.8, 1.0, (x, y, height // 3, height))
     window = np.array([[x + height // 6 - height // 3, y - height // 6, 2 * height // 3, 4 * height // 3]], np.int32)
 
-    faulty = Faulty(Sees(window), DetectorFaults(misses_like=model), seed)
+    faulty = Faulty(Finds(*window), DetectorFaults(misses_like=model), seed)
     truths = [Truth(frame / 10, (0.0, 0.0, 0.0), (person, None), Contacts()) for frame in range(frames)]
     return np.array([(faulty.at(now).windows == window).all(axis=1).any() for now in truths])
 
@@ -214,23 +210,72 @@ def test_the_fits_are_probabilities_that_grow_with_the_height() -> None:
 
 @pytest.fixture
 def unkind(tmp_path: Path) -> str:
-    file = tmp_path / "unkind.toml"
-    file.write_text(
-        "[[people]]\nroute = [[3.0, 0.0, 0.0]]\n[detector]\nrecall = 0.5\nburst_s = 0.2\nfalse_rate = 0.2\n",
-        encoding="utf-8",
-    )
-    return str(file)
+    faults = "recall = 0.5\nburst_s = 0.2\nfalse_rate = 0.2\n"
+    (tmp_path / "unkind.toml").write_text(f"[[people]]\nroute = [[3.0, 0.0, 0.0]]\n[detector]\n{faults}")
+    return str(tmp_path / "unkind.toml")
 
 
 def test_in_the_closed_loop_the_card_shows_the_recall(unkind: str) -> None:
     episode = run_episode(Scenario.load(unkind), TrackingController(), detector_named("hog"), 20.0, 0)
-    card = score(episode)
-    assert card.detected is not None
     # 200 frames of a chain with a correlation of 0: four standard errors.
-    assert abs(card.detected - 0.5) < 4 * 0.5 / math.sqrt(200)
+    assert abs((score(episode).detected or 0.0) - 0.5) < 4 * 0.5 / math.sqrt(200)
 
 
 def test_one_and_two_workers_play_the_same_runs(unkind: str) -> None:
     runs = [Run(unkind, "tracking", "hog", seed, 2.0) for seed in (0, 1)]
     one, two = (dict(in_processes(play, runs, workers)) for workers in (1, 2))
     assert all(figures(one[run]) == figures(two[run]) for run in runs)
+
+
+DRAWN = Scenario(
+    name="drawn", people=(Person(route=((2.5, 0.0, 0.0), (3.0, 1.5, 0.0))),), vary=Vary(clothes=True, place=0.4)
+)
+UNKIND = Scenario(name="unkind", detector=DetectorFaults(recall=0.5))
+
+
+@pytest.fixture
+def node(tmp_path: Path) -> Path:
+    (tmp_path / "node.py").write_text("import rclpy\nrclpy.init()\nrclpy.spin(rclpy.create_node('idle'))\n")
+    return tmp_path / "node.py"
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        lambda _: Arena(DRAWN, 3),
+        lambda _: run_episode(DRAWN, ApproachController(), detector_named("hog"), 0.2, 3),
+        lambda node: run_node(Stage(node, DRAWN, 0.5, 3)).episode,
+        lambda _: run_live(DRAWN, 3, 0.04, None),
+    ],
+    ids=["arena", "closed loop", "node", "arena on the network"],
+)
+def test_whoever_runs_meets_the_people_of_the_seed(start: Callable[[Path], Any], node: Path) -> None:
+    assert start(node).scenario == of_run(DRAWN, 3)
+
+
+def test_a_sweep_runs_with_the_people_of_the_seed(tmp_path: Path) -> None:
+    assert Arena(DRAWN).scenario == Arena(DRAWN, 0).scenario != Arena(DRAWN, 3).scenario
+    file = tmp_path / "drawn.toml"
+    file.write_text("[vary]\nplace = 0.4\n[[people]]\nroute = [[2.5, 0.0, 0.0], [3.0, 1.5, 0.0]]\n", encoding="utf-8")
+    cards = [play(Run(str(file), "approach", "hog", seed, 0.2)) for seed in (3, 4, 3)]
+    assert cards[0].scenario_hash == cards[2].scenario_hash != cards[1].scenario_hash
+
+
+def test_every_episode_of_the_environment_draws_people_of_its_own() -> None:
+    env = LimoFollowV1(DRAWN)
+    places = [env.reset(seed=seed)[0].tolist() for seed in (0, 1, 0)]
+    assert places[0] == places[2] != places[1]
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        lambda node: Stage(node, UNKIND, 0.5),
+        lambda _: run_live(UNKIND, 0, 0.04, None),
+        lambda _: LimoFollowV1(UNKIND, "camera"),
+    ],
+    ids=["run", "arena", "images of LimoFollow-v1"],
+)
+def test_faults_are_refused_where_the_detector_is_anothers(start: Callable[[Path], object], node: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"scenario 'unkind': detector: .*; leave the table out"):
+        start(node)

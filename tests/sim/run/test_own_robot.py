@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.sim.logs import drive
 
 from limo_hog import PeopleDetector
 from limo_hog.follow import LIMO, Decision, Follower, Mode, RobotError, Twist
+from limo_hog.follow.robot import RobotGeometry
 from limo_hog.follow.sense.clearance import completed, scan_points
 from limo_hog.follow.sense.observation import Sensors
 from limo_sim.run.arena import Arena
@@ -39,15 +41,9 @@ def own(tmp_path: Path, text: str = OWN, scenario: str = "empty") -> Scenario:
 
 
 def quiet(scenario: Scenario) -> Scenario:
-    exact = Depth(noise=0.0, invalid=0.0, far_m=20.0)
-    return dataclasses.replace(
-        scenario,
-        depth=exact,
-        camera=Camera(noise=0.0),
-        lidar=Lidar(noise_m=0.0),
-        odometry=Wheels(slip=0.0),
-        room=Room(3.0),
-    )
+    exact: dict[str, Any] = {"depth": Depth(noise=0.0, invalid=0.0, far_m=20.0), "camera": Camera(noise=0.0)}
+    exact |= {"lidar": Lidar(noise_m=0.0), "odometry": Wheels(slip=0.0), "room": Room(3.0)}
+    return dataclasses.replace(scenario, **exact)
 
 
 def test_the_camera_sees_from_where_it_sits_and_as_wide_as_it_is(tmp_path: Path) -> None:
@@ -85,22 +81,15 @@ def test_the_scan_of_a_lidar_that_looks_where_the_camera_does_stays_as_it_is(tmp
 
 def test_wheels_do_what_the_file_says(tmp_path: Path) -> None:
     arena = Arena(quiet(own(tmp_path)))
-    for _ in range(60):
-        arena.command(Twist(1.0, 0.0))
-        arena.step()
-        if arena.time == pytest.approx(0.5):
-            assert arena.odometry().linear == pytest.approx(0.25, abs=0.011)
-    arena.command(Twist(0.0, 5.0))
-    for _ in range(150):
-        arena.command(Twist(0.0, 5.0))
-        arena.step()
-    assert arena.odometry().angular == pytest.approx(2 * 0.6 / 0.3, abs=1e-6)
+    assert drive(arena, 0.5, Twist(1.0, 0.0)).odometry().linear == pytest.approx(0.25, abs=0.011)
+    assert drive(arena, 3.0, Twist(0.0, 5.0)).odometry().angular == pytest.approx(2 * 0.6 / 0.3, abs=1e-6)
 
 
+@dataclasses.dataclass(frozen=True)
 class Ahead:
     """Drives ahead, whatever there is."""
 
-    robot = LIMO
+    robot: RobotGeometry = LIMO
 
     def start(self) -> None:
         return None
@@ -112,8 +101,7 @@ class Ahead:
 @pytest.mark.parametrize("text", ["", OWN], ids=["limo", "own"])
 def test_the_outline_keeps_its_distance_from_a_wall(text: str, tmp_path: Path) -> None:
     arena = Arena(quiet(own(tmp_path, text)))
-    controller: Any = dataclasses.make_dataclass("Ahead", [("robot", Any, LIMO)], bases=(Ahead,), frozen=True)()
-    follower = Follower(controller, PeopleDetector(), arena.robot)
+    follower = Follower(Ahead(), PeopleDetector(), arena.robot)
     while arena.time < 14.0:
         log = follower.tick(arena.time, arena.frame(), Sensors(arena.scan(), arena.odometry()))
         if log is not None:
@@ -131,14 +119,10 @@ def test_a_scenario_may_bring_its_robot_and_a_wrong_one_is_named(tmp_path: Path)
     assert scenario.robot.geometry == dataclasses.replace(LIMO, camera_z=0.25)
     assert scenario_hash(scenario) != scenario_hash(Scenario()) == scenario_hash(own(tmp_path, ""))
     (tmp_path / "wrong.toml").write_text("[robot.geometry]\ncamera_z = 5.0\n")
-    with pytest.raises(
-        ScenarioError, match=r"wrong\.toml: robot\.geometry\.camera_z: got 5\.0, want a number in 0\.02"
-    ):
+    with pytest.raises(ScenarioError, match=r"wrong\.toml: robot\.geometry\.camera_z: got 5\.0, want .* 0\.02"):
         Scenario.load(tmp_path / "wrong.toml")
     with pytest.raises(RobotError, match=r"robot\.toml: wings: unknown key"):
         own(tmp_path, "wings = 2")
     (tmp_path / "cone.toml").write_text('[[furniture]]\nkind = "cone"\nx = 1.0\ny = 0.0\n')
-    with pytest.raises(
-        ScenarioError, match=r"furniture\[0\]: is 0\.80 m from the robot's centre, want at least 1\.41 m"
-    ):
+    with pytest.raises(ScenarioError, match=r"furniture\[0\]: is 0\.80 m from .*, want at least 1\.41 m"):
         own(tmp_path, "half_length = 1.0\nhalf_width = 1.0", str(tmp_path / "cone.toml"))

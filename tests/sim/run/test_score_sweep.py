@@ -1,30 +1,43 @@
-"""Many runs: every card belongs to its run; worker processes end with their parent."""
+"""Many runs: cards belong to their runs and are summed up by textbook; workers end in time; suites are frozen."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import math
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.stats import t as student
+from scipy.stats import ttest_1samp
+from tests.sim.logs import card, person, step
 
-from limo_sim.run.sweep import Run, in_processes, play
+from limo_sim.run import suite as suites
+from limo_sim.run.arena import Arena
+from limo_sim.run.provenance import code_version, scenario_hash
+from limo_sim.run.score import ScoreCard
+from limo_sim.run.suite import Suite
+from limo_sim.run.sweep import Run, compare, estimate, in_processes, play, summarise
+from limo_sim.world.scenario import Camera, Scenario
+from limo_sim.world.schema import ScenarioError
 
 
 def test_every_card_belongs_to_its_run_whatever_the_scenario_calls_itself(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text('name = "another name"\n', encoding="utf-8")
-    runs = [
-        Run(str(file), "proxemic", "hog", 0, 0.2, 1.8),
-        Run("workshop", "approach", "hog", 1, 0.4),
-        Run("empty", "proxemic", "hog", 2, 0.1),
-    ]
+    (tmp_path / "mine.toml").write_text('name = "another name"\n')
+    runs = [Run(str(tmp_path / "mine.toml"), "proxemic", "hog", 0, 0.2, 1.8)]
+    runs += [Run("workshop", "approach", "hog", 1, 0.4), Run("empty", "proxemic", "hog", 2, 0.1)]
     cards = dict(in_processes(play, runs, 1))
     assert set(cards) == set(runs)
     assert [cards[run].scenario for run in runs] == ["another name", "workshop", "empty"]
@@ -79,9 +92,7 @@ def test_workers_end_with_their_parent_whatever_ends_it(number: signal.Signals) 
 
 
 @pytest.mark.parametrize("stop", [signal.SIGKILL, signal.SIGINT])
-def test_finished_runs_are_kept_when_a_worker_is_killed_or_score_is_stopped(
-    stop: signal.Signals, tmp_path: Path
-) -> None:
+def test_finished_runs_are_kept_when_a_worker_or_score_ends(stop: signal.Signals, tmp_path: Path) -> None:
     outputs = ["--json", str(tmp_path / "s.json"), "--csv", str(tmp_path / "s.csv")]
     with _scoring("--seeds", "300", "--seconds", "2", *outputs) as (child, workers):
         time.sleep(2.0)
@@ -99,3 +110,120 @@ def test_finished_runs_are_kept_when_a_worker_is_killed_or_score_is_stopped(
     else:
         assert code == 1 and line.startswith("limo-hog: a worker process was killed")
         assert f" {300 - len(runs)} of 300 runs" in line
+
+
+def test_the_interval_is_students() -> None:
+    values = [1.0, 2.0, 4.0, 4.5, 7.0, 2.5]
+    found = estimate(values)
+    half = student.ppf(0.975, 5) * np.std(values, ddof=1) / math.sqrt(6)
+    assert found.mean == pytest.approx(3.5)
+    assert found.interval == pytest.approx(half, rel=0.02)
+    assert (found.least, found.most) == (1.0, 7.0)
+    assert estimate([1.0, 2.0]).interval is not None
+    assert estimate([3.0]).interval is None
+    assert not estimate([3.0]).is_sure
+
+
+def test_cards_are_summed_up_by_scenario_and_controller() -> None:
+    one = card(step(0, person()))
+    summaries = summarise([one, replace(one, seed=1), replace(one, controller="other")])
+    assert [(s.controller, s.runs) for s in summaries] == [("c", 2), ("other", 1)]
+    assert summaries[0].measures["found_again"] is None
+
+
+def several(controller: str, figures: dict[tuple[str, int], float]) -> list[ScoreCard]:
+    """Return cards by scenario and seed that differ in one figure."""
+    plain = replace(card(step(0, person())), controller=controller)
+    return [replace(plain, scenario=name, seed=seed, path_wrong_m=value) for (name, seed), value in figures.items()]
+
+
+def test_a_group_is_averaged_seed_by_seed_and_its_interval_is_that_of_the_seeds() -> None:
+    cards = several("c", {("one", 0): 1.0, ("two", 0): 3.0, ("one", 1): 5.0, ("two", 1): 7.0})
+    (summary,) = summarise(cards, {"one": "both", "two": "both"})
+    assert (summary.scenario, summary.runs) == ("both", 4)
+    assert summary.measures["path_wrong_m"] == estimate([2.0, 6.0])
+
+
+def test_two_controllers_are_compared_run_by_run() -> None:
+    # A seed that is hard for both moves both figures, not their difference.
+    mine = several("mine", {("one", 0): 1.5, ("one", 1): 10.5, ("one", 2): 5.5})
+    theirs = several("theirs", {("one", 0): 1.0, ("one", 1): 10.0, ("one", 2): 5.0, ("one", 3): 50.0})
+    (comparison,) = compare([*mine, *theirs], "theirs")
+    assert (comparison.controller, comparison.against, comparison.pairs) == ("mine", "theirs", 3)
+    difference = comparison.differences["path_wrong_m"]
+    assert difference is not None
+    assert difference.mean == pytest.approx(0.5)
+    assert difference.interval == pytest.approx(0.0)
+    assert comparison.differences["found_again"] is None
+    overall = compare([*mine, *theirs], "theirs", {"one": "all"})[0]
+    assert (overall.scenario, overall.differences) == ("all", comparison.differences)
+
+
+@pytest.mark.parametrize("values", [[1.0, 2.0, 1.5], [-3.0, -2.5, -3.5, -2.9], [1.0, -1.0, 0.5], [0.1, 4.0, 0.2, -1.0]])
+def test_a_difference_is_sure_where_students_test_rejects_that_there_is_none(values: list[float]) -> None:
+    assert estimate(values).is_sure == (ttest_1samp(values, 0.0).pvalue < 0.05)
+
+
+@pytest.mark.parametrize("count", [51, 201, 1001])
+def test_students_quantile_is_right_to_the_third_power_of_the_degrees_of_freedom(count: int) -> None:
+    values = np.random.default_rng(1).normal(0.0, 1.0, count).tolist()
+    found, freedom = estimate(values), count - 1
+    assert found.interval is not None
+    quantile = found.interval / (np.std(values, ddof=1) / math.sqrt(count))
+    assert quantile == pytest.approx(float(student.ppf(0.975, freedom)), abs=5 / freedom**3)
+
+
+V1 = Suite.load("v1")
+
+
+def test_the_first_suite_has_twenty_scenarios_in_four_groups() -> None:
+    assert Counter(V1.groups.values()) == {"plain": 5, "senses": 5, "people": 5, "places": 5}
+    assert len({entry.sha256 for entry in V1.scenarios}) == 20
+    assert {path.stem for path in V1.path(V1.scenarios[0]).parent.glob("*.toml")} == set(V1.groups)
+
+
+@pytest.mark.parametrize("entry", V1.scenarios, ids=lambda entry: entry.name)
+def test_every_scenario_can_be_run_with_ten_seeds_and_its_people_differ(entry: suites.Entry) -> None:
+    scenario = Scenario.load(V1.path(entry))
+    assert scenario.summary
+    assert len({Arena(scenario, seed).scenario.people for seed in range(10)}) == 10
+
+
+def test_a_file_that_was_changed_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(suites._FOLDER, tmp_path, dirs_exist_ok=True)
+    monkeypatch.setattr(suites, "_FOLDER", tmp_path)
+    assert Suite.load("v1") == V1
+    file = tmp_path / "v1" / "door.toml"
+    file.write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
+    assert Suite.load("v1") == V1
+    file.write_text(file.read_text(encoding="utf-8") + "# easier\n", encoding="utf-8")
+    with pytest.raises(ScenarioError, match="unknown suite v0: want one of v1"):
+        Suite.load("v0")
+    with pytest.raises(ScenarioError, match=r"suite v1: door.toml has the SHA-256 .*those of another suite"):
+        Suite.load("v1")
+
+
+def test_the_page_of_the_benchmark_is_about_these_files() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    for entry in V1.scenarios:
+        assert f"| `{entry.name}` | {Scenario.load(V1.path(entry)).summary} | `{entry.sha256[:16]}` |" in page
+
+
+def test_scenarios_have_hashes_of_their_own_whatever_they_are_called() -> None:
+    names = Scenario.names()
+    assert len({scenario_hash(Scenario.load(name)) for name in names}) == len(names)
+    workshop = Scenario.load("workshop")
+    assert scenario_hash(dataclasses.replace(workshop, name="mine", summary="")) == scenario_hash(workshop)
+    assert scenario_hash(dataclasses.replace(workshop, camera=Camera(noise=1.001))) != scenario_hash(workshop)
+    # What it would have left out may be said.
+    told = dataclasses.replace(workshop, people=(dataclasses.replace(workshop.people[0], speed=0.75),), camera=Camera())
+    assert scenario_hash(told) == scenario_hash(workshop)
+
+
+def test_new_options_leave_the_hashes_of_old_scenarios_alone() -> None:
+    assert scenario_hash(Scenario.load("empty")) == "44136fa355b3678a"
+    assert scenario_hash(Scenario.load("workshop")) == "f6353cf7e6222da5"
+
+
+def test_the_code_is_told_by_versions_and_a_hash() -> None:
+    assert re.fullmatch(r"limo-hog \d+\.\d+\S*, limo-sim \d+\.\d+\S*, [0-9a-f]{16}", code_version())

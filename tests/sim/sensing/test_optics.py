@@ -9,12 +9,13 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.sim.logs import drive, there
 
 from limo_hog.follow.robot import LIMO, Twist
 from limo_sim.run.arena import Arena
 from limo_sim.sensing.camera import CENTRE_X, CENTRE_Y, HEIGHT, WIDTH, TrueFrame
 from limo_sim.sensing.optics import Lens, Shutter
-from limo_sim.world.scenario import Camera, Depth, Furniture, Light, Person, Scenario
+from limo_sim.world.scenario import Camera, Depth, Furniture, Light, Person, Robot, Scenario
 
 MATRIX = np.array([[LIMO.focal_px(640), 0, CENTRE_X], [0, LIMO.focal_px(640), CENTRE_Y], [0, 0, 1.0]])
 # A dark pillar in the middle of the image, nothing else.
@@ -28,9 +29,7 @@ def test_a_place_in_the_image_moves_as_opencvs_camera_model_says(k1: float, k2: 
     for column, row in places:
         cv2.circle(picture, (column, row), 6, (255, 255, 255), -1)
     bent = Lens(k1, k2, LIMO.focal_px(640)).image(picture)[..., 0].astype(float)
-    rays = np.array(
-        [[(u - CENTRE_X) / LIMO.focal_px(640), (v - CENTRE_Y) / LIMO.focal_px(640), 1.0] for u, v in places]
-    )
+    rays = np.array([(*place, 1.0) for place in places]) @ np.linalg.inv(MATRIX).T
     expected = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), MATRIX, np.array([k1, k2, 0.0, 0.0]))[0].reshape(-1, 2)
     for u, v in expected:
         if not (12 < u < WIDTH - 12 and 12 < v < HEIGHT - 12):
@@ -45,33 +44,25 @@ def test_a_place_in_the_image_moves_as_opencvs_camera_model_says(k1: float, k2: 
 def test_the_true_box_goes_round_the_bent_silhouette(k1: float) -> None:
     person = Person(route=((2.2, 0.9, 3600.0),))
     scenario = Scenario(camera=Camera(k1=k1), depth=Depth(noise=0.0, invalid=0.0))
-    there = Arena(dataclasses.replace(scenario, people=(person,)), 0).frame()
+    frame = Arena(dataclasses.replace(scenario, people=(person,)), 0).frame()
     empty = Arena(scenario, 0).frame()
-    rows, columns = np.nonzero(there.depth < empty.depth - 0.05)
-    truth = there.truth.people[0]
-    assert truth is not None
-    assert truth.box is not None
-    left, top, width, height = truth.box
+    rows, columns = np.nonzero(frame.depth < empty.depth - 0.05)
+    left, top, width, height = there(there(frame.truth.people[0]).box)
     # Nothing is cut off; a box's corner may bend farther than the silhouette, which has none.
-    for outside in (
-        columns.min() - left,
-        left + width - columns.max() - 1,
-        rows.min() - top,
-        top + height - rows.max() - 1,
-    ):
-        assert -1 <= outside <= 9
+    beside = columns.min() - left, left + width - columns.max() - 1
+    above = rows.min() - top, top + height - rows.max() - 1
+    assert all(-1 <= outside <= 9 for outside in (*beside, *above))
 
 
 @pytest.mark.parametrize(("x", "y"), [(1.7, 1.26), (2.5, 1.7), (2.5, 1.8), (3.5, 2.4)])
 def test_what_the_lens_moves_out_of_the_image_is_not_visible(x: float, y: float) -> None:
     people, pillar = (Person(route=((x, y, 3600.0),)),), (Furniture("pillar", x, -y),)
     scenario = Scenario(depth=Depth(noise=0.0, invalid=0.0), camera=Camera(k1=0.3, k2=0.1))
-    there = Arena(dataclasses.replace(scenario, people=people, furniture=pillar), 0)
-    assert np.array_equal(there.frame().depth, Arena(scenario, 0).frame().depth, equal_nan=True)
+    bent = Arena(dataclasses.replace(scenario, people=people, furniture=pillar), 0)
+    assert np.array_equal(bent.frame().depth, Arena(scenario, 0).frame().depth, equal_nan=True)
     plain = Arena(Scenario(people=people, furniture=pillar), 0)
-    for arena, within in ((plain, True), (there, False)):
-        person = arena.frame().truth.people[0]
-        assert person is not None
+    for arena, within in ((plain, True), (bent, False)):
+        person = there(arena.frame().truth.people[0])
         for visible, box in ((person.visible, person.box), *arena.furniture_in_frame()):
             assert bool(visible > 0.0) is within
             assert (box is not None) is within
@@ -80,11 +71,8 @@ def test_what_the_lens_moves_out_of_the_image_is_not_visible(x: float, y: float)
 def turned(camera: Camera, rate: float) -> TrueFrame:
     """Return a frame taken while the robot turns, by which time it looks straight ahead again."""
     scenario = dataclasses.replace(POST, camera=dataclasses.replace(camera, noise=0.0, rate_hz=50.0))
-    arena = Arena(dataclasses.replace(scenario, robot=dataclasses.replace(scenario.robot, wheel_acceleration=10.0)), 0)
-    while arena.time < 0.6 - 1e-9:
-        arena.command(Twist(0.0, rate))
-        arena.step()
-    return arena.frame()
+    arena = Arena(dataclasses.replace(scenario, robot=Robot(wheel_acceleration=10.0)), 0)
+    return drive(arena, 0.6, Twist(0.0, rate)).frame()
 
 
 def darkness(frame: TrueFrame, row: int) -> NDArray[np.float64]:
@@ -140,9 +128,6 @@ def test_the_depth_image_and_the_truth_are_of_the_stamp() -> None:
 
 def test_the_light_goes_down_and_comes_back() -> None:
     scenario = Scenario(light=Light(swing=0.6, swing_s=4.0), camera=Camera(noise=0.0))
-    arena, means = Arena(scenario, 0), []
-    while arena.time < 4.01:
-        if round(arena.time * 50) % 50 == 0:
-            means.append(arena.frame().image.mean())
-        arena.step()
+    arena = Arena(scenario, 0)
+    means = [drive(arena, seconds).frame().image.mean() for seconds in (0, 1, 1, 1, 1)]
     assert np.array(means) / means[0] == pytest.approx([1.0, 0.7, 0.4, 0.7, 1.0], abs=0.01)

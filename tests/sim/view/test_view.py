@@ -1,4 +1,4 @@
-"""The live page's pace, parameters and numbers."""
+"""The live page's pace, parameters and numbers; and the figure of many runs, on which everything can be read."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ import socket
 import statistics
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from tests.sim.logs import steps_of
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from tests.sim.logs import card, person, step, steps_of
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import CONTROLLERS, controller_named
@@ -23,8 +27,10 @@ from limo_hog.live.controls import Parameter, ParameterError
 from limo_hog.live.pace import Pace
 from limo_sim.run.episode import run_episode
 from limo_sim.run.log import Step
+from limo_sim.run.sweep import summarise
 from limo_sim.view.reading import depth_colours, depth_picture, figures, followed_person, measured_m, rollouts
 from limo_sim.view.server import View
+from limo_sim.view.sweep_plot import plot
 from limo_sim.view.tuning import Tunable
 from limo_sim.world.scenario import Scenario
 
@@ -34,17 +40,12 @@ WORKSHOP = Scenario.load("workshop")
 DETECTOR = PeopleDetector(model="opencv", scale=1.2)
 
 
-def test_real_time_takes_its_time_and_all_it_can_does_not() -> None:
-    pace = Pace(speed=4)
-    start = time.monotonic()
+@pytest.mark.parametrize(("speed", "apart_s", "least", "most"), [(4, 0.2, 0.19, 0.8), (0, 250.0, 0.0, 5.0)])
+def test_a_run_takes_its_time(speed: float, apart_s: float, least: float, most: float) -> None:
+    pace, start = Pace(speed), time.monotonic()
     for tick in range(5):
-        pace.wait(0.2 * tick)
-    assert 0.19 < time.monotonic() - start < 0.8  # at its own speed .8 s
-    pace.set_speed(0)
-    start = time.monotonic()
-    for tick in range(1000):
-        pace.wait(tick)
-    assert time.monotonic() - start < 5  # in real time a thousand
+        pace.wait(apart_s * tick)
+    assert least < time.monotonic() - start < most
 
 
 def test_a_paused_run_goes_on_one_step_at_a_time() -> None:
@@ -66,17 +67,6 @@ def test_a_paused_run_goes_on_one_step_at_a_time() -> None:
     pace.resume()
     thread.join(5)
     assert len(ticks) == 100
-
-
-def test_a_parameter_changes_the_controller_and_keeps_its_kind() -> None:
-    tunable: Tunable[Any] = Tunable(controller_named("tracking", None))
-    tunable.set("target_distance", 2)
-    tunable.set("whole_image_every", 5.0)
-    assert tunable.parameters["target_distance"].value == 2.0
-    assert type(tunable.parameters["whole_image_every"].value) is int
-    tunable.set("following.max_speed", 0.3)
-    assert tunable.parameters["following.max_speed"].value == 0.3
-    assert tunable.parameters["planner.max_turn"].value == 3.0
 
 
 def test_the_page_is_served_on_loopback_alone() -> None:
@@ -163,8 +153,10 @@ def test_a_parameter_brings_its_bounds_unit_and_tooltip() -> None:
         Parameter("count", 4, 1, 9, "frames", "How many."),
         Parameter("inner.shown", 2.0, 1.0, 3.0, "m", "Has bounds."),
     ]
-    tunable.set("inner.shown", 3)
-    assert tunable.parameters["inner.shown"].value == 3.0
+    for name, value in (("inner.shown", 3), ("count", 5.0)):
+        tunable.set(name, value)
+        assert tunable.parameters[name].value == value
+        assert type(tunable.parameters[name].value) is not type(value)
     wrong = [
         ("inner.shown", 3.1),
         ("inner.hidden", 1.0),
@@ -197,3 +189,33 @@ def test_a_run_goes_on_with_every_parameter_at_its_bound(name: str, bound: str) 
     steps = steps_of(WORKSHOP, controller, DETECTOR, 6, 0)
     reasons = [step.log.decision.reason for step in steps]
     assert not any("failed" in reason or "finite" in reason for reason in reasons), set(reasons)
+
+
+@pytest.fixture
+def figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Figure:
+    drawn: list[Figure] = []
+    save = Figure.savefig
+
+    def kept(self: Figure, *args: object, **options: object) -> None:
+        drawn.append(self)
+        save(self, *args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Figure, "savefig", kept)
+    one = replace(card(step(0, person())), success=False, time_to_find_again_s=None, intrusion_personal=0.0)
+    plot(summarise([one, replace(one, seed=1)]), tmp_path / "a.png")
+    return drawn[0]
+
+
+def test_no_title_is_cut_off(figure: Figure) -> None:
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    titles = [axes._left_title.get_window_extent(canvas.get_renderer()) for axes in figure.axes]  # type: ignore[attr-defined]
+    assert all(left.x1 < right.x0 for left, right in pairwise(titles))
+    assert titles[-1].x1 < figure.bbox.x1
+
+
+def test_a_marker_at_0_is_whole_and_an_empty_panel_says_so(figure: Figure) -> None:
+    assert all(axes.get_xlim()[0] < 0 for axes in figure.axes)
+    said = [[text.get_text() for text in axes.texts] for axes in figure.axes]
+    assert said[3] == ["no data"]
+    assert said[0] == said[4] == []

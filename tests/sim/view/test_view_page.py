@@ -1,54 +1,39 @@
-"""The page of a running episode, in a real browser; its pictures are kept in `out/view/` to look at."""
+"""The page of a running episode in a real browser, and whom it is told to follow; pictures are kept in `out/view/`."""
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from tests.sim.view.browser import CHROMIUM, chromium
+from tests.sim.view.browser import CHROMIUM, chromium, played
 
 from limo_hog.detector import PeopleDetector
-from limo_hog.follow.control.naming import controller_named
+from limo_hog.follow.control.naming import ControllerError, controller_named
+from limo_hog.follow.sense.detectors import detector_named
+from limo_hog.follow.tracks.asking import Whom
+from limo_hog.live.controls import apply
 from limo_hog.live.pace import Pace
-from limo_sim.run.episode import run_episode, score
+from limo_sim.run.episode import run_episode
+from limo_sim.run.log import Step
+from limo_sim.view.reading import followed_person
 from limo_sim.view.server import View
 from limo_sim.view.tuning import Tunable
+from limo_sim.world.people import Person
 from limo_sim.world.scenario import Scenario
 
 PICTURES = Path(__file__).parents[3] / "out" / "view"
-SECONDS = 90.0  # at twice real time: longer than the browser takes to start and look
-SCENARIO = Scenario.load("workshop")
-
-
-@pytest.fixture
-def running() -> Iterator[tuple[View, Tunable[Any]]]:
-    controller = Tunable(controller_named("tracking", None))
-    with View(SCENARIO, controller, pace=Pace(2)) as view:
-
-        def episode() -> None:
-            # A coarse search: this is about the page.
-            detector = PeopleDetector(scale=1.2, min_height=None, nms="group")
-            view.end(score(run_episode(SCENARIO, controller, detector, SECONDS, 0, watch=view.watch)).to_json())
-
-        run = threading.Thread(target=episode)
-        run.start()
-        try:
-            yield view, controller
-        finally:
-            view.pace.set_speed(0)
-            view.pace.resume()
-            run.join()
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
-def test_a_browser_sees_the_run_move_and_steers_it(running: tuple[View, Tunable[Any]]) -> None:
-    view, controller = running
-    with chromium() as browser:
+def test_a_browser_sees_the_run_move_and_steers_it() -> None:
+    controller: Tunable[Any] = Tunable(controller_named("tracking", None))
+    # A coarse search: this is about the page.
+    detector = PeopleDetector(scale=1.2, min_height=None, nms="group")
+    with played(Scenario.load("workshop"), controller, detector, 2) as view, chromium() as browser:
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.goto(view.url)
         _see_no_icon_of_a_broken_picture(page)
@@ -119,8 +104,7 @@ def _see_it_move(page: Page) -> None:
     _until(page, "now && document.querySelector('#camera').dataset.count > 2 && now.boxes > 0 && now.time > 5")
     for picture in ("#camera", "#depth"):
         before = page.get_attribute(picture, "src")
-        assert before
-        expect(page.locator(picture)).not_to_have_attribute("src", before)
+        expect(page.locator(picture)).not_to_have_attribute("src", before or "")
     expect(page.locator("#camera")).to_have_js_property("naturalWidth", 640)
     # Boxes: the arena itself has nothing that is as green or as red.
     _until(
@@ -188,9 +172,8 @@ def _see_it_on_a_phone(browser: Browser, view: View, controller: Tunable[Any]) -
     _see_the_controls_in_one_row(page)
     # The caption is text, not part of the picture, and every parameter tells what it is.
     assert page.evaluate("parseFloat(getComputedStyle(document.querySelector('#seen')).fontSize)") >= 14
-    fields = page.evaluate(
-        "[...document.querySelectorAll('#fields label')].map((l) => [l.title, l.querySelector('input').max])"
-    )
+    labels = "[...document.querySelectorAll('#fields label')]"
+    fields = page.evaluate(labels + ".map((label) => [label.title, label.querySelector('input').max])")
     assert len(fields) == len(controller.parameters)
     assert all(len(title) > 20 and float(high) > 0 for title, high in fields)
     # Both distances are told, each with a word of its own.
@@ -206,13 +189,11 @@ def _see_it_on_a_phone(browser: Browser, view: View, controller: Tunable[Any]) -
 
 
 def _take_light_and_dark(page: Page, name: str) -> None:
-    size = page.viewport_size
-    assert size
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
         page.wait_for_timeout(300)
         page.screenshot(path=PICTURES / f"{name}-{scheme}.png", full_page=True)
-        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
 def _see_it_end(page: Page) -> None:
@@ -224,8 +205,7 @@ def _see_it_end(page: Page) -> None:
     page.fill("#timeline", "5")
     assert page.inner_text("#shown") == "5.0 s"
     then = page.get_attribute("#camera", "src"), page.inner_text("#distance")
-    assert then[0] != newest[0]
-    assert then[1] != newest[1]
+    assert then[0] != newest[0] and then[1] != newest[1]
     assert then[1].split()[0] == page.evaluate("number(nearest(history, 5)[DISTANCE], 2)")
     # A cursor on a plot reads the values, the wheel zooms.
     plot = page.locator("#plot-distance")
@@ -245,3 +225,70 @@ def _see_it_end(page: Page) -> None:
     # The page keeps what it showed last.
     expect(page.locator("#camera")).to_have_js_property("naturalWidth", 640)
     assert page.is_disabled("#pause")
+
+
+WORKSHOP = Scenario.load("workshop")
+#: From left to right: the nearest, the largest in the image, and a small one.
+THREE = replace(
+    WORKSHOP,
+    furniture=(),
+    robot=replace(WORKSHOP.robot, x=-2.2, y=0.0, yaw=0.0),
+    people=tuple(
+        Person(((x, y, 0.0),), height=height, shirt=shirt)
+        for x, y, height, shirt in (
+            (-0.2, 0.55, 0.7, (180, 40, 40)),
+            (0.0, 0.0, 0.95, (40, 60, 170)),
+            (0.3, -0.65, 0.8, (40, 140, 60)),
+        )
+    ),
+)
+#: Two who both stay in the image, whichever is faced.
+TWO = replace(THREE, people=tuple(Person(((0.2, y, 0.0),), height=0.75) for y in (0.35, -0.35)))
+
+
+@pytest.mark.parametrize(("whom", "index"), [("left", 0), ("nearest", 0), ("largest", 1), ("right", 2)])
+def test_the_person_asked_for_is_followed(whom: Whom, index: int) -> None:
+    steps: list[Step] = []
+    detector = detector_named("hog")
+    run_episode(THREE, controller_named("tracking", person=whom), detector, 4, 0, watch=steps.append)
+    assert steps[0].log.decision.reason.endswith("not found yet")
+    assert {followed_person(step) for step in steps[20:] if step.log.decision.target is not None} == {index}
+
+
+def test_only_the_tracking_controller_can_be_asked() -> None:
+    with pytest.raises(ControllerError, match="approach controller follows whoever is detected first"):
+        controller_named("approach", person="left")
+    for controller, complaint in (
+        (None, "this run has no follower of ours"),
+        (Tunable(controller_named("proxemic")), "ProxemicController follows nobody in particular"),
+        (Tunable(controller_named("tracking")), "got 'leftmost' for the person to follow; want nearest, left"),
+    ):
+        assert (apply('{"follow": "leftmost"}', Pace(), controller) or "").startswith(complaint)
+    assert apply('{"follow": 2}', Pace(), Tunable(controller_named("tracking"))) is None
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
+def test_a_click_on_a_person_and_a_button_change_whom_the_robot_follows() -> None:
+    controller = Tunable(controller_named("tracking"))
+    with played(TWO, controller, detector_named("hog"), 1) as view, chromium() as browser:
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.goto(view.url)
+        # The two in turns, by a click and then by the keyboard.
+        for side, click in (("0", True), ("1", True), ("0", False)):
+            deadline, followed = time.monotonic() + 60, False
+            while not followed:
+                assert time.monotonic() < deadline
+                page.wait_for_timeout(500)
+                if page.evaluate("now === null || now.choices.length < 2"):
+                    continue
+                # While the robot turns, a box of 2 s ago is beside the person: the click is repeated, as people do.
+                number, followed, x, y, width, height = page.evaluate(
+                    f"[...now.choices].sort((a, b) => a[2] - b[2])[{side}]"
+                )
+                if followed:
+                    assert page.get_attribute(f"#choices button[value='{number}']", "aria-pressed") == "true"
+                elif click:
+                    box = page.evaluate("(({x, y, width}) => [x, y, width / 640])(camera.getBoundingClientRect())")
+                    page.mouse.click(box[0] + (x + width / 2) * box[2], box[1] + (y + height / 4) * box[2])
+                else:
+                    page.locator(f"#choices button[value='{number}']").press("Enter")

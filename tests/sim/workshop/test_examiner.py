@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import gc
 import weakref
 from pathlib import Path
 
 import pytest
-from tests.sim.workshop.strangers import CALLBACK, SEQUEL
+from tests.sim.workshop.strangers import CALLBACK, SEQUEL, WRONG, checked, exchanged, table_of, written
 
 from limo_hog.cli.main import main
 from limo_sim.workshop import solution
@@ -18,9 +17,8 @@ from limo_sim.workshop.report import by_task, total
 from limo_sim.workshop.takes import play
 from limo_sim.world.schema import ScenarioError
 
-DETECT = "self.det.detectMultiScale(img, winStride=(8, 8), padding=(4, 4), scale=1.05)"
+TURNS_AWAY = exchanged(CALLBACK, "0.005 * error → -0.005 * error")
 DRIVES = "        t.linear.x = 0.2\n"
-IN_THE_WALK = "        if self.get_clock().now().nanoseconds > 5e9:\n            [][1]\n"
 
 QUICK = """
 title = "a lecturer's own: one scene, two checkpoints"
@@ -43,25 +41,12 @@ name = "nobody is touched"
 """
 
 
-def checked(tmp_path: Path, text: str, name: str = "follower") -> list[Verdict]:
-    script = tmp_path / "node.py"
-    script.write_text(text, encoding="utf-8")
-    return examine(script, name).verdicts
-
-
-def changed(text: str, *exchanged: tuple[str, str]) -> str:
-    for old, new in exchanged:
-        assert old in text
-        text = text.replace(old, new)
-    return text
-
-
 def named(verdicts: list[Verdict], words: str) -> Verdict:
     return next(verdict for verdict in verdicts if words in verdict.checkpoint)
 
 
 def test_a_fault_in_task_4_leaves_the_points_of_tasks_1_to_3(tmp_path: Path) -> None:
-    verdicts = checked(tmp_path, changed(CALLBACK, ("t.linear.x = 0.2", "t.linear.x = 1")))
+    verdicts = checked(tmp_path, exchanged(CALLBACK, "t.linear.x = 0.2 → t.linear.x = 1"))
     assert {task: won for task, (won, _) in by_task(verdicts).items()} == {1: 10, 2: 25, 3: 25, 4: 0}
     assert verdicts[0].holds is False
     assert verdicts[0].evidence.startswith("a person stands on the left: node.py failed with AssertionError at 0.00 s")
@@ -69,7 +54,7 @@ def test_a_fault_in_task_4_leaves_the_points_of_tasks_1_to_3(tmp_path: Path) -> 
 
 
 def test_a_fault_in_one_scene_is_told_with_that_scene(tmp_path: Path) -> None:
-    verdicts = checked(tmp_path, changed(CALLBACK, ("        self.pub.publish(Twist())\n", "        [][1]\n")))
+    verdicts = checked(tmp_path, exchanged(CALLBACK, "self.pub.publish(Twist()) → [][1]"))
     assert verdicts[0].evidence.startswith("the room is empty: node.py failed with IndexError at 0.00 s")
     assert "so it does in 1 other scene" in verdicts[0].evidence
     assert named(verdicts, "stands while").holds is False
@@ -77,84 +62,68 @@ def test_a_fault_in_one_scene_is_told_with_that_scene(tmp_path: Path) -> None:
 
 
 def test_a_walk_that_fails_tells_why_and_what_was_wanted(tmp_path: Path) -> None:
-    fails = named(checked(tmp_path, changed(CALLBACK, (DRIVES, IN_THE_WALK + DRIVES))), "follows")
+    in_the_walk = "t.linear.x = 0.2 → t.linear.x = 0.2 if self.get_clock().now().nanoseconds < 5e9 else [][1]"
+    fails = named(checked(tmp_path, exchanged(CALLBACK, in_the_walk)), "follows")
     assert "a person walks for 20 s: node.py failed with IndexError" in fails.evidence
     assert fails.line is not None
-    loses = named(checked(tmp_path, changed(CALLBACK, ("0.005 * error", "0.0002 * error"))), "follows")
+    loses = named(checked(tmp_path, exchanged(CALLBACK, "0.005 * error → 0.0002 * error")), "follows")
     assert "in_view is 0." in loses.evidence
     assert "wanted 0.7 to 1" in loses.evidence
 
 
 def test_a_crop_that_cannot_be_placed_is_judged_by_the_red_box(tmp_path: Path) -> None:
-    turned = "cv2.rotate(img, cv2.ROTATE_180), winStride"
-    text = changed(CALLBACK, (DETECT, DETECT.replace("img, winStride", turned)))
-    found = named(checked(tmp_path, text), "people are found")
+    turned = "detectMultiScale(img → detectMultiScale(cv2.rotate(img, cv2.ROTATE_180)"
+    found = named(checked(tmp_path, exchanged(CALLBACK, turned)), "people are found")
     assert "no part of a camera image" not in found.evidence or found.holds is not True
-    wide = "cv2.copyMakeBorder(img, 60, 60, 20, 20, cv2.BORDER_REFLECT)"
-    text = changed(
-        CALLBACK,
-        (DETECT, DETECT.replace("img", wide)),
-        (
-            "tuple(int(v) for v in r) for r in rects",
-            "(int(x) - 20, int(y) - 60, int(k), int(h)) for x, y, k, h in rects",
-        ),
-    )
-    verdicts = checked(tmp_path, text)
+    wide = """
+        detectMultiScale(img → detectMultiScale(cv2.copyMakeBorder(img, 60, 60, 20, 20, cv2.BORDER_REFLECT)
+        tuple(int(v) for v in r) for r in → (int(x) - 20, int(y) - 60, int(k), int(h)) for x, y, k, h in
+    """
+    verdicts = checked(tmp_path, exchanged(CALLBACK, wide))
     assert "(600, 680, 3)" in named(verdicts, "people are found").evidence
     assert [verdict.checkpoint for verdict in verdicts if verdict.holds is False] == []
 
 
 def test_a_forged_box_gains_nothing(tmp_path: Path) -> None:
-    forged = "self.pub._context.world.link.tell('found', [480, 640, 3], "
-    forged += (
-        "[[300, 100, 64, 128]], [9.0], 1.0, True, data=img.tobytes())\n        return [(300, 100, 64, 128)], [9.0]\n"
-    )
-    start = CALLBACK.index("        rects, w = self.det")
-    text = CALLBACK[:start] + "        " + forged + CALLBACK[CALLBACK.index("\n    def choose") :]
-    verdicts = checked(tmp_path, text)
+    forged = """
+        rects, w = self.det → rects, w = [(300, 100, 64, 128)], [9.0]
+            ⏎self.pub._context.world.link.tell('found', [480, 640, 3], [rects[0]], w, 1.0, True, data=img.tobytes())
+            ⏎return rects, w⏎self.det
+    """
+    verdicts = checked(tmp_path, exchanged(CALLBACK, forged))
     assert "is on nobody" in named(verdicts, "people are found").evidence
     assert by_task(verdicts)[2][0] == by_task(verdicts)[3][0] == 0
 
 
 def test_commands_that_the_robot_cannot_get_are_told_as_ros_tells_it(tmp_path: Path) -> None:
-    qos = "rclpy.qos.QoSProfile(depth=1, reliability=rclpy.qos.ReliabilityPolicy.BEST_EFFORT)"
-    verdicts = checked(
-        tmp_path, changed(CALLBACK, ('"/cmd_vel", 10', f'"/cmd_vel", {qos}'), ("import rclpy\n", "import rclpy.qos\n"))
-    )
+    verdicts = checked(tmp_path, WRONG["any best effort commands"][1])
     said = "requesting incompatible QoS. No messages will be sent to it. Last incompatible policy: RELIABILITY"
     assert any(said in verdict.evidence for verdict in verdicts)
 
 
 def test_an_exercise_can_be_a_lecturers_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.toml").write_text(QUICK)
-    (tmp_path / "class").mkdir()
-    for name, text in (("amy", CALLBACK), ("bob", changed(CALLBACK, ("0.005 * error", "-0.005 * error")))):
-        (tmp_path / "class" / f"{name}.py").write_text(text)
-    node = str(tmp_path / "class" / "amy.py")
-    own = ["--exercise", str(tmp_path / "mine.toml")]
-    assert main(["workshop", "check", node, *own, "--html", str(tmp_path / "amy.html")]) == 0
+    folder, own = written(tmp_path / "class", amy=CALLBACK, bob=TURNS_AWAY), ["--exercise", str(tmp_path / "mine.toml")]
+    assert main(["workshop", "check", str(folder / "amy.py"), *own, "--html", str(tmp_path / "amy.html")]) == 0
     assert "100 of 100 points" in capsys.readouterr().out
     assert "a lecturer&#x27;s own" in (tmp_path / "amy.html").read_text()
-    table = tmp_path / "points.csv"
-    assert main(["workshop", "grade", str(tmp_path / "class"), *own, "--csv", str(table)]) == 0
-    assert [row["points"] for row in csv.DictReader(table.read_text().splitlines())] == ["100", "40"]
+    assert [row["points"] for row in table_of(folder, *own).values()] == ["100", "40"]
 
 
-WRONG_FILES = {
-    "scene": ('scenes = ["left", "corner"]', 'scenes = ["lefft"]', "unknown scene 'lefft', want one of left, right"),
-    "key": ("title", "titel", "titel: unknown key"),
-    "check": ('check = "figures"', 'check = "figur"', "unknown check 'figur', want one of shown, found"),
-    "bound": ("contacts_p", "contact_p", "contact_person: unknown key; bounds of 'figures' are: scenario, "),
-    "place": ("[[2.6, -1.1]]", "[[9.0, 0.0]]", "want x and y in"),
-    "toml": ("title =", "title", "cannot be read as TOML"),
-}
-
-
-@pytest.mark.parametrize("name", WRONG_FILES)
-def test_an_exercise_that_cannot_be_is_refused_by_its_key(tmp_path: Path, name: str) -> None:
-    old, new, said = WRONG_FILES[name]
-    (tmp_path / "mine.toml").write_text(changed(QUICK, (old, new)))
-    with pytest.raises(ScenarioError, match=said.replace("[", r"\[")):
+@pytest.mark.parametrize(
+    ("exchange", "said"),
+    [
+        ('scenes = ["left", "corner"] → scenes = ["lefft"]', "unknown scene 'lefft', want one of left, right"),
+        ("title → titel", "titel: unknown key"),
+        ('check = "figures" → check = "figur"', "unknown check 'figur', want one of shown, found"),
+        ("contacts_p → contact_p", "contact_person: unknown key; bounds of 'figures' are: scenario, "),
+        ("[[2.6, -1.1]] → [[9.0, 0.0]]", "want x and y in"),
+        ("title = → title", "cannot be read as TOML"),
+    ],
+)
+def test_an_exercise_that_cannot_be_is_refused_by_its_key(tmp_path: Path, exchange: str, said: str) -> None:
+    (tmp_path / "mine.toml").write_text(exchanged(QUICK, exchange))
+    with pytest.raises(ScenarioError, match=said):
         exercise(str(tmp_path / "mine.toml"))
 
 
@@ -172,28 +141,23 @@ PACKAGE = {
     "package.xml": "<package/>",
     "setup.py": "setup(entry_points={'console_scripts': ['go = amy_pkg.human_detector:main']})",
     "amy_pkg/__init__.py": "",
-    "amy_pkg/human_detector.py": changed(
-        CALLBACK, ("import rclpy\n", "import rclpy\nfrom amy_pkg.helper import WORD\n")
-    ),
+    "amy_pkg/human_detector.py": "from amy_pkg.helper import WORD\n" + CALLBACK,
     "amy_pkg/helper.py": "WORD = 'cmd_vel'\n",
     "test/test_flake8.py": "import rclpy\n",
     "launch/go.launch.py": "import launch\n",
 }
 
 
-def test_a_class_of_packages_is_one_row_and_one_page_a_student(tmp_path: Path) -> None:
+def test_a_class_is_one_row_and_page_a_student(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "class"
     for name, text in PACKAGE.items():
         path = folder / "amy" / "amy_pkg" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    (folder / "bob.py").write_text("# mine\n" + solution("follower").replace("twist", "command"))
-    (folder / "eve.py").write_text("import rclpy\nraise ValueError('=1+1 \\x1b[2J')\n")
+    copy = "# mine\n" + solution("follower").replace("twist", "command")
+    written(folder, bob=copy, eve="import rclpy\nraise ValueError('=1+1 \\x1b[2J')\n")
     (folder / "=ian.ipynb").write_text("{}")
-    table = tmp_path / "points.csv"
-    options = ["--csv", str(table), "--html", str(tmp_path / "pages")]
-    assert main(["workshop", "grade", str(folder), *options]) == 0
-    rows = {row["file"]: row for row in csv.DictReader(table.read_text(encoding="utf-8").splitlines())}
+    rows = table_of(folder, "--html", str(tmp_path / "pages"))
     assert {name: row["points"] for name, row in rows.items()} == {
         "'=ian.ipynb": "0",
         "amy/amy_pkg/amy_pkg/human_detector.py": "100",
@@ -201,25 +165,24 @@ def test_a_class_of_packages_is_one_row_and_one_page_a_student(tmp_path: Path) -
         "eve.py": "0",
     }
     assert [row["copy_of"] for row in rows.values()] == ["", "", "the model solution", ""]
+    assert [rows["bob.py"][f"task_{task}"] for task in (1, 2, 3, 4)] == ["10", "25", "25", "40"]
+    assert "4 files" in capsys.readouterr().err
     assert "wanted is a .py file" in rows["'=ian.ipynb"]["first_mistake"]
-    assert "\x1b" not in table.read_text()
+    assert "\x1b" not in (tmp_path / "class.csv").read_text()
     pages = {path.name for path in (tmp_path / "pages").iterdir()}
     assert pages == {"amy.amy_pkg.amy_pkg.human_detector.py.html", "bob.py.html", "eve.py.html"}
     assert "<svg" in (tmp_path / "pages" / "bob.py.html").read_text()
 
 
-def test_the_report_cites_a_frame_and_folds_what_was_not_tried(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_report_cites_a_frame_and_is_short(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     script = tmp_path / "my node.py"
-    script.write_text(changed(CALLBACK, ("0.005 * error", "-0.005 * error")))
+    script.write_text(TURNS_AWAY)
     assert main(["workshop", "check", str(script), "--html", str(tmp_path / "page.html")]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) < 24
     assert max(map(len, lines)) <= 80
-    assert (tmp_path / "page.html").read_text().count(
-        "A person stands on the left<span>at 0.0 s: window “Limo Camera”; 1 box found"
-    ) == 1
+    cited = "A person stands on the left<span>at 0.0 s: window “Limo Camera”; 1 box found"
+    assert (tmp_path / "page.html").read_text().count(cited) == 1
     script.write_text("import rclpy\n")
     assert main(["workshop", "check", str(script)]) == 1
     out = capsys.readouterr().out
@@ -238,20 +201,19 @@ def test_a_model_solution_can_be_hidden(
     assert main(["workshop", "solution", "-"]) == 2
 
 
-REFUSED = {
-    "latin": (b"# \xe9t\xe9\nimport rclpy\n", "invalid or missing encoding declaration"),
-    "latin later": (b"import rclpy\n" * 9 + b"# \xe9\n", "byte 0xe9 is no utf-8: save the file as UTF-8"),
-    "keyboard": (b"import rclpy\ninput()\n", "a node has no keyboard here"),
-    "title": (b"import cv2, numpy\ncv2.imshow(5, numpy.zeros((9, 9)))\n", "imshow: want a title"),
-    "height": (b"import cv2, numpy\ncv2.imshow('a', numpy.zeros((70000, 2)))\n", "at most 16384 px a side"),
-    "channels": (b"import cv2, numpy\ncv2.imshow('a', numpy.zeros((9, 9, 2)))\n", "1, 3 or 4 channels"),
-    "control": (b"raise ValueError('\\x1b[2J' + 'long' * 100000)\n", "\\x1b[2J"),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_python_or_opencv_refuse_is_told(tmp_path: Path, name: str) -> None:
-    text, said = REFUSED[name]
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (b"# \xe9t\xe9\nimport rclpy\n", "invalid or missing encoding declaration"),
+        (b"import rclpy\n" * 9 + b"# \xe9\n", "byte 0xe9 is no utf-8: save the file as UTF-8"),
+        (b"import rclpy\ninput()\n", "a node has no keyboard here"),
+        (b"import cv2, numpy\ncv2.imshow(5, numpy.zeros((9, 9)))\n", "imshow: want a title"),
+        (b"import cv2, numpy\ncv2.imshow('a', numpy.zeros((70000, 2)))\n", "at most 16384 px a side"),
+        (b"import cv2, numpy\ncv2.imshow('a', numpy.zeros((9, 9, 2)))\n", "1, 3 or 4 channels"),
+        (b"raise ValueError('\\x1b[2J' + 'long' * 100000)\n", "\\x1b[2J"),
+    ],
+)
+def test_what_python_or_opencv_refuse_is_told(tmp_path: Path, text: bytes, said: str) -> None:
     (tmp_path / "node.py").write_bytes(text)
     verdicts = examine(tmp_path / "node.py").verdicts
     assert said in verdicts[0].evidence

@@ -1,4 +1,4 @@
-"""People who yield come and go through doors, find their way, keep clear of the robot or react to it."""
+"""People who yield come and go, find their way, keep clear of the robot or react to it; furniture moves among them."""
 
 from __future__ import annotations
 
@@ -10,30 +10,40 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.sim.logs import drive, there
 from tests.sim.logs import poses_of as poses
-from tests.sim.logs import there
 
 from limo_hog.follow.robot import Twist
 from limo_sim.run.arena import Arena
 from limo_sim.world.crowd import STEP_S
-from limo_sim.world.scenario import Camera, Furniture, Group, Person, Robot, Room, Scenario, Wall
+from limo_sim.world.furniture import Disc, Rectangle, distance_to
+from limo_sim.world.movers import Movers
+from limo_sim.world.paths import FloorPlan
+from limo_sim.world.person import Pose
+from limo_sim.world.scenario import Camera, Furniture, Group, Mover, Person, Robot, Room, Scenario, Wall
 
 YIELDS = Person(route=((-2, 1, 0), (2, 1, 1.0), (2, 3, 0)), behaviour="social_force")
 CORNER = Robot(x=-4.5, y=-4.5)
 
 
+def walked(person: Person, seconds: float, *walls: Wall) -> list[Pose]:
+    """Return a person's poses from step to step, alone with a robot that stands in a corner."""
+    return [there(one) for (one,) in poses(Scenario(people=(person,), walls=walls, robot=CORNER), seconds)]
+
+
 def test_the_corners_of_the_route_are_visited_in_order_with_their_pauses() -> None:
-    seen = [there(one) for (one,) in poses(Scenario(people=(YIELDS,), robot=CORNER), 25.0)]
-    reached = []
-    for x, y, _ in YIELDS.route[1:]:
-        reached.append(next(index for index, pose in enumerate(seen) if math.dist((pose.x, pose.y), (x, y)) < 0.3))
+    seen = walked(YIELDS, 25.0)
+    reached = [
+        next(index for index, pose in enumerate(seen) if math.dist((pose.x, pose.y), corner[:2]) < 0.3)
+        for corner in YIELDS.route[1:]
+    ]
     assert reached == sorted(reached)
     still = sum(math.dist((pose.x, pose.y), (2, 1)) < 0.1 and pose.swing < 0.5 for pose in seen) * STEP_S
     assert 0.8 < still < 2.0
 
 
 def test_headings_and_gait_are_those_of_a_person_who_walks() -> None:
-    seen = [there(one) for (one,) in poses(Scenario(people=(YIELDS,), robot=CORNER), 25.0)]
+    seen = walked(YIELDS, 25.0)
     turns = [math.remainder(b.yaw - a.yaw, math.tau) for a, b in pairwise(seen)]
     assert max(map(abs, turns)) < math.radians(6)
     at = seen[150]
@@ -44,9 +54,8 @@ def test_headings_and_gait_are_those_of_a_person_who_walks() -> None:
 
 
 def test_somebody_finds_the_door_between_two_rooms() -> None:
-    walls = Wall((0, -4.9), (0, 2.0)), Wall((0, 2.8), (0, 4.9))
     person = dataclasses.replace(YIELDS, route=((-2, -2, 0), (2, -2, 30)))
-    seen = [there(one) for (one,) in poses(Scenario(people=(person,), walls=walls, robot=CORNER), 25.0)]
+    seen = walked(person, 25.0, Wall((0, -4.9), (0, 2.0)), Wall((0, 2.8), (0, 4.9)))
     crossing = next(pose for pose in seen if pose.x > 0)
     assert 2.1 < crossing.y < 2.7
     assert math.dist((seen[-1].x, seen[-1].y), (2, -2)) < 0.1
@@ -77,7 +86,7 @@ def test_a_person_who_arrives_walks_in_through_a_door_and_who_leaves_walks_out()
         (YIELDS.route, (0.0, -8.0), 8.0, 0.0, -8.5),
     ],
 )
-def test_people_come_in_by_the_nearest_door_or_their_own(
+def test_people_come_in_by_a_door(
     route: tuple[Any, ...], door: tuple[float, ...], half: float, x: float, y: float
 ) -> None:
     person = dataclasses.replace(YIELDS, route=route, arrives_s=0.5, enters=door)
@@ -86,22 +95,22 @@ def test_people_come_in_by_the_nearest_door_or_their_own(
     assert (first.x, first.y) == pytest.approx((x, y), abs=0.05)
 
 
-def test_two_who_walk_at_each_other_give_way() -> None:
-    one, other = (dataclasses.replace(YIELDS, route=((s * 3, 0, 0), (-s * 3, 0, 900))) for s in (-1, 1))
-    seen = poses(Scenario(people=(one, other), robot=CORNER), 14.0)
-    gaps = [math.dist((there(a).x, there(a).y), (there(b).x, there(b).y)) for a, b in seen]
-    assert min(gaps) > 0.26 * 0.9
-    assert there(seen[-1][0]).x > 2.8
-    assert there(seen[-1][1]).x < -2.8
-
-
-def test_a_person_who_yields_walks_round_somebody_on_a_timetable() -> None:
+@pytest.mark.parametrize(
+    "other",
+    [
+        dataclasses.replace(YIELDS, route=((3, 0, 0), (-3, 0, 900))),
+        Person(route=((3, 0.02, 0), (-3, 0.02, 900)), speed=0.5),
+    ],
+    ids=["who yields", "on a timetable"],
+)
+def test_a_person_walks_round_somebody_who_comes_towards_them(other: Person) -> None:
     walker = dataclasses.replace(YIELDS, route=((-3, 0, 0), (3, 0, 900)))
-    rail = Person(route=((3, 0.02, 0), (-3, 0.02, 900)), speed=0.5)
-    seen = poses(Scenario(people=(rail, walker), robot=CORNER), 12.0)
-    assert max(abs(there(a).y - 0.02) for a, _ in seen) < 1e-9
+    seen = poses(Scenario(people=(other, walker), robot=CORNER), 14.0)
     assert min(math.dist((there(a).x, there(a).y), (there(b).x, there(b).y)) for a, b in seen) > 0.26 * 0.9
     assert there(seen[-1][1]).x > 2.8
+    assert there(seen[-1][0]).x < -2.8
+    if other.behaviour == "route":
+        assert max(abs(there(a).y - 0.02) for a, _ in seen) < 1e-9
 
 
 def test_a_group_steps_aside_for_the_robot_and_comes_back() -> None:
@@ -114,12 +123,10 @@ def test_a_group_steps_aside_for_the_robot_and_comes_back() -> None:
 
     assert strayed() < 0.05
     while arena.truth().robot[0] < 1.0:
-        arena.command(Twist(0.3, 0.0))
-        arena.step()
+        drive(arena, 0.1, Twist(0.3, 0.0))
     assert strayed() > 0.15
     while arena.truth().robot[0] < 4.0:
-        arena.command(Twist(0.5, 0.0))
-        arena.step()
+        drive(arena, 0.1, Twist(0.5, 0.0))
     assert arena.contacts.person == 0
     assert strayed() < 0.1
 
@@ -151,41 +158,18 @@ def test_the_same_seed_gives_the_same_walks_and_another_seed_others() -> None:
     assert one != other
 
 
-def test_frames_that_come_late_show_people_where_they_were() -> None:
-    late = Scenario(people=(YIELDS,), robot=CORNER, camera=Camera(latency_s=0.4))
-    prompt, delayed = Arena(dataclasses.replace(late, camera=Camera()), 0), Arena(late, 0)
-    for _ in range(100):
-        prompt.step()
-        delayed.step()
-    was = prompt.frame().truth
-    for _ in range(20):
-        delayed.step()
-    frame = delayed.frame()
-    assert frame.stamp == was.stamp == 2.0
-    assert frame.truth.people == was.people
-
-
 def test_a_crowd_in_a_furnished_room_stays_inside_and_out_of_the_furniture() -> None:
     random = np.random.default_rng(5)
     furniture = tuple(Furniture("pillar", x, y) for x, y in ((-2, -2), (0, 2.5), (2, -1.5), (2.5, 2)))
-    people = tuple(
-        Person(
-            route=tuple(
-                (float(x), float(y), 0.5)
-                for x, y in random.permutation(
-                    [(-3.5, -3.5), (3.5, 3.5), (-3.5, 3.5), (3.5, -3.5), (0, 0.5), (-1, -3.5), (1, 4.0), (-3.5, 0.5)]
-                )[:4]
-            ),
-            behaviour="social_force",
-            speed=float(random.uniform(0.4, 1.0)),
-        )
-        for _ in range(8)
-    )
-    scenario = Scenario(people=people, furniture=furniture, robot=Robot(x=4.5, y=0.0, yaw=1.0))
-    for step in poses(scenario, 30.0, (4.5, 0.0, 1.0)):
-        for pose in step:
-            assert max(abs(there(pose).x), abs(there(pose).y)) < 4.9 - 0.1
-            assert all(math.dist((there(pose).x, there(pose).y), (f.x, f.y)) > 0.15 + 0.1 for f in furniture)
+    corners = [(-3.5, -3.5), (3.5, 3.5), (-3.5, 3.5), (3.5, -3.5), (0, 0.5), (-1, -3.5), (1, 4.0), (-3.5, 0.5)]
+    people = []
+    for _ in range(8):
+        route = tuple((float(x), float(y), 0.5) for x, y in random.permutation(corners)[:4])
+        people.append(Person(route, behaviour="social_force", speed=float(random.uniform(0.4, 1.0))))
+    scenario = Scenario(people=tuple(people), furniture=furniture, robot=Robot(x=4.5, y=0.0, yaw=1.0))
+    for x, y in ((there(pose).x, there(pose).y) for step in poses(scenario, 30.0, (4.5, 0.0, 1.0)) for pose in step):
+        assert max(abs(x), abs(y)) < 4.9 - 0.1
+        assert all(math.dist((x, y), (piece.x, piece.y)) > 0.15 + 0.1 for piece in furniture)
 
 
 def test_a_group_in_a_file_becomes_people_who_look_at_its_middle(tmp_path: Path) -> None:
@@ -197,3 +181,101 @@ def test_a_group_in_a_file_becomes_people_who_look_at_its_middle(tmp_path: Path)
         x, y, _ = person.route[0]
         assert math.dist((x, y), (-2, 1)) == pytest.approx(0.7)
         assert (x + 0.7 * math.cos(person.facing), y + 0.7 * math.sin(person.facing)) == pytest.approx((-2, 1))
+
+
+TROLLEY = Scenario(movers=(Mover("trolley", ((2.0, -1.0, 0), (2.0, 1.0, 0)), 0.5),))
+
+
+def test_a_mover_keeps_its_timetable() -> None:
+    for time, y in ((0.0, -1.0), (2.0, 0.0), (4.0, 1.0), (6.0, 0.0), (10.0, 0.0)):
+        (piece,) = Movers(TROLLEY.movers).at(time)
+        assert (piece.x, piece.y) == pytest.approx((2.0, y))
+
+
+def test_camera_and_lidar_see_a_mover_where_it_was_when_they_looked() -> None:
+    arena = drive(Arena(dataclasses.replace(TROLLEY, camera=Camera(latency_s=0.4)), 0), 2.4)
+    frame, scan = arena.frame(), arena.scan()
+    assert frame.stamp == pytest.approx(2.0)
+    # Long side along y: the trolley drives sideways to the camera, 0.17 m deep.
+    assert frame.depth[200:280, 320].min() == pytest.approx(2.0 - 0.17 - 0.084, abs=0.03)
+    angles = np.linspace(-2.0, 2.0, 292)
+    hit = scan.ranges < 2.5
+    assert np.median(np.sin(angles[hit]) * scan.ranges[hit]) == pytest.approx(0.5 * (scan.stamp - 2.0), abs=0.1)
+
+
+def test_a_mover_pushes_the_robot_aside_which_counts_as_a_contact() -> None:
+    arena = drive(Arena(Scenario(movers=(Mover("trolley", ((1.0, 0.05, 0), (-1.0, 0.05, 0)), 0.4),)), 0), 4.0)
+    assert arena.contacts.wall == 1
+    assert arena.contacts.person == 0
+    assert arena.truth().robot[0] < -0.3
+
+
+@pytest.mark.parametrize("heading", [0.0, math.pi / 2, -2.0])
+def test_a_mover_has_the_velocity_of_its_way_in_the_physics(heading: float) -> None:
+    end = (2.0 + math.cos(heading), math.sin(heading), 0)
+    arena = drive(Arena(Scenario(movers=(Mover("trolley", ((2.0, 0.0, 0), end), 0.5),))), 0.5)
+    (body,) = arena._moving
+    # Half a second at half a metre a second.
+    assert tuple(body.velocity) == pytest.approx((0.5 * math.cos(heading), 0.5 * math.sin(heading)))
+    assert tuple(body.position) == pytest.approx((2.0 + 0.25 * math.cos(heading), 0.25 * math.sin(heading)))
+
+
+def test_a_person_who_yields_walks_round_a_mover() -> None:
+    person = Person(route=((-1.0, 0.03, 0), (4.0, 0.03, 900)), behaviour="social_force", speed=0.7)
+    scenario = dataclasses.replace(
+        TROLLEY, people=(person,), robot=Robot(x=-4), movers=(Mover("trolley", ((4.2, 0, 0), (-2.0, 0, 0)), 0.4),)
+    )
+    seen = [there(pose) for (pose,) in poses(scenario, 10.0, (-4.0, 0.0, 0.0))]
+    pieces = [piece for step in range(len(seen)) for piece in Movers(scenario.movers).at(step * STEP_S)]
+    assert min(math.dist((a.x, a.y), (b.x, b.y)) for a, b in zip(seen, pieces, strict=True)) > 0.17 + 0.1
+    assert seen[-1].x > 3.8
+
+
+def test_the_way_is_straight_where_nothing_stands_in_it() -> None:
+    plan = FloorPlan([Rectangle(0, 3, 1, 1)], 5.0, 0.3)
+    place, length = plan.way((-2, 0), (2, 1))
+    assert place == (2, 1)
+    assert length == pytest.approx(math.hypot(4, 1))
+
+
+def test_the_way_round_a_square_goes_by_its_nearer_corners() -> None:
+    plan = FloorPlan([Rectangle(0, 0.2, 1, 1)], 5.0, 0.3)
+    (x, y), length = plan.way((-3, 0), (3, 0))
+    assert (x, y) == pytest.approx((-1.3, -1.1), abs=0.01)
+    assert length == pytest.approx(2 * math.hypot(1.7, 1.1) + 2.6, abs=0.01)
+
+
+def test_the_way_round_a_disc_is_hardly_longer_than_tangents_and_arc() -> None:
+    plan = FloorPlan([Disc(0, 0, 0.7)], 5.0, 0.3)
+    angle = math.acos(1.0 / 3.0)
+    shortest = 2 * math.sqrt(9 - 1) + (math.pi - 2 * angle)
+    assert shortest <= plan.way((-3, 0), (3, 0))[1] < 1.03 * shortest
+
+
+def test_a_door_is_found_and_one_too_narrow_is_none() -> None:
+    for width, passable in ((0.7, True), (0.5, False)):
+        walls = [Rectangle(0, side * (2.5 + width / 2), 0.05, 2.5) for side in (-1, 1)]
+        length = FloorPlan(walls, 5.0, 0.3).way((-2, 2), (2, 2))[1]
+        assert math.isfinite(length) == passable
+
+
+def test_ways_within_the_margin_begin_without_it() -> None:
+    plan = FloorPlan([Rectangle(0, 0, 1, 1)], 5.0, 0.3)
+    place, length = plan.way((-1.1, 0), (1.1, 0))
+    assert place[0] == pytest.approx(-1.3, abs=0.01)
+    assert length < 2 * math.hypot(1.3, 0.2) + 2.7
+
+
+def test_a_wall_hides_what_is_behind_it() -> None:
+    plan = FloorPlan([Rectangle(0, 0, 0.05, 1.0, 0.3), Disc(3, 0, 0.2)], 5.0, 0.3)
+    start, end = np.array([[-1.0, 0], [-1, 2], [2, 0], [2, 0.5]]), np.array([[1.0, 0], [1, 2], [4, 0], [4, 0.5]])
+    assert plan.hidden(start, end).tolist() == [True, False, True, False]
+
+
+def test_the_way_to_the_nearest_point_is_as_long_as_the_distance() -> None:
+    shapes: list[Disc | Rectangle] = [Disc(1, 2, 0.4), Rectangle(-1, 0.5, 0.7, 0.2, 0.6)]
+    places = np.random.default_rng(0).uniform(-4, 4, (200, 2))
+    away = FloorPlan(shapes, 5.0, 0.3).away(places)
+    for index, place in enumerate(places.tolist()):
+        for column, shape in ((1, shapes[0]), (0, shapes[1])):
+            assert math.hypot(*away[index, column]) == pytest.approx(max(distance_to(shape, *place), 0.0), abs=1e-6)

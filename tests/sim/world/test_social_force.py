@@ -19,22 +19,12 @@ ADULT = MODEL.adult_m
 FREE = np.full((1, 1, 2), np.inf)
 
 
-def two(at: tuple[float, float], velocity: tuple[float, float], wanted: tuple[float, float] = (1.0, 0.0)) -> People:
-    """Return a person at `at` who looks along x, and another at the origin with a velocity."""
-    return People(
-        position=np.array([at, (0.0, 0.0)]),
-        velocity=np.array([wanted, velocity]),
-        radius=np.full(2, 0.13 * ADULT),
-        height=np.full(1, ADULT),
-        wanted=np.array([wanted]),
-        ahead=np.array([[1.0, 0.0]]),
-    )
-
-
 def felt(at: tuple[float, float], velocity: tuple[float, float] = (0.0, 0.0), *, hidden: bool = False) -> F64:
-    """Return what the person at `at` feels of the other alone: float64 (2,) [m/s²]."""
-    push: F64 = acceleration(two(at, velocity), FREE, np.array([[False, hidden]]), MODEL)[0]
-    return push
+    """Return what the person at `at`, who walks along x, feels of another at the origin alone: float64 (2,) [m/s²]."""
+    along = np.array([[1.0, 0.0]])
+    places, radii = np.array([at, (0.0, 0.0)]), np.full(2, 0.13 * ADULT)
+    two = People(places, np.array([along[0], velocity]), radii, np.full(1, ADULT), along, along)
+    return np.asarray(acceleration(two, FREE, np.array([[False, hidden]]), MODEL)[0])
 
 
 def potential(at: F64, velocity: F64) -> float:
@@ -46,16 +36,12 @@ def potential(at: F64, velocity: F64) -> float:
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.9, 0.0), (-0.3, 1.1)])
 @pytest.mark.parametrize("at", [(-0.9, 0.3), (-1.4, -0.6), (-0.6, 0.02)])
-def test_people_are_pushed_down_the_slope_of_the_papers_potential(
-    at: tuple[float, float], velocity: tuple[float, float]
-) -> None:
+def test_the_push_is_the_slope_of_the_papers_potential(at: tuple[float, float], velocity: tuple[float, float]) -> None:
     place, pace, tiny = np.array(at), np.array(velocity), 1e-6
-    downhill = [
-        -(potential(place + tiny * axis, pace) - potential(place - tiny * axis, pace)) / (2 * tiny)
-        for axis in np.eye(2)
-    ]
+    around = [[potential(place + side * axis, pace) for axis in np.eye(2)] for side in (-tiny, tiny)]
+    downhill = -np.diff(around, axis=0)[0] / (2 * tiny)
     in_sight = -downhill[0] >= math.cos(math.radians(100.0)) * math.hypot(*downhill)
-    np.testing.assert_allclose(felt(at, velocity), np.array(downhill) * (1.0 if in_sight else 0.5), rtol=1e-5)
+    np.testing.assert_allclose(felt(at, velocity), downhill * (1.0 if in_sight else 0.5), rtol=1e-5)
 
 
 def test_what_is_behind_counts_half_and_what_a_wall_hides_not_at_all() -> None:
@@ -66,10 +52,10 @@ def test_what_is_behind_counts_half_and_what_a_wall_hides_not_at_all() -> None:
 
 
 def test_a_wall_pushes_with_the_papers_strength_and_a_child_feels_it_in_proportion() -> None:
-    for height in (ADULT, ADULT / 2):
-        scale = height / ADULT
-        rest = np.zeros((1, 2))
-        alone = People(rest, rest, np.array([0.13 * height]), np.array([height]), rest, np.array([[1.0, 0.0]]))
+    rest = np.zeros((1, 2))
+    for scale in (1.0, 0.5):
+        size = np.array([scale * ADULT])
+        alone = People(rest, rest, 0.13 * size, size, rest, np.array([[1.0, 0.0]]))
         pushed = acceleration(alone, np.array([[[0.0, 0.4 * scale]]]), np.zeros((1, 1), bool), MODEL)[0]
         np.testing.assert_allclose(pushed, [0.0, scale * 50.0 * math.exp(-2.0)])
 
@@ -90,11 +76,8 @@ def speeds(places: F64) -> NDArray[np.float64]:
 
 
 def test_somebody_alone_reaches_the_wanted_speed_in_the_papers_half_second() -> None:
-    alone = Scenario(
-        people=(Person(route=((-3, 0, 0), (4, 0, 900)), speed=1.34, height=ADULT, behaviour="social_force"),),
-        robot=Robot(y=-4),
-    )
-    places = walked(alone, 3.0, (0.0, -4.0, 0.0))
+    alone = Person(route=((-3, 0, 0), (4, 0, 900)), speed=1.34, height=ADULT, behaviour="social_force")
+    places = walked(Scenario(people=(alone,), robot=Robot(y=-4)), 3.0, (0.0, -4.0, 0.0))
     times = STEP_S * np.arange(1, 126)
     assert np.abs(speeds(places)[:125, 0] - 1.34 * (1 - np.exp(-times / 0.5))).max() < 0.08
     assert np.abs(places[..., 1]).max() < 0.1
@@ -103,18 +86,14 @@ def test_somebody_alone_reaches_the_wanted_speed_in_the_papers_half_second() -> 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_two_streams_pass_a_door_by_turns(seed: int) -> None:
     """As in the paper's figure 2: where one has got through others follow, until the other side gets a chance."""
-    half, side = 9.0, []
-    people = []
-    for index in range(9):
-        row, column = divmod(index, 3)
-        for sign in (-1, 1):
-            start = (sign * (2.5 + 0.9 * row), 0.9 * (column - 1), 0)
-            through = (-sign * 6.0, 1.5 * (column - 1), 0)
-            away = (-sign * 7.5, 1.5 * (column - 1) + 0.6 * row, 900)
-            people.append(Person(route=(start, through, away), speed=1.34, height=1.75, behaviour="social_force"))
-            side.append(sign)
-    door = Wall((0, -half), (0, -0.6)), Wall((0, 0.6), (0, half))
-    scenario = Scenario(people=tuple(people), walls=door, room=Room(half), robot=Robot(x=-8, y=-8))
+    people, side = [], [-1, 1] * 9
+    for index, sign in enumerate(side):
+        row, beside = index // 6, index // 2 % 3 - 1
+        start, through = (sign * (2.5 + 0.9 * row), 0.9 * beside, 0), (-sign * 6.0, 1.5 * beside, 0)
+        away = (-sign * 7.5, 1.5 * beside + 0.6 * row, 900)
+        people.append(Person(route=(start, through, away), speed=1.34, height=1.75, behaviour="social_force"))
+    door = Wall((0, -9), (0, -0.6)), Wall((0, 0.6), (0, 9))
+    scenario = Scenario(people=tuple(people), walls=door, room=Room(9.0), robot=Robot(x=-8, y=-8))
     places = walked(scenario, 45.0, (-8.0, -8.0, 0.0), seed)
 
     across = places[..., 0] * -np.array(side) > 0

@@ -46,19 +46,17 @@ function plot(id, series, low, high, bands = []) {
   const rows = rowsShown();
   const x = (t) => LEFT + ((t - begin) / (end - begin)) * (width - LEFT - 4);
   const y = (v) => 4 + ((high - v) / (high - low)) * (height - BOTTOM - 8);
-  for (let i = 0; i + 1 < bands.length; i++) {
-    pen.fillStyle = colours[`zone-${i}`];
-    const top = y(Math.min(bands[i + 1], high));
-    pen.fillRect(LEFT, top, width - LEFT - 4, y(bands[i]) - top);
-  }
-  // The names go where there is room for them, clear of the line above and below.
-  pen.fillStyle = colours.faint;
   pen.textAlign = "right";
   pen.textBaseline = "middle";
   for (let i = 0; i + 1 < bands.length; i++) {
     const [top, foot] = [y(Math.min(bands[i + 1], high)), y(bands[i])];
+    pen.fillStyle = colours[`zone-${i}`];
+    pen.fillRect(LEFT, top, width - LEFT - 4, foot - top);
+    // The names go where there is room for them, clear of the line above and below.
+    pen.fillStyle = colours.faint;
     if (foot - top > 13) pen.fillText(ZONES[i], width - 10, (top + foot) / 2);
   }
+  pen.fillStyle = colours.faint;
   pen.lineWidth = 1;
   const step = nice((high - low) / 6);
   for (let v = Math.ceil(low / step) * step; v <= high; v += step) {

@@ -117,10 +117,8 @@ function choose() {
     for (const old of [...row.children]) if (!shown.includes(Number(old.value))) old.remove();
     shown.forEach((number, i) => {
       if (row.children[i]?.value === String(number)) return;
-      const button = document.createElement("button");
-      button.value = button.textContent = number;
-      button.onclick = () => send({ follow: number });
-      row.insertBefore(button, row.children[i] || null);
+      const onclick = () => send({ follow: number });
+      row.insertBefore(element("button", { value: number, textContent: number, onclick }), row.children[i] || null);
     });
   }
   const followed = now.choices.filter(([, followed]) => followed).map(([number]) => String(number));
@@ -182,12 +180,8 @@ function goTo(time) {
 function nodeWindow(name) {
   const known = [...document.querySelectorAll("#windows img")].find((picture) => picture.alt === name);
   if (known) return known;
-  const figure = document.createElement("figure");
-  const caption = document.createElement("figcaption");
-  const picture = document.createElement("img");
-  caption.textContent = name;
-  picture.alt = name;
-  figure.append(caption, picture);
+  const [figure, picture] = [element("figure"), element("img", { alt: name })];
+  figure.append(element("figcaption", { textContent: name }), picture);
   $("windows").append(figure);
   return picture;
 }
@@ -309,7 +303,6 @@ function drawMap() {
   pen.lineWidth = 3;
   const side = 2 * scene.room * scale;
   pen.strokeRect(...at(-scene.room, scene.room), side, side);
-  pen.fillStyle = colours.faint;
   for (const piece of scene.furniture) {
     if (piece.length === 3) {
       disc(...piece);

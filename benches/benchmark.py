@@ -139,29 +139,23 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
         "## By group",
         "",
     ]
-    for group in dict.fromkeys(groups.values()):
-        members = ", ".join(f"`{name}`" for name, of in groups.items() if of == group)
-        lines += [f"**{group}**: {members}", "", *table([one for one in by_group if one.scenario == group]), ""]
-    lines += ["## Success by scenario", "", *successes(suite, each), "", "## Against `tracking`, run by run", ""]
+    rows = [one for group in dict.fromkeys(groups.values()) for one in by_group if one.scenario == group]
     lines += [
+        *table(rows, "group"),
+        "",
+        "## Against `tracking`, run by run",
+        "",
         *(["Bold: the interval leaves out 0.", ""] if args.seeds > 1 else []),
         *differences(compare(cards, "tracking", dict.fromkeys(groups, "all"))),
     ]
     lines += [
         "",
-        "## What was run",
+        "## Success by scenario",
         "",
         f"{played_by(cards)} The files of the suite are in `sim/limo_sim/suites/{suite.name}`; "
         f"`limo-hog score --suite {suite.name}` refuses them if one was changed.",
         "",
-        "| scenario | what happens | SHA-256 of the file |",
-        "|---|---|---|",
-    ]
-    from limo_sim.world.scenario import Scenario
-
-    lines += [
-        f"| `{entry.name}` | {Scenario.load(suite.path(entry)).summary} | `{entry.sha256[:16]}` |"
-        for entry in suite.scenarios
+        *successes(suite, each),
     ]
     page = DOCS / "benchmark.md"
     old = page.read_text(encoding="utf-8")
@@ -177,13 +171,13 @@ def shown_for(seeds: int) -> str:
     return f"Mean ± half of the 95 % interval over {seeds} seeds."
 
 
-def table(summaries: Sequence[Summary]) -> list[str]:
-    """Return a markdown table, a controller a line."""
-    lines = ["| controller | " + " | ".join(heading for _, heading, _, _ in FIGURES) + " |"]
-    lines.append("|---" * (len(FIGURES) + 1) + "|")
+def table(summaries: Sequence[Summary], of: str = "") -> list[str]:
+    """Return a markdown table, a controller a line; before it a column `of` that names the scenarios."""
+    heads = [*filter(None, [of]), "controller", *(heading for _, heading, _, _ in FIGURES)]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for one in summaries:
         cells = [cell(one.measures[name], name, factor, style) for name, _, factor, style in FIGURES]
-        lines.append(f"| `{one.controller}` | " + " | ".join(cells) + " |")
+        lines.append(f"| {one.scenario + ' | ' if of else ''}`{one.controller}` | " + " | ".join(cells) + " |")
     return lines
 
 
@@ -193,18 +187,21 @@ def cell(estimate: Estimate | None, name: str, factor: int, style: str) -> str:
 
 
 def successes(suite: Suite, summaries: Sequence[Summary]) -> list[str]:
-    """Return a markdown table of how many runs of each scenario succeeded."""
+    """Return a markdown table of the scenarios: what happens, the file, and how many runs succeeded."""
+    from limo_sim.world.scenario import Scenario
+
     controllers = list(dict.fromkeys(one.controller for one in summaries))
     of: dict[tuple[str, str], Any] = {(one.scenario, one.controller): one for one in summaries}
-    lines = ["| group | scenario | " + " | ".join(f"`{name}`" for name in controllers) + " |"]
-    lines.append("|---" * (len(controllers) + 2) + "|")
+    heads = ["group", "scenario", "what happens", "SHA-256 of the file", *(f"`{name}`" for name in controllers)]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for entry in suite.scenarios:
         cells = []
         for controller in controllers:
             one = of[entry.name, controller]
             success = one.measures["success"]
             cells.append("–" if success is None else f"{round(success.mean * one.runs)} of {one.runs}")
-        lines.append(f"| {entry.group} | `{entry.name}` | " + " | ".join(cells) + " |")
+        about = f"{Scenario.load(suite.path(entry)).summary} | `{entry.sha256[:16]}`"
+        lines.append(f"| {entry.group} | `{entry.name}` | {about} | " + " | ".join(cells) + " |")
     return lines
 
 

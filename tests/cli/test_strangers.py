@@ -249,7 +249,8 @@ def test_an_input_is_never_written_over(
         *(f"{one} --video there.mp4" for one in ("follow", "run n.py", "arena")),
         *(f"{one} --record there.mcap" for one in ("follow", "run n.py", "arena")),
         *(f"{one} --plot there.png" for one in ("follow", "run n.py", "score")),
-        *(f"workshop check n.py --{kind} there.txt" for kind in ("html", "gradescope")),
+        "workshop check n.py --html there.png",
+        "workshop check n.py --gradescope there.txt",
         "workshop grade full --csv there.csv",
         "score --csv there.csv",
         "export --out full",
@@ -264,6 +265,9 @@ def test_no_command_replaces_what_is_there_unless_it_is_told_to(
         Path(name).write_text("mine")
     code, _, err = answer_to(*typed.split())
     assert code == 2 and " would be overwritten: --overwrite replaces it" in err
+    if "there.txt" in typed:
+        err = answer_to(*typed.replace("there.txt", "full").split()).err
+        assert "'full' is a folder; wanted is a file's name" in err
     assert {path.read_text() for path in tmp_path.rglob("*") if path.is_file()} == {"mine"}
 
 

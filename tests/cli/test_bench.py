@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 import pytest
+from tests.cli.material import AnswerTo
 
 import limo_hog
 from limo_hog import detector
 from limo_hog.cli import bench
-from limo_hog.cli.main import main
 from limo_hog.cli.support.race import race
 from limo_hog.cli.support.scene import street
 
@@ -23,14 +22,17 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "SECONDS", 0.05)
 
 
-def _bench(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
-    assert main(["bench", "--json", "-", *arguments]) == 0
-    result: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return result
+#: A row of the table.
+SMALL = ("bench", "--size", "128x160", "--channels", "gray", "--threads", 1)
 
 
-def test_each_size_image_and_thread_count_is_a_row(capsys: pytest.CaptureFixture[str]) -> None:
-    result = _bench(capsys, "--size", "128x160", "96x256", "--threads", "1", "2")
+def rows_of(answer_to: AnswerTo, *words: object) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = json.loads(answer_to(*words, "--json", "-").out)["rows"]
+    return rows
+
+
+def test_each_size_image_and_thread_count_is_a_row(answer_to: AnswerTo) -> None:
+    result = json.loads(answer_to("bench", "--size", "128x160", "96x256", "--threads", 1, 2, "--json", "-").out)
     assert [(row["size"], row["channels"], row["threads"]) for row in result["rows"]] == [
         ([w, h], channels, threads) for w, h in ((128, 160), (96, 256)) for channels in (1, 3) for threads in (1, 2)
     ]
@@ -43,36 +45,26 @@ def test_each_size_image_and_thread_count_is_a_row(capsys: pytest.CaptureFixture
     assert result["environment"]["opencv"] == cv2.__version__
 
 
-def test_without_a_rival_this_detector_is_timed_alone(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_rival_this_detector_is_timed_alone(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(cv2, "HOGDescriptor")
-    (row,) = _bench(capsys, "--size", "128x160", "--channels", "gray", "--threads", "1")["rows"]
+    (row,) = rows_of(answer_to, *SMALL)
     assert row["limo_ms"]["min"] > 0
     assert [row[name] for name in ("cv2_ms", "ratio", "rects_equal", "max_weight_diff")] == [None] * 4
-    assert main(["bench", "--size", "128x160", "--channels", "gray", "--threads", "1"]) == 0
-    assert "pip install 'opencv-python-headless<5' to compare" in capsys.readouterr().out
+    assert "pip install 'opencv-python-headless<5' to compare" in answer_to(*SMALL).out
 
 
-def test_other_rectangles_than_opencvs_are_an_error(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_rectangles_than_opencvs_are_an_error(answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limo_hog.HOGDescriptor, "detectMultiScale", lambda *_, **__: ([[0, 0, 64, 128]], [1.0]))
-    assert main(["bench", "--size", "128x160", "--channels", "gray", "--threads", "1"]) == 1
-    shown = capsys.readouterr()
-    assert "differ" in shown.out
-    assert "other rectangles than OpenCV" in shown.err
+    code, out, err = answer_to(*SMALL)
+    assert code == 1 and "differ" in out and "other rectangles than OpenCV" in err
 
 
-def test_a_picture_of_ones_own_is_benched_in_its_own_size_or_another(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_picture_of_ones_own_is_benched_in_its_own_size_or_another(answer_to: AnswerTo, tmp_path: Path) -> None:
     path = tmp_path / "own.png"
     cv2.imwrite(str(path), street(144, 192, 3))
-    own = _bench(capsys, "--image", str(path), "--channels", "bgr", "--threads", "1")
-    other = _bench(capsys, "--image", str(path), "--channels", "bgr", "--threads", "1", "--size", "96x128")
-    assert own["rows"][0]["size"] == [144, 192]
-    assert other["rows"][0]["size"] == [96, 128]
+    own = ("bench", "--image", path, "--channels", "bgr", "--threads", 1)
+    sizes = [rows_of(answer_to, *own, *more)[0]["size"] for more in ((), ("--size", "96x128"))]
+    assert sizes == [[144, 192], [96, 128]]
 
 
 def test_calls_are_timed_in_turn_and_no_more_often_than_asked() -> None:
@@ -82,20 +74,13 @@ def test_calls_are_timed_in_turn_and_no_more_often_than_asked() -> None:
     assert all(0 <= timing.min <= timing.p50 for timing in timings)
 
 
-def test_the_street_is_the_same_each_time_and_has_people_in_it() -> None:
-    picture = street(640, 480, 3)
-    assert np.array_equal(picture, street(640, 480, 3))
-    assert len(limo_hog.PeopleDetector().detect(picture)) >= 3
-
-
 def test_a_guided_search_may_miss_what_the_exact_one_finds(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    arguments = ["--search", "guided", "--size", "128x160", "--channels", "gray", "--threads", "1"]
-    (row,) = _bench(capsys, *arguments)["rows"]
+    (row,) = rows_of(answer_to, *SMALL, "--search", "guided")
     assert (row["search"], row["rects_equal"]) == ("guided", True)
     assert row["ratio"] > 0
     monkeypatch.setattr(bench, "street", lambda *_: street(640, 480, 1))
     monkeypatch.setitem(detector._GUIDES, "guided", (6, 0.0, (0.0, 0.0)))
-    (row,) = _bench(capsys, *arguments)["rows"]
+    (row,) = rows_of(answer_to, *SMALL, "--search", "guided")
     assert row["rects_equal"] is False

@@ -5,9 +5,10 @@ from __future__ import annotations
 import subprocess
 
 import pytest
+from tests.cli.material import AnswerTo
 
 from limo_hog.cli.completion import SHELLS
-from limo_hog.cli.main import ARENA, BUILT_IN, main
+from limo_hog.cli.main import ARENA, BUILT_IN
 
 
 @pytest.mark.parametrize(
@@ -21,9 +22,8 @@ from limo_hog.cli.main import ARENA, BUILT_IN, main
         ("limo-hog workshop ''", {"new", "check", "grade", "solution"}),
     ],
 )
-def test_bash_completes(typed: str, offered: set[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["completion", "bash"]) == 0
-    script = capsys.readouterr().out
+def test_bash_completes(typed: str, offered: set[str], answer_to: AnswerTo) -> None:
+    script = answer_to("completion", "bash").out
     complete = (
         f'COMP_WORDS=({typed}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _shtab_limo_hog; echo "${{COMPREPLY[@]}}"'
     )
@@ -33,7 +33,6 @@ def test_bash_completes(typed: str, offered: set[str], capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_each_shell_gets_a_script_that_knows_every_command(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["completion", shell]) == 0
-    script = capsys.readouterr().out
+def test_each_shell_gets_a_script_that_knows_every_command(shell: str, answer_to: AnswerTo) -> None:
+    script = answer_to("completion", shell).out
     assert all(command in script for command in ARENA | BUILT_IN)

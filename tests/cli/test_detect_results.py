@@ -14,7 +14,7 @@ from pathlib import Path
 
 import cv2
 import pytest
-from tests.cli.material import LIMO_HOG, film_of, lines_of, on_a_full_disk
+from tests.cli.material import LIMO_HOG, AnswerTo, film_of, lines_of, on_a_full_disk
 
 from limo_hog.cli.main import main
 
@@ -36,7 +36,7 @@ def test_resuming_does_only_what_is_left(pictures: Path, tmp_path: Path) -> None
     assert sorted(p.name for p in tmp_path.iterdir()) == ["film.mp4", "in", "out.json"]
 
 
-def test_copies_that_are_there_are_not_made_again(pictures: Path, tmp_path: Path) -> None:
+def test_copies_and_lines_that_are_there_are_not_made_again(pictures: Path, tmp_path: Path) -> None:
     film, out, file = tmp_path / "film.mp4", tmp_path / "out", tmp_path / "found.json"
     film_of(film)
     arguments = ["detect", str(pictures), str(film), "--out", str(out), "--json", str(file), "--resume"]
@@ -44,34 +44,23 @@ def test_copies_that_are_there_are_not_made_again(pictures: Path, tmp_path: Path
     before = file.read_text()
     made = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
     assert len(made) == 4
-    gone = next(path for path in made if path.name == "b.png")
+    gone = out / "in" / "deep" / "b.png"
     gone.unlink()
     assert main(arguments) == 0
     again = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
-    assert again.keys() == made.keys()
-    assert [path for path in made if made[path] != again[path]] == [gone]
-    # And no second line.
+    assert [path for path in made if made[path] != again.pop(path)] == [gone] and not again
     assert file.read_text() == before
-
-
-def test_resuming_gives_a_whole_copy_of_a_video_the_lines_it_lacks(tmp_path: Path) -> None:
-    film, out, file = tmp_path / "film.mp4", tmp_path / "out", tmp_path / "found.json"
-    film_of(film)
-    assert main(["detect", str(film), "--out", str(out)]) == 0
-    made = (out / "film.mp4").stat().st_mtime_ns
-    arguments = ["detect", str(film), "--out", str(out), "--json", str(file), "--resume"]
+    # Lines that a killed run lacks are added, and the film's copy stays.
+    file.write_text("".join(before.splitlines(keepends=True)[:8]))
     assert main(arguments) == 0
-    lines = file.read_text().splitlines(keepends=True)
-    assert [r["frame"] for r in lines_of("".join(lines))] == list(range(12))
-    # As a killed run leaves it.
-    file.write_text("".join(lines[:5]))
-    assert main(arguments) == 0
-    assert [r["frame"] for r in lines_of(file.read_text())] == list(range(12))
-    assert (out / "film.mp4").stat().st_mtime_ns == made
+    assert [(r["source"], r["frame"]) for r in lines_of(file.read_text())] == [
+        (r["source"], r["frame"]) for r in lines_of(before)
+    ]
+    assert (out / "film.mp4").stat().st_mtime_ns == made[out / "film.mp4"]
 
 
 def test_results_go_through_a_pipe_which_keeps_nothing_to_go_on_from(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    pictures: Path, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
     pipe, came = tmp_path / "pipe", []
     os.mkfifo(pipe)
@@ -82,8 +71,8 @@ def test_results_go_through_a_pipe_which_keeps_nothing_to_go_on_from(
     assert [Path(r["source"]).name for r in lines_of(came[0])] == ["a.png", "c.png", "b.png"]
     assert stat.S_ISFIFO(pipe.stat().st_mode)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["in", "pipe"]
-    assert main(["detect", str(pictures), "--json", str(pipe), "--resume"]) == 2
-    assert "--json FILE or --out DIR" in capsys.readouterr().err
+    code, _, err = answer_to("detect", pictures, "--json", pipe, "--resume")
+    assert code == 2 and "--json FILE or --out DIR" in err
 
 
 def test_results_to_the_null_device_leave_it_a_device(pictures: Path, tmp_path: Path) -> None:
@@ -95,33 +84,23 @@ def test_results_to_the_null_device_leave_it_a_device(pictures: Path, tmp_path: 
 
 
 def test_the_files_of_an_earlier_run_are_replaced_only_when_asked(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    pictures: Path, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
-    out, table = tmp_path / "out", tmp_path / "found.csv"
-    file = tmp_path / "found.json"
-    for kept, told in (
-        (["--json", str(file)], "found.json"),
-        (["--out", str(out)], "a.png"),
-        (["--csv", str(table)], "csv"),
-    ):
-        arguments = ["detect", str(pictures), *kept]
-        assert main(arguments) == 0
+    for option, name, told in (("--json", "found.json", "found.json"), ("--out", "out", "a.png")):
+        arguments = ("detect", pictures, option, tmp_path / name)
+        assert answer_to(*arguments).code == 0
         before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
-        capsys.readouterr()
-        assert main(arguments) == 2
-        said = capsys.readouterr().err
-        assert told in said and "--overwrite" in said
+        code, _, err = answer_to(*arguments)
+        assert code == 2 and told in err and "--overwrite" in err
         assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
-        assert main([*arguments, "--overwrite"]) == 0
-    assert len(lines_of(file.read_text())) == 3
+        assert answer_to(*arguments, "--overwrite").code == 0
+    assert len(lines_of((tmp_path / "found.json").read_text())) == 3
 
 
-def test_what_a_killed_run_left_is_not_lost_unasked(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_a_killed_run_left_is_not_lost_unasked(pictures: Path, tmp_path: Path, answer_to: AnswerTo) -> None:
     (tmp_path / ".found.part.json").write_text("{}\n")
-    assert main(["detect", str(pictures), "--json", str(tmp_path / "found.json")]) == 2
-    assert "--resume goes on from it" in capsys.readouterr().err
+    code, _, err = answer_to("detect", pictures, "--json", tmp_path / "found.json")
+    assert code == 2 and "--resume goes on from it" in err
 
 
 @pytest.mark.parametrize(
@@ -129,59 +108,46 @@ def test_what_a_killed_run_left_is_not_lost_unasked(
     [("--threshold 0.5", "threshold 0.5, now None"), ("--search guided", "search guided, now exact")],
 )
 def test_resuming_with_other_parameters_is_refused(
-    option: str, told: str, pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    option: str, told: str, pictures: Path, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
     file = tmp_path / "found.json"
-    arguments = ["detect", str(pictures), "--json", str(file)]
-    assert main([*arguments, *option.split()]) == 0
+    arguments = ("detect", pictures, "--json", file)
+    assert answer_to(*arguments, *option.split()).code == 0
     before = file.read_bytes()
-    assert main([*arguments, "--resume"]) == 1
-    assert f"found.json was made with other parameters: {told}" in capsys.readouterr().err
-    assert file.read_bytes() == before
+    code, _, err = answer_to(*arguments, "--resume")
+    assert code == 1 and f"found.json was made with other parameters: {told}" in err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["found.json", "in"]
-    assert main([*arguments, "--resume", *option.split()]) == 0
+    assert answer_to(*arguments, "--resume", *option.split()).code == 0
     assert file.read_bytes() == before
 
 
-def test_resuming_from_another_file_leaves_it_alone(
-    pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "notes.json"
-    file.write_text("my notes\n")
-    assert main(["detect", str(pictures), "--json", str(file), "--resume"]) == 1
-    assert "not the JSON lines of an earlier run" in capsys.readouterr().err
-    assert file.read_text() == "my notes\n"
+#: Values of another kind than those of a line.
+WRONG: dict[str, tuple[object, ...]] = {
+    "boxes": (5, [5], [[1, 2, 3]], [["1", 2, 3, 4]]),
+    "scores": (["high"], []),
+    "source": ([],),
+    "frame": ("0",),
+    "width": (None,),
+    "parameters": (7,),
+}
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"boxes": 5},
-        {"boxes": [5]},
-        {"boxes": [[1, 2, 3]]},
-        {"boxes": [["1", 2, 3, 4]]},
-        {"scores": ["high"]},
-        {"scores": []},
-        {"source": []},
-        {"frame": "0"},
-        {"width": None},
-        {"parameters": 7},
-    ],
-)
+@pytest.mark.parametrize("change", [{name: value} for name, values in WRONG.items() for value in values])
 def test_a_line_with_a_value_of_another_kind_is_not_gone_on_from(
-    change: dict[str, object], pictures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    change: dict[str, object], pictures: Path, tmp_path: Path, answer_to: AnswerTo
 ) -> None:
     file, table = tmp_path / "found.json", tmp_path / "found.csv"
-    arguments = ["detect", str(pictures / "a.png"), "--json", str(file), "--csv", str(table)]
-    assert main(arguments) == 0
+    arguments = ("detect", pictures / "a.png", "--json", file, "--csv", table)
+    assert answer_to(*arguments).code == 0
     (line,) = lines_of(file.read_text())
     kept = {"boxes": [[1, 2, 3, 4]], "windows": [[0, 0, 9, 9]], "scores": [0.5], "probabilities": [0.9]}
-    file.write_text(json.dumps(line | kept | change) + "\n")
-    capsys.readouterr()
-    assert main([*arguments, "--resume"]) == 1
-    assert "found.json: not the JSON lines of an earlier run: line 1 is another" in capsys.readouterr().err
+    for damaged in (json.dumps(line | kept | change) + "\n", "my notes\n"):
+        file.write_text(damaged)
+        code, _, err = answer_to(*arguments, "--resume")
+        assert code == 1 and "found.json: not the JSON lines of an earlier run" in err
+        assert file.read_text() == damaged
     file.write_text(json.dumps(line | kept) + "\n")
-    assert main([*arguments, "--resume"]) == 0
+    assert answer_to(*arguments, "--resume").code == 0
 
 
 def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:

@@ -7,14 +7,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.cli.material import AnswerTo
 
 from limo_hog.cli.main import ARENA, BUILT_IN, main
 
 
 @pytest.mark.parametrize("command", ARENA | BUILT_IN)
-def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([command, "--help"]) == 0
-    assert f"limo-hog {command}" in capsys.readouterr().out
+def test_every_command_explains_itself(command: str, answer_to: AnswerTo) -> None:
+    code, out, _ = answer_to(command, "--help")
+    assert code == 0 and f"limo-hog {command}" in out
 
 
 def test_the_package_runs_as_a_module() -> None:
@@ -22,47 +23,36 @@ def test_the_package_runs_as_a_module() -> None:
     assert subprocess.run(command, check=True, capture_output=True, text=True).stdout.startswith("limo-hog ")
 
 
-def test_too_little_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_little_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, answer_to: AnswerTo) -> None:
     def starve(_: object) -> int:
         raise MemoryError("Unable to allocate 3 TiB")
 
     monkeypatch.setattr("limo_hog.cli.info.run", starve)
-    assert main(["info"]) == 1
-    assert capsys.readouterr().err == "limo-hog: out of memory: Unable to allocate 3 TiB\n"
+    assert answer_to("info") == (1, "", "limo-hog: out of memory: Unable to allocate 3 TiB\n")
 
 
-def test_a_named_error_is_one_line_and_with_debug_a_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_named_error_is_one_line_and_with_debug_a_traceback(answer_to: AnswerTo) -> None:
     arguments = ["bench", "--image", "no-such-file.jpg"]
-    assert main(arguments) == 1
-    assert capsys.readouterr().err == "limo-hog: no-such-file.jpg: No such file or directory\n"
-    with pytest.raises(FileNotFoundError):
-        main([*arguments, "--debug"])
-    with pytest.raises(FileNotFoundError):
-        main(["--debug", *arguments])
+    assert answer_to(*arguments) == (1, "", "limo-hog: no-such-file.jpg: No such file or directory\n")
+    for typed in ([*arguments, "--debug"], ["--debug", *arguments]):
+        with pytest.raises(FileNotFoundError):
+            main(typed)
 
 
-def test_help_imports_no_library() -> None:
-    code = (
-        "import sys; from limo_hog.cli.main import main; main(['--help']);"
-        "sys.exit(any(name in sys.modules for name in ('cv2', 'rich', 'av', 'limo_sim', 'aiohttp')))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 0
+def modules_of(*words: object) -> set[str]:
+    """Run a command in a process of its own; return its lines and the modules it imported."""
+    code = "import sys; from limo_hog.cli.main import main; main(); print(*sys.modules, sep='\\n')"
+    command = [sys.executable, "-c", code, *map(str, words)]
+    return set(subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines())
 
 
-def test_detect_imports_rich_only_where_a_terminal_shows_its_progress(tmp_path: Path) -> None:
-    code = "import sys; from limo_hog.cli.main import main; main(sys.argv[1:]); sys.exit('rich' in sys.modules)"
+def test_help_imports_no_library_and_rich_is_for_a_terminals_progress(tmp_path: Path) -> None:
+    assert modules_of("--help").isdisjoint({"cv2", "rich", "av", "limo_sim", "aiohttp"})
     (tmp_path / "broken.jpg").write_bytes(b"no picture")
-    command = [sys.executable, "-c", code, "detect", "--json", "-", str(tmp_path / "broken.jpg")]
-    done = subprocess.run(command, check=False, capture_output=True, text=True)
-    assert done.returncode == 0
-    assert "limo-hog: " in done.stderr and "broken.jpg" in done.stderr
+    assert modules_of("detect", "--json", "-", tmp_path / "broken.jpg") & {"cv2", "rich"} == {"cv2"}
 
 
-def test_wrong_words_are_answered_with_the_usage_and_a_name_that_is_no_file_too(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    for arguments in (["nonsense"], ["detect", "a.png", "--json", ""]):
-        assert main(arguments) == 2
-        shown = capsys.readouterr().err
-        assert "usage: limo-hog" in shown
-    assert "'' is no file" in shown
+def test_wrong_words_are_answered_with_the_usage_and_a_name_that_is_no_file_too(answer_to: AnswerTo) -> None:
+    for typed, told in ((["nonsense"], "nonsense"), (["detect", "a.png", "--json", ""], "'' is no file")):
+        code, _, err = answer_to(*typed)
+        assert code == 2 and err.startswith("usage: limo-hog") and told in err

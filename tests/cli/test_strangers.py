@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import io
 import json
 import math
 import os
@@ -17,12 +15,10 @@ from pathlib import Path
 
 import cv2
 import pytest
-from tests.cli.material import LIMO_HOG, PICTURE, film_of, lines_of
+from tests.cli.material import LIMO_HOG, PICTURE, AnswerTo, film_of, lines_of
 
 from limo_hog.atomic import alone, json_text, whole_file
 from limo_hog.cli.main import main
-from limo_hog.cli.support import output
-from limo_hog.cli.support.console import console
 from limo_hog.imaging.reading import Source
 from limo_hog.imaging.writing import write_image
 
@@ -48,7 +44,7 @@ def png_header(side: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
-def test_a_film_whose_name_is_not_utf8_is_searched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_film_whose_name_is_not_utf8_is_searched(tmp_path: Path) -> None:
     film_of(tmp_path / "film.mp4", frames=3)
     (tmp_path / "film.mp4").rename(tmp_path / f"{WRONG_BYTE}.mp4")
     assert ended("detect", tmp_path, "--json", tmp_path / "found").returncode == 0
@@ -106,28 +102,23 @@ def test_a_picture_of_too_many_pixels_is_refused_by_its_header(pictures: Path) -
 
 
 def test_a_picture_that_memory_does_not_hold_is_named_and_the_rest_is_done(
-    pictures: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    pictures: Path, answer_to: AnswerTo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-
     def read(source: Source) -> object:
         if source.path.name == "a.png":
             raise MemoryError("1 GB")
         return PICTURE
 
     monkeypatch.setattr("limo_hog.cli.support.pictures.read_image", read)
-    assert main(["detect", str(pictures)]) == 1
-    shown = capsys.readouterr()
-    assert len(shown.out.splitlines()) == 2
-    assert f"limo-hog: {pictures / 'a.png'}: out of memory: 1 GB" in shown.err.splitlines()
+    code, out, err = answer_to("detect", pictures)
+    assert (code, len(out.splitlines())) == (1, 2)
+    assert f"limo-hog: {pictures / 'a.png'}: out of memory: 1 GB" in err.splitlines()
 
 
-def test_copies_in_a_folder_below_the_pictures_are_no_inputs(
-    pictures: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    typed = ["detect", str(pictures), "--out", str(pictures / "found"), "--json", str(pictures / "found.json")]
-    assert main(typed) == 0
-    assert main([*typed, "--resume"]) == 0
-    assert "0 pictures, 0 people in 0 of them; 3 done before" in capsys.readouterr().err
+def test_copies_in_a_folder_below_the_pictures_are_no_inputs(pictures: Path, answer_to: AnswerTo) -> None:
+    typed = ("detect", pictures, "--out", pictures / "found", "--json", pictures / "found.json")
+    assert answer_to(*typed).code == 0
+    assert "0 pictures, 0 people in 0 of them; 3 done before" in answer_to(*typed, "--resume").err
     assert len(list((pictures / "found").rglob("*.png"))) == 3
 
 
@@ -164,19 +155,12 @@ def test_films_that_are_none_are_named_and_their_bytes_do_not_reach_the_terminal
     assert named == ["cut.mkv: no frame of it could be read", "evil.avi: not a video that OpenCV can read"]
 
 
-def test_a_table_escapes_what_a_terminal_would_obey() -> None:
-    screen = console()
-    screen.file = text = io.StringIO()
-    screen.print("a\x1b[2J\x07b\x9bc", markup=False)
-    assert text.getvalue() == "a\\x1b[2J\\x07b\\x9bc\n" or text.getvalue() == "a\\x1b[2Jb\\x9bc\n"
-
-
 #: Commands that end soon, with the lines they print where nothing is closed.
 QUICK = ("info", "completion bash", "detect a.png", "detect a.png --json found", "follow --seconds 0.5")
 
 
 @pytest.mark.parametrize("typed", QUICK)
-@pytest.mark.parametrize("shell", [">&-", "2>&-", "<&-", ">&- 2>&-", "| head -1"])
+@pytest.mark.parametrize("shell", [">&-", "2>&-", "<&-", ">&- 2>&-", "| head -1", "2>/dev/full"])
 def test_closed_descriptors_and_lost_readers_change_nothing(typed: str, shell: str, tmp_path: Path) -> None:
     write_image(tmp_path / "a.png", PICTURE)
     done = ended(*typed.split(), shell=shell, cwd=tmp_path)
@@ -212,32 +196,12 @@ def test_a_reader_who_leaves_ends_a_run_that_keeps_nothing(tmp_path: Path) -> No
 
 
 def test_a_terminal_that_is_gone_is_survived_and_a_full_disk_is_told() -> None:
-    class Gone(io.StringIO):
-        number = errno.EIO
-
-        def write(self, _: str) -> int:
-            raise OSError(self.number, os.strerror(self.number))
-
-    class Full(Gone):
-        number = errno.ENOSPC
-
-    output._Lasting(Gone(), every_error=False).write("x")
-    output._Lasting(Full(), every_error=True).write("x")
-    with pytest.raises(OSError, match="standard output"):
-        output._Lasting(Full(), every_error=False).write("x")
-
-
-def test_two_runs_do_not_write_one_file(pictures: Path, tmp_path: Path) -> None:
-    found = tmp_path / "found.json"
-    assert main(["detect", str(pictures), "--json", str(found)]) == 0
-    before = found.read_bytes()
-    for how in ("--resume", "--overwrite"):
-        with alone(found):
-            done = ended("detect", pictures, "--json", found, how)
-        assert (done.returncode, found.read_bytes()) == (1, before)
-        assert done.stderr == f"limo-hog: {found}: another run is writing it, and holds .found.lock.json\n"
-    assert ended("detect", pictures, "--json", found, "--resume").returncode == 0
-    assert not list(tmp_path.glob(".*"))
+    terminal, gone = os.openpty()
+    os.close(terminal)
+    assert subprocess.run([LIMO_HOG, "info"], check=False, stdout=gone, timeout=60).returncode == 0
+    os.close(gone)
+    full = ended("info", shell=">/dev/full")
+    assert (full.returncode, full.stderr) == (1, "limo-hog: standard output: No space left on device\n")
 
 
 def test_two_writers_of_one_file_do_not_share_a_temporary_name(tmp_path: Path) -> None:
@@ -257,16 +221,17 @@ def test_two_writers_of_one_file_do_not_share_a_temporary_name(tmp_path: Path) -
         "train labels.json --out labels.json",
         "detect a.png --model m.yml --csv m.yml --overwrite",
         "follow --scenario s.toml --json s.toml",
+        *(f"detect a.png --out . {how}" for how in ("", "--resume", "--overwrite")),
     ],
 )
 def test_an_input_is_never_written_over(
-    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer_to: AnswerTo
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("labels.json", "m.yml", "s.toml", "a.png"):
         Path(name).write_text("mine")
-    assert main(typed.split()) == 2
-    assert "is itself an input: give another name" in capsys.readouterr().err
+    code, _, err = answer_to(*typed.split())
+    assert code == 2 and "is itself an input: " in err
     assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
 
 
@@ -284,21 +249,25 @@ def test_an_input_is_never_written_over(
         *(f"{one} --video there.mp4" for one in ("follow", "run n.py", "arena")),
         *(f"{one} --record there.mcap" for one in ("follow", "run n.py", "arena")),
         *(f"{one} --plot there.png" for one in ("follow", "run n.py", "score")),
-        *(f"workshop check n.py --{kind} there.txt" for kind in ("html", "gradescope")),
+        "workshop check n.py --html there.png",
+        "workshop check n.py --gradescope there.txt",
         "workshop grade full --csv there.csv",
         "score --csv there.csv",
         "export --out full",
     ],
 )
 def test_no_command_replaces_what_is_there_unless_it_is_told_to(
-    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer_to: AnswerTo
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "full").mkdir()
     for name in ("full/mine", *(f"there.{suffix}" for suffix in ("txt", "yml", "mp4", "mcap", "png", "csv"))):
         Path(name).write_text("mine")
-    assert main(typed.split()) == 2
-    assert " would be overwritten: --overwrite replaces it" in capsys.readouterr().err
+    code, _, err = answer_to(*typed.split())
+    assert code == 2 and " would be overwritten: --overwrite replaces it" in err
+    if "there.txt" in typed:
+        err = answer_to(*typed.replace("there.txt", "full").split()).err
+        assert "'full' is a folder; wanted is a file's name" in err
     assert {path.read_text() for path in tmp_path.rglob("*") if path.is_file()} == {"mine"}
 
 
@@ -312,14 +281,25 @@ def test_a_command_replaces_what_is_there_where_it_is_told_to(tmp_path: Path) ->
     assert not list(tmp_path.glob(".*"))
 
 
-@pytest.mark.parametrize("typed", ["train labels.json --out m.yml", "follow --seconds 1 --record m.mcap"])
-def test_two_runs_of_one_command_do_not_write_one_file(
-    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    "typed",
+    [
+        "train labels.json --overwrite --out m.yml",
+        "follow --seconds 1 --overwrite --record m.mcap",
+        *(f"detect a.png {how} --json m.json" for how in ("--resume", "--overwrite")),
+    ],
+)
+def test_two_runs_do_not_write_one_file(
+    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer_to: AnswerTo
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with alone(Path(typed.split()[-1])):
-        assert main(typed.split()) == 1
-    assert "another run is writing it, and holds .m.lock." in capsys.readouterr().err
+    target = Path(typed.split()[-1])
+    target.write_text("mine")
+    with alone(target):
+        code, _, err = answer_to(*typed.split())
+    assert (code, target.read_text()) == (1, "mine")
+    assert err == f"limo-hog: {target}: another run is writing it, and holds .m.lock{target.suffix}\n"
+    assert list(tmp_path.iterdir()) == [tmp_path / target]
 
 
 def test_json_holds_no_number_that_json_does_not_know() -> None:
@@ -344,9 +324,8 @@ def test_pictures_are_searched_while_python_ends(tmp_path: Path) -> None:
     assert int(done.stdout) >= 8 and not done.stderr
 
 
-def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, answer_to: AnswerTo) -> None:
     (tmp_path / "file").write_text("")
     for option in ("--json", "--csv"):
         target = tmp_path / "file" / "a.csv"
-        assert main(["score", option, str(target)]) == 1
-        assert capsys.readouterr().err == f"limo-hog: {target}: Not a directory\n"
+        assert answer_to("score", option, target) == (1, "", f"limo-hog: {target}: Not a directory\n")

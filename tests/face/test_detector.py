@@ -5,12 +5,13 @@ from __future__ import annotations
 import copy
 import json
 import pickle
+import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import FrozenInstanceError, replace
 from decimal import Decimal
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,6 +26,10 @@ from limo_hog.suppression import intersection_over_smaller, nms
 
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "real" / "pedestrians"
 Image = NDArray[np.uint8]
+
+
+#: Every hit, without grouping.
+RAW: Any = {"nms": "group", "group_threshold": 0}
 
 
 @cache
@@ -73,9 +78,7 @@ def test_searching_at_half_the_size_finds_what_a_half_size_image_holds() -> None
     assert len(found) > 0
     np.testing.assert_array_equal(found.windows, 2 * expected.windows)
     np.testing.assert_array_equal(found.scores, expected.scores)
-
-
-def test_the_height_of_a_window_without_enlarging_is_the_models_own() -> None:
+    # Without enlarging, the least height is the model's own.
     own, asked = PeopleDetector(min_height=None), PeopleDetector(min_height=0.78 * 128)
     np.testing.assert_array_equal(own.detect(picture()).windows, asked.detect(picture()).windows)
 
@@ -133,7 +136,7 @@ def test_an_image_that_would_be_enlarged_beyond_memory_is_refused() -> None:
 
 
 def test_of_hits_on_one_person_the_best_stays_by_the_person_boxes_overlap() -> None:
-    detector = PeopleDetector(model="opencv", min_height=None, threshold=-0.7, nms="group", group_threshold=0)
+    detector = PeopleDetector(model="opencv", min_height=None, threshold=-0.7, **RAW)
     hits = detector.detect(picture())
     x, y, w, h = hits.windows.T
     # People are compared, not windows: those of two people side by side share their margins.
@@ -146,13 +149,11 @@ def test_of_hits_on_one_person_the_best_stays_by_the_person_boxes_overlap() -> N
 
 
 def test_the_limit_of_overlap_can_be_chosen() -> None:
-    hits = PeopleDetector(nms="group", group_threshold=0).detect(picture())
+    hits = PeopleDetector(**RAW).detect(picture())
     assert len(PeopleDetector(overlap=1).detect(picture())) == len(hits)
     counts = [len(PeopleDetector(threshold=-1.0, overlap=limit).detect(picture())) for limit in (0.1, 0.65, 0.95)]
     assert 0 < counts[0] < counts[1] < counts[2]
-
-
-def test_a_threshold_below_minus_one_gives_more_and_surest_first() -> None:
+    # A threshold below -1 gives more, the surest first.
     few, many = PeopleDetector().detect(picture()), PeopleDetector(threshold=-1.2).detect(picture())
     assert len(many) > len(few)
     assert -1.2 <= many.scores.min() < 0
@@ -183,28 +184,17 @@ def test_a_copy_is_equal_and_finds_the_same(again: Any, of_a_file: bool, tmp_pat
     np.testing.assert_array_equal(twin.detect(picture()).windows, found.windows)
 
 
-def test_a_guided_search_finds_people_and_only_what_the_exact_search_finds() -> None:
-    exact, guided = (
-        {
-            tuple(box)
-            for box in PeopleDetector(nms="group", group_threshold=0, search=search).detect(picture()).windows.tolist()
-        }
-        for search in ("exact", "guided")
-    )
-    assert guided <= exact
-    assert len(guided) > 0.9 * len(exact) > 0
-
-
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="photographs lie in ../shared")
-def test_on_photographs_a_guided_search_misses_few_hits() -> None:
-    hits: dict[Literal["exact", "guided"], int] = {"exact": 0, "guided": 0}
+def test_on_photographs_a_guided_search_misses_few_hits_and_adds_none() -> None:
+    exact, guided = (PeopleDetector(min_height=None, **RAW, search=search) for search in ("exact", "guided"))
+    hits, misses = 0, 0
     for file in sorted(PHOTOGRAPHS.iterdir()):
-        image = cv2.imread(str(file))
-        for search in hits:
-            detector = PeopleDetector(min_height=None, nms="group", group_threshold=0, search=search)
-            hits[search] += 0 if image is None else len(detector.detect(np.asarray(image, np.uint8)))
-    assert hits["exact"] > 100
-    assert 0.97 * hits["exact"] < hits["guided"] <= hits["exact"]
+        if cv2.haveImageReader(str(file)):
+            every, some = ({*map(tuple, one.detect(file).windows.tolist())} for one in (exact, guided))
+            assert some <= every
+            hits, misses = hits + len(every), misses + len(every - some)
+    assert misses < 0.03 * hits
+    assert hits > 100
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -247,17 +237,11 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"model": 7}, TypeError, "model is 7"),
     ({"threshold": Decimal("sNaN")}, TypeError, "threshold is Decimal"),
     ({"threshold": np.complex128(1 + 2j)}, TypeError, "a real number is wanted"),
-    ({"threshold": np.str_("x")}, TypeError, "threshold is"),
-    ({"model": None}, TypeError, "model is None"),
     ({"min_height": 0}, ValueError, "min_height is 0; 8 or more is wanted"),
-    ({"min_height": float("nan")}, ValueError, "min_height is nan"),
-    ({"min_height": "64"}, TypeError, "min_height is '64'; a number is wanted"),
     ({"min_height": 300, "max_height": 100}, ValueError, "at least 300 is wanted, the height of the smallest person"),
     ({"min_height": None, "max_height": 70}, ValueError, "max_height is 70; at least 74.88"),
-    ({"max_height": float("inf")}, ValueError, "max_height is inf"),
     ({"threshold": float("nan")}, ValueError, "threshold is nan; a finite number is wanted"),
     ({"threshold": 10**400}, ValueError, r"threshold is 1000.*… is wanted|threshold is 10000"),
-    ({"threshold": True}, TypeError, "threshold is True"),
     ({"threshold": np.zeros(3)}, TypeError, "threshold is array"),
     ({"nms": "bogus"}, ValueError, "nms is 'bogus'; one of overlap, group is wanted"),
     ({"nms": ["group"]}, TypeError, r"nms is \['group'\]"),
@@ -268,12 +252,10 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"group_threshold": 0}, ValueError, 'group_threshold has no meaning for nms="overlap"'),
     ({"win_stride": (0, 8)}, ValueError, r"win_stride is \(0, 8\)"),
     ({"win_stride": 8}, TypeError, r"win_stride is 8; two integers \(x, y\) are wanted"),
-    ({"win_stride": (8.0, 8)}, TypeError, "win_stride is"),
     ({"padding": -1}, TypeError, "padding is -1; two integers"),
     ({"padding": (-1, 0)}, ValueError, r"padding is \(-1, 0\)"),
     ({"padding": (65, 0)}, ValueError, r"padding is \(65, 0\).*\(64, 128\)"),
     ({"scale": 0.5}, ValueError, "scale is 0.5; 1.005 or more"),
-    ({"scale": float("nan")}, ValueError, "scale is nan"),
     ({"scale": None}, TypeError, "scale is None"),
     # (An array of records cannot be compared with a text.)
     ({"min_height": None, "max_height": 64, "nms": np.zeros(3, "i4,f4")}, TypeError, "nms is"),
@@ -310,24 +292,19 @@ def saved(path: Path, card: Any = None) -> Path:
     return path
 
 
-@pytest.mark.parametrize("suffix", [".yml", ".xml.gz", ".json"])
-def test_a_model_that_opencv_wrote_finds_the_same(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"people{suffix}"
-    theirs = cv2.HOGDescriptor()
-    theirs.setSVMDetector(np.asarray(cv2.HOGDescriptor.getDefaultPeopleDetector()))
-    theirs.save(str(path))
-    expected = PeopleDetector(model="opencv").detect(picture())
-    for name in (path, str(path)):
-        np.testing.assert_array_equal(PeopleDetector(model=name).detect(picture()).windows, expected.windows)
+def test_a_model_is_a_name_a_file_or_in_memory(tmp_path: Path) -> None:
+    file, memory = saved(tmp_path / "people.xml.gz"), load_model("opencv")
+    expected = PeopleDetector(model="opencv").detect(picture()).windows
+    for model in (file, str(file), memory):
+        np.testing.assert_array_equal(PeopleDetector(model=model).detect(picture()).windows, expected)
+    detector = PeopleDetector(model=memory)
+    assert replace(detector) == detector == PeopleDetector(model=load_model("opencv"))
+    assert detector != PeopleDetector(model=load_model("daimler"))
+    assert len(pickle.loads(pickle.dumps(detector)).detect(picture())) > 0
 
 
 def test_a_models_card_gives_its_person_box_threshold_and_calibration(tmp_path: Path) -> None:
-    card = {
-        "person_box": [0.1, 0.2, 0.5, 0.5],
-        "threshold": 0.75,
-        "calibration": {"slope": 2, "offset": -1},
-        "recipe": "ours",
-    }
+    card = {"person_box": [0.1, 0.2, 0.5, 0.5], "threshold": 0.75, "calibration": {"slope": 2, "offset": -1}}
     detector = PeopleDetector(model=saved(tmp_path / "m.yml", card), min_height=64)
     found = detector.detect(picture())
     assert len(found) > 0 and found.scores.min() >= 0.75
@@ -357,22 +334,10 @@ def test_a_damaged_card_is_named(tmp_path: Path, card: Any, told: str) -> None:
         PeopleDetector(model=saved(tmp_path / "m.yml", card))
 
 
-def test_a_model_need_not_be_in_a_file() -> None:
-    detector = PeopleDetector(model=load_model("daimler"))
-    np.testing.assert_array_equal(
-        detector.detect(picture()).windows, PeopleDetector(model="daimler").detect(picture()).windows
-    )
-    assert replace(detector) == detector == PeopleDetector(model=load_model("daimler"))
-    assert detector != PeopleDetector(model=load_model("opencv"))
-    assert len(pickle.loads(pickle.dumps(detector)).detect(picture())) > 0
-
-
 @pytest.mark.parametrize("word", [".Inf", "-.Inf", ".Nan", "1e39"])
 def test_a_model_with_a_coefficient_that_is_no_finite_number_is_refused(tmp_path: Path, word: str) -> None:
     path = saved(tmp_path / "m.yml")
-    text = path.read_text()
-    start = text.index("SVMDetector: [") + len("SVMDetector: [")
-    path.write_text(text[:start] + f" {word}," + text[text.index(",", start) + 1 :])
+    path.write_text(re.sub(r"(?<=SVMDetector: \[)[^,]+", f" {word}", path.read_text()))
     with pytest.raises(limo_hog.ModelFormatError, match=r"m\.yml: a coefficient is infinite or NaN"):
         PeopleDetector(model=path)
     weights = load_model("opencv").coefficients.copy()

@@ -62,12 +62,6 @@ def test_nms_keeps_what_opencvs_keeps() -> None:
     assert nms(boxes, scores, 0.4).tolist() == list(theirs)
 
 
-def test_a_part_of_a_person_is_no_second_person() -> None:
-    whole_and_part = np.array([[0, 0, 64, 128], [16, 4, 32, 64]])
-    assert nms(whole_and_part, np.array([1.0, 0.9]), 0.65).tolist() == [0, 1]
-    assert nms(whole_and_part, np.array([1.0, 0.9]), 0.65, intersection_over_smaller).tolist() == [0]
-
-
 def test_thousands_of_hits_are_suppressed_at_once() -> None:
     boxes, scores = crowd(5000, 100)
     start = time.process_time()

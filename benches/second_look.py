@@ -47,7 +47,7 @@ from rivals import tud, usc
 #: The first look: the large window, which alone serves people from 64 px on.
 LIMO = load_model(files("limo_hog") / "weights" / "limo_64x128.yml")
 #: Share of the logit in a score, of .05 to .3 the best on USC-C and TUD 1-41 together; where measured curves end.
-SHARE, LEAST_SCORE = 0.15, -1.5
+SHARE, LEAST_SCORE = 0.2, -1.5
 
 #: The window [px], and the margin around it that jitter may show.
 WIDTH, HEIGHT, MARGIN = 64, 128, 8
@@ -65,7 +65,7 @@ STREET, TALL, SLIM, INSIDE, NOT_THE_PERSON = (720, 576), 70, (0.2, 0.62), 0.7, 0
 PERSON, STREET_PERSON, ABOVE = 96, 0.76, 0.12
 #: An epoch: people, negatives for each, shares of these that are cut out of people, and that are parts found on the
 #: streets, from epoch HARD_FROM on of the others the share of the hardest; and people for their places alone.
-PEOPLE, NEGATIVES, PARTS, FOUND_PARTS, HARDEST, HARD_FROM, PLACES = 8192, 3, 1 / 6, 1 / 12, 0.5, 2, 4096
+PEOPLE, NEGATIVES, PARTS, FOUND_PARTS, HARDEST, HARD_FROM, PLACES = 8192, 3, 1 / 4, 1 / 6, 0.5, 2, 4096
 BATCH, RATE, DECAY, DROPOUT, SURE, LARGEST_STEP = 256, 2e-3, 0.02, 0.4, 0.99, 1.0
 #: How much the places' loss counts, and where it passes from squares to lines.
 PLACE_SHARE, PLACE_SQUARE = 0.05, 0.1
@@ -92,7 +92,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True, help="with eval/usc-c and real/annotations")
     parser.add_argument("--frames", type=Path, required=True, help="frames 1 to 41 of TUD-Stadtmitte")
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--epochs", type=int, default=16)
+    parser.add_argument("--epochs", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
     if not args.out.exists():

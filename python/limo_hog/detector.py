@@ -33,7 +33,7 @@ _OVERLAP = 0.65
 _LARGE_WINDOW_FROM_PX = 64.0
 #: What a second look is given: windows of at least this margin, of those whose people share more than this (IoU) the
 #: best, and of these the best few. On USC-C, TUD 1-41 and Penn-Fudan lower margins and more windows find nobody more.
-_LOOKED_AT_FROM, _LOOKED_AT_IOU, _LOOKED_AT_MOST = -1.0, 0.7, 32
+_LOOKED_AT_FROM, _LOOKED_AT_IOU, _LOOKED_AT_MOST = -1.0, 0.7, 50
 #: Of its boxes, those vote on where a person stands that overlap by this (IoU), and a vote is 1/e where the score is
 #: lower by that much; .5 to .7 and .3 to 1 hardly differ on these sets.
 _VOTES_FROM_IOU, _VOTE_SOFTNESS = 0.5, 0.3
@@ -100,7 +100,7 @@ class PeopleDetector:
         on the levels around them: about twice as fast, and a raw hit in two hundred is missed (docs/simd.md).
         Geometries without kernels are searched whole.
     second_look
-        A small network looks again at the best 32 windows, the most that are then found in an image; a score is SVM
+        A small network looks again at the best 50 windows, the most that are then found in an image; a score is SVM
         margin + a share of the network's logit, and `threshold` applies to it; boxes, and windows with them, are moved
         and stretched to where the network sees the person. For "limo", `nms="overlap"` and `search="exact"` (a guide
         that follows every candidate takes longer). None: where it can be had. False: every step is HOG's.

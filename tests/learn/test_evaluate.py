@@ -91,7 +91,7 @@ def test_the_report_shows_the_first_look_apart_from_the_second(streets: Path, tm
     out = tmp_path / "report"
     assert main(["evaluate", "limo", str(streets), "--against", "opencv", "--report", str(out), "--json", "-"]) == 0
     names = [model["model"] for model in json.loads((out / "figures.json").read_text())["models"]]
-    assert names == ["limo", "limo, second look", "opencv"]
+    assert names == ["limo", "limo, first look", "opencv"]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -52,7 +53,8 @@ def test_people_too_small_for_the_large_window_are_found_by_the_small_one() -> N
 )
 def test_from_64_px_on_and_in_opencvs_grouping_the_large_window_alone_is_used(options: dict[str, Any]) -> None:
     picture = street(640, 480, 3)
-    limo, large = (PeopleDetector(model=model, **options).detect(picture) for model in ("limo", LARGE))
+    first = partial(PeopleDetector, second_look=False, **options)
+    limo, large = (first(model=model).detect(picture) for model in ("limo", LARGE))
     assert len(limo) > 0
     assert limo.boxes.tolist() == large.boxes.tolist()
     assert limo.scores.tolist() == large.scores.tolist()
@@ -71,17 +73,17 @@ def test_the_cards_say_where_the_weights_come_from() -> None:
         assert [source["files"] for source in card["data"]] == [2416, 924, 4146, 3019]
         assert all(len(source["sha256"]) == 64 for source in card["data"])
         assert load_model(model).threshold == card["threshold"]
-    assert sum(path.stat().st_size for path in WEIGHTS.iterdir()) < 250_000
+    assert sum(path.stat().st_size for path in WEIGHTS.iterdir()) < 300_000
 
 
 @pytest.mark.skipif(not USC.is_dir(), reason="the photographs of ../shared are not here")
 def test_on_the_validation_photographs_two_looks_miss_fewer_people_than_one_and_than_opencvs_weights(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main(["evaluate", "limo", str(USC), "--against", "opencv", "--second-look", "--json", "-"]) == 0
+    assert main(["evaluate", "limo", str(USC), "--against", "opencv", "--first-look", "--json", "-"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert (result["pictures"], result["objects"]) == (100, 232)
     card = json.loads((WEIGHTS / "second_look.f16.json").read_text())
     twice = card["figures"]["USC-C"]["lamr"]
     assert twice < 0.24
-    assert [model["lamr"] for model in result["models"]] == pytest.approx([0.268, twice, 0.298], abs=0.01)
+    assert [model["lamr"] for model in result["models"]] == pytest.approx([twice, 0.268, 0.298], abs=0.01)

@@ -76,7 +76,7 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
         dest="second_look",
         action="store_const",
         const=False,
-        help="do not let a small network look again at limo's best 32 windows: HOG alone, with more misses",
+        help="do not let a small network look again at limo's best 50 windows: HOG alone, with more misses",
     )
     parser.add_argument(
         "--min-height",

@@ -31,7 +31,7 @@ PLOT = Path(__file__).parents[1] / "docs" / "images" / "front.png"
 LEAST = -1.5
 ROUNDS = 9
 SEARCHES: dict[str, dict[str, Any]] = {
-    **{f"exact, scale {scale}": {"scale": scale} for scale in (1.05, 1.075, 1.1, 1.15)},
+    **{f"exact, scale {scale}": {"scale": scale} for scale in (1.05, 1.075, 1.1, 1.15, 1.2)},
     "guided, scale 1.05": {"search": "guided"},
 }
 

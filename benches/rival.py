@@ -12,6 +12,7 @@ import importlib
 import json
 import sys
 import time
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 
@@ -23,13 +24,14 @@ LEAST = -1.2
 OURS = ("numpy", "rich", "markdown-it-py", "mdurl", "pygments")
 
 
-def limo(model, min_height):
+def limo(model, min_height, second_look):
     """Make `PeopleDetector`'s search with every hit that a curve needs, and with a user's threshold."""
     import limo_hog
 
     limo_hog.set_num_threads(1)
-    plain = limo_hog.PeopleDetector(model=model, min_height=min_height)
-    every = limo_hog.PeopleDetector(model=model, min_height=min_height, threshold=LEAST)
+    height, look = None if min_height == "none" else float(min_height), False if second_look == "no" else None
+    plain = limo_hog.PeopleDetector(model=model, min_height=height, second_look=look)
+    every = replace(plain, threshold=LEAST)
 
     def found(detector, image):
         people = detector.detect(image)
@@ -158,7 +160,7 @@ def main():
         describe = descriptor(*arguments)
     else:
         every, plain = {
-            "limo": lambda: limo(arguments[0], None if arguments[1] == "none" else float(arguments[1])),
+            "limo": lambda: limo(*arguments),
             "opencv": lambda: opencv(*map(float, arguments)),
             "haar": haar,
             "ssdlite": ssdlite,

@@ -54,8 +54,9 @@ class Entry(NamedTuple):
 def finders(min_height: int) -> list[Entry]:
     """Return who finds people; limo-hog is told the height of the smallest [px]."""
     return [
-        Entry("limo-hog, `PeopleDetector()`", (), ("limo", "limo", str(min_height))),
-        Entry('limo-hog, `model="opencv"`', (), ("limo", "opencv", str(min_height))),
+        Entry("limo-hog, `PeopleDetector()`", (), ("limo", "limo", str(min_height), "yes")),
+        Entry("limo-hog, `second_look=False`", (), ("limo", "limo", str(min_height), "no")),
+        Entry('limo-hog, `model="opencv"`', (), ("limo", "opencv", str(min_height), "no")),
         Entry("OpenCV's HOG, boxes as its sample's", (OPENCV,), ("opencv", "0.15", "0.05", "0.7", "0.9")),
         Entry("OpenCV's HOG, boxes as ours", (OPENCV,), ("opencv", *map(str, PERSON_BOX))),
         Entry("OpenCV's Haar cascade, whole body", (OPENCV,), ("haar",)),

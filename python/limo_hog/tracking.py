@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
+from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
 from limo_hog.extras import needed
-from limo_hog.models import load_model
 
 #: Class of each tracker in `trackers`.
 TRACKERS = MappingProxyType({"bytetrack": "ByteTrackTracker", "ocsort": "OCSORTTracker", "sort": "SORTTracker"})
 
-#: Boxes of so much less than the threshold continue a person who was seen before [SVM margin].
+#: Boxes of so much less than the threshold continue a person who was seen before [score].
 FED = 0.3
 #: A person is numbered in the second picture, and waited for for 1 s (in 1/30 s); IoU of a box with where the person is
 #: expected. Chosen, with `FED`, on the odd ones of TUD's frames 1 to 41.
@@ -36,7 +36,7 @@ class Tracker:
     name
         "bytetrack", "ocsort" or "sort". docs/detect.md compares them.
     threshold
-        Least SVM margin of a box that may be a new person; other boxes only continue one. None: that of our weights.
+        Least score of a box that may be a new person; other boxes only continue one. None: `PeopleDetector()`'s.
     fps
         Pictures a second [Hz].
 
@@ -59,15 +59,15 @@ class Tracker:
             position=Position.BOTTOM_CENTER, trace_length=round(2 * fps), color_lookup=ColorLookup.TRACK
         )
         self._tracker = getattr(trackers, TRACKERS[name])(frame_rate=fps, **_SETTINGS)
-        self.set_threshold(load_model("limo").threshold if threshold is None else threshold)
+        self.set_threshold(PeopleDetector().least_score if threshold is None else threshold)
 
     @property
     def lowest(self) -> float:
-        """Least SVM margin of a box that is of use: the detector's threshold."""
+        """Least score of a box that is of use: the detector's threshold."""
         return self._threshold - FED
 
     def set_threshold(self, threshold: float) -> None:
-        """Take new people from another SVM margin on, from the next picture on."""
+        """Take new people from another score on, from the next picture on."""
         self._threshold = threshold
         # SORT has the first, OC-SORT the second, ByteTrack both.
         for name in {"track_activation_threshold", "high_conf_det_threshold"} & {*vars(self._tracker)}:

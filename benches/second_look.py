@@ -66,6 +66,8 @@ PERSON, STREET_PERSON, ABOVE = 96, 0.76, 0.12
 #: An epoch: people, negatives for each, shares of these that are cut out of people, and that are parts found on the
 #: streets, from epoch HARD_FROM on of the others the share of the hardest; and people for their places alone.
 PEOPLE, NEGATIVES, PARTS, FOUND_PARTS, HARDEST, HARD_FROM, PLACES = 8192, 3, 1 / 4, 1 / 6, 0.5, 2, 4096
+#: What is left of a weight: 0 below this, else so many bits of the mantissa.
+LEAST_WEIGHT, MANTISSA_BITS = 0.007, 3
 BATCH, RATE, DECAY, DROPOUT, SURE, LARGEST_STEP = 256, 2e-3, 0.02, 0.4, 0.99, 1.0
 #: How much the places' loss counts, and where it passes from squares to lines.
 PLACE_SHARE, PLACE_SQUARE = 0.05, 0.1
@@ -125,7 +127,14 @@ def learnt(args: argparse.Namespace) -> bytes:
     params = train(people, negatives, len(parts), args.epochs, args.seed)
     # (jax sorts a dictionary's keys, which puts a bias before its weights.)
     ordered = [np.asarray(params[f"{layer}{kind}"]).ravel() for layer in range(5) for kind in "wb"]
-    return np.concatenate(ordered).astype("<f2").tobytes()
+    return rounded(np.concatenate(ordered)).tobytes()
+
+
+def rounded(weights: NDArray[np.float32]) -> NDArray[np.float16]:
+    """Return them so that a wheel packs them in half as many bytes; LAMR stays within .005."""
+    small = np.where(np.abs(weights) < LEAST_WEIGHT, 0, weights).astype("<f2").view("<u2").astype(np.uint32)
+    dropped = 10 - MANTISSA_BITS
+    return ((small + (1 << (dropped - 1)) >> dropped) << dropped).astype("<u2").view("<f2")
 
 
 def streets(folder: Path) -> tuple[People, Images]:

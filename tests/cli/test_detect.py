@@ -48,9 +48,9 @@ def test_annotated_copies_lie_as_the_pictures_lie(
     monkeypatch.chdir(pictures / "deep")
     assert main(["detect", "../a.png", "b.png", "--out", str(tmp_path / "more")]) == 0
     copies = [
-        path.relative_to(tmp_path) for path in tmp_path.rglob("*.png") if {pictures, out}.isdisjoint(path.parents)
+        str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.png") if {pictures, out}.isdisjoint(path.parents)
     ]
-    assert sorted(map(str, copies)) == ["more/a.png", "more/deep/b.png"]
+    assert sorted(copies) == ["more/a.png", "more/deep/b.png"]
 
 
 def test_what_cannot_be_read_is_named_and_the_rest_is_done(pictures: Path, answer_to: AnswerTo) -> None:

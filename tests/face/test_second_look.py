@@ -94,7 +94,7 @@ def test_a_score_is_the_margin_and_a_share_of_the_networks_logit() -> None:
 def test_the_network_moves_and_stretches_the_boxes() -> None:
     def best(*answer: float) -> Numbers:
         model = replace(load_model("limo"), second_look=always(9, *answer))
-        return PeopleDetector(model=model).detect(picture()).windows[0].astype(float)
+        return np.asarray(PeopleDetector(model=model).detect(picture()).windows[0], np.float64)
 
     x, y, w, h = best(0, 0, 1, 1)
     moved = PERSON_BOX.inside(best(0.1, -0.05, 1.2, 0.9)[None])[0]

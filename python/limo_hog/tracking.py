@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.detections import Detections
-from limo_hog.detector import PeopleDetector
 from limo_hog.exceptions import ParameterError
 from limo_hog.extras import needed
+from limo_hog.models import load_model
 
 #: Class of each tracker in `trackers`.
 TRACKERS = MappingProxyType({"bytetrack": "ByteTrackTracker", "ocsort": "OCSORTTracker", "sort": "SORTTracker"})
@@ -59,7 +59,8 @@ class Tracker:
             position=Position.BOTTOM_CENTER, trace_length=round(2 * fps), color_lookup=ColorLookup.TRACK
         )
         self._tracker = getattr(trackers, TRACKERS[name])(frame_rate=fps, **_SETTINGS)
-        self.set_threshold(PeopleDetector().least_score if threshold is None else threshold)
+        limo = load_model("limo")
+        self.set_threshold((limo.second_look or limo).threshold if threshold is None else threshold)
 
     @property
     def lowest(self) -> float:

@@ -139,7 +139,7 @@ def write_page(suite: Suite, cards: Sequence[ScoreCard], args: argparse.Namespac
         "## By group",
         "",
     ]
-    rows = [one for group in dict.fromkeys(groups.values()) for one in by_group if one.scenario == group]
+    rows = [summary for group in dict.fromkeys(groups.values()) for summary in by_group if summary.scenario == group]
     lines += [
         *table(rows, "group"),
         "",

@@ -10,8 +10,7 @@
         --photographs photographs/images --streets motion-pairs --data ../shared/data --frames TUD --out second_look.f16
 
 writes the weights (float16, little-endian) and beside them a card. All that is drawn comes from `--seed`.
-The windows that `limo` takes for people on the photographs are mined first, and what it finds on parts of the people of
-the streets.
+First the windows are mined that `limo` takes for people on photographs, and on parts of people on streets.
 Weights that are there are not trained again: only their card is made.
 """
 
@@ -27,7 +26,6 @@ from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import cv2
 import jax
@@ -39,6 +37,7 @@ from numpy.typing import NDArray
 from limo_hog import PeopleDetector, __version__
 from limo_hog.learn.card import calibrate, calibration_error
 from limo_hog.learn.evaluation.run import Evaluation, Rival, evaluate
+from limo_hog.learn.formats import read_labels
 from limo_hog.learn.sources import hash_of
 from limo_hog.models import PERSON_BOX, Calibration, SecondLook, load_model
 from limo_hog.suppression import intersection_over_union, nms, share_inside
@@ -56,8 +55,8 @@ SOURCE = WIDTH + 2 * MARGIN, HEIGHT + 2 * MARGIN * 2
 INPUT = 32, 64
 CHANNELS, KERNELS = (16, 32, 64), (5, 3, 3)
 HIDDEN = 32
-#: Mined: least margin, most windows of a photograph, most overlap (IoU) of two.
-LEAST_MARGIN, MOST, MOST_IOU = -1.3, 25, 0.7
+#: Mined: least margin, most windows of a photograph and of a street, most overlap (IoU) of two.
+LEAST_MARGIN, MOST, MOST_OF_STREET, MOST_IOU = -1.3, 25, 60, 0.7
 #: The streets: size of the pictures that belong to them [px], least height of a person [px], and bounds of a person's
 #: width [heights]; a window on a labelled person (share inside) that is not the person's (IoU) shows a part.
 STREET, TALL, SLIM, INSIDE, NOT_THE_PERSON = (720, 576), 70, (0.2, 0.62), 0.7, 0.3
@@ -66,7 +65,7 @@ PERSON, STREET_PERSON, ABOVE = 96, 0.76, 0.12
 #: An epoch: people, negatives for each, shares of these that are cut out of people, and that are parts found on the
 #: streets, from epoch HARD_FROM on of the others the share of the hardest; and people for their places alone.
 PEOPLE, NEGATIVES, PARTS, FOUND_PARTS, HARDEST, HARD_FROM, PLACES = 8192, 3, 1 / 4, 1 / 6, 0.5, 2, 4096
-#: What is left of a weight: 0 below this, else so many bits of the mantissa.
+#: Weights below the first are stored as 0, all others with this many bits of mantissa.
 LEAST_WEIGHT, MANTISSA_BITS = 0.007, 3
 BATCH, RATE, DECAY, DROPOUT, SURE, LARGEST_STEP = 256, 2e-3, 0.02, 0.4, 0.99, 1.0
 #: How much the places' loss counts, and where it passes from squares to lines.
@@ -139,13 +138,11 @@ def rounded(weights: NDArray[np.float32]) -> NDArray[np.float16]:
 
 def streets(folder: Path) -> tuple[People, Images]:
     """Return the people of the streets, seen whole, and windows that `limo` finds on parts of them."""
-    detector = PeopleDetector(model=LIMO, threshold=LEAST_MARGIN, nms="group", group_threshold=0)
     whole, places, parts = [], [], []
-    for path in sorted((folder / "Annotations").glob("*.xml")):
-        picture = folder / "JPEGImages" / f"{path.stem}.jpg"
-        image = gray(picture) if picture.exists() else None
-        boxes = list(labelled(path))
-        if image is None or image.shape[::-1] != STREET or not boxes:
+    for picture in read_labels(folder, folder / "JPEGImages"):
+        image = gray(picture.path)
+        boxes = [(box.x, box.y, box.width, box.height) for box in picture.boxes if box.label == "person"]
+        if image.shape[::-1] != STREET or not boxes:
             continue
         for x, y, w, h in boxes:
             is_inside = x > 2 and y > 2 and x + w < STREET[0] - 3 and y + h < STREET[1] - 3
@@ -157,22 +154,12 @@ def streets(folder: Path) -> tuple[People, Images]:
             right, down = x + w / 2 - window[0], y + h / 2 - window[1]
             across, along = WIDTH / window[2], HEIGHT / window[3]
             places.append((right * across - WIDTH / 2, down * along - HEIGHT / 2, w * across, h * along))
-        found = detector.detect(image)
-        windows = found.windows[nms(found.windows, found.scores, MOST_IOU)[:60]]
+        windows = windows_in(image, MOST_OF_STREET)
         people, there = PERSON_BOX.inside(windows), np.array(boxes)
         is_part = intersection_over_union(people, there).max(axis=1, initial=0) < NOT_THE_PERSON
         is_part &= share_inside(people, there).max(axis=1, initial=0) > INSIDE
         parts += [cut(image, window) for window in windows[is_part]]
     return People(np.stack(whole), np.array(places, np.float32)), np.stack(parts)
-
-
-def labelled(path: Path) -> Iterator[tuple[float, float, float, float]]:
-    """Yield the people's boxes x, y, w, h [px] of a file of PASCAL VOC's format, which counts pixels from 1."""
-    for thing in ElementTree.parse(path).iter("object"):
-        if thing.findtext("name") == "person":
-            sides = ("xmin", "ymin", "xmax", "ymax")
-            x, y, right, below = (float(thing.findtext(f"bndbox/{side}", "0")) for side in sides)
-            yield x - 1, y - 1, right - x + 1, below - y + 1
 
 
 def source(folder: Path) -> dict[str, Any]:
@@ -198,15 +185,13 @@ def measured(weights: bytes, data: Path, frames: Path) -> dict[str, Any]:
         "threshold": round(evaluations[0].threshold_01, 4),
         "calibration": calibration._asdict(),
         "figures": {
-            **{each.name: figures_of(each) for each in evaluations},
+            **{
+                each.name: {"lamr": round(each.figures.lamr, 4), "lamr_interval": each.intervals["lamr"]}
+                for each in evaluations
+            },
             "calibration_error": round(calibration_error(calibration.probabilities(scores), right), 4),
         },
     }
-
-
-def figures_of(evaluation: Evaluation) -> dict[str, Any]:
-    """Return an evaluation's log-average miss rate and its interval."""
-    return {"lamr": round(evaluation.figures.lamr, 4), "lamr_interval": evaluation.intervals["lamr"]}
 
 
 def crops(folder: Path) -> Images:
@@ -230,13 +215,17 @@ def gray(path: Path) -> Images:
 
 def mine(folder: Path) -> Iterator[Images]:
     """Yield what `limo` takes for people, with a margin: (160, 80)."""
-    # Grouped by 0, every hit is returned.
-    detector = PeopleDetector(model=LIMO, threshold=LEAST_MARGIN, nms="group", group_threshold=0)
     for path in sorted(folder.iterdir()):
         image = gray(path)
-        found = detector.detect(image)
-        for box in found.windows[nms(found.windows, found.scores, MOST_IOU)[:MOST]]:
-            yield cut(image, box)
+        for window in windows_in(image, MOST):
+            yield cut(image, window)
+
+
+def windows_in(image: Images, most: int) -> NDArray[np.int32]:
+    """Return the windows that `limo` takes for people, best first: (N, 4) x, y, w, h [px]."""
+    # Grouped by 0, every hit is returned.
+    found = PeopleDetector(model=LIMO, threshold=LEAST_MARGIN, nms="group", group_threshold=0).detect(image)
+    return found.windows[nms(found.windows, found.scores, MOST_IOU)[:most]]
 
 
 def cut(image: Images, box: NDArray[np.int32]) -> Images:

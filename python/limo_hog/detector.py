@@ -159,8 +159,7 @@ class PeopleDetector:
         self._check_max_height(least if self.min_height is None else self.min_height)
         look = self._compiled_look()
         step = self.scale or (_SCALE if look is None else _SCALE_LOOKED_AT)
-        self._set(_zoom=zoom, _step=step, _look=look)
-        self._set(_hogs=tuple(self._compiled(smaller)))
+        self._set(_zoom=zoom, _step=step, _look=look, _hogs=tuple(self._compiled(smaller, step)))
 
     @property
     def least_score(self) -> float:
@@ -182,12 +181,12 @@ class PeopleDetector:
             return None
         return look.compiled(), look
 
-    def _compiled(self, smaller: Model | None) -> Iterator[_core.Hog]:
+    def _compiled(self, smaller: Model | None, step: float) -> Iterator[_core.Hog]:
         """Yield the model's detector and, where it serves, the one for smaller people, up to the size of the former."""
         model = self._model
         yield model.geometry._replace(nlevels=_LEVELS).compiled(model.coefficients)
         if smaller is not None:
-            levels = math.ceil(math.log(model.person_height / smaller.person_height) / math.log(self._step))
+            levels = math.ceil(math.log(model.person_height / smaller.person_height) / math.log(step))
             yield smaller.geometry._replace(nlevels=levels).compiled(smaller.coefficients)
 
     def _check_max_height(self, least: float) -> None:
@@ -282,7 +281,8 @@ class PeopleDetector:
         if self._look is not None:
             found, scores = self._looked_at_again(self._look, image, boxes / zoom, scores, threads)
         else:
-            kept = np.argsort(-scores, kind="stable") if self.nms == "group" else self._best(boxes, scores)
+            people = self._model.person_box.inside(boxes)
+            kept = np.argsort(-scores, kind="stable") if self.nms == "group" else self._best(people, scores)
             found, scores = boxes[kept] / zoom, scores[kept]
         if self.max_height is not None:
             # A level's window is rounded to whole pixels.
@@ -291,10 +291,9 @@ class PeopleDetector:
         boxes = np.rint(found).astype(np.int32)
         return Detections(boxes, scores, self._model.person_box, reading.calibration, searched)
 
-    def _best(self, windows: NDArray[Any], scores: NDArray[np.float64]) -> NDArray[np.intp]:
-        """Return which windows hold the people, one each, best first."""
-        # People are compared, not windows: those of two people side by side share most of their margins.
-        people = self._model.person_box.inside(windows)
+    def _best(self, people: NDArray[np.float64], scores: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Return which boxes to keep, one for each person, best first."""
+        # Boxes are compared, not windows: those of two people side by side share most of their margins.
         return nms(people, scores, _OVERLAP if self.overlap is None else self.overlap, intersection_over_smaller)
 
     def _looked_at_again(
@@ -306,13 +305,13 @@ class PeopleDetector:
         threads: int | None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the people's windows (K, 4) [px], corrected by the network, and their scores, best first."""
-        person_box = self._model.person_box
+        (network, reading), person_box = look, self._model.person_box
         best = nms(person_box.inside(windows), margins, _LOOKED_AT_IOU, most=_LOOKED_AT_MOST)
         windows = windows[best]
-        answers = look[0].answers(image, windows, threads=threads)
-        scores = margins[best] + look[1].share * answers[:, 0]
-        people = look[1].moved(person_box.inside(windows), windows, answers)
-        kept = self._best(person_box.around(people), scores)
+        answers = network.answers(image, windows, threads=threads)
+        scores = margins[best] + reading.share * answers[:, 0]
+        people = reading.moved(person_box.inside(windows), windows, answers)
+        kept = self._best(people, scores)
         kept = kept[scores[kept] >= self.least_score]
         return person_box.around(voted(people, scores, kept, _VOTES_FROM_IOU, _VOTE_SOFTNESS)), scores[kept]
 

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from tests.threads import beside
+
 from limo_hog.ros2 import dds, messages, names
 
 
@@ -15,9 +17,8 @@ from limo_hog.ros2 import dds, messages, names
 def publishing(topic: str, message: Any, hertz: float = 10.0) -> Iterator[None]:
     """Publish a message again and again, stamped with the time where it has a header."""
     publisher = dds.Bus().publisher(topic, message.__msgtype__, kept=topic == names.TF_STATIC)
-    over = threading.Event()
 
-    def work() -> None:
+    def work(over: threading.Event) -> None:
         at = time.monotonic()
         while not over.is_set():
             if hasattr(message, "header"):
@@ -26,10 +27,5 @@ def publishing(topic: str, message: Any, hertz: float = 10.0) -> Iterator[None]:
             at += 1 / hertz
             time.sleep(max(at - time.monotonic(), 0))
 
-    thread = threading.Thread(target=work)
-    thread.start()
-    try:
+    with beside(work):
         yield
-    finally:
-        over.set()
-        thread.join()

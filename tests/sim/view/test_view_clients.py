@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests.sim.view.stalled import HANDSHAKE, stalled
+from tests.threads import beside
 
 from limo_hog.detector import PeopleDetector
 from limo_hog.follow.control.naming import controller_named
@@ -55,21 +56,15 @@ def pictured(step: Step, image: NDArray[np.uint8]) -> Step:
 @contextmanager
 def showing(view: View, steps: list[Step]) -> Iterator[None]:
     """Show the steps over and over, 50 a second, in a thread of their own."""
-    over = threading.Event()
 
-    def show() -> None:
+    def show(over: threading.Event) -> None:
         while not over.is_set():
             for step in steps:
                 view.watch(step)
                 time.sleep(0.02)
 
-    thread = threading.Thread(target=show)
-    thread.start()
-    try:
+    with beside(show):
         yield
-    finally:
-        over.set()
-        thread.join()
 
 
 @pytest.mark.parametrize(

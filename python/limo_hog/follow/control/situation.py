@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limo_hog.follow.robot import RobotGeometry, Twist
-from limo_hog.follow.sense.clearance import Points, places_behind, to_odometry
+from limo_hog.follow.sense.clearance import Points, from_odometry, places_behind, to_odometry
 from limo_hog.follow.sense.observation import Array, Odometry
 from limo_hog.follow.space.grid import Grid, Ground
 
@@ -75,9 +75,8 @@ class Situation:
 
 def carried(people: Array, pose: Odometry) -> Array:
     """Carry places and velocities (N, 4) from the odometry frame into the base frame of a robot at `pose`."""
-    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    turn = np.array([[cos, -sin], [sin, cos]])
-    return np.concatenate([(people[:, :2] - (pose.x, pose.y)) @ turn, people[:, 2:] @ turn], axis=1)
+    velocities = from_odometry(people[:, 2:], replace(pose, x=0.0, y=0.0))
+    return np.concatenate([from_odometry(people[:, :2], pose), velocities], axis=1)
 
 
 @dataclass(frozen=True, slots=True)

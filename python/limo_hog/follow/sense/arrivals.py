@@ -33,8 +33,6 @@ class Arrivals:
         A reading from the future came before the robot's clock was set back: nobody knows how old it is.
         """
         ages = {name: abs(now - came) for name, (_, came) in self.newest.items()}
-        if ages.keys() >= set(needed) and max(ages.values()) <= max_age:
-            return ""
         reasons = [f"no {name} has come" for name in needed if name not in ages]
         if ages.get(CAMERA, 0.0) > max_age:
             ages.pop(DEPTH, None)  # it comes with its frame

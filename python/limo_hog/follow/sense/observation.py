@@ -147,12 +147,12 @@ def pose_at(poses: tuple[Odometry, ...], stamp: float) -> Odometry:
     after = bisect.bisect_left(poses, stamp, key=attrgetter("stamp"))
     if after == 0:
         return replace(poses[0], stamp=stamp, linear=last.linear, angular=last.angular)
-    one, other = poses[after - 1], poses[after]
-    share = (stamp - one.stamp) / (other.stamp - one.stamp)
-    yaw = one.yaw + share * math.remainder(other.yaw - one.yaw, math.tau)
-    x, y = one.x + share * (other.x - one.x), one.y + share * (other.y - one.y)
-    linear = one.linear + share * (other.linear - one.linear)
-    return Odometry(stamp, x, y, yaw, linear, one.angular + share * (other.angular - one.angular))
+    before, behind = poses[after - 1], poses[after]
+    share = (stamp - before.stamp) / (behind.stamp - before.stamp)
+    yaw = before.yaw + share * math.remainder(behind.yaw - before.yaw, math.tau)
+    x, y = before.x + share * (behind.x - before.x), before.y + share * (behind.y - before.y)
+    linear = before.linear + share * (behind.linear - before.linear)
+    return Odometry(stamp, x, y, yaw, linear, before.angular + share * (behind.angular - before.angular))
 
 
 @dataclass(frozen=True, slots=True)

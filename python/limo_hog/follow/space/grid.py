@@ -95,9 +95,13 @@ class Grid:
         freed = np.where(cleared & (occupied <= 0), scan.stamp, ground.freed)
         return Ground(ground.corner, occupied, seen, freed, scan.stamp)
 
+    def cell_of(self, ground: Ground, points: Points) -> Cells:
+        """Return the cell of each point, int64 (N, 2); it may be outside of the square."""
+        return np.asarray(np.floor(points / self.cell).astype(np.int64) - ground.corner)
+
     def flat(self, ground: Ground, points: Points) -> tuple[NDArray[np.int64], Mask]:
         """Return the flat index of each point's cell, int64 (N,), 0 where it is not in the square, and if it is."""
-        cells: Cells = np.floor(points / self.cell).astype(np.int64) - ground.corner
+        cells = self.cell_of(ground, points)
         # As unsigned numbers, what is below 0 is large.
         within = cells.view(np.uint64) < self.cells
         inside = within[:, 0] & within[:, 1]
@@ -110,8 +114,7 @@ class Grid:
     def is_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether each point is in an occupied cell; `lasting`: one not free within `lasts_s`. bool (N,)."""
         flat, inside = self.flat(ground, points)
-        blocked = inside & (ground.occupied.take(flat) > 0)
-        return blocked & (ground.freed.take(flat) < ground.stamp - self.lasts_s) if lasting else blocked
+        return inside & self._is_occupied(ground, flat, lasting)
 
     def is_free_since(self, ground: Ground, points: Points, stamps: float | Array) -> Mask:
         """Return whether each point was seen to be free after its stamp [s], bool (N,); outside of the square none."""
@@ -120,23 +123,27 @@ class Grid:
 
     def is_near_blocked(self, ground: Ground, points: Points, *, lasting: bool = False) -> Mask:
         """Return whether an occupied cell is within half a cell of each point, bool (N,); at the edge none is."""
-        lowest: Cells = np.floor((points - self.cell / 2) / self.cell).astype(np.int64) - ground.corner
+        lowest = self.cell_of(ground, points - self.cell / 2)
         within = lowest.view(np.uint64) < self.cells - 1
         inside = within[:, 0] & within[:, 1]
         flat = np.where(inside, lowest[:, 0] * self.cells + lowest[:, 1], 0)
-        around = flat[:, None] + np.array((0, 1, self.cells, self.cells + 1), np.int64)
-        occupied = ground.occupied.take(around) > 0
-        if lasting:
-            occupied &= ground.freed.take(around) < ground.stamp - self.lasts_s
-        return np.asarray(inside & occupied.any(axis=1))
+        steps = np.array((0, 1, self.cells, self.cells + 1), np.int64)
+        return np.asarray(inside & self._is_occupied(ground, flat[:, None] + steps, lasting).any(axis=1))
 
     def lasting_near(self, ground: Ground, pose: Odometry, reach: float) -> Points:
         """Return the middles of cells within `reach` [m] in which something lasts, float64 (N, 2), odometry frame."""
-        x, y = math.floor(pose.x / self.cell) - ground.corner[0], math.floor(pose.y / self.cell) - ground.corner[1]
+        x, y = self.cell_of(ground, np.array([[pose.x, pose.y]]))[0].tolist()
         side = int(reach / self.cell)
         rows, columns = slice(max(x - side, 0), x + side + 1), slice(max(y - side, 0), y + side + 1)
         lasts = (ground.occupied[rows, columns] > 0) & (ground.freed[rows, columns] < ground.stamp - self.lasts_s)
         return self.middle_of(ground, np.argwhere(lasts) + np.array([rows.start, columns.start]))
+
+    def _is_occupied(self, ground: Ground, flat: NDArray[np.int64], lasting: bool) -> Mask:
+        """Return whether the cells of flat indices are occupied, bool of their shape; `lasting` as `is_blocked`."""
+        occupied = ground.occupied.take(flat) > 0
+        if lasting:
+            occupied &= ground.freed.take(flat) < ground.stamp - self.lasts_s
+        return np.asarray(occupied)
 
     def sees(self, ground: Ground, origins: Points, places: Points, *, lasting: bool = False) -> Mask:
         """Return whether nothing occupied is between (K, 2) origins and (N, 2) places, at `samples` points, (K, N)."""

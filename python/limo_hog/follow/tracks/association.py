@@ -150,8 +150,7 @@ class Legs:
 
     def noise_at(self, distance: float, noise: Noise, pose: Odometry) -> Noise:
         """Return the noise with that of legs measured at a distance [m] from a robot at `pose`."""
-        bearing = math.hypot(self.sigma / max(distance, 0.3), noise.clocks * pose.angular)
-        return replace(noise, bearing=bearing, range=self.sigma)
+        return replace(noise, bearing=self.sigma / max(distance, 0.3), range=self.sigma).turning(pose.angular)
 
 
 def distances(points: Points, track: Track) -> Array:

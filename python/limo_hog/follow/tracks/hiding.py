@@ -46,9 +46,9 @@ class Hiding:
         # Of a few places, lists are faster than arrays.
         own, legs = followed.tolist(), felt.tolist()
         left = [
-            one
-            for one in others
-            if now - one.at < self.remembers_s and all(math.dist(place, one[:2]) > self.same for place in own)
+            other
+            for other in others
+            if now - other.at < self.remembers_s and all(math.dist(place, other[:2]) > self.same for place in own)
         ]
         kept: list[Other] = []
         for person in seen:

@@ -80,7 +80,8 @@ class Movers:
         if ground is not None:
             points = points[~grid.is_near_blocked(ground, points, lasting=True)]
         kept: list[Mover] = []
-        movers = (*[one for one in movers if one.number is not None], *[one for one in movers if one.number is None])
+        people = [mover for mover in movers if mover.number is not None]
+        movers = (*people, *[mover for mover in movers if mover.number is None])
         expected = [kalman.predict(one.track, returns.stamp, noise) for one in movers]
         gaps = all_distances(points, expected)
         whose, free, near = self._whose(movers, gaps), np.ones(len(points), bool), gaps < self.legs.radius
@@ -95,7 +96,8 @@ class Movers:
             due = is_in_view(expected[index], returns, lidar, self.robot, self.robot.lidar_yaw)
             if returns.stamp - mover.felt < (self.forget_s if due else self.unseen_s):
                 kept.append(mover)
-        if ground is not None and False in [one.left for one in kept]:
+        have_left = [mover.left for mover in kept]
+        if ground is not None and not all(have_left):
             began, since = np.array([one.began for one in kept]), np.array([one.since for one in kept])
             # The map is sure only a second after a person who stood there left; a beam that passes shows it at once.
             left = grid.is_free_since(ground, began, since) | self._passed(returns, began)
@@ -110,9 +112,11 @@ class Movers:
     def moving(self, movers: tuple[Mover, ...]) -> list[Mover]:
         """Return those that have moved."""
         return [
-            one
-            for one in movers
-            if one.left and one.scans >= self.fewest_scans and math.dist(one.track.mean[:2], one.began) > self.least_way
+            mover
+            for mover in movers
+            if mover.left
+            and mover.scans >= self.fewest_scans
+            and math.dist(mover.track.mean[:2], mover.began) > self.least_way
         ]
 
     def felt(self, movers: tuple[Mover, ...], now: float) -> Points:

@@ -39,9 +39,9 @@ class Tracks:
 
     def person(self, number: int | None) -> Person | None:
         """Return the person of a number, if they are tracked."""
-        for one in self.people:
-            if one.number == number:
-                return one
+        for person in self.people:
+            if person.number == number:
+                return person
         return None
 
     @property
@@ -219,7 +219,7 @@ class Tracker:
             movers = self.movers.assign(movers, seen, returns.stamp)
             movers = self._come_back(movers, people, returns.stamp)
             unseen = [one for one in people if one.confirmed and one.seen != tracks.stamp]
-            walking = {one.number for one in self.movers.moving(movers)} if unseen else set()
+            walking = {mover.number for mover in self.movers.moving(movers)} if unseen else set()
             for one in unseen:
                 if (tracks.stamp or 0.0) - one.seen < self.legs_only_s or one.number in walking:
                     now = self.movers.continued(one, movers, returns, self.noise)

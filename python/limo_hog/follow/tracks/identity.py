@@ -29,6 +29,8 @@ class Traits:
     clothes: Clothes | None  #: What is worn; None where no colour image tells.
     window: float  #: Height of the detection window, times the distance [px m]: the stature.
     boxes: int = 1  #: Boxes it was learnt from [1].
+    #: Variance of what the boxes show of these clothes, times that of `ColourSampling`.
+    variance: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +55,9 @@ class Identity:
     """Moves the probabilities from frame to frame."""
 
     sure: float = param(0.95, "1", "From this probability on the person's place, clothes and stature are learnt.")
-    strange_shirt: float = param(0.1, "1", "How likely another is to wear just this shirt.")
+    strange_shirt: float = param(0.1, "1", "How likely another is to wear just this shirt, at a variance of 1.")
     strange_trousers: float = param(0.5, "1", "The same of the trousers.")
+    least_variance: float = param(0.16, "1", "Lower limit of the variance of clothes that is believed.")
     odd_shirt: float = param(0.1, "1", "Share of boxes that show something else in the shirt's place.")
     odd_trousers: float = param(0.3, "1", "The same of the trousers.")
     stature_sigma: float = param(0.05, "1", "Standard deviation of the stature in the depth image, as a share.")
@@ -87,18 +90,20 @@ class Identity:
         """Bring the probabilities up to a frame, whose boxes `tracks` holds."""
         people, seen = {one.number: one for one in tracks.people}, tracks.in_view
         walking = {one.number for one in tracks.people if self._walks_on(one, tracks)}
-        alone = {one.number: one for one in seen if self._is_alone(one, tracks)}
+        alone = {one.number for one in seen if self._is_alone(one, tracks)}
         chances = self._passed(known, people, tracks, walking)
         odds, before = dict(chances), dict(known.chances)
-        for number, one in alone.items():
+        for one in seen:
+            number = one.number
             stays = before.get(number, 0.0) >= self.stays and number in walking
             evidence = self._evidence(known, one, first=one.age <= 1)
             odds[number] *= math.exp(self.steady * evidence if stays else evidence)
         total = sum(odds.values()) + max(1.0 - sum(chances.values()), 1e-6)
         chances = {number: value / total for number, value in odds.items()}
         known = replace(known, chances=tuple(chances.items()))
+        sure = max([chances[one.number] for one in seen], default=0.0) >= self.sure
         for one in seen:
-            known = self._learnt(known, one, chances[one.number], alone=one.number in alone)
+            known = self._learnt(known, one, chances[one.number], alone=one.number in alone, sure=sure)
         return known
 
     def _passed(
@@ -118,7 +123,7 @@ class Identity:
                 leaves = self.strained if one.strained and one.seen == stamp else self.passes
             chances[number] *= 1.0 - leaves
         lost_s = stamp - known.at
-        share = min(max(lost_s - self.unseen_s, 0.0) / self.fades_s, 1.0) / (2 + len(known.others))
+        share = min(max(lost_s - self.unseen_s, 0.0) / self.fades_s, 1.0) / 2
         for number, one in people.items():
             if number in chances:
                 continue
@@ -173,24 +178,24 @@ class Identity:
 
     def _evidence(self, known: Likeness, person: Person, *, first: bool) -> float:
         """Return how much more likely a person's last box is on the person followed than on another [log-odds]."""
-        # A track that was another person before is compared with that one, any other with all who are about.
-        others = [traits for traits in known.others if traits.number == person.number]
-        others = others or [traits for traits in known.others if traits.number != known.traits.number]
-        same, strange = self._fit(person, known.traits, first=first), self._fit(person, None, first=first)
-        for traits in others:
-            strange = max(strange, self._fit(person, traits, first=first))
+        variance = known.traits.variance
+        same = self._fit(person, known.traits, variance, first=first)
+        strange = self._fit(person, None, variance, first=first)
+        for traits in known.others:
+            strange = max(strange, self._fit(person, traits, variance, first=first))
         return min(max(same - strange, -self.most), self.most)
 
-    def _fit(self, person: Person, traits: Traits | None, *, first: bool) -> float:
+    def _fit(self, person: Person, traits: Traits | None, variance: float, *, first: bool) -> float:
         """Return how likely a person's last box is on one who looks like this, or on anybody [log]."""
         clothes = stature = 0.0
         if person.worn is not None:
             parts = (self.strange_shirt, self.odd_shirt), (self.strange_trousers, self.odd_trousers)
             for part, (strange, odd) in enumerate(parts):
+                strange *= variance**1.5
                 if traits is None or traits.clothes is None:
                     clothes += math.log(strange)
                 else:
-                    same = math.exp(-chi_squared(traits.clothes[part].tolist(), person.worn[part].tolist()) / 2)
+                    same = math.exp(-chi_squared(traits.clothes[part].tolist(), person.worn[part].tolist()) / 2 / variance)
                     clothes += math.log((1.0 - odd) * same + odd * strange)
         if person.tall is not None and traits is None:
             stature = math.log(self.strange_stature)
@@ -199,32 +204,37 @@ class Identity:
             stature = math.log((1.0 - self.odd_stature) * same + self.odd_stature * self.strange_stature)
         return clothes + stature if first else self.again * clothes + self.steady * stature
 
-    def _learnt(self, known: Likeness, person: Person, chance: float, *, alone: bool) -> Likeness:
+    def _learnt(self, known: Likeness, person: Person, chance: float, *, alone: bool, sure: bool) -> Likeness:
         """Learn who looks how: the person followed where `chance` is sure and they are `alone` in it, else others."""
         if chance >= self.sure:
             traits = self._moved(known.traits, person) if alone else known.traits
             return replace(known, place=person.track.place, at=person.measured, traits=traits)
-        if not person.confirmed or chance > 1.0 - self.sure:
+        if not person.confirmed or chance > 1.0 - self.sure or not sure:
             return known
         rest = [traits for traits in known.others if traits.number != person.number]
-        mine = Traits(person.number, self._told_apart(person.clothes, known.traits.clothes), person.window)
+        mine = Traits(person.number, self._told_apart(person.clothes, known.traits), person.window)
         return replace(known, others=(*rest, mine)[-self.remembered :])
 
-    def _told_apart(self, clothes: Clothes | None, own: Clothes | None) -> Clothes | None:
+    def _told_apart(self, clothes: Clothes | None, traits: Traits) -> Clothes | None:
         """Return another's clothes, and the person's own in place of a shirt or trousers that do not clearly differ.
 
         What little they differ by is light, the same in every frame, and would soon add up to a proof.
         """
+        own = traits.clothes
         if clothes is None or own is None:
             return clothes
-        same = ((clothes - own) ** 2).sum(axis=1) < self.clear
+        same = ((clothes - own) ** 2).sum(axis=1) < self.clear * traits.variance
         return np.where(same[:, None], own, clothes)
 
     def _moved(self, traits: Traits, person: Person) -> Traits:
         rate = max(self.rate, 1.0 / (traits.boxes + 1))
-        clothes, window = traits.clothes, traits.window
-        if person.worn is not None:
-            clothes = person.worn if clothes is None else mixed(clothes, person.worn, rate, self.clear)
+        clothes, window, variance = traits.clothes, traits.window, traits.variance
+        if person.worn is not None and clothes is not None:
+            off = np.minimum((person.worn - clothes) ** 2, self.clear)
+            variance = max(variance + rate * (float(off.mean()) - variance), self.least_variance)
+            clothes = mixed(clothes, person.worn, rate, self.clear)
+        elif person.worn is not None:
+            clothes = person.worn
         if person.tall is not None and abs(math.log(person.tall / window)) < self.stature_sigma:
             window += rate * (person.tall - window)
-        return Traits(person.number, clothes, window, traits.boxes + 1)
+        return Traits(person.number, clothes, window, traits.boxes + 1, variance)
